@@ -1,0 +1,101 @@
+"""Design numbers of one Omnid, shared by the estimator and the simulator."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from estimator.errors import InputError
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class OmnidDesign:
+    """Geometry, masses, stiffness and limits of one Omnid; SI units, named in each field's suffix.
+
+    The fields are the keys of ``models/omnid/design.toml`` and of ``design`` in a recording's metadata.
+    """
+
+    base_radius_m: float
+    platform_radius_m: float
+    proximal_length_m: float
+    rod_length_m: float
+    phi_min_rad: float
+    phi_max_rad: float
+    home_height_m: float
+    workspace_radius_m: float
+    gimbal_limit_rad: float
+    sea_stiffness_Nm_per_rad: float
+    torque_limit_Nm: float
+    rotor_inertia_kgm2: float
+    proximal_mass_kg: float
+    proximal_com_m: float
+    proximal_inertia_kgm2: float
+    rod_mass_kg: float
+    platform_mass_kg: float
+    yoke_mass_kg: float
+    yoke_inertia_kgm2: Triple
+    ring_mass_kg: float
+    ring_inertia_kgm2: Triple
+    flange_mass_kg: float
+    flange_inertia_kgm2: Triple
+    gravity_mps2: float
+
+    @property
+    def wrist_mass_kg(self) -> float:
+        """Mass that translates with the wrist: platform and the three gimbal bodies [kg]."""
+        return self.platform_mass_kg + self.yoke_mass_kg + self.ring_mass_kg + self.flange_mass_kg
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], where: str = "design") -> OmnidDesign:
+        """Build from a mapping with exactly the documented keys.
+
+        Raises:
+            InputError: a key is unknown or missing, or a value is not a finite number of the allowed sign.
+        """
+        names = [field.name for field in dataclasses.fields(cls)]
+        unknown = sorted(set(values) - set(names))
+        missing = [name for name in names if name not in values]
+        if unknown or missing:
+            problem = f"unknown key {unknown[0]!r}" if unknown else f"missing key {missing[0]!r}"
+            raise InputError(f"{where}: {problem}; the keys are {', '.join(names)}")
+        return cls(**{name: _number(f"{where}.{name}", name, values[name]) for name in names})
+
+    def to_dict(self) -> dict[str, Any]:
+        """The numbers as plain JSON types, keys as in ``design.toml``."""
+        return {k: list(v) if isinstance(v, tuple) else v for k, v in dataclasses.asdict(self).items()}
+
+
+def load_design(path: Path) -> OmnidDesign:
+    """Read a design file.
+
+    Raises:
+        InputError: the file cannot be read, is not TOML, or its keys are not the documented ones.
+    """
+    try:
+        values = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: not a readable design file ({error})") from error
+    return OmnidDesign.from_dict(values, where=str(path))
+
+
+def _number(where: str, name: str, value: Any) -> Any:
+    if name.endswith("_inertia_kgm2") and name.split("_")[0] in ("yoke", "ring", "flange"):
+        if not isinstance(value, list | tuple) or len(value) != 3:
+            raise InputError(f"{where} is {value!r}; it must be three numbers")
+        return tuple(_scalar(where, entry, positive=True) for entry in value)
+    return _scalar(where, value, positive=name != "phi_min_rad")
+
+
+def _scalar(where: str, value: Any, *, positive: bool) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"{where} is {value!r}; it must be a finite number")
+    if positive and value <= 0:
+        raise InputError(f"{where} is {value!r}; it must be greater than 0")
+    return float(value)

@@ -1,0 +1,9 @@
+"""Errors that the user can act on."""
+
+
+class InputError(ValueError):
+    """Bad input from the user: one sentence that names the file, the field, the value and what is allowed."""
+
+
+class UndeterminedError(ValueError):
+    """The data cannot determine what was asked; the sentence says which direction is missing."""

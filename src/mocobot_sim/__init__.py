@@ -1,0 +1,1 @@
+"""The Omnid team in MuJoCo: scene, control, trajectories, sensors, trials."""
