@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import math
+import sys
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,6 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from estimator.errors import InputError
+
+# Also refuses inf, NaN and whole numbers too large for a float.
+_LARGEST = sys.float_info.max
 
 Triple = tuple[float, float, float]
 
@@ -94,7 +97,7 @@ def _number(where: str, name: str, value: Any) -> Any:
 
 
 def _scalar(where: str, value: Any, *, positive: bool) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _LARGEST:
         raise InputError(f"{where} is {value!r}; it must be a finite number")
     if positive and value <= 0:
         raise InputError(f"{where} is {value!r}; it must be greater than 0")

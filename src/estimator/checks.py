@@ -1,0 +1,133 @@
+"""Is a recording plausible? Checked before anything is computed from it; one sentence per fault."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.delta import is_reachable, leg_geometry
+from estimator.errors import InputError
+from estimator.filtering import MIN_SAMPLES, trim_slice
+
+if TYPE_CHECKING:
+    from estimator.recording import Recording
+
+Array = NDArray[np.float64]
+
+SPACING_TOLERANCE = 0.5  # of one sample period: a time stamp may jitter by so much
+RATE_TOLERANCE = 1e-3  # of rate_hz: enters accelerations, and so inertia, twice
+
+
+def check_recording(recording: Recording) -> None:
+    """Check number of rows, finiteness, time axis, joint ranges and leg geometry of a recording.
+
+    Raises:
+        InputError: names the recording, the column, the row (counted from 0), the value and what is allowed.
+    """
+    rows = len(recording.time)
+    if rows < MIN_SAMPLES:
+        raise InputError(f"{recording.name}: {rows} rows are too few; at least {MIN_SAMPLES} are needed")
+    _check_finite(recording)
+    _check_time(recording)
+    design = recording.metadata.design
+    _check_range(recording, ("phi1", "phi2", "phi3"), design.phi_min_rad, design.phi_max_rad)
+    limit = design.gimbal_limit_rad
+    _check_range(recording, ("theta_z", "theta_y", "theta_x"), -limit, limit)
+    _check_legs(recording)
+
+
+def check_duration(recording: Recording, trim_s: float) -> None:
+    """Check that samples are left once ``trim_s`` seconds are dropped at each end.
+
+    Raises:
+        InputError: nothing would be left, or trim_s is not a non-negative number.
+    """
+    try:
+        trim_slice(len(recording.time), recording.metadata.rate_hz, trim_s)
+    except InputError as error:
+        raise InputError(f"{recording.name}: {error}") from error
+
+
+def _check_finite(recording: Recording) -> None:
+    for name, values in recording.columns().items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise InputError(
+                f"{recording.name}: column {name!r} is {values[bad[0]]} in {len(bad)} of {len(values)} rows, "
+                f"first in row {bad[0]}; every value must be a finite number"
+            )
+
+
+def _check_time(recording: Recording) -> None:
+    time, rate_hz, name = recording.time, recording.metadata.rate_hz, recording.name
+    spacing = np.diff(time)
+    backward = np.flatnonzero(spacing <= 0)
+    if len(backward):
+        row = int(backward[0]) + 1
+        what = "repeats" if spacing[row - 1] == 0 else "goes back"
+        raise InputError(
+            f"{name}: time {what} in row {row} (from {time[row - 1]:.9g} s to {time[row]:.9g} s); "
+            "it must increase"
+        )
+    # The median is blind to gaps, the mean to jitter; a gap must not be reported as a wrong rate.
+    if abs(np.median(spacing) * rate_hz - 1.0) > SPACING_TOLERANCE / 2:
+        raise InputError(
+            f"{name}: samples are {np.median(spacing):.6g} s apart, but rate_hz is {rate_hz:g}, "
+            f"which makes {1 / rate_hz:.6g} s"
+        )
+    uneven = np.flatnonzero(np.abs(spacing * rate_hz - 1.0) > SPACING_TOLERANCE)
+    if len(uneven):
+        row = int(uneven[0]) + 1
+        low, high = (1 - SPACING_TOLERANCE) / rate_hz, (1 + SPACING_TOLERANCE) / rate_hz
+        what = "a gap" if spacing[row - 1] > high else "a crowding"
+        raise InputError(
+            f"{name}: {what} in time of {spacing[row - 1]:.6g} s before row {row} "
+            f"(from {time[row - 1]:.9g} s to {time[row]:.9g} s); "
+            f"samples must be {low:.4g} to {high:.4g} s apart at {rate_hz:g} Hz"
+        )
+    intervals, duration = len(spacing), time[-1] - time[0]
+    # Counted in samples; the first and the last stamp may jitter too.
+    drift = duration * rate_hz - intervals
+    if abs(drift) > RATE_TOLERANCE * intervals + 2 * SPACING_TOLERANCE:
+        raise InputError(
+            f"{name}: samples come at {intervals / duration:.6g} Hz on average, but rate_hz is {rate_hz:g}; "
+            f"they must agree within {100 * RATE_TOLERANCE:g} %"
+        )
+
+
+def _check_range(recording: Recording, suffixes: tuple[str, ...], low: float, high: float) -> None:
+    """Joint limits; the bound itself is allowed."""
+    for name, values in recording.columns().items():
+        if not name.endswith(tuple(f".{suffix}" for suffix in suffixes)):
+            continue
+        bad = np.flatnonzero((values < low) | (values > high))
+        if len(bad):
+            worst = values[bad[np.argmax(np.abs(values[bad]))]]
+            # No such joint turns past 90 deg, so more "radians" than that which fit as degrees are degrees.
+            as_degrees = np.abs(worst) > np.pi / 2 and low <= np.deg2rad(worst) <= high
+            raise InputError(
+                f"{recording.name}: column {name!r} reaches {worst:.6g} rad (outside in {len(bad)} rows, "
+                f"first in row {bad[0]}); the joint's range is {low:.6g} to {high:.6g} rad"
+                + (" - the values look like degrees" if as_degrees else "")
+            )
+
+
+def _check_legs(recording: Recording) -> None:
+    phi, design = recording.phi, recording.metadata.design
+
+    def fail(row: int, robot: int, what: str) -> None:
+        angles = ", ".join(f"{value:.6g}" for value in phi[row, robot])
+        raise InputError(
+            f"{recording.name}: omnid{robot + 1} has phi = ({angles}) rad in row {row}, where {what}; "
+            "are zeros, signs and order of the joints right?"
+        )
+
+    apart = np.argwhere(~is_reachable(phi, design))
+    if len(apart):
+        fail(int(apart[0][0]), int(apart[0][1]), "the three rods cannot meet")
+    folded = np.argwhere(leg_geometry(phi, design).leverage <= 0)
+    if len(folded):
+        row, robot, leg = (int(index) for index in folded[0])
+        fail(row, robot, f"leg {leg + 1} is past its stretched position")

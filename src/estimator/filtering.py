@@ -1,0 +1,94 @@
+"""Zero-phase low-pass filter, high-order differences and trimming of uniformly sampled signals."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.signal import butter, sosfiltfilt
+
+from estimator.errors import InputError
+
+Array = NDArray[np.float64]
+
+BUTTERWORTH_ORDER = 3
+MIN_SAMPLES = 16  # what the filter's padding and the widest difference need
+_HALF_WIDTH = 3
+
+
+def low_pass(x: ArrayLike, rate_hz: float, cutoff_hz: float) -> Array:
+    """Third-order Butterworth filter run forward and backward along axis 0 (paper, section IV.B).
+
+    Zero phase; the two passes square the magnitude to 1 / (1 + (f / cutoff)^6) in the analogue prototype,
+    so it is 1/2, not 1/sqrt(2), at the cut-off.
+
+    Args:
+        x: samples, shape (Q, ...).
+        rate_hz: sampling rate [Hz].
+        cutoff_hz: cut-off of one pass [Hz], below half the sampling rate.
+
+    Raises:
+        InputError: the cut-off is outside (0, rate/2), or there are fewer than 16 samples.
+    """
+    x = _samples(x)
+    if not 0.0 < cutoff_hz < rate_hz / 2.0:
+        raise InputError(f"cutoff_hz is {cutoff_hz!r}; it must lie between 0 and {rate_hz / 2.0:g} Hz")
+    sections = butter(BUTTERWORTH_ORDER, cutoff_hz, fs=rate_hz, output="sos")
+    return sosfiltfilt(sections, x, axis=0)
+
+
+def differentiate(x: ArrayLike, rate_hz: float) -> Array:
+    """Time derivative along axis 0 by a sixth-order central difference, same shape, unit of x per second.
+
+    At frequency f its gain is i w (1 - (w/rate)^6 / 140 + ...), w = 2 pi f: 7e-6 low at 5 Hz and 100 Hz
+    sampling, where the usual two-point difference is 1.6 % low. The three samples at each end come from
+    one-sided differences on the same seven samples, also of sixth order but with larger error constants.
+
+    Args:
+        x: samples, shape (Q, ...).
+        rate_hz: sampling rate [Hz].
+
+    Raises:
+        InputError: fewer than 16 samples.
+    """
+    x = _samples(x)
+    n, width = len(x), 2 * _HALF_WIDTH + 1
+    y = np.empty_like(x)
+    centre = slice(_HALF_WIDTH, n - _HALF_WIDTH)
+    weights = _difference_weights(_HALF_WIDTH)
+    y[centre] = sum(w * x[k : n - width + 1 + k] for k, w in enumerate(weights) if k != _HALF_WIDTH)
+    for k in range(_HALF_WIDTH):
+        weights = _difference_weights(k)
+        y[k] = np.tensordot(weights, x[:width], axes=1)
+        y[n - 1 - k] = -np.tensordot(weights, x[: n - width - 1 : -1], axes=1)
+    return y * rate_hz
+
+
+def trim_slice(samples: int, rate_hz: float, trim_s: float) -> slice:
+    """Indices left after dropping ``trim_s`` seconds at each end (paper, section IV.B: two seconds).
+
+    Raises:
+        InputError: trim_s is negative or not finite, or nothing would be left.
+    """
+    if not (np.isfinite(trim_s) and trim_s >= 0.0):
+        raise InputError(f"trim_s is {trim_s!r}; it must be a finite number of seconds, at least 0")
+    drop = round(trim_s * rate_hz)
+    if samples <= 2 * drop:
+        raise InputError(
+            f"{samples} samples are too few: dropping {trim_s:g} s at each end at {rate_hz:g} Hz "
+            f"needs more than {2 * drop}"
+        )
+    return slice(drop, samples - drop)
+
+
+def _samples(x: ArrayLike) -> Array:
+    x = np.atleast_1d(np.asarray(x, dtype=float))
+    if len(x) < MIN_SAMPLES:
+        raise InputError(f"{len(x)} samples are too few; at least {MIN_SAMPLES} are needed")
+    return x
+
+
+def _difference_weights(at: int) -> Array:
+    """Weights of the first derivative at node ``at`` of the nodes 0..6, exact for polynomials of degree 6."""
+    nodes = np.arange(2 * _HALF_WIDTH + 1) - at
+    powers = np.vander(nodes, increasing=True).T.astype(float)
+    return np.linalg.solve(powers, np.eye(len(nodes))[1])

@@ -1,0 +1,57 @@
+"""From a recording's joint angles and spring torques to the data points D_iq (paper, section IV.B)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimator.arm_dynamics import wrench_on_payload
+from estimator.checks import check_duration, check_recording
+from estimator.delta import leg_geometry, wrist_motion
+from estimator.filtering import differentiate, low_pass, trim_slice
+from estimator.gimbal import angular_motion, rotation
+from estimator.grasp_data import GraspData
+from estimator.recording import Recording
+
+
+def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: float = 2.0) -> GraspData:
+    """Filter, differentiate and convert a recording to poses, twists, twist derivatives and wrenches.
+
+    Joint angles and torques pass through the same zero-phase filter. Rates and accelerations come from
+    sixth-order differences of the *joint* angles; the twist (29), its derivative and the wrench then
+    follow analytically.
+
+    Args:
+        recording: one trial.
+        cutoff_hz: cut-off of the Butterworth filter [Hz].
+        trim_s: time dropped at each end against filter transients [s].
+
+    Raises:
+        InputError: the recording is not usable (see ``check_recording``), or an option is out of range.
+    """
+    check_recording(recording)
+    check_duration(recording, trim_s)
+    rate_hz, design = recording.metadata.rate_hz, recording.metadata.design
+    keep = trim_slice(len(recording.time), rate_hz, trim_s)
+    sensors = recording.phi, recording.theta, recording.tau
+    phi, theta, tau = (low_pass(samples, rate_hz, cutoff_hz) for samples in sensors)
+    phi_dot, theta_dot = differentiate(phi, rate_hz), differentiate(theta, rate_hz)
+    phi_ddot, theta_ddot = differentiate(phi_dot, rate_hz), differentiate(theta_dot, rate_hz)
+    phi, phi_dot, phi_ddot = phi[keep], phi_dot[keep], phi_ddot[keep]
+    theta, theta_dot, theta_ddot = theta[keep], theta_dot[keep], theta_ddot[keep]
+
+    legs = leg_geometry(phi, design)
+    h_dot, h_ddot = wrist_motion(legs, phi_dot, phi_ddot)
+    R_bi = rotation(theta)
+    omega, omega_dot = angular_motion(theta, theta_dot, theta_ddot)
+    v = np.einsum("...ji,...j->...i", R_bi, h_dot)
+    v_dot = np.einsum("...ji,...j->...i", R_bi, h_ddot) - np.cross(omega, v)
+    return GraspData(
+        time=recording.time[keep],
+        R_bi=R_bi,
+        p_bi=legs.h,
+        twist=np.concatenate([omega, v], axis=-1),
+        twist_dot=np.concatenate([omega_dot, v_dot], axis=-1),
+        wrench=wrench_on_payload((phi, phi_dot, phi_ddot), (theta, theta_dot, theta_ddot), tau[keep], design),
+        rate_hz=rate_hz,
+        gravity_mps2=design.gravity_mps2,
+    )

@@ -1,0 +1,186 @@
+"""Recordings: joint angles and spring torques of one trial, and their Parquet file (docs/recording.md)."""
+
+from __future__ import annotations
+
+import contextlib
+import difflib
+import os
+import uuid
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from estimator.checks import check_recording
+from estimator.errors import InputError
+from estimator.recording_metadata import RecordingMetadata
+
+Array = NDArray[np.float64]
+
+METADATA_KEY = b"mocobot"
+# Column suffixes in array order: one (Q, N, 3) array per field.
+CHANNELS = {
+    "phi": ("phi1", "phi2", "phi3"),
+    "theta": ("theta_z", "theta_y", "theta_x"),
+    "tau": ("tau1", "tau2", "tau3"),
+    "ref": ("ref_x", "ref_y", "ref_z"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """Samples of one trial with N robots, all taken at the same instants.
+
+    Attributes:
+        time: sample times [s], shape (Q,).
+        phi: driven angles [rad], 0 horizontal outward, positive raises the knee, shape (Q, N, 3).
+        theta: gimbal angles in the order (theta_z, theta_y, theta_x) [rad], shape (Q, N, 3).
+        tau: spring torques on the proximal links, positive raising them [N m], shape (Q, N, 3).
+        ref: commanded wrist positions in each robot's {b} [m], shape (Q, N, 3), or None.
+        metadata: what the recording says about itself.
+        name: the file's name, or what else to call the recording in messages.
+
+    Raises:
+        InputError: the arrays' shapes do not agree with each other or with ``metadata.robots``.
+    """
+
+    time: Array
+    phi: Array
+    theta: Array
+    tau: Array
+    ref: Array | None
+    metadata: RecordingMetadata
+    name: str = "recording"
+
+    def __post_init__(self) -> None:
+        """Bring the arrays to float64 and check their shapes."""
+        shape = (np.size(self.time), self.metadata.robots, 3)
+        for field in ("time", *CHANNELS):
+            value = getattr(self, field)
+            if value is None and field == "ref":
+                continue
+            array = np.asarray(value, dtype=float)
+            expected = shape[:1] if field == "time" else shape
+            if array.shape != expected:
+                raise InputError(f"{self.name}: {field} has shape {array.shape}; it must be {expected}")
+            object.__setattr__(self, field, array)
+
+    def columns(self) -> dict[str, Array]:
+        """Every column of the file by its name, in file order, each of shape (Q,)."""
+        columns = {"time": self.time}
+        for robot in range(self.metadata.robots):
+            for field, suffixes in CHANNELS.items():
+                if (array := getattr(self, field)) is not None:
+                    columns |= {f"omnid{robot + 1}.{s}": array[:, robot, k] for k, s in enumerate(suffixes)}
+        return columns
+
+
+def write_recording(recording: Recording, path: Path | str) -> None:
+    """Write a recording as Parquet; an existing file is replaced only once the new one is complete.
+
+    Raises:
+        InputError: the target cannot be written, or the metadata is not valid.
+    """
+    path = Path(path)
+    metadata = {METADATA_KEY: recording.metadata.to_json().encode()}
+    table = pa.table({name: np.ascontiguousarray(values) for name, values in recording.columns().items()})
+    temporary = path.parent / f".{uuid.uuid4().hex}.tmp"
+    try:
+        # Measured samples hardly repeat, so dictionaries only cost space; checksums catch damaged pages.
+        pq.write_table(
+            table.replace_schema_metadata(metadata),
+            temporary,
+            use_dictionary=False,
+            write_page_checksum=True,
+        )
+        os.replace(temporary, path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def read_recording(path: Path | str) -> Recording:
+    """Read and check a recording (see ``check_recording`` for what is checked in the samples).
+
+    Raises:
+        InputError: the file cannot be read, is not a recording, or its content is not plausible.
+    """
+    path = Path(path)
+    table = _read_table(path)
+    text = (table.schema.metadata or {}).get(METADATA_KEY)
+    if text is None:
+        raise InputError(f"{path}: not a recording, the schema metadata has no key {METADATA_KEY.decode()!r}")
+    metadata = RecordingMetadata.from_json(text, where=f"{path}: metadata")
+    _check_column_names(table.column_names, metadata.robots, path)
+    if table.num_rows == 0:
+        raise InputError(f"{path}: the file has no rows")
+    values = {name: _column(table, name, path) for name in table.column_names}
+
+    def stack(suffixes: tuple[str, ...]) -> Array:
+        names = [f"omnid{i}.{s}" for i in range(1, metadata.robots + 1) for s in suffixes]
+        return np.stack([values[name] for name in names], axis=-1).reshape(-1, metadata.robots, 3)
+
+    arrays = {field: stack(suffixes) for field, suffixes in CHANNELS.items() if field != "ref"}
+    ref = stack(CHANNELS["ref"]) if any(".ref_" in name for name in values) else None
+    recording = Recording(time=values["time"], ref=ref, metadata=metadata, name=str(path), **arrays)
+    check_recording(recording)
+    return recording
+
+
+def _read_table(path: Path) -> pa.Table:
+    try:
+        exists, is_file = path.exists(), path.is_file()
+    except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL in it
+        raise InputError(f"{str(path)!r:.80}: not a usable file name ({error})") from error
+    if not exists:
+        raise InputError(f"{path}: there is no such file")
+    if not is_file:
+        what = "a directory" if path.is_dir() else "not a regular file"
+        raise InputError(f"{path}: is {what}; it must be a recording file")
+    try:
+        # ParquetFile, not read_table: the latter turns folder names such as a=1 into extra columns.
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            return file.read(use_threads=False)
+    except PermissionError as error:
+        raise InputError(f"{path}: cannot be read (permission denied)") from error
+    except Exception as error:  # on damaged bytes pyarrow raises many types, not all of them its own
+        detail = (str(error).splitlines() or [type(error).__name__])[0]
+        raise InputError(f"{path}: not a readable Parquet file, or a damaged one ({detail})") from error
+
+
+def _check_column_names(names: list[str], robots: int, path: Path) -> None:
+    def of_robots(*fields: str) -> list[str]:
+        # No need to spell out an absurd number of robots: each has more columns than one.
+        spelled = range(1, min(robots, len(names)) + 1)
+        return [f"omnid{i}.{s}" for i in spelled for field in fields for s in CHANNELS[field]]
+
+    required, optional = ["time", *of_robots("phi", "theta", "tau")], of_robots("ref")
+    valid = {*required, *optional}
+    if any(name in optional for name in names):
+        required += optional
+    suffixes = ", ".join(s for group in CHANNELS.values() for s in group)
+    rule = f"the columns are time and, for i = 1..{robots}, omnid{{i}}. followed by {suffixes}"
+    for name in names:
+        if name not in valid:
+            close = difflib.get_close_matches(name, sorted(valid), n=1)
+            hint = f" (did you mean {close[0]!r}?)" if close else ""
+            raise InputError(f"{path}: unknown column {name!r}{hint}; {rule}")
+        if names.count(name) > 1:
+            raise InputError(f"{path}: column {name!r} appears {names.count(name)} times; {rule}")
+    for name in required:
+        if name not in names:
+            raise InputError(f"{path}: missing column {name!r}; {rule} (ref_* for all robots or for none)")
+
+
+def _column(table: pa.Table, name: str, path: Path) -> Array:
+    column = table.column(name)
+    kind = column.type
+    if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)):
+        raise InputError(f"{path}: column {name!r} holds {kind}; it must hold numbers (float64)")
+    # Empty cells become NaN, which the checks report with their row.
+    return column.cast(pa.float64(), safe=False).to_numpy()

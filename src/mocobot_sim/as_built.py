@@ -1,0 +1,78 @@
+"""How one real unit differs from its design: geometry, springs and sensor zeros."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def _zeros() -> Array:
+    return np.zeros(3)
+
+
+@dataclass(frozen=True)
+class AsBuilt:
+    """Deviations of one Omnid from its design, one entry per leg 1..3 (or gimbal axis z, y, x).
+
+    Geometry and stiffness change the simulated robot; zeros change what its sensors and its controller read.
+    The estimator and the controller keep using the design.
+
+    Attributes:
+        base_radius_m: base radius minus design [m], shape (3,).
+        proximal_length_m: proximal length minus design [m], shape (3,).
+        rod_length_m: rod length minus design [m], shape (3,).
+        platform_radius_m: platform radius minus design [m], shape (3,).
+        stiffness_ratio: spring stiffness over design, minus 1, shape (3,).
+        phi_zero_rad: reading minus true phi [rad], shape (3,).
+        theta_zero_rad: reading minus true (theta_z, theta_y, theta_x) [rad], shape (3,).
+        tau_zero_Nm: reading minus true spring torque [N m], shape (3,).
+    """
+
+    base_radius_m: Array = field(default_factory=_zeros)
+    proximal_length_m: Array = field(default_factory=_zeros)
+    rod_length_m: Array = field(default_factory=_zeros)
+    platform_radius_m: Array = field(default_factory=_zeros)
+    stiffness_ratio: Array = field(default_factory=_zeros)
+    phi_zero_rad: Array = field(default_factory=_zeros)
+    theta_zero_rad: Array = field(default_factory=_zeros)
+    tau_zero_Nm: Array = field(default_factory=_zeros)
+
+
+@dataclass(frozen=True)
+class CalibrationSpread:
+    """Standard deviations of as-built deviations, normally distributed and independent.
+
+    Attributes:
+        encoder_zero_rad: of each phi and theta zero [rad].
+        stiffness_ratio: of each spring's relative stiffness [-].
+        geometry_m: of each base radius, platform radius, proximal and rod length [m].
+        tau_zero_Nm: of each torque zero [N m].
+    """
+
+    encoder_zero_rad: float = 0.0
+    stiffness_ratio: float = 0.0
+    geometry_m: float = 0.0
+    tau_zero_Nm: float = 0.0
+
+    def draw(self, robots: int, rng: np.random.Generator) -> tuple[AsBuilt, ...]:
+        """Draw one team; robot i's unit does not depend on how many robots follow it."""
+        units = []
+        for _ in range(robots):
+            z = rng.standard_normal((8, 3))
+            units.append(
+                AsBuilt(
+                    base_radius_m=self.geometry_m * z[0],
+                    proximal_length_m=self.geometry_m * z[1],
+                    rod_length_m=self.geometry_m * z[2],
+                    platform_radius_m=self.geometry_m * z[3],
+                    stiffness_ratio=self.stiffness_ratio * z[4],
+                    phi_zero_rad=self.encoder_zero_rad * z[5],
+                    theta_zero_rad=self.encoder_zero_rad * z[6],
+                    tau_zero_Nm=self.tau_zero_Nm * z[7],
+                )
+            )
+        return tuple(units)

@@ -1,0 +1,89 @@
+"""Addresses of the team's joints, sites and constraints in a compiled model, looked up by name."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+Index = NDArray[np.intp]
+
+GIMBAL_AXES = ("z", "y", "x")
+SLIDES = ("platform_x", "platform_y", "platform_z")
+PAYLOAD_PREFIX = "omnid1/payload/"
+
+
+@dataclass(frozen=True)
+class TeamIndex:
+    """Where each robot's coordinates live; every joint here has one coordinate.
+
+    Attributes:
+        motor_qpos, spring_qpos, gimbal_qpos, slide_qpos: positions in ``qpos``, shape (N, 3); gimbal order z, y, x.
+        motor_dof, spring_dof, gimbal_dof, slide_dof, knee_dof: positions in ``qvel``; (N, 3), knees (N, 6).
+        actuator: positions in ``ctrl``, shape (N, 3).
+        grasp_site: the flange's site of every robot, shape (N,).
+        payload_site: the payload's grasp site of every robot, shape (N,).
+        payload_body: body id of the payload.
+    """
+
+    motor_qpos: Index
+    spring_qpos: Index
+    gimbal_qpos: Index
+    slide_qpos: Index
+    motor_dof: Index
+    spring_dof: Index
+    gimbal_dof: Index
+    slide_dof: Index
+    knee_dof: Index
+    actuator: Index
+    grasp_site: Index
+    payload_site: Index
+    payload_body: int
+
+    @property
+    def robots(self) -> int:
+        """Number of robots N."""
+        return len(self.grasp_site)
+
+    @classmethod
+    def of(cls, model: mujoco.MjModel) -> TeamIndex:
+        """Look everything up by name.
+
+        Raises:
+            KeyError: the model is not a team scene (the message names what is missing).
+        """
+        robots = 0
+        while mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, f"omnid{robots + 1}/grasp") >= 0:
+            robots += 1
+        prefixes = [f"omnid{i + 1}/" for i in range(robots)]
+
+        def joints(names: list[str]) -> list[int]:
+            return [model.joint(name).id for name in names]
+
+        motor = np.array([joints([f"{p}motor{k}" for k in (1, 2, 3)]) for p in prefixes], dtype=np.intp)
+        spring = np.array([joints([f"{p}spring{k}" for k in (1, 2, 3)]) for p in prefixes], dtype=np.intp)
+        gimbal = np.array([joints([f"{p}gimbal_{axis}" for axis in GIMBAL_AXES]) for p in prefixes], dtype=np.intp)
+        slide = np.array([joints([f"{p}{name}" for name in SLIDES]) for p in prefixes], dtype=np.intp)
+        knee = np.array(
+            [joints([f"{p}knee{k}_{motion}" for k in (1, 2, 3) for motion in ("swing", "tilt")]) for p in prefixes],
+            dtype=np.intp,
+        )
+        return cls(
+            motor_qpos=model.jnt_qposadr[motor].astype(np.intp),
+            spring_qpos=model.jnt_qposadr[spring].astype(np.intp),
+            gimbal_qpos=model.jnt_qposadr[gimbal].astype(np.intp),
+            slide_qpos=model.jnt_qposadr[slide].astype(np.intp),
+            motor_dof=model.jnt_dofadr[motor].astype(np.intp),
+            spring_dof=model.jnt_dofadr[spring].astype(np.intp),
+            gimbal_dof=model.jnt_dofadr[gimbal].astype(np.intp),
+            slide_dof=model.jnt_dofadr[slide].astype(np.intp),
+            knee_dof=model.jnt_dofadr[knee].astype(np.intp),
+            actuator=np.array([[model.actuator(f"{p}motor{k}").id for k in (1, 2, 3)] for p in prefixes], dtype=np.intp),
+            grasp_site=np.array([model.site(f"{p}grasp").id for p in prefixes], dtype=np.intp),
+            payload_site=np.array(
+                [model.site(f"{PAYLOAD_PREFIX}grasp{i + 1}").id for i in range(robots)], dtype=np.intp
+            ),
+            payload_body=model.body(f"{PAYLOAD_PREFIX}payload").id,
+        )

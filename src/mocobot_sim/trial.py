@@ -1,0 +1,228 @@
+"""Run one trial: physics and control at 1 kHz, logged at 100 Hz, checked for everything that can go wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from estimator.design import OmnidDesign
+from mocobot_sim.as_built import AsBuilt
+from mocobot_sim.assemble import assemble_at_home
+from mocobot_sim.control import ControlGains, TeamController, home_phi
+from mocobot_sim.models import omnid_design
+from mocobot_sim.scene import TeamScene
+from mocobot_sim.team_index import TeamIndex
+from mocobot_sim.trajectories import RATE_HZ, Trajectory
+
+Array = NDArray[np.float64]
+
+ROD_LIMIT_M = 0.02e-3
+WELD_LIMIT_M = 0.01e-3
+WELD_LIMIT_RAD = np.deg2rad(0.001)
+
+
+class TrialError(RuntimeError):
+    """The physics of a trial cannot be trusted; the sentence says what broke, where and when."""
+
+
+@dataclass(frozen=True)
+class TrialLog:
+    """What truly happened, at ``RATE_HZ``; nothing here has passed a sensor.
+
+    All quantities of one row belong to one instant.
+
+    Attributes:
+        trial: kind of trajectory.
+        time: [s], shape (Q,).
+        phi: driven angles [rad], shape (Q, N, 3).
+        theta: gimbal angles (z, y, x) [rad], shape (Q, N, 3).
+        tau: spring torque on the proximal links, positive raising them [N m], shape (Q, N, 3).
+        ref_b: commanded wrist positions in {b} [m], shape (Q, N, 3).
+        p_W1: origin of {1} in the world [m], shape (Q, 3).
+        R_W1: orientation of {1} (the payload) in the world, shape (Q, 3, 3).
+        feed_forward: the controller's frozen load force in {b} [N], shape (N, 3).
+        gains: control gains.
+        rod_error_m: largest distance between a rod's tip and its platform joint [m].
+        weld_error_m: largest distance between a flange and its grasp [m].
+        weld_error_rad: largest angle between a flange and its grasp [rad].
+    """
+
+    trial: str
+    time: Array
+    phi: Array
+    theta: Array
+    tau: Array
+    ref_b: Array
+    p_W1: Array
+    R_W1: Array
+    feed_forward: Array
+    gains: ControlGains
+    rod_error_m: float
+    weld_error_m: float
+    weld_error_rad: float
+
+    @property
+    def robots(self) -> int:
+        """Number of robots N."""
+        return self.phi.shape[1]
+
+    def payload_rotation(self) -> Array:
+        """Rotation vector of the payload from its pose at the first sample, in {1} then [rad], shape (Q, 3)."""
+        return (Rotation.from_matrix(self.R_W1[0]).inv() * Rotation.from_matrix(self.R_W1)).as_rotvec()
+
+
+def run_trial(
+    scene: TeamScene,
+    trajectory: Trajectory,
+    gains: ControlGains | None = None,
+    as_built: Sequence[AsBuilt] = (),
+    progress: Callable[[int], None] | None = None,
+) -> TrialLog:
+    """Simulate one trial in closed loop.
+
+    Args:
+        scene: the team; build it with the same ``as_built``.
+        trajectory: commands.
+        gains: control gains; None for the defaults.
+        as_built: what each unit's controller misreads; empty for robots as designed.
+        progress: called with the number of samples done since the last call.
+
+    Raises:
+        TrialError: a constraint opens too far, a value is not finite, MuJoCo warns, or a joint or spring
+            leaves its range.
+        InputError: the team cannot be assembled, or the trajectory is for another number of robots.
+    """
+    gains = gains or ControlGains()
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    index = TeamIndex.of(model)
+    design = omnid_design()
+    assemble_at_home(scene, model, data, index)
+    controller = TeamController(index, design, gains, data, as_built)
+    log = _Buffers(model, data, index, len(trajectory.ref_b))
+
+    ticks = round(gains.rate_hz / RATE_HZ)
+    substeps = round(1.0 / (gains.rate_hz * model.opt.timestep))
+    ref_dot_b = np.diff(trajectory.ref_b, axis=0, append=trajectory.ref_b[-1:]) * RATE_HZ
+    ref = np.empty_like(trajectory.ref_b[0])
+    reported = 0
+    for sample, (start, rate) in enumerate(zip(trajectory.ref_b, ref_dot_b, strict=True)):
+        for tick in range(ticks):
+            np.multiply(rate, tick / gains.rate_hz, out=ref)
+            ref += start
+            controller.update(ref, rate)
+            if tick == 0:
+                # A step first evaluates forces and frames at the state it starts from: one instant for all.
+                log.before_step(sample)
+                mujoco.mj_step(model, data)
+                log.after_step(sample)
+                remaining = substeps - 1
+            else:
+                remaining = substeps
+            if remaining:
+                mujoco.mj_step(model, data, nstep=remaining)
+        if sample % 100 == 99 or sample == len(trajectory.ref_b) - 1:
+            log.check(reported, sample + 1, design)
+            if progress:
+                progress(sample + 1 - reported)
+            reported = sample + 1
+    return log.finish(trajectory, controller, gains)
+
+
+class _Buffers:
+    """Rows of a trial as they are written, and the checks on them."""
+
+    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex, samples: int) -> None:
+        self.model, self.data, self.index = model, data, index
+        robots = index.robots
+        tip, platform = [], []
+        for i in range(robots):
+            for k in (1, 2, 3):
+                tip.append(model.site(f"omnid{i + 1}/rod{k}_tip").id)
+                platform.append(model.site(f"omnid{i + 1}/platform{k}").id)
+        self.sites = np.array([*index.grasp_site, *index.payload_site, *tip, *platform])
+        self.qpos = np.empty((samples, model.nq))
+        self.spring_force = np.empty((samples, model.nv))
+        self.site_xpos = np.empty((samples, len(self.sites), 3))
+        self.site_xmat = np.empty((samples, 2 * robots, 9))
+
+    def before_step(self, sample: int) -> None:
+        self.qpos[sample] = self.data.qpos
+
+    def after_step(self, sample: int) -> None:
+        self.spring_force[sample] = self.data.qfrc_spring
+        self.site_xpos[sample] = self.data.site_xpos[self.sites]
+        self.site_xmat[sample] = self.data.site_xmat[self.sites[: 2 * self.index.robots]]
+
+    def phi(self, rows: slice, design: OmnidDesign) -> Array:
+        q = self.qpos[rows]
+        return home_phi(design) + q[:, self.index.motor_qpos] + q[:, self.index.spring_qpos]
+
+    def theta(self, rows: slice) -> Array:
+        return self.qpos[rows][:, self.index.gimbal_qpos]
+
+    def tau(self, rows: slice) -> Array:
+        return self.spring_force[rows][:, self.index.spring_dof]
+
+    def errors(self, rows: slice) -> tuple[Array, Array, Array]:
+        """Rod and weld opening [m] and weld angle [rad] per row and constraint."""
+        n = self.index.robots
+        xpos, xmat = self.site_xpos[rows], self.site_xmat[rows].reshape(-1, 2 * n, 3, 3)
+        rod = np.linalg.norm(xpos[:, 2 * n : 5 * n] - xpos[:, 5 * n :], axis=-1)
+        weld = np.linalg.norm(xpos[:, :n] - xpos[:, n : 2 * n], axis=-1)
+        # |R1 - R2|_F = 2 sqrt(2) sin(angle / 2): exact for the tiny angles here, where arccos is not.
+        angle = np.linalg.norm(xmat[:, :n] - xmat[:, n:], axis=(-2, -1)) / np.sqrt(2.0)
+        return rod, weld, angle
+
+    def check(self, start: int, stop: int, design: OmnidDesign) -> None:
+        """Check the rows since the last check."""
+        rows = slice(start, stop)
+        when = np.arange(start, stop) / RATE_HZ
+        warned = [mujoco.mjtWarning(k).name for k in np.flatnonzero(self.data.warning.number)]
+        if warned:
+            raise TrialError(f"MuJoCo warned {warned[0]} before t = {when[-1]:.2f} s")
+        if not np.isfinite(self.qpos[rows]).all() or not np.isfinite(self.data.qvel).all():
+            raise TrialError(f"the state is not finite before t = {when[-1]:.2f} s")
+        phi, theta, tau = self.phi(rows, design), self.theta(rows), self.tau(rows)
+        rod, weld, angle = self.errors(rows)
+        _limit("phi", phi, design.phi_min_rad, design.phi_max_rad, "rad", when)
+        _limit("theta (z, y, x)", theta, -design.gimbal_limit_rad, design.gimbal_limit_rad, "rad", when)
+        _limit("SEA torque", tau, -design.torque_limit_Nm, design.torque_limit_Nm, "N m", when)
+        _limit("rod error", rod.reshape(len(rod), -1, 3), 0.0, ROD_LIMIT_M, "m", when)
+        _limit("weld error", weld[:, :, None], 0.0, WELD_LIMIT_M, "m", when)
+        _limit("weld angle", angle[:, :, None], 0.0, WELD_LIMIT_RAD, "rad", when)
+
+    def finish(self, trajectory: Trajectory, controller: TeamController, gains: ControlGains) -> TrialLog:
+        rows = slice(None)
+        rod, weld, angle = self.errors(rows)
+        return TrialLog(
+            trial=trajectory.trial,
+            time=np.arange(len(self.qpos)) / RATE_HZ,
+            phi=self.phi(rows, omnid_design()),
+            theta=self.theta(rows),
+            tau=self.tau(rows),
+            ref_b=trajectory.ref_b,
+            p_W1=self.site_xpos[:, 0].copy(),
+            R_W1=self.site_xmat[:, 0].reshape(-1, 3, 3).copy(),
+            feed_forward=controller.feed_forward.copy(),
+            gains=gains,
+            rod_error_m=float(rod.max()),
+            weld_error_m=float(weld.max()),
+            weld_error_rad=float(angle.max()),
+        )
+
+
+def _limit(name: str, values: Array, low: float, high: float, unit: str, when: Array) -> None:
+    """Raise for the first value, shape (rows, N, k), outside [low, high]."""
+    bad = ~((values >= low) & (values <= high))
+    if bad.any():
+        row, robot, k = (int(axis[0]) for axis in np.nonzero(bad))
+        raise TrialError(
+            f"omnid{robot + 1}: {name} {k + 1} is {values[row, robot, k]:.4g} {unit} at t = {when[row]:.2f} s; "
+            f"the allowed range is {low:.4g} .. {high:.4g} {unit}"
+        )
