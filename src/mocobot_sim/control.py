@@ -84,7 +84,7 @@ class TeamController:
         design: geometry and masses that the robots believe in.
         gains: control gains.
         data: MuJoCo data of the trial; the controller reads ``qpos`` and writes ``ctrl`` in place.
-        as_built: sensor zeros and true stiffness of every unit; empty for robots as designed.
+        as_built: sensor zeros of every unit; empty for robots as designed.
     """
 
     def __init__(
@@ -95,59 +95,52 @@ class TeamController:
         data: mujoco.MjData,
         as_built: Sequence[AsBuilt] = (),
     ) -> None:
-        robots = index.robots
-        units = list(as_built) or [AsBuilt()] * robots
-        self.feed_forward = np.zeros((robots, 3))  # F_ff in {b} [N]
-        self._state = np.zeros((robots, 4, 3))  # phi, tau (previous); their filtered rates
-        self._tick = 0
-        phi_home = home_phi(design)
-        self._fixed = (
-            data.qpos,
-            data.ctrl,
-            index.motor_qpos,
-            index.spring_qpos,
-            index.actuator,
-            np.array([unit.phi_zero_rad for unit in units]) + phi_home,
-            np.array([unit.tau_zero_Nm for unit in units]),
-            np.array(
-                [
-                    design.base_radius_m - design.platform_radius_m,
-                    design.proximal_length_m,
-                    design.rod_length_m,
-                    design.sea_stiffness_Nm_per_rad,
-                    # gravity torque per cos(phi) of one driven link with half its rod at the knee [N m]
-                    design.gravity_mps2
-                    * (design.proximal_mass_kg * design.proximal_com_m
-                       + 0.5 * design.rod_mass_kg * design.proximal_length_m),
-                    # weight that hangs at the wrist [N]
-                    design.gravity_mps2 * (design.wrist_mass_kg + 1.5 * design.rod_mass_kg),
-                ]
-            ),
-            np.array(
-                [
-                    gains.stiffness_N_per_m,
-                    gains.damping_Ns_per_m,
-                    gains.torque_gain,
-                    gains.torque_rate_gain_s,
-                    1.0 / gains.rate_hz,
-                    1.0 / (1.0 + gains.rate_filter_s * gains.rate_hz),
-                    1.0 / (gains.take_up_time_constant_s * gains.rate_hz),
-                    gains.motor_torque_limit_Nm,
-                ]
-            ),
-            self._state,
-            self.feed_forward,
-        )  # fmt: skip
+        units = list(as_built) or [AsBuilt()] * index.robots
+        phi_zero = np.array([unit.phi_zero_rad for unit in units])
+        self._qpos, self._ctrl = data.qpos, data.ctrl
+        self._address = np.stack([index.motor_qpos, index.spring_qpos, index.actuator], axis=1)  # (N, 3, leg)
+        self._offset = np.stack([home_phi(design) + phi_zero, [unit.tau_zero_Nm for unit in units]], axis=1)
+        self._constants = (
+            design.base_radius_m - design.platform_radius_m,
+            design.proximal_length_m,
+            design.rod_length_m,
+            design.sea_stiffness_Nm_per_rad,
+            # gravity torque per cos(phi) of a driven link that carries half its rod at the knee [N m]
+            design.gravity_mps2
+            * (design.proximal_mass_kg * design.proximal_com_m + 0.5 * design.rod_mass_kg * design.proximal_length_m),
+            # weight that hangs at the wrist [N]
+            design.gravity_mps2 * (design.wrist_mass_kg + 1.5 * design.rod_mass_kg),
+            gains.stiffness_N_per_m,
+            gains.damping_Ns_per_m,
+            gains.torque_gain,
+            gains.torque_rate_gain_s,
+            1.0 / gains.rate_hz,
+            1.0 / (1.0 + gains.rate_filter_s * gains.rate_hz),
+            1.0 / (gains.take_up_time_constant_s * gains.rate_hz),
+            gains.motor_torque_limit_Nm,
+        )
+        self._state = np.zeros((index.robots, 5, 3))  # phi, tau, their filtered rates, F_ff
         self._take_up_ticks = round(gains.take_up_s * gains.rate_hz)
+        self._tick = 0
 
-    def update(self, ref: Array, ref_dot: Array) -> None:
+    @property
+    def feed_forward(self) -> Array:
+        """F_ff of every robot in its {b} [N], shape (N, 3)."""
+        return self._state[:, 4].copy()
+
+    def update(self, ref: Array, ref_dot: Array, lead_s: float = 0.0) -> None:
         """One control tick: read ``qpos``, write ``ctrl``.
 
         Args:
             ref: commanded wrist positions in every robot's {b} [m], shape (N, 3).
             ref_dot: their rates [m/s], shape (N, 3).
+            lead_s: time since ``ref`` was commanded; it has moved on at ``ref_dot`` since [s].
         """
-        _update(*self._fixed, ref, ref_dot, self._tick == 0, self._tick < self._take_up_ticks)
+        phase = 0 if self._tick == 0 else 1 if self._tick < self._take_up_ticks else 2
+        _update(
+            self._qpos, self._ctrl, self._address, self._offset, self._constants, self._state,
+            ref, ref_dot, lead_s, phase,
+        )  # fmt: skip
         self._tick += 1
 
 
@@ -163,106 +156,126 @@ def home_phi(design: OmnidDesign) -> float:
     return float(np.arctan2(height, -reach) - np.arccos(cosine))
 
 
-@njit(cache=True, nogil=True, fastmath=False)
-def _update(  # noqa: PLR0913
-    qpos, ctrl, motor, spring, actuator, phi_offset, tau_zero, body, gain, state, feed_forward,
-    ref, ref_dot, first, taking_up,
-):  # fmt: skip
-    reach, proximal, rod, stiffness, link_gravity, wrist_weight = body
-    impedance, damping, torque_gain, rate_gain, period, rate_weight, take_up_weight, limit = gain
-    s = np.empty((3, 3))
-    lever = np.empty(3)
-    phi = np.empty(3)
-    tau = np.empty(3)
-    force = np.empty(3)
-    for i in range(motor.shape[0]):
-        for k in range(3):
-            deflection = qpos[spring[i, k]]
-            phi[k] = qpos[motor[i, k]] + deflection + phi_offset[i, k]
-            tau[k] = -stiffness * deflection + tau_zero[i, k]
-            if first:
-                state[i, 0, k] = phi[k]
-                state[i, 1, k] = tau[k]
-            state[i, 2, k] += rate_weight * ((phi[k] - state[i, 0, k]) / period - state[i, 2, k])
-            state[i, 3, k] += rate_weight * ((tau[k] - state[i, 1, k]) / period - state[i, 3, k])
-            state[i, 0, k] = phi[k]
-            state[i, 1, k] = tau[k]
-        h = _legs(phi, reach, proximal, rod, s, lever)
+# The kernel works on tuples of three floats: an array per vector would cost more than the arithmetic.
 
-        # h_dot = S^-1 (lever * phi_dot); measured force without the arm's weight f = S^T (tau_load / lever)
-        h_dot = _solve(s, lever * state[i, 2])
-        for j in range(3):
-            measured = 0.0
-            for k in range(3):
-                measured += s[k, j] * (tau[k] - link_gravity * np.cos(phi[k])) / lever[k]
-            if j == 2:
-                measured -= wrist_weight
-            if first:
-                feed_forward[i, j] = measured
-            elif taking_up:
-                feed_forward[i, j] += take_up_weight * (measured - feed_forward[i, j])
-            force[j] = (
-                impedance * (ref[i, j] - h[j]) + damping * (ref_dot[i, j] - h_dot[j]) + feed_forward[i, j]
-            )
-        force[2] += wrist_weight
-        leg_force = _solve(s.T, force)
-        for k in range(3):
-            desired = lever[k] * leg_force[k] + link_gravity * np.cos(phi[k])
-            command = desired + torque_gain * (desired - tau[k]) - rate_gain * state[i, 3, k]
-            ctrl[actuator[i, k]] = min(max(command, -limit), limit)
+_COS = (1.0, -0.5, -0.5)
+_SIN = (0.0, float(np.sqrt(0.75)), -float(np.sqrt(0.75)))
 
 
 @njit(cache=True, nogil=True)
-def _legs(phi, reach, proximal, rod, s, lever):
-    """Wrist position h; fills the rod vectors s (3, 3) and lever_k = s_k . dc_k/dphi_k.
+def _update(qpos, ctrl, address, offset, constants, state, ref, ref_dot, lead, phase):
+    (reach, proximal, rod, stiffness, link_gravity, wrist_weight, impedance, damping,
+     torque_gain, rate_gain, period, rate_weight, take_up_weight, limit) = constants  # fmt: skip
+    for i in range(address.shape[0]):
+        robot = state[i]
+        for k in range(3):
+            deflection = qpos[address[i, 1, k]]
+            phi = qpos[address[i, 0, k]] + deflection + offset[i, 0, k]
+            tau = -stiffness * deflection + offset[i, 1, k]
+            if phase > 0:
+                robot[2, k] += rate_weight * ((phi - robot[0, k]) / period - robot[2, k])
+                robot[3, k] += rate_weight * ((tau - robot[1, k]) / period - robot[3, k])
+            robot[0, k] = phi
+            robot[1, k] = tau
+        h, s, lever, cos_phi = wrist(robot[0], reach, proximal, rod)
+        # h_dot = S^-1 (lever * phi_dot); f_measured = S^T (tau without the arm's gravity / lever)
+        h_dot = _solve(s, (lever[0] * robot[2, 0], lever[1] * robot[2, 1], lever[2] * robot[2, 2]))
+        if phase < 2:
+            for j in range(3):
+                measured = -wrist_weight if j == 2 else 0.0
+                for k in range(3):
+                    measured += s[k][j] * (robot[1, k] - link_gravity * cos_phi[k]) / lever[k]
+                robot[4, j] += (1.0 if phase == 0 else take_up_weight) * (measured - robot[4, j])
+        fx = impedance * (ref[i, 0] + lead * ref_dot[i, 0] - h[0]) + damping * (ref_dot[i, 0] - h_dot[0])
+        fy = impedance * (ref[i, 1] + lead * ref_dot[i, 1] - h[1]) + damping * (ref_dot[i, 1] - h_dot[1])
+        fz = impedance * (ref[i, 2] + lead * ref_dot[i, 2] - h[2]) + damping * (ref_dot[i, 2] - h_dot[2])
+        transposed = ((s[0][0], s[1][0], s[2][0]), (s[0][1], s[1][1], s[2][1]), (s[0][2], s[1][2], s[2][2]))
+        along_rods = _solve(
+            transposed, (fx + robot[4, 0], fy + robot[4, 1], fz + robot[4, 2] + wrist_weight)
+        )
+        for k in range(3):
+            desired = lever[k] * along_rods[k] + link_gravity * cos_phi[k]
+            command = desired + torque_gain * (desired - robot[1, k]) - rate_gain * robot[3, k]
+            ctrl[address[i, 2, k]] = min(max(command, -limit), limit)
 
-    c_k is the knee moved inward by the platform radius, so |h - c_k| = rod for all legs and
-    S h_dot = lever * phi_dot.
+
+@njit(cache=True, nogil=True)
+def wrist(phi, reach, proximal, rod):
+    """Forward kinematics of one Delta.
+
+    c_k is the knee moved inward by the platform radius, so |h - c_k| = rod for every leg, and with
+    s_k = h - c_k and lever_k = s_k . dc_k/dphi_k the rates obey S h_dot = lever * phi_dot.
+
+    Args:
+        phi: driven angles [rad], shape (3,).
+        reach: base radius minus platform radius [m].
+        proximal, rod: lengths [m].
+
+    Returns:
+        h [m], (s_1, s_2, s_3) [m], lever [m^2/rad], cos(phi): tuples of three.
     """
-    c = np.empty((3, 3))
-    for k in range(3):
-        cos_az, sin_az = np.cos(2.0 * np.pi * k / 3.0), np.sin(2.0 * np.pi * k / 3.0)
-        radius = reach + proximal * np.cos(phi[k])
-        c[k, 0] = radius * cos_az
-        c[k, 1] = radius * sin_az
-        c[k, 2] = proximal * np.sin(phi[k])
-    # Circumcentre of the three c_k, then up along their normal.
-    a = c[1] - c[0]
-    b = c[2] - c[0]
+    cos_phi = (np.cos(phi[0]), np.cos(phi[1]), np.cos(phi[2]))
+    sin_phi = (np.sin(phi[0]), np.sin(phi[1]), np.sin(phi[2]))
+    c0 = _knee(cos_phi[0], sin_phi[0], 0, reach, proximal)
+    c1 = _knee(cos_phi[1], sin_phi[1], 1, reach, proximal)
+    c2 = _knee(cos_phi[2], sin_phi[2], 2, reach, proximal)
+    # From the circumcentre of the three c_k up along their normal.
+    a, b = _minus(c1, c0), _minus(c2, c0)
     n = _cross(a, b)
-    nn = n[0] * n[0] + n[1] * n[1] + n[2] * n[2]
-    aa = a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
-    bb = b[0] * b[0] + b[1] * b[1] + b[2] * b[2]
-    centre = (aa * _cross(b, n) + bb * _cross(n, a)) / (2.0 * nn)
-    # Out of reach the root is clipped; the trial's joint check reports such a state.
-    rise = np.sqrt(max(rod * rod - (centre[0] ** 2 + centre[1] ** 2 + centre[2] ** 2), 1e-8))
+    nn, aa, bb = _dot(n, n), _dot(a, a), _dot(b, b)
+    bn, na = _cross(b, n), _cross(n, a)
+    half = 0.5 / nn
+    centre = (
+        half * (aa * bn[0] + bb * na[0]),
+        half * (aa * bn[1] + bb * na[1]),
+        half * (aa * bn[2] + bb * na[2]),
+    )
+    # Out of reach there is no root; the trial's range checks report such a state.
+    rise = np.sqrt(max(rod * rod - _dot(centre, centre), 1e-8) / nn)
     if n[2] < 0.0:
         rise = -rise
-    h = c[0] + centre + rise * n / np.sqrt(nn)
-    for k in range(3):
-        cos_az, sin_az = np.cos(2.0 * np.pi * k / 3.0), np.sin(2.0 * np.pi * k / 3.0)
-        for j in range(3):
-            s[k, j] = h[j] - c[k, j]
-        lever[k] = proximal * (
-            np.cos(phi[k]) * s[k, 2] - np.sin(phi[k]) * (cos_az * s[k, 0] + sin_az * s[k, 1])
-        )
-    return h
+    h = (
+        c0[0] + centre[0] + rise * n[0],
+        c0[1] + centre[1] + rise * n[1],
+        c0[2] + centre[2] + rise * n[2],
+    )
+    s = (_minus(h, c0), _minus(h, c1), _minus(h, c2))
+    lever = (
+        proximal * (cos_phi[0] * s[0][2] - sin_phi[0] * (_COS[0] * s[0][0] + _SIN[0] * s[0][1])),
+        proximal * (cos_phi[1] * s[1][2] - sin_phi[1] * (_COS[1] * s[1][0] + _SIN[1] * s[1][1])),
+        proximal * (cos_phi[2] * s[2][2] - sin_phi[2] * (_COS[2] * s[2][0] + _SIN[2] * s[2][1])),
+    )
+    return h, s, lever, cos_phi
+
+
+@njit(cache=True, nogil=True)
+def _knee(cos_phi, sin_phi, leg, reach, proximal):
+    radius = reach + proximal * cos_phi
+    return (radius * _COS[leg], radius * _SIN[leg], proximal * sin_phi)
+
+
+@njit(cache=True, nogil=True)
+def _minus(a, b):
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@njit(cache=True, nogil=True)
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @njit(cache=True, nogil=True)
 def _cross(a, b):
-    out = np.empty(3)
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
-    return out
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 @njit(cache=True, nogil=True)
 def _solve(m, y):
     """Solve the 3x3 system m x = y by Cramer's rule (LAPACK's call costs more than the work)."""
-    c0 = _cross(m[1], m[2])
-    c1 = _cross(m[2], m[0])
-    c2 = _cross(m[0], m[1])
-    det = m[0, 0] * c0[0] + m[0, 1] * c0[1] + m[0, 2] * c0[2]
-    return (y[0] * c0 + y[1] * c1 + y[2] * c2) / det
+    c0, c1, c2 = _cross(m[1], m[2]), _cross(m[2], m[0]), _cross(m[0], m[1])
+    scale = 1.0 / _dot(m[0], c0)
+    return (
+        scale * (y[0] * c0[0] + y[1] * c1[0] + y[2] * c2[0]),
+        scale * (y[0] * c0[1] + y[1] * c1[1] + y[2] * c2[1]),
+        scale * (y[0] * c0[2] + y[1] * c1[2] + y[2] * c2[2]),
+    )

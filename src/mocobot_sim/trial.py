@@ -109,13 +109,10 @@ def run_trial(
     ticks = round(gains.rate_hz / RATE_HZ)
     substeps = round(1.0 / (gains.rate_hz * model.opt.timestep))
     ref_dot_b = np.diff(trajectory.ref_b, axis=0, append=trajectory.ref_b[-1:]) * RATE_HZ
-    ref = np.empty_like(trajectory.ref_b[0])
     reported = 0
     for sample, (start, rate) in enumerate(zip(trajectory.ref_b, ref_dot_b, strict=True)):
         for tick in range(ticks):
-            np.multiply(rate, tick / gains.rate_hz, out=ref)
-            ref += start
-            controller.update(ref, rate)
+            controller.update(start, rate, tick / gains.rate_hz)
             if tick == 0:
                 # A step first evaluates forces and frames at the state it starts from: one instant for all.
                 log.before_step(sample)

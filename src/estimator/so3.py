@@ -1,0 +1,58 @@
+"""The few SO(3) operations the estimator needs beside scipy's ``Rotation``; stacked over leading axes."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+
+
+def skew(a: Array) -> Array:
+    """The matrix [a] with [a] b = a x b, shapes (..., 3) -> (..., 3, 3)."""
+    a = np.asarray(a, dtype=float)
+    out = np.zeros((*a.shape, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -a[..., 2], a[..., 1], -a[..., 0]
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = a[..., 2], -a[..., 1], a[..., 0]
+    return out
+
+
+def exp(phi: Array) -> Array:
+    """Rotation matrix of the rotation vector phi [rad], shapes (..., 3) -> (..., 3, 3)."""
+    return Rotation.from_rotvec(phi).as_matrix()
+
+
+def log(R: Array) -> Array:
+    """Rotation vector [rad] of R, of length at most pi, shapes (..., 3, 3) -> (..., 3)."""
+    return Rotation.from_matrix(R).as_rotvec()
+
+
+def left_jacobian(phi: Array) -> Array:
+    """J(phi) with exp(phi + d) = exp(J(phi) d) exp(phi) to first order in d, shapes (3,) -> (3, 3).
+
+    Closed form of the series sum_n [phi]^n / (n + 1)!, used itself below 0.01 rad where the closed form cancels.
+    """
+    angle = float(np.linalg.norm(phi))
+    if angle < 1e-2:
+        first, second = 0.5 - angle**2 / 24, 1 / 6 - angle**2 / 120
+    else:
+        first, second = (1 - np.cos(angle)) / angle**2, (angle - np.sin(angle)) / angle**3
+    K = skew(phi)
+    return np.eye(3) + first * K + second * K @ K
+
+
+def rotvec_covariance(R: Array, covariance: Array) -> Array:
+    """Covariance of the components of log(R) from that of a left error rotation [rad^2], (3, 3) both.
+
+    R is known up to exp(delta) R with the covariance given for delta; log(R) then moves by J(log R)^-1 delta.
+    """
+    J_inverse = np.linalg.inv(left_jacobian(log(R)))
+    return J_inverse @ covariance @ J_inverse.T
+
+
+def chordal_mean(R: Array) -> Array:
+    """The rotation nearest (Frobenius) to the average of R, shapes (Q, ..., 3, 3) -> (..., 3, 3)."""
+    U, _, Vt = np.linalg.svd(R.mean(axis=0))
+    U[..., :, 2] *= np.linalg.det(U @ Vt)[..., None]
+    return U @ Vt

@@ -1,0 +1,124 @@
+"""What the robots' joint sensors make of the truth: calibration, noise, quantisation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.errors import InputError
+from estimator.recording import Recording
+from estimator.recording_metadata import RecordingMetadata
+from mocobot_sim.as_built import AsBuilt, CalibrationSpread
+from mocobot_sim.models import omnid_design
+from mocobot_sim.trajectories import RATE_HZ
+from mocobot_sim.trial import TrialLog
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class SensorPreset:
+    """Quality of the sensors and of the calibration.
+
+    Attributes:
+        name: how the command line calls it.
+        encoder_bits: resolution of every phi and theta encoder, per turn; None for continuous.
+        tau_step_Nm: torque resolution [N m]; 0 for continuous.
+        tau_noise_Nm: standard deviation of white torque noise before rounding [N m].
+        spread: standard deviations of the calibration errors.
+    """
+
+    name: str
+    encoder_bits: int | None = None
+    tau_step_Nm: float = 0.0
+    tau_noise_Nm: float = 0.0
+    spread: CalibrationSpread = field(default_factory=CalibrationSpread)
+
+    @property
+    def calibrated(self) -> bool:
+        """Whether robots and sensors are exactly as designed."""
+        return self.spread == CalibrationSpread()
+
+
+PRESETS = {
+    preset.name: preset
+    for preset in (
+        SensorPreset("ideal"),
+        SensorPreset("nominal", encoder_bits=16, tau_step_Nm=0.01, tau_noise_Nm=0.01),
+        SensorPreset(
+            "uncalibrated",
+            encoder_bits=16,
+            tau_step_Nm=0.01,
+            tau_noise_Nm=0.01,
+            spread=CalibrationSpread(
+                encoder_zero_rad=float(np.deg2rad(1.0)), stiffness_ratio=0.02, geometry_m=1e-3, tau_zero_Nm=0.02
+            ),
+        ),
+    )
+}
+
+
+def sensor_preset(name: str) -> SensorPreset:
+    """Look a preset up by name.
+
+    Raises:
+        InputError: there is no such preset.
+    """
+    if name not in PRESETS:
+        raise InputError(f"preset {name!r} does not exist; the presets are {', '.join(PRESETS)}")
+    return PRESETS[name]
+
+
+def measure(
+    log: TrialLog,
+    preset: SensorPreset,
+    rng: np.random.Generator,
+    as_built: Sequence[AsBuilt] = (),
+    payload: str | None = None,
+    seed: int | None = None,
+) -> Recording:
+    """Read a trial through the sensors.
+
+    A torque reading is the spring's deflection times its design stiffness, so a stiffer spring reads low.
+
+    Args:
+        log: the trial.
+        preset: quality of the sensors.
+        rng: source of the noise.
+        as_built: the units' zeros and stiffness; empty for units as designed.
+        payload: name of the payload, for the metadata.
+        seed: seed, for the metadata.
+    """
+    units = list(as_built) or [AsBuilt()] * log.robots
+    phi = log.phi + np.array([unit.phi_zero_rad for unit in units])
+    theta = log.theta + np.array([unit.theta_zero_rad for unit in units])
+    stiffness_ratio = np.array([unit.stiffness_ratio for unit in units])
+    tau = log.tau / (1.0 + stiffness_ratio) + np.array([unit.tau_zero_Nm for unit in units])
+    if preset.tau_noise_Nm:
+        tau = tau + preset.tau_noise_Nm * rng.standard_normal(tau.shape)
+    encoder_step = 2.0 * np.pi / 2**preset.encoder_bits if preset.encoder_bits else 0.0
+    return Recording(
+        time=log.time,
+        phi=_round_to(phi, encoder_step),
+        theta=_round_to(theta, encoder_step),
+        tau=_round_to(tau, preset.tau_step_Nm),
+        ref=log.ref_b,
+        metadata=RecordingMetadata(
+            robots=log.robots,
+            rate_hz=RATE_HZ,
+            trial=log.trial,
+            source=f"mocobot simulation, {preset.name} sensors",
+            payload=payload,
+            seed=seed,
+            design=omnid_design(),
+            control=log.gains.to_dict() | {"feed_forward_N": log.feed_forward.tolist()},
+        ),
+        name=f"{payload or 'payload'} {log.trial} {preset.name}",
+    )
+
+
+def _round_to(values: Array, step: float) -> Array:
+    return np.round(values / step) * step if step else values
