@@ -49,7 +49,7 @@ def random_vias(
     wrist_home_b: Array,
     rng: np.random.Generator,
     vias: int = 80,
-    box_m: Sequence[float] = (0.045, 0.045, 0.050),
+    box_m: Sequence[float] = (0.060, 0.060, 0.037),
     transit_s: tuple[float, float] = (0.5, 0.8),
     dwell_s: tuple[float, float] = (0.5, 0.8),
 ) -> Trajectory:
@@ -93,8 +93,8 @@ def sphere_motion(
     X_1i: RigidTransform,
     duration_s: float = 60.0,
     rng: np.random.Generator | None = None,
-    amplitude_rad: float = np.deg2rad(5.5),
-    frequency_hz: Sequence[float] = (0.7, 0.85, 0.55),
+    amplitude_rad: float = np.deg2rad(4.8),
+    frequency_hz: Sequence[float] = (0.7, 0.85, 0.6),
 ) -> Trajectory:
     """Periodic motion of all wrists on the sphere whose great circle runs through the grasps (section IV.C.3).
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator.design import OmnidDesign
+from estimator.errors import InputError
 from mocobot_sim.as_built import AsBuilt
 from mocobot_sim.assemble import assemble_at_home
 from mocobot_sim.control import ControlGains, TeamController, home_phi
@@ -95,8 +96,10 @@ def run_trial(
     Raises:
         TrialError: a constraint opens too far, a value is not finite, MuJoCo warns, or a joint or spring
             leaves its range.
-        InputError: the team cannot be assembled, or the trajectory is for another number of robots.
+        InputError: the team cannot be assembled, or the trajectory is for another number of robots or leaves
+            the workspace.
     """
+    _check_commands(scene, trajectory)
     gains = gains or ControlGains()
     model = scene.compile()
     data = mujoco.MjData(model)
@@ -129,6 +132,19 @@ def run_trial(
                 progress(sample + 1 - reported)
             reported = sample + 1
     return log.finish(trajectory, controller, gains)
+
+
+def _check_commands(scene: TeamScene, trajectory: Trajectory) -> None:
+    if trajectory.ref_b.shape[1:] != (scene.robots, 3):
+        raise InputError(f"the trajectory is for {trajectory.ref_b.shape[1]} robots; the scene has {scene.robots}")
+    design = omnid_design()
+    reach = np.linalg.norm(trajectory.ref_b - [0.0, 0.0, design.home_height_m], axis=-1)
+    if not reach.max() <= design.workspace_radius_m:
+        sample, robot = np.unravel_index(np.argmax(reach), reach.shape)
+        raise InputError(
+            f"omnid{robot + 1}: the command at t = {sample / RATE_HZ:.2f} s is {reach.max():.3f} m from home; "
+            f"the workspace ends at {design.workspace_radius_m:g} m"
+        )
 
 
 class _Buffers:

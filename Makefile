@@ -1,0 +1,32 @@
+# Two commands, each complete in a fresh clone: `make paper` (the main job) and `make test`.
+# They need Python >= 3.11 and make; everything else goes into .venv.
+PYTHON ?= python3
+JOBS ?= 2
+BIN := .venv/bin
+MARK := .venv/.installed
+
+.PHONY: paper test lint benchmark clean
+
+paper: $(MARK)
+	$(BIN)/mocobot paper --jobs $(JOBS) --out out/paper
+
+test: $(MARK) lint
+	$(BIN)/pytest
+
+lint: $(MARK)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+
+benchmark: $(MARK)
+	$(BIN)/python benchmarks/trial_speed.py
+	$(BIN)/python benchmarks/paper_speed.py
+
+$(MARK): pyproject.toml constraints.txt
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "mocobot needs Python 3.11 or newer")'
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	touch $(MARK)
+
+clean:
+	rm -rf .venv out build dist

@@ -1,0 +1,56 @@
+"""Imports run one way: estimator <- mocobot_sim <- discrepancy <- mocobot (the command line)."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SRC = Path(__file__).resolve().parents[1] / "src"
+LAYERS = ["estimator", "mocobot_sim", "discrepancy", "mocobot"]
+ESTIMATOR_MAY_IMPORT = {"estimator", "numpy", "scipy"} | set(sys.stdlib_module_names)
+
+
+def imported_roots(path: Path) -> set[str]:
+    roots = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            roots |= {alias.name.split(".")[0] for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, f"{path}: relative import"
+            roots.add((node.module or "").split(".")[0])
+    return roots
+
+
+def source_files(package: str) -> list[Path]:
+    return sorted((SRC / package).rglob("*.py"))
+
+
+@pytest.mark.parametrize("package", [name for name in LAYERS if (SRC / name).is_dir()])
+def test_no_layer_imports_a_later_one(package: str) -> None:
+    files = source_files(package)
+    assert files
+    later = set(LAYERS[LAYERS.index(package) + 1 :])
+    for path in files:
+        assert not imported_roots(path) & later, path
+
+
+def test_estimator_needs_numpy_and_scipy_only() -> None:
+    files = source_files("estimator")
+    assert len(files) > 10
+    for path in files:
+        allowed = ESTIMATOR_MAY_IMPORT | ({"pyarrow"} if path.name == "recording.py" else set())
+        assert imported_roots(path) <= allowed, path
+
+
+def test_estimator_runs_without_mujoco() -> None:
+    code = (
+        "import sys; import pkgutil, importlib, estimator\n"
+        "for m in pkgutil.walk_packages(estimator.__path__, 'estimator.'): importlib.import_module(m.name)\n"
+        "assert 'estimator.design' in sys.modules\n"
+        "assert not {'mujoco', 'dm_control', 'numba', 'mocobot_sim'} & set(sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
