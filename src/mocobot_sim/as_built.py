@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+
+from estimator.errors import InputError
 
 Array = NDArray[np.float64]
 
@@ -40,6 +43,17 @@ class AsBuilt:
     phi_zero_rad: Array = field(default_factory=_zeros)
     theta_zero_rad: Array = field(default_factory=_zeros)
     tau_zero_Nm: Array = field(default_factory=_zeros)
+
+
+def units_of(as_built: Sequence[AsBuilt], robots: int) -> tuple[AsBuilt, ...]:
+    """One unit per robot; none given means all as designed.
+
+    Raises:
+        InputError: units are given, but not one per robot.
+    """
+    if as_built and len(as_built) != robots:
+        raise InputError(f"as_built has {len(as_built)} units; the payload has {robots} grasps")
+    return tuple(as_built) or (AsBuilt(),) * robots
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,8 @@ def assemble_at_home(scene: TeamScene, model: mujoco.MjModel, data: mujoco.MjDat
         Spring torques [N m] at rest, positive raising the link, shape (N, 3); also written to ``data.ctrl``.
 
     Raises:
-        InputError: no configuration of the legs closes the loops (a grasp is out of reach).
+        InputError: no configuration of the legs closes the loops (a grasp is out of reach), or no spring
+            torques hold the payload at rest at home (one or two grasps leave it free to swing).
     """
     mujoco.mj_resetData(model, data)
     design_home = np.array([0.0, 0.0, omnid_design().home_height_m])
@@ -66,7 +67,14 @@ def _static_spring_torque(model: mujoco.MjModel, data: mujoco.MjData, index: Tea
     selection = (rows[:, None] == spring).astype(float)  # (rows, 3 N)
     # Constraint forces are free, spring torques cost: weigh the former out of the least-norm solution.
     free = 1e4
-    solution = np.linalg.lstsq(np.hstack([free * constraint, selection]), data.qfrc_bias[rows])[0]
+    forces = np.hstack([free * constraint, selection])
+    solution = np.linalg.lstsq(forces, data.qfrc_bias[rows])[0]
+    unheld = np.abs(forces @ solution - data.qfrc_bias[rows]).max()
+    if unheld > 1e-6:
+        raise InputError(
+            f"the payload cannot rest in the home pose: {unheld:.2g} N m stay unbalanced; with one or two "
+            "grasps its centre of mass must hang under them"
+        )
     return solution[constraint.shape[1] :].reshape(index.spring_dof.shape)
 
 

@@ -13,6 +13,7 @@ controller never knows the payload.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any
@@ -24,10 +25,13 @@ from numpy.typing import NDArray
 
 from estimator.design import OmnidDesign
 from estimator.errors import InputError
-from mocobot_sim.as_built import AsBuilt
+from mocobot_sim.as_built import AsBuilt, units_of
 from mocobot_sim.team_index import TeamIndex
 
 Array = NDArray[np.float64]
+
+# Also refuses inf, NaN and whole numbers too large for a float.
+_LARGEST = sys.float_info.max
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ class ControlGains:
         gains = {}
         for entry in fields(cls):
             value = values.get(entry.name)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value < np.inf:
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= _LARGEST:
                 raise InputError(f"control.{entry.name} is {value!r}; it must be a number greater than 0")
             gains[entry.name] = float(value)
         return cls(**gains)
@@ -85,6 +89,9 @@ class TeamController:
         gains: control gains.
         data: MuJoCo data of the trial; the controller reads ``qpos`` and writes ``ctrl`` in place.
         as_built: sensor zeros of every unit; empty for robots as designed.
+
+    Raises:
+        InputError: ``as_built`` does not match the number of robots.
     """
 
     def __init__(
@@ -95,7 +102,7 @@ class TeamController:
         data: mujoco.MjData,
         as_built: Sequence[AsBuilt] = (),
     ) -> None:
-        units = list(as_built) or [AsBuilt()] * index.robots
+        units = units_of(as_built, index.robots)
         phi_zero = np.array([unit.phi_zero_rad for unit in units])
         self._qpos, self._ctrl = data.qpos, data.ctrl
         self._address = np.stack([index.motor_qpos, index.spring_qpos, index.actuator], axis=1)  # (N, 3, leg)
@@ -107,7 +114,10 @@ class TeamController:
             design.sea_stiffness_Nm_per_rad,
             # gravity torque per cos(phi) of a driven link that carries half its rod at the knee [N m]
             design.gravity_mps2
-            * (design.proximal_mass_kg * design.proximal_com_m + 0.5 * design.rod_mass_kg * design.proximal_length_m),
+            * (
+                design.proximal_mass_kg * design.proximal_com_m
+                + 0.5 * design.rod_mass_kg * design.proximal_length_m
+            ),
             # weight that hangs at the wrist [N]
             design.gravity_mps2 * (design.wrist_mass_kg + 1.5 * design.rod_mass_kg),
             gains.stiffness_N_per_m,
@@ -128,18 +138,17 @@ class TeamController:
         """F_ff of every robot in its {b} [N], shape (N, 3)."""
         return self._state[:, 4].copy()
 
-    def update(self, ref: Array, ref_dot: Array, lead_s: float = 0.0) -> None:
+    def update(self, ref: Array, ref_dot: Array) -> None:
         """One control tick: read ``qpos``, write ``ctrl``.
 
         Args:
             ref: commanded wrist positions in every robot's {b} [m], shape (N, 3).
             ref_dot: their rates [m/s], shape (N, 3).
-            lead_s: time since ``ref`` was commanded; it has moved on at ``ref_dot`` since [s].
         """
         phase = 0 if self._tick == 0 else 1 if self._tick < self._take_up_ticks else 2
         _update(
             self._qpos, self._ctrl, self._address, self._offset, self._constants, self._state,
-            ref, ref_dot, lead_s, phase,
+            ref, ref_dot, phase,
         )  # fmt: skip
         self._tick += 1
 
@@ -163,7 +172,7 @@ _SIN = (0.0, float(np.sqrt(0.75)), -float(np.sqrt(0.75)))
 
 
 @njit(cache=True, nogil=True)
-def _update(qpos, ctrl, address, offset, constants, state, ref, ref_dot, lead, phase):
+def _update(qpos, ctrl, address, offset, constants, state, ref, ref_dot, phase):
     (reach, proximal, rod, stiffness, link_gravity, wrist_weight, impedance, damping,
      torque_gain, rate_gain, period, rate_weight, take_up_weight, limit) = constants  # fmt: skip
     for i in range(address.shape[0]):
@@ -186,13 +195,11 @@ def _update(qpos, ctrl, address, offset, constants, state, ref, ref_dot, lead, p
                 for k in range(3):
                     measured += s[k][j] * (robot[1, k] - link_gravity * cos_phi[k]) / lever[k]
                 robot[4, j] += (1.0 if phase == 0 else take_up_weight) * (measured - robot[4, j])
-        fx = impedance * (ref[i, 0] + lead * ref_dot[i, 0] - h[0]) + damping * (ref_dot[i, 0] - h_dot[0])
-        fy = impedance * (ref[i, 1] + lead * ref_dot[i, 1] - h[1]) + damping * (ref_dot[i, 1] - h_dot[1])
-        fz = impedance * (ref[i, 2] + lead * ref_dot[i, 2] - h[2]) + damping * (ref_dot[i, 2] - h_dot[2])
+        fx = impedance * (ref[i, 0] - h[0]) + damping * (ref_dot[i, 0] - h_dot[0])
+        fy = impedance * (ref[i, 1] - h[1]) + damping * (ref_dot[i, 1] - h_dot[1])
+        fz = impedance * (ref[i, 2] - h[2]) + damping * (ref_dot[i, 2] - h_dot[2])
         transposed = ((s[0][0], s[1][0], s[2][0]), (s[0][1], s[1][1], s[2][1]), (s[0][2], s[1][2], s[2][2]))
-        along_rods = _solve(
-            transposed, (fx + robot[4, 0], fy + robot[4, 1], fz + robot[4, 2] + wrist_weight)
-        )
+        along_rods = _solve(transposed, (fx + robot[4, 0], fy + robot[4, 1], fz + robot[4, 2] + wrist_weight))
         for k in range(3):
             desired = lever[k] * along_rods[k] + link_gravity * cos_phi[k]
             command = desired + torque_gain * (desired - robot[1, k]) - rate_gain * robot[3, k]

@@ -13,18 +13,25 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.errors import InputError
-from mocobot_sim.as_built import AsBuilt
+from mocobot_sim.as_built import AsBuilt, units_of
 from mocobot_sim.models import models_dir, omnid_design, payload_path
 
-# dm_control picks a renderer when imported and warns without a display; composing needs none.
-os.environ.setdefault("MUJOCO_GL", "egl" if os.name == "posix" and "DISPLAY" not in os.environ else "glfw")
-from dm_control import mjcf  # noqa: E402
+# dm_control loads a renderer when imported and warns or fails without a display; composing needs none.
+_renderer = os.environ.get("MUJOCO_GL")
+os.environ["MUJOCO_GL"] = "disabled"
+try:
+    from dm_control import mjcf
+finally:
+    del os.environ["MUJOCO_GL"]
+    if _renderer is not None:
+        os.environ["MUJOCO_GL"] = _renderer
 
 Array = NDArray[np.float64]
 
 TIMESTEP_S = 0.001
 STIFF = {"solref": [0.004, 1.0], "solimp": [0.9999, 0.9999, 0.001, 0.5, 2.0]}
 BASE_JOINTS = ("base_x", "base_y", "base_yaw")
+OWN_COMPILER_SETTINGS = ("angle", "autolimits", "eulerseq", "assetdir", "meshdir", "texturedir")
 WHEELS = ("wheel_front_left", "wheel_front_right", "wheel_rear_left", "wheel_rear_right")
 
 
@@ -55,12 +62,14 @@ class TeamScene:
         return mujoco.MjModel.from_xml_string(self.to_xml(), self.root.get_assets())
 
 
-def build_team(payload: str | Path, as_built: Sequence[AsBuilt] = (), timestep_s: float = TIMESTEP_S) -> TeamScene:
+def build_team(
+    payload: str | Path, as_built: Sequence[AsBuilt] = (), timestep_s: float = TIMESTEP_S
+) -> TeamScene:
     """Park one Omnid under each grasp of a payload and weld the payload to their gimbals.
 
-    All bases stand on one floor, turned so that their gimbals are at theta_z = 0 in the home pose; where grasps
-    differ in height, the wrists do, around the home height. The payload is a child of robot 1's flange; a weld
-    ties each other flange to its grasp.
+    All bases stand on one floor, turned so that their gimbals are at theta_z = 0 in the home pose; where
+    grasps differ in height, the wrists do, around the home height. The payload is a child of robot 1's
+    flange; a weld ties each other flange to its grasp.
 
     Args:
         payload: name of a shipped payload, or path of an MJCF with a body ``payload`` at {1} and sites
@@ -74,8 +83,7 @@ def build_team(payload: str | Path, as_built: Sequence[AsBuilt] = (), timestep_s
     payload_root = _load_payload(payload)
     X_1i = _grasps(payload_root, str(payload))
     robots = len(X_1i)
-    if as_built and len(as_built) != robots:
-        raise InputError(f"as_built has {len(as_built)} units; the payload has {robots} grasps")
+    units = units_of(as_built, robots)
 
     design = omnid_design()
     root = mjcf.from_path(str(models_dir() / "team.xml"))
@@ -89,7 +97,7 @@ def build_team(payload: str | Path, as_built: Sequence[AsBuilt] = (), timestep_s
         omnid = mjcf.from_path(str(models_dir() / "omnid" / "omnid.xml"))
         omnid.model = f"omnid{i + 1}"
         if as_built:
-            _deviate(omnid, as_built[i])
+            _deviate(omnid, units[i])
         _park(omnid)
         yaw = theta_home[i, 0]
         mount = root.worldbody.add(
@@ -98,7 +106,12 @@ def build_team(payload: str | Path, as_built: Sequence[AsBuilt] = (), timestep_s
         )  # fmt: skip
         mount.attach(omnid)
         if i == 0:
-            omnid.find("site", "grasp").attach(payload_root)
+            try:
+                omnid.find("site", "grasp").attach(payload_root)
+            except ValueError as error:
+                raise InputError(
+                    f"{payload}: the payload does not fit into the team's scene ({error})"
+                ) from error
         else:
             root.equality.add(
                 "weld", name=f"grasp{i + 1}", **STIFF,
@@ -113,33 +126,68 @@ def _load_payload(payload: str | Path) -> mjcf.RootElement:
     path = Path(payload) if Path(payload).suffix == ".xml" else payload_path(str(payload))
     try:
         root = mjcf.from_path(str(path))
-    except (OSError, ValueError, AttributeError, KeyError) as error:
+    except (OSError, ValueError, AttributeError, KeyError, SyntaxError) as error:
         raise InputError(f"{path}: not a readable MJCF ({error})") from error
     if root.compiler.angle != "radian":
         # The composed scene has one compiler setting for all parts; degrees here would be read as radians.
         raise InputError(f'{path}: compiler angle is {root.compiler.angle or "degree"}; it must be "radian"')
+    own = set(root.compiler.get_attributes()) - set(OWN_COMPILER_SETTINGS)
+    if own:
+        raise InputError(
+            f"{path}: compiler setting {min(own)!r} would act on the robots too; "
+            f"the payload may set {', '.join(OWN_COMPILER_SETTINGS)}"
+        )
     root.model = "payload"
     return root
 
 
 def _grasps(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
     """Grasp frames X_1i, from the compiled payload so that every MJCF orientation attribute works."""
-    model = mujoco.MjModel.from_xml_string(payload_root.to_xml_string(), payload_root.get_assets())
+    try:
+        model = mujoco.MjModel.from_xml_string(payload_root.to_xml_string(), payload_root.get_assets())
+    except ValueError as error:
+        raise InputError(
+            f"{where}: MuJoCo cannot compile the payload ({' '.join(str(error).split())})"
+        ) from error
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
-    ids = []
-    while (site := mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, f"grasp{len(ids) + 1}")) >= 0:
-        ids.append(site)
-    if not ids:
-        raise InputError(f"{where}: the payload has no site 'grasp1'; it needs grasp1 .. graspN")
+    numbers = sorted(
+        int(n) for i in range(model.nsite) if (n := model.site(i).name.removeprefix("grasp")).isdecimal()
+    )
+    if not numbers or numbers != list(range(1, len(numbers) + 1)):
+        missing = next(n for n in range(1, len(numbers) + 2) if n not in numbers)
+        raise InputError(f"{where}: the payload has no site 'grasp{missing}'; it needs grasp1 .. graspN")
+    ids = [model.site(f"grasp{n}").id for n in numbers]
+    _check_rigid(model, where)
+    if (
+        np.abs(data.site_xpos[ids[0]]).max() > 1e-9
+        or np.abs(data.site_xmat[ids[0]] - np.eye(3).ravel()).max() > 1e-9
+    ):
+        raise InputError(
+            f"{where}: site 'grasp1' must be at the origin of body 'payload', and that at the world's"
+        )
     X_Wi = RigidTransform.from_components(
         data.site_xpos[ids], Rotation.from_matrix(data.site_xmat[ids].reshape(-1, 3, 3))
     )
     return X_Wi[0].inv() * X_Wi
 
 
+def _check_rigid(model: mujoco.MjModel, where: str) -> None:
+    """The payload is one rigid body ``payload`` with all the mass: the ground truth is read from it."""
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "payload")
+    if body < 0:
+        raise InputError(f"{where}: the payload has no body 'payload'")
+    if model.njnt:
+        raise InputError(f"{where}: the payload has joints, {model.njnt} of them; it must be rigid")
+    if not model.body_mass[body] > 0 or model.body_mass.sum() != model.body_mass[body]:
+        raise InputError(
+            f"{where}: body 'payload' weighs {model.body_mass[body]:g} kg of {model.body_mass.sum():g} kg; "
+            "it must carry all the mass, and some"
+        )
+
+
 def _park(omnid: mjcf.RootElement) -> None:
-    """Lock base and wheels to the floor, exactly and at no cost: a parked joint is a joint that is not there."""
+    """Lock base and wheels to the floor, exactly and at no cost: a parked joint is one that is not there."""
     for name in (*BASE_JOINTS, *WHEELS):
         omnid.find("joint", name).remove()
 

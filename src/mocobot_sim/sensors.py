@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from estimator.errors import InputError
 from estimator.recording import Recording
 from estimator.recording_metadata import RecordingMetadata
-from mocobot_sim.as_built import AsBuilt, CalibrationSpread
+from mocobot_sim.as_built import AsBuilt, CalibrationSpread, units_of
 from mocobot_sim.models import omnid_design
 from mocobot_sim.trajectories import RATE_HZ
 from mocobot_sim.trial import TrialLog
@@ -54,7 +54,10 @@ PRESETS = {
             tau_step_Nm=0.01,
             tau_noise_Nm=0.01,
             spread=CalibrationSpread(
-                encoder_zero_rad=float(np.deg2rad(1.0)), stiffness_ratio=0.02, geometry_m=1e-3, tau_zero_Nm=0.02
+                encoder_zero_rad=float(np.deg2rad(1.0)),
+                stiffness_ratio=0.02,
+                geometry_m=1e-3,
+                tau_zero_Nm=0.02,
             ),
         ),
     )
@@ -91,8 +94,11 @@ def measure(
         as_built: the units' zeros and stiffness; empty for units as designed.
         payload: name of the payload, for the metadata.
         seed: seed, for the metadata.
+
+    Raises:
+        InputError: ``as_built`` does not match the number of robots.
     """
-    units = list(as_built) or [AsBuilt()] * log.robots
+    units = units_of(as_built, log.robots)
     phi = log.phi + np.array([unit.phi_zero_rad for unit in units])
     theta = log.theta + np.array([unit.theta_zero_rad for unit in units])
     stiffness_ratio = np.array([unit.stiffness_ratio for unit in units])

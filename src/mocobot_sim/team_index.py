@@ -20,7 +20,7 @@ class TeamIndex:
     """Where each robot's coordinates live; every joint here has one coordinate.
 
     Attributes:
-        motor_qpos, spring_qpos, gimbal_qpos, slide_qpos: positions in ``qpos``, shape (N, 3); gimbal order z, y, x.
+        motor_qpos, spring_qpos, gimbal_qpos, slide_qpos: positions in ``qpos``, (N, 3); gimbal order z, y, x.
         motor_dof, spring_dof, gimbal_dof, slide_dof, knee_dof: positions in ``qvel``; (N, 3), knees (N, 6).
         actuator: positions in ``ctrl``, shape (N, 3).
         grasp_site: the flange's site of every robot, shape (N,).
@@ -64,10 +64,15 @@ class TeamIndex:
 
         motor = np.array([joints([f"{p}motor{k}" for k in (1, 2, 3)]) for p in prefixes], dtype=np.intp)
         spring = np.array([joints([f"{p}spring{k}" for k in (1, 2, 3)]) for p in prefixes], dtype=np.intp)
-        gimbal = np.array([joints([f"{p}gimbal_{axis}" for axis in GIMBAL_AXES]) for p in prefixes], dtype=np.intp)
+        gimbal = np.array(
+            [joints([f"{p}gimbal_{axis}" for axis in GIMBAL_AXES]) for p in prefixes], dtype=np.intp
+        )
         slide = np.array([joints([f"{p}{name}" for name in SLIDES]) for p in prefixes], dtype=np.intp)
         knee = np.array(
-            [joints([f"{p}knee{k}_{motion}" for k in (1, 2, 3) for motion in ("swing", "tilt")]) for p in prefixes],
+            [
+                joints([f"{p}knee{k}_{motion}" for k in (1, 2, 3) for motion in ("swing", "tilt")])
+                for p in prefixes
+            ],
             dtype=np.intp,
         )
         return cls(
@@ -80,7 +85,9 @@ class TeamIndex:
             gimbal_dof=model.jnt_dofadr[gimbal].astype(np.intp),
             slide_dof=model.jnt_dofadr[slide].astype(np.intp),
             knee_dof=model.jnt_dofadr[knee].astype(np.intp),
-            actuator=np.array([[model.actuator(f"{p}motor{k}").id for k in (1, 2, 3)] for p in prefixes], dtype=np.intp),
+            actuator=np.array(
+                [[model.actuator(f"{p}motor{k}").id for k in (1, 2, 3)] for p in prefixes], dtype=np.intp
+            ),
             grasp_site=np.array([model.site(f"{p}grasp").id for p in prefixes], dtype=np.intp),
             payload_site=np.array(
                 [model.site(f"{PAYLOAD_PREFIX}grasp{i + 1}").id for i in range(robots)], dtype=np.intp

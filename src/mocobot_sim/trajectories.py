@@ -1,7 +1,7 @@
 """Commanded wrist positions: random vias, motion on a common sphere, static orientations.
 
-Commands are sampled at the recording's rate; the controller interpolates linearly between them, so a recording
-that carries its commands can be run again exactly.
+Commands are sampled at the recording's rate; between them the controller follows the cubic spline through them, so
+a recording that carries its commands can be run again exactly.
 """
 
 from __future__ import annotations
@@ -63,10 +63,12 @@ def random_vias(
         transit_s, dwell_s: uniform ranges of the time between and at vias [s].
 
     Raises:
-        InputError: fewer than one via.
+        InputError: fewer than one via, or a transit that takes no time.
     """
     if vias < 1:
         raise InputError(f"vias is {vias}; it must be at least 1")
+    if not min(transit_s) > 0:
+        raise InputError(f"transit is {transit_s} s; it must be greater than 0")
     paths = []
     for home in np.asarray(wrist_home_b):
         points = home + rng.uniform(-1.0, 1.0, (vias, 3)) * np.asarray(box_m)
@@ -83,7 +85,9 @@ def _via_path(time: Array, points: Array, transit: Array, dwell: Array) -> Array
     start = SETTLE_S
     for k in range(len(transit)):
         on = time >= start
-        ref[on] = points[k] + minimum_jerk((time[on] - start) / transit[k])[:, None] * (points[k + 1] - points[k])
+        ref[on] = points[k] + minimum_jerk((time[on] - start) / transit[k])[:, None] * (
+            points[k + 1] - points[k]
+        )
         start += transit[k] + dwell[k]
     return ref
 
@@ -110,10 +114,10 @@ def sphere_motion(
         frequency_hz: frequency of each component [Hz].
 
     Raises:
-        InputError: the motion is shorter than its ramps.
+        InputError: the motion is shorter than its ramps, or endless.
     """
     ramp = 2.0
-    if duration_s < 2.0 * ramp:
+    if not 2.0 * ramp <= duration_s < np.inf:
         raise InputError(f"duration is {duration_s} s; it must be at least {2.0 * ramp:g} s")
     time = np.arange(round((duration_s + 2.0 * SETTLE_S) * RATE_HZ) + 1) / RATE_HZ - SETTLE_S
     envelope = minimum_jerk(time / ramp) * minimum_jerk((duration_s - time) / ramp)

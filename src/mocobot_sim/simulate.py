@@ -1,0 +1,123 @@
+"""From a payload's name to recordings: build the team, run a trial, read it through the sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from estimator.errors import InputError
+from estimator.recording import Recording
+from mocobot_sim.as_built import AsBuilt
+from mocobot_sim.control import ControlGains
+from mocobot_sim.scene import TeamScene, build_team
+from mocobot_sim.sensors import SensorPreset, measure
+from mocobot_sim.trajectories import Trajectory, random_vias, sphere_motion, static_orientations
+from mocobot_sim.trial import TrialLog, run_trial
+from mocobot_sim.truth import GroundTruth
+
+TRIALS = ("random", "periodic", "static")
+
+
+@dataclass(frozen=True)
+class TrialRequest:
+    """One trial to simulate; equal requests give equal bits.
+
+    Attributes:
+        payload: name of a shipped payload, or path of a payload MJCF.
+        trial: ``random``, ``periodic`` or ``static``.
+        seed: seed of everything random, at least 0.
+        number: which of several trials of that kind, at least 0.
+        vias: number of vias of a random trial.
+        duration_s: length of a periodic trial's motion [s].
+    """
+
+    payload: str
+    trial: str
+    seed: int = 0
+    number: int = 0
+    vias: int = 80
+    duration_s: float = 60.0
+
+    def rng(self, purpose: str) -> np.random.Generator:
+        """Independent stream for one purpose of this trial."""
+        words = f"{purpose}|{self.payload}|{self.trial}|{self.number}".encode()
+        return np.random.default_rng(np.random.SeedSequence([self.seed, *words]))
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A finished trial.
+
+    Attributes:
+        recordings: one per sensor preset.
+        log: what truly happened.
+        truth: the payload.
+        as_built: the units' deviations; empty for units as designed.
+    """
+
+    recordings: dict[str, Recording]
+    log: TrialLog
+    truth: GroundTruth
+    as_built: tuple[AsBuilt, ...]
+
+
+def simulate(
+    request: TrialRequest,
+    presets: Sequence[SensorPreset],
+    grasps: RigidTransform | None = None,
+    gains: ControlGains | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> Simulated:
+    """Run one trial and read it through one or several sensor presets.
+
+    Presets with the same calibration spread share the trial: noise and quantisation of the logged channels do not
+    act on the motion. The units of a team depend on the seed alone, so they are the same in all its trials.
+
+    Args:
+        request: what to simulate.
+        presets: sensor presets, all with the same calibration spread.
+        grasps: grasp frames X_1i that the robots believe in when they construct periodic and static
+            trajectories, N transforms; None for the true ones.
+        gains: control gains; None for the defaults.
+        progress: called with the number of samples done since the last call.
+
+    Raises:
+        InputError: a request or preset that cannot be met.
+        TrialError: the physics of the trial cannot be trusted.
+    """
+    if request.trial not in TRIALS:
+        raise InputError(f"trial {request.trial!r} does not exist; the trials are {', '.join(TRIALS)}")
+    if len({preset.spread for preset in presets}) != 1:
+        raise InputError("presets of one trial must share their calibration spread")
+    if request.seed < 0:
+        raise InputError(f"seed is {request.seed}; it must be at least 0")
+    robots = build_team(request.payload).robots
+    as_built: tuple[AsBuilt, ...] = ()
+    if not presets[0].calibrated:
+        as_built = presets[0].spread.draw(robots, np.random.default_rng([request.seed, *b"units"]))
+    scene = build_team(request.payload, as_built)
+    trajectory = make_trajectory(request, scene, grasps)
+    log = run_trial(scene, trajectory, gains, as_built, progress)
+    recordings = {
+        preset.name: measure(
+            log, preset, request.rng(f"sensors {preset.name}"), as_built, payload=request.payload, seed=request.seed
+        )
+        for preset in presets
+    }
+    return Simulated(recordings, log, GroundTruth.of(scene), as_built)
+
+
+def make_trajectory(
+    request: TrialRequest, scene: TeamScene, grasps: RigidTransform | None = None
+) -> Trajectory:
+    """Commands of a request (arguments as in ``simulate``)."""
+    home, X_1i = scene.wrist_home_b, scene.X_1i if grasps is None else grasps
+    rng = request.rng("trajectory")
+    if request.trial == "random":
+        return random_vias(home, rng, vias=request.vias)
+    if request.trial == "periodic":
+        return sphere_motion(home, X_1i, duration_s=request.duration_s, rng=rng)
+    return static_orientations(home, X_1i)
