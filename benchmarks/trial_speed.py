@@ -39,7 +39,9 @@ def main() -> None:
     payload = "a"
     scene = build_team(payload)
     trajectory = random_vias(scene.wrist_home_b, np.random.default_rng(0), vias=20)
-    run_trial(scene, random_vias(scene.wrist_home_b, np.random.default_rng(0), vias=1))  # compile the controller
+    run_trial(
+        scene, random_vias(scene.wrist_home_b, np.random.default_rng(0), vias=1)
+    )  # compile the controller
     trials, bares = [], []
     for _ in range(5):  # alternate, so that a slow spell of the machine hits both
         bares.append(seconds_per_step_bare(payload))

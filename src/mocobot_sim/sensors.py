@@ -82,6 +82,7 @@ def measure(
     as_built: Sequence[AsBuilt] = (),
     payload: str | None = None,
     seed: int | None = None,
+    name: str = "simulated",
 ) -> Recording:
     """Read a trial through the sensors.
 
@@ -94,6 +95,7 @@ def measure(
         as_built: the units' zeros and stiffness; empty for units as designed.
         payload: name of the payload, for the metadata.
         seed: seed, for the metadata.
+        name: how messages call the recording.
 
     Raises:
         InputError: ``as_built`` does not match the number of robots.
@@ -122,7 +124,7 @@ def measure(
             design=omnid_design(),
             control=log.gains.to_dict() | {"feed_forward_N": log.feed_forward.tolist()},
         ),
-        name=f"{payload or 'payload'} {log.trial} {preset.name}",
+        name=name,
     )
 
 

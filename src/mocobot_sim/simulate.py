@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from scipy.spatial.transform import RigidTransform
@@ -41,9 +42,14 @@ class TrialRequest:
     vias: int = 80
     duration_s: float = 60.0
 
+    @property
+    def label(self) -> str:
+        """Name of the payload: a custom payload goes by its file's name."""
+        return Path(self.payload).stem
+
     def rng(self, purpose: str) -> np.random.Generator:
         """Independent stream for one purpose of this trial."""
-        words = f"{purpose}|{self.payload}|{self.trial}|{self.number}".encode()
+        words = f"{purpose}|{self.label}|{self.trial}|{self.number}".encode()
         return np.random.default_rng(np.random.SeedSequence([self.seed, *words]))
 
 
@@ -69,7 +75,7 @@ def simulate(
     presets: Sequence[SensorPreset],
     grasps: RigidTransform | None = None,
     gains: ControlGains | None = None,
-    progress: Callable[[int], None] | None = None,
+    progress: Callable[[int], object] | None = None,
 ) -> Simulated:
     """Run one trial and read it through one or several sensor presets.
 
@@ -94,20 +100,30 @@ def simulate(
         raise InputError("presets of one trial must share their calibration spread")
     if request.seed < 0:
         raise InputError(f"seed is {request.seed}; it must be at least 0")
-    robots = build_team(request.payload).robots
-    as_built: tuple[AsBuilt, ...] = ()
-    if not presets[0].calibrated:
-        as_built = presets[0].spread.draw(robots, np.random.default_rng([request.seed, *b"units"]))
+    as_built = draw_units(request.payload, presets[0], request.seed)
     scene = build_team(request.payload, as_built)
     trajectory = make_trajectory(request, scene, grasps)
     log = run_trial(scene, trajectory, gains, as_built, progress)
     recordings = {
         preset.name: measure(
-            log, preset, request.rng(f"sensors {preset.name}"), as_built, payload=request.payload, seed=request.seed
+            log,
+            preset,
+            request.rng(f"sensors {preset.name}"),
+            as_built,
+            payload=request.label,
+            seed=request.seed,
+            name=f"{request.label}_{request.trial}{request.number}_{preset.name}",
         )
         for preset in presets
     }
     return Simulated(recordings, log, GroundTruth.of(scene), as_built)
+
+
+def draw_units(payload: str, preset: SensorPreset, seed: int) -> tuple[AsBuilt, ...]:
+    """The robots that carry a payload: as designed (empty) if the preset is calibrated, else drawn from the seed."""
+    if preset.calibrated:
+        return ()
+    return preset.spread.draw(build_team(payload).robots, np.random.default_rng([seed, *b"units"]))
 
 
 def make_trajectory(

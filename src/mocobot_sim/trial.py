@@ -83,7 +83,7 @@ def run_trial(
     trajectory: Trajectory,
     gains: ControlGains | None = None,
     as_built: Sequence[AsBuilt] = (),
-    progress: Callable[[int], None] | None = None,
+    progress: Callable[[int], object] | None = None,
 ) -> TrialLog:
     """Simulate one trial in closed loop.
 

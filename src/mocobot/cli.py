@@ -1,0 +1,141 @@
+"""The ``mocobot`` command: a thin edge over the estimator and the simulator."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from estimator.errors import InputError
+from mocobot.files import write_json
+
+
+@dataclass(frozen=True)
+class Paper:
+    """Run the paper's experiment and print Tables II-V, published figures beside ours."""
+
+    payload: tuple[str, ...] = ("a", "b", "c", "d")
+    """Payload configurations."""
+    preset: tuple[str, ...] = ("ideal", "nominal", "uncalibrated")
+    """Sensor presets."""
+    trials: int = 6
+    """Random trials per payload; half as many are periodic."""
+    jobs: int = 2
+    """Parallel processes."""
+    seed: int = 0
+    """Seed of trajectories, noise and calibration errors."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for paper.json, tables.txt, the estimates and plots."""
+    recordings: bool = False
+    """Write the recordings, too (needs --out)."""
+
+    def run(self) -> None:
+        """Run the command."""
+        from mocobot.paper_command import run
+
+        run(self)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Estimate grasps, mass, centre of mass and inertia from recordings of one payload."""
+
+    rec: tyro.conf.Positional[tuple[Path, ...]]
+    """Recordings (Parquet), all of one payload."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
+    """Write the estimate as JSON, too."""
+    method: Literal["auto", "staged", "joint"] = "auto"
+    """The paper's stages, one joint least squares, or stages where static holds allow."""
+    cutoff_hz: float = 5.0
+    """Cut-off of the low-pass filter [Hz]."""
+
+    def run(self) -> None:
+        """Run the command."""
+        from estimator.estimate import estimate_payload
+        from estimator.recording import read_recording
+        from estimator.report import format_estimate
+        from mocobot.progress import bar
+
+        if not self.rec:
+            raise InputError("no recording given; name at least one file")
+        with bar(len(self.rec), "reading", "file") as advance:
+            recordings = []
+            for path in self.rec:
+                recordings.append(read_recording(path))
+                advance(1)
+        estimate = estimate_payload(recordings, self.method, self.cutoff_hz)
+        if self.out:
+            write_json(self.out, estimate.to_dict())
+        print(format_estimate(estimate))
+
+
+@dataclass(frozen=True)
+class Simulate:
+    """Simulate one trial and write its recording, with the ground truth in a sidecar."""
+
+    out: Annotated[Path, tyro.conf.arg(metavar="REC.parquet")]
+    """Recording to write; the truth goes beside it as REC.truth.json."""
+    payload: str = "a"
+    """Payload configuration, or the path of a payload MJCF (body 'payload', sites grasp1 .. graspN)."""
+    trajectory: Literal["random", "periodic", "static"] = "random"
+    """Kind of motion."""
+    vias: int = 80
+    """Vias of a random trial."""
+    duration: float = 60.0
+    """Length of a periodic motion [s]."""
+    preset: str = "nominal"
+    """Sensors: ideal, nominal or uncalibrated."""
+    seed: int = 0
+    """Seed of trajectory, noise and calibration errors."""
+
+    def run(self) -> None:
+        """Run the command."""
+        from estimator.recording import write_recording
+        from mocobot.progress import bar
+        from mocobot_sim.sensors import sensor_preset
+        from mocobot_sim.simulate import TrialRequest, simulate
+        from mocobot_sim.truth import write_truth
+
+        if self.out.suffix != ".parquet":
+            raise InputError(f"{self.out}: the file's name must end in .parquet")
+        if not self.out.parent.is_dir():
+            raise InputError(f"{self.out.parent}: there is no such folder")
+        request = TrialRequest(
+            self.payload, self.trajectory, self.seed, vias=self.vias, duration_s=self.duration
+        )
+        with bar(None, "simulating", "sample") as advance:
+            done = simulate(request, [sensor_preset(self.preset)], progress=advance)
+        write_recording(done.recordings[self.preset], self.out)
+        write_truth(done.truth, self.out, done.as_built)
+        print(f"{self.out}: {done.log.time[-1]:.1f} s of {self.trajectory} motion, {self.preset} sensors")
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Entry point: exit code 0, or 2 after one sentence on standard error."""
+    from mocobot_sim.trial import TrialError
+
+    parsed = tyro.cli(
+        Annotated[Paper, tyro.conf.subcommand("paper")]
+        | Annotated[Estimate, tyro.conf.subcommand("estimate")]
+        | Annotated[Simulate, tyro.conf.subcommand("simulate")],
+        prog="mocobot",
+        description="Simulate mobile cobots that carry an unknown payload together, and estimate it.",
+        args=arguments,
+        config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes),
+    )
+    try:
+        parsed.run()
+    except (InputError, TrialError) as error:
+        print(f"mocobot: {error}", file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        print("mocobot: interrupted", file=sys.stderr)
+        sys.exit(130)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,84 @@
+"""``mocobot paper``: run the experiment, print the tables, write the results."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from estimator.errors import InputError
+from estimator.recording import write_recording
+from mocobot.files import make_folder, write_json, write_text
+from mocobot.progress import bar
+from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
+from mocobot_sim.paper.plots import save_plots
+from mocobot_sim.paper.tables import format_tables
+from mocobot_sim.scene import build_team
+from mocobot_sim.sensors import sensor_preset
+from mocobot_sim.simulate import draw_units
+from mocobot_sim.truth import GroundTruth, write_truth
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from mocobot.cli import Paper
+
+
+def run(options: Paper) -> None:
+    """Run the command.
+
+    Raises:
+        InputError: an option that cannot be met.
+        TrialError: the physics of a trial cannot be trusted.
+    """
+    plan = PaperPlan(options.payload, options.preset, options.trials, options.seed)
+    if options.recordings and not options.out:
+        raise InputError("--recordings needs --out")
+    if options.jobs < 1:
+        raise InputError(f"jobs is {options.jobs}; it must be at least 1")
+    if options.out:
+        make_folder(options.out)
+    start = time.perf_counter()
+    with bar(plan.steps, "paper", "step") as advance:
+        result = run_paper(plan, options.jobs, advance)
+    tables = format_tables(result.scores)
+    print(tables)
+    print(f"\n{_summary(result)} Wall time {time.perf_counter() - start:.0f} s.")
+    if options.out:
+        _write(options.out, plan, result, tables)
+        if options.recordings:
+            _write_recordings(make_folder(options.out / "recordings"), plan, result)
+        print(f"Written to {options.out}: paper.json, tables.txt, estimates and plots.")
+
+
+def _summary(result: PaperResult) -> str:
+    trials = result.trials
+    return (
+        f"{len(trials)} trials: payload rotation at most {max(t.rotation_deg for t in trials):.1f} deg, "
+        f"SEA torque {max(t.torque_Nm for t in trials):.1f} N m, "
+        f"rod error {1e3 * max(t.rod_error_m for t in trials):.4f} mm, "
+        f"weld error {1e3 * max(t.weld_error_m for t in trials):.4f} mm "
+        f"and {max(t.weld_error_deg for t in trials):.5f} deg."
+    )
+
+
+def _write(folder: Path, plan: PaperPlan, result: PaperResult, tables: str) -> None:
+    write_json(folder / "paper.json", result.scores)
+    write_text(folder / "tables.txt", tables + "\n")
+    write_json(folder / "trials.json", {"trials": [asdict(trial) for trial in result.trials]})
+    estimates = make_folder(folder / "estimates")
+    for preset in plan.presets:
+        for payload in plan.payloads:
+            write_json(estimates / f"{payload}_{preset}.json", result.estimates[preset][payload].to_dict())
+    save_plots(result.scores, folder)
+
+
+def _write_recordings(folder: Path, plan: PaperPlan, result: PaperResult) -> None:
+    for payload in plan.payloads:
+        truth = GroundTruth.of(build_team(payload))
+        for preset in plan.presets:
+            units = draw_units(payload, sensor_preset(preset), plan.seed)
+            for recording in result.recordings[preset][payload]:
+                path = folder / f"{recording.name}.parquet"
+                write_recording(recording, path)
+                write_truth(truth, path, units)
