@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from estimator.paper_tables import published_errors
 
 COLOURS = {"paper": "#6b7280", "ideal": "#2a9d8f", "nominal": "#2f6fd0", "uncalibrated": "#e07b39"}
+MARKERS = {"paper": "D", "ideal": "v", "nominal": "o", "uncalibrated": "s"}
 PAIRS = ("12", "23", "31")
 Scores = Mapping[str, Any]
 
@@ -32,12 +33,12 @@ def save_plots(scores: Mapping[str, Mapping[str, Scores]], folder: Path) -> list
     figure = Figure(figsize=(11, 7.5), layout="constrained")  # without pyplot: no display, no global state
     axes = figure.subplots(2, 1)
     labels = [label for label, _, _ in grasps]
-    _bars(
+    _dots(
         axes[0], labels, {n: [s[p][f"R{pair}_deg"]["mean"] for _, p, pair in grasps] for n, s in series.items()},
         {n: [s[p][f"R{pair}_deg"]["std"] for _, p, pair in grasps] for n, s in series.items()},
         "Table II: rotation error [deg]",
     )  # fmt: skip
-    _bars(
+    _dots(
         axes[1], labels, {n: [s[p][f"p{pair}_percent"]["mean"] for _, p, pair in grasps] for n, s in series.items()},
         {n: [s[p][f"p{pair}_percent"]["std"] for _, p, pair in grasps] for n, s in series.items()},
         "Table III: position error [% of |p|]",
@@ -51,12 +52,12 @@ def save_plots(scores: Mapping[str, Mapping[str, Scores]], folder: Path) -> list
         (axes[0], "m_percent", "Table IV: mass error [%]"),
         (axes[1], "p1c_percent", "Table IV: centre-of-mass error [% of |p1c|]"),
     ):
-        _bars(axis, labels, {n: [s[p][key] for p in payloads] for n, s in series.items()}, {}, title)
+        _dots(axis, labels, {n: [s[p][key] for p in payloads] for n, s in series.items()}, {}, title)
     paths.append(_save(figure, axes[0], folder / "mass_com.png"))
 
     figure = Figure(figsize=(11, 4.4), layout="constrained")
     axis = figure.subplots()
-    _bars(
+    _dots(
         axis, [label for label, _, _ in moments],
         {n: [s[p]["all"][m]["percent"] for _, p, m in moments] for n, s in series.items()},
         {n: [s[p]["all"][m]["std_percent"] for _, p, m in moments] for n, s in series.items()},
@@ -66,28 +67,29 @@ def save_plots(scores: Mapping[str, Mapping[str, Scores]], folder: Path) -> list
     return paths
 
 
-def _bars(
+def _dots(
     axis: Axes,
     labels: Sequence[str],
     values: Mapping[str, Sequence[float | None]],
     spreads: Mapping[str, Sequence[float | None]],
     title: str,
 ) -> None:
-    """Grouped bars; whiskers reach up by one standard deviation (down has no meaning on a log axis)."""
-    width = 0.8 / len(values)
+    """One dot per column and row; whiskers reach up by one standard deviation (down has no meaning on a log axis)."""
     for k, (name, heights) in enumerate(values.items()):
-        x = [i + (k - (len(values) - 1) / 2) * width for i in range(len(labels))]
+        x = [i + 0.13 * (k - (len(values) - 1) / 2) for i in range(len(labels))]
         shown = [float("nan") if h is None else h for h in heights]
-        axis.bar(x, shown, width, label=name, color=COLOURS.get(name))
         up = [0.0 if s is None else s for s in spreads.get(name, [None] * len(labels))]
         axis.errorbar(
-            x, shown, yerr=[[0.0] * len(up), up], fmt="none", ecolor="#111827", elinewidth=0.8, capsize=1.5
-        )
+            x, shown, yerr=[[0.0] * len(up), up], label=name, color=COLOURS.get(name),
+            fmt=MARKERS.get(name, "o"), markersize=6, elinewidth=1.2, capsize=2,
+        )  # fmt: skip
     axis.set_yscale("log")
+    axis.set_xlim(-0.5, len(labels) - 0.5)
     axis.set_xticks(range(len(labels)), labels)
-    axis.tick_params(axis="x", length=0)
+    axis.set_xticks([i + 0.5 for i in range(len(labels) - 1)], minor=True)
+    axis.tick_params(axis="x", which="both", length=0)
     axis.grid(axis="y", alpha=0.3)
-    axis.set_axisbelow(True)
+    axis.grid(axis="x", which="minor", alpha=0.3)
     axis.set_title(title, loc="left", fontsize=10)
 
 
