@@ -79,7 +79,7 @@ def wrench_on_payload(
     f_i = np.einsum("...ji,...j->...i", rotation(theta[0]), f_b)
     axes_T = np.swapaxes(rate_matrix(theta[0]), -1, -2)
     m_i = -np.linalg.solve(axes_T, gimbal_torque(*theta, design)[..., None])[..., 0]
-    return np.concatenate([m_i, f_i], axis=-1)
+    return np.concatenate([m_i, f_i], axis=-1, dtype=np.float64)
 
 
 def _arm_torque(

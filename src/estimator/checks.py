@@ -98,19 +98,22 @@ def _check_time(recording: Recording) -> None:
 
 
 def _check_range(recording: Recording, suffixes: tuple[str, ...], low: float, high: float) -> None:
-    """Joint limits; the bound itself is allowed."""
-    for name, values in recording.columns().items():
-        if not name.endswith(tuple(f".{suffix}" for suffix in suffixes)):
-            continue
+    """Joint limits of one kind of joint; the bound itself is allowed."""
+    columns = {name: x for name, x in recording.columns().items() if name.rpartition(".")[2] in suffixes}
+    every = np.stack(list(columns.values()))
+    as_degrees = np.deg2rad(every)
+    # Far outside as radians, all inside as degrees; a single jump or a slight excess is neither.
+    in_degrees = (
+        np.abs(every).max() > 2.0 * max(-low, high) and as_degrees.min() >= low and as_degrees.max() <= high
+    )
+    for name, values in columns.items():
         bad = np.flatnonzero((values < low) | (values > high))
         if len(bad):
             worst = values[bad[np.argmax(np.abs(values[bad]))]]
-            # No such joint turns past 90 deg, so more "radians" than that which fit as degrees are degrees.
-            as_degrees = np.abs(worst) > np.pi / 2 and low <= np.deg2rad(worst) <= high
             raise InputError(
-                f"{recording.name}: column {name!r} reaches {worst:.6g} rad (outside in {len(bad)} rows, "
-                f"first in row {bad[0]}); the joint's range is {low:.6g} to {high:.6g} rad"
-                + (" - the values look like degrees" if as_degrees else "")
+                f"{recording.name}: column {name!r} reaches {worst:.6g} rad (outside in {len(bad)} of "
+                f"{len(values)} rows, first in row {bad[0]}); its range is {low:.6g} to {high:.6g} rad"
+                + (" - the values look like degrees" if in_degrees else "")
             )
 
 

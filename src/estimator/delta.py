@@ -138,9 +138,8 @@ def inverse_kinematics(h: ArrayLike, design: OmnidDesign) -> Array:
         *where, leg = np.unravel_index(np.argmax(outside), outside.shape)
         position = ", ".join(f"{value:.4g}" for value in h[tuple(where)])
         raise InputError(f"leg {int(leg) + 1} cannot reach the wrist position ({position}) m")
-    # Wrapped, so that a wrist below the driven axes does not come out a turn too low.
-    phi = np.arctan2(up, outward) - np.arccos(cosine)
-    return np.arctan2(np.sin(phi), np.cos(phi))
+    # The outward knee lies clockwise of the line to the wrist if that points up, else counter-clockwise.
+    return np.arctan2(up, outward) - np.copysign(np.arccos(cosine), up)
 
 
 def _solve(matrix: Array, right: Array) -> Array:

@@ -67,7 +67,7 @@ class StepReport:
     @property
     def rank(self) -> int:
         """Number of determined directions."""
-        return len(self.singular_values) - len(self.weak)
+        return max(0, len(self.singular_values) - len(self.weak))
 
     @property
     def condition(self) -> float:
@@ -112,10 +112,7 @@ def judge(
         if value > limit:
             continue
         vector = vector * np.sign(vector[np.argmax(np.abs(vector))])
-        if words:
-            direction = f"{words} {_axis(vector)} of {frame}"
-        else:
-            direction = _combination(vector, parameters)
+        direction = f"{words} {_axis(vector)} of {frame}" if words else combination(vector, parameters)
         sentence = f"{reason} (signal {value:.2g} {unit}, noise {noise:.2g} {unit})"
         weak.append(WeakDirection(step, direction, tuple(float(x) for x in vector), sentence))
     return StepReport(
@@ -140,6 +137,7 @@ def _axis(vector: Array) -> str:
     return "(" + ", ".join(f"{x:.2f}" for x in vector) + ")"
 
 
-def _combination(vector: Array, parameters: Sequence[str]) -> str:
+def combination(vector: Array, parameters: Sequence[str]) -> str:
+    """The large entries of a unit vector in words, such as ``0.90 Ixx -0.44 Iyy``."""
     large = [k for k in np.argsort(-np.abs(vector)) if abs(vector[k]) > 0.3]
     return " ".join(f"{vector[k]:+.2f} {parameters[k]}" for k in large).removeprefix("+")

@@ -31,7 +31,8 @@ def log(R: Array) -> Array:
 def left_jacobian(phi: Array) -> Array:
     """J(phi) with exp(phi + d) = exp(J(phi) d) exp(phi) to first order in d, shapes (3,) -> (3, 3).
 
-    Closed form of the series sum_n [phi]^n / (n + 1)!, used itself below 0.01 rad where the closed form cancels.
+    Closed form of the series sum_n [phi]^n / (n + 1)!, used itself below 0.01 rad where the
+    closed form cancels.
     """
     angle = float(np.linalg.norm(phi))
     if angle < 1e-2:

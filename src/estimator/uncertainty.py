@@ -9,6 +9,7 @@ the noise in the normal equations, whatever its colour inside a block and across
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,7 +28,7 @@ def block_slices(samples: int, rate_hz: float, block_s: float = BLOCK_S) -> list
     length = min(block_s * rate_hz, samples / MIN_BLOCKS)
     count = max(1, min(samples, round(samples / max(length, 1.0))))
     edges = np.linspace(0, samples, count + 1).astype(int)
-    return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [slice(a, b) for a, b in pairwise(edges)]
 
 
 def block_normals(J: Array, r: Array, slices: list[slice]) -> tuple[Array, Array]:

@@ -97,7 +97,7 @@ def sphere_motion(
     X_1i: RigidTransform,
     duration_s: float = 60.0,
     rng: np.random.Generator | None = None,
-    amplitude_rad: float = np.deg2rad(4.8),
+    amplitude_rad: float = np.deg2rad(4.4),
     frequency_hz: Sequence[float] = (0.7, 0.85, 0.6),
 ) -> Trajectory:
     """Periodic motion of all wrists on the sphere whose great circle runs through the grasps (section IV.C.3).

@@ -1,0 +1,28 @@
+"""Wall time of `mocobot paper` with one and with two processes: python benchmarks/paper_speed.py [--quick]
+
+--quick runs one payload with two random trials instead of the whole experiment.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+
+from mocobot_sim.paper.experiment import PaperPlan, run_paper
+
+
+def main() -> None:
+    """Print the wall times and their ratio."""
+    plan = PaperPlan(payloads=("a",), trials=2) if "--quick" in sys.argv[1:] else PaperPlan()
+    run_paper(PaperPlan(payloads=("a",), presets=("ideal",), trials=1, vias=2, duration_s=8.0))  # compile, warm up
+    seconds = {}
+    for jobs in (2, 1):
+        start = time.perf_counter()
+        run_paper(plan, jobs)
+        seconds[jobs] = time.perf_counter() - start
+        print(f"{jobs} process{'es' * (jobs > 1)}: {seconds[jobs]:6.1f} s", flush=True)
+    print(f"speed-up: {seconds[1] / seconds[2]:.2f}")
+
+
+if __name__ == "__main__":
+    main()

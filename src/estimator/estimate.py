@@ -1,0 +1,210 @@
+"""The pipeline: from recordings of one payload to its estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from estimator.consistency import (
+    Trial,
+    balance_flags,
+    check_agreement,
+    check_rigid,
+    check_same_payload,
+    wrench_balance,
+)
+from estimator.errors import InputError
+from estimator.grasp_estimate import GraspEstimate
+from estimator.grasps import estimate_grasps
+from estimator.holds import Hold, find_holds
+from estimator.identifiability import StepReport
+from estimator.inertia import InertiaEstimate, estimate_inertia
+from estimator.joint import estimate_joint
+from estimator.payload_estimate import PayloadEstimate, RecordingEstimate
+from estimator.process import process_recording
+from estimator.recording import Recording
+from estimator.statics import ComEstimate, MassEstimate, estimate_com, estimate_mass
+from estimator.uncertainty import BLOCK_S
+
+Method = Literal["auto", "staged", "joint"]
+
+RESTING = 0.5
+"""A recording that rests for more than this share of its time does not serve the inertia, if another does."""
+
+
+def estimate_payload(
+    recordings: Sequence[Recording],
+    method: Method = "auto",
+    cutoff_hz: float = 5.0,
+    trim_s: float = 2.0,
+    block_s: float = BLOCK_S,
+) -> PayloadEstimate:
+    """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
+
+    Args:
+        recordings: one or several trials with the same robots and grasps.
+        method: ``"staged"``, the paper's sequence (grasps from motion; mass and centre of mass from static
+            holds; inertia from motion); ``"joint"``, one least squares for mass, centre of mass and inertia;
+            ``"auto"``, staged when the holds determine the centre of mass, else joint.
+        cutoff_hz: cut-off of the low-pass filter [Hz].
+        trim_s: time dropped at both ends of each recording [s].
+        block_s: length of the blocks for standard errors [s].
+
+    Raises:
+        InputError: the recordings do not belong together or contradict each other, the method needs what
+            they lack, or nothing can be estimated from them.
+    """
+    trials = [
+        Trial(r.name, r.metadata.trial, r.metadata.payload, process_recording(r, cutoff_hz, trim_s))
+        for r in recordings
+    ]
+    return estimate_from_trials(trials, method, block_s)
+
+
+def estimate_from_trials(
+    trials: Sequence[Trial], method: Method = "auto", block_s: float = BLOCK_S
+) -> PayloadEstimate:
+    """The same from processed data; see ``estimate_payload``."""
+    if method not in ("auto", "staged", "joint"):
+        raise InputError(f"method is {method!r}; it must be 'auto', 'staged' or 'joint'")
+    payload = check_same_payload(trials)
+    names = _distinct([trial.name for trial in trials])
+    trials = [replace(trial, name=name) for trial, name in zip(trials, names, strict=True)]
+    holds = [find_holds(trial.data) for trial in trials]
+    records = [
+        RecordingEstimate(t.name, t.kind, t.data.samples / t.data.rate_hz, len(h))
+        for t, h in zip(trials, holds, strict=True)
+    ]
+    flags: list[str] = []
+    grasps, steps = _grasps(trials, records, flags, block_s)
+
+    every_hold = [hold for found in holds for hold in found]
+    mass, com, com_step = _from_holds(every_hold, grasps, trials[0].data.gravity_mps2)
+    if method == "auto":
+        method = "joint" if com is None and grasps is not None else "staged"
+    inertia: InertiaEstimate | None = None
+    if method == "joint":
+        if grasps is None:
+            raise InputError(f"nothing can be estimated jointly: {_why(steps)}")
+        joint, joint_steps = estimate_joint([trial.data for trial in trials], grasps, block_s)
+        mass, com, inertia = joint.mass, joint.com, joint.inertia
+        steps += joint_steps
+    else:
+        if not every_hold:
+            raise InputError(
+                "method 'staged' needs static holds and the recordings have none; use 'joint' or 'auto'"
+            )
+        steps += [com_step] if com_step else []
+    moving = _moving(trials, holds)
+    if grasps is not None and com is not None:
+        upstream = com.own_covariance[1:, 1:], com.grasp_jacobian
+        if method == "staged":
+            data = [trials[k].data for k in moving]
+            inertia, step = estimate_inertia(data, grasps, com.p_1c, upstream, block_s)
+            steps.append(step)
+        for k in moving:
+            records[k] = replace(records[k], inertia=_alone(trials[k], grasps, com, method, block_s))
+        for k, trial in enumerate(trials):
+            force, moment = (
+                wrench_balance(trial.data, grasps, mass.mass, com.p_1c, inertia) if mass else (0, 0)
+            )
+            records[k] = replace(records[k], force_residual=force, moment_residual_m=moment)
+            flags += balance_flags(trial.name, force, moment, grasps)
+    if inertia is not None:
+        flags += _inertia_flags(inertia)
+    if mass is None and inertia is None and (grasps is None or grasps.robots == 1):
+        raise InputError(f"nothing can be estimated from these recordings: {_why(steps)}")
+    return PayloadEstimate(
+        payload=payload,
+        robots=trials[0].data.robots,
+        method=method,
+        grasps=grasps,
+        mass=mass,
+        p_1c=None if com is None else com.p_1c,
+        p_1c_covariance=None if com is None else com.covariance[1:, 1:],
+        inertia=inertia,
+        steps=tuple(steps),
+        recordings=tuple(records),
+        flags=tuple(flags),
+    )
+
+
+def _grasps(
+    trials: Sequence[Trial], records: list[RecordingEstimate], flags: list[str], block_s: float
+) -> tuple[GraspEstimate | None, list[StepReport]]:
+    """Grasps of every recording alone (into ``records``), checked against each other, and pooled."""
+    for k, trial in enumerate(trials):
+        alone, _ = estimate_grasps([trial.data], block_s)
+        records[k] = replace(records[k], grasps=alone)
+        if alone is not None:
+            flags += check_rigid(trial.name, alone)
+    found = [(record.name, record.grasps) for record in records if record.grasps is not None]
+    check_agreement([name for name, _ in found], [grasps for _, grasps in found])
+    pooled, steps = estimate_grasps([trial.data for trial in trials], block_s)
+    return pooled, list(steps)
+
+
+def _from_holds(
+    holds: Sequence[Hold], grasps: GraspEstimate | None, gravity_mps2: float
+) -> tuple[MassEstimate | None, ComEstimate | None, StepReport | None]:
+    if not holds:
+        return None, None, None
+    mass = estimate_mass(holds, gravity_mps2)
+    if grasps is None:
+        return mass, None, None
+    return mass, *estimate_com(holds, mass, grasps, gravity_mps2)
+
+
+def _moving(trials: Sequence[Trial], holds: Sequence[Sequence[Hold]]) -> list[int]:
+    rest = [sum(hold.end_s - hold.start_s for hold in found) for found in holds]
+    length = [float(trial.data.time[-1] - trial.data.time[0]) for trial in trials]
+    moving = [k for k in range(len(trials)) if rest[k] <= RESTING * length[k]]
+    return moving or list(range(len(trials)))
+
+
+def _alone(
+    trial: Trial, grasps: GraspEstimate, com: ComEstimate, method: str, block_s: float
+) -> InertiaEstimate | None:
+    if method == "joint":
+        return estimate_joint([trial.data], grasps, block_s)[0].inertia
+    upstream = com.own_covariance[1:, 1:], com.grasp_jacobian
+    return estimate_inertia([trial.data], grasps, com.p_1c, upstream, block_s)[0]
+
+
+def _inertia_flags(inertia: InertiaEstimate) -> list[str]:
+    flags = []
+    if inertia.projected:
+        flags.append("The least-squares inertia had a negative eigenvalue, which was replaced by zero.")
+    moments, se = inertia.principal.moments, inertia.principal.moments_se
+    excess, excess_se = moments[2] - moments[0] - moments[1], float(np.sqrt(np.sum(se**2)))
+    if excess > max(3 * excess_se, 0.02 * moments[2]):
+        flags.append("The largest principal moment exceeds the sum of the others: no real body has that.")
+    if inertia.principal.R_1c is None:
+        flags.append("Two principal moments are equal within their errors, so their axes are not determined.")
+    if inertia.residual_rms > 0.5 * inertia.moment_rms:
+        share = inertia.residual_rms / inertia.moment_rms
+        flags.append(
+            f"The moments follow the motion poorly (residual {100 * share:.0f} % of what is explained)."
+        )
+    return flags
+
+
+def _why(steps: Sequence[StepReport]) -> str:
+    weak = [str(weak) for step in steps for weak in step.weak]
+    if not weak:
+        return "there is no static hold and no motion"
+    more = f" (and {len(weak) - 1} more)" if len(weak) > 1 else ""
+    return weak[0] + more
+
+
+def _distinct(names: Sequence[str]) -> list[str]:
+    """Names with a running number where two recordings share one."""
+    seen: dict[str, int] = {}
+    out = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        out.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+    return out

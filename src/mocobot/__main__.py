@@ -1,0 +1,5 @@
+"""``python -m mocobot``."""
+
+from mocobot.cli import main
+
+main()

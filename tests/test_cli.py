@@ -1,0 +1,261 @@
+"""The command line as a user meets it: what it writes, what it says, and its exit code on bad input."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+
+from mocobot.cli import main
+
+Edit = Callable[[pa.Table], pa.Table]
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A short random trial, written by the command itself."""
+    path = tmp_path_factory.mktemp("cli") / "rec.parquet"
+    main(["simulate", "--payload", "b", "--vias", "8", "--seed", "3", "--out", str(path)])
+    return path
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    """Exit code, standard output, and standard error without the progress bar."""
+    try:
+        main(list(arguments))
+        code = 0
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    out, err = capsys.readouterr()
+    lines = [line for line in err.replace("\r", "\n").split("\n") if line.strip() and "it/s" not in line]
+    return code, out, "\n".join(line for line in lines if not line.startswith(("reading:", "simulating:")))
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    """The one sentence on standard error of a command that must exit with 2."""
+    code, out, err = run(capsys, *arguments)
+    assert code == 2, (out, err)
+    assert out == ""
+    assert err.startswith("mocobot: ")
+    assert "\n" not in err
+    assert "Traceback" not in err
+    return err
+
+
+def column(name: str, change: Callable[[np.ndarray], np.ndarray]) -> Edit:
+    """Edit one column."""
+
+    def edit(table: pa.Table) -> pa.Table:
+        values = pa.array(change(table.column(name).to_numpy().copy()))
+        return table.set_column(table.column_names.index(name), name, values)
+
+    return edit
+
+
+def columns(names: list[str], change: Callable[[np.ndarray], np.ndarray]) -> Edit:
+    """Edit several columns alike."""
+
+    def edit(table: pa.Table) -> pa.Table:
+        for name in names:
+            table = column(name, change)(table)
+        return table
+
+    return edit
+
+
+def exchange(pairs: list[tuple[str, str]]) -> Edit:
+    """Exchange the contents of columns."""
+
+    def edit(table: pa.Table) -> pa.Table:
+        names = list(table.column_names)
+        for a, b in pairs:
+            i, j = names.index(a), names.index(b)
+            names[i], names[j] = names[j], names[i]
+        return table.rename_columns(names).replace_schema_metadata(table.schema.metadata)
+
+    return edit
+
+
+def with_value(row: int, value: float) -> Callable[[np.ndarray], np.ndarray]:
+    def change(values: np.ndarray) -> np.ndarray:
+        values[row] = value
+        return values
+
+    return change
+
+
+THETA = [f"omnid{i}.theta_{axis}" for i in (1, 2, 3) for axis in "zyx"]
+PHI = [f"omnid{i}.phi{k}" for i in (1, 2, 3) for k in (1, 2, 3)]
+TAU = [f"omnid{i}.tau{k}" for i in (1, 2, 3) for k in (1, 2, 3)]
+
+
+@pytest.mark.parametrize(
+    ("edit", "words"),
+    [
+        (lambda t: t.drop_columns(["omnid2.tau1"]), ["missing column", "omnid2.tau1"]),
+        (column("omnid1.phi2", with_value(500, np.nan)), ["omnid1.phi2", "nan", "row 500"]),
+        (column("omnid3.tau2", with_value(7, np.inf)), ["omnid3.tau2", "inf", "row 7"]),
+        (column("time", with_value(300, 1.0)), ["time goes back", "row 300"]),
+        (lambda t: pa.concat_tables([t.slice(0, 200), t.slice(199)]), ["time repeats", "row 200"]),
+        (lambda t: pa.concat_tables([t.slice(0, 400), t.slice(450)]), ["gap", "row 400", "0.51 s"]),
+        (columns(PHI + THETA, np.rad2deg), ["degrees", "range"]),
+        (columns(THETA, lambda v: 10.0 * np.rad2deg(v)), ["omnid", "theta", "range"]),
+        (lambda t: t.slice(0, 0), ["no rows"]),
+        (lambda t: t.slice(0, 100), ["samples", "too few"]),
+        (lambda t: t.replace_schema_metadata({}), ["mocobot", "not a recording"]),
+        (
+            exchange([(f"omnid1.{c}", f"omnid2.{c}") for c in ("phi1", "phi2", "phi3")]),
+            ["robots 1 and 2", "rigid body"],
+        ),
+    ],
+)
+def test_bad_recording_is_refused(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], edit: Edit, words: list[str]
+) -> None:
+    bad, out = tmp_path / "bad.parquet", tmp_path / "est.json"
+    pq.write_table(edit(pq.read_table(recording)), bad)
+    message = refused(capsys, "estimate", str(bad), "--out", str(out))
+    for word in ["bad.parquet", *words]:
+        assert word in message
+    assert not out.exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["bad.parquet"]
+
+
+def test_files_that_are_no_recordings(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    truncated, text = tmp_path / "truncated.parquet", tmp_path / "text.parquet"
+    truncated.write_bytes(recording.read_bytes()[:5000])
+    text.write_text("time,omnid1.phi1\n0,0.6\n")
+    for path, words in (
+        (truncated, "damaged"),
+        (text, "not a readable Parquet file"),
+        (tmp_path / "missing.parquet", "no such file"),
+        (tmp_path, "directory"),
+    ):
+        message = refused(capsys, "estimate", str(path))
+        assert words in message
+        assert str(path) in message
+
+
+def test_exchanged_robots_in_one_of_two_recordings(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad = tmp_path / "swapped.parquet"
+    suffixes = [
+        name.split(".")[1] for name in pq.read_table(recording).column_names if name.startswith("omnid1.")
+    ]
+    pq.write_table(
+        exchange([(f"omnid1.{c}", f"omnid2.{c}") for c in suffixes])(pq.read_table(recording)), bad
+    )
+    message = refused(capsys, "estimate", str(recording), str(bad))
+    assert "disagree" in message
+    assert "robots 1 and 2" in message
+
+
+def test_torques_of_two_robots_exchanged_are_flagged(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bad = tmp_path / "tau.parquet"
+    pq.write_table(
+        exchange([(f"omnid2.tau{k}", f"omnid3.tau{k}") for k in (1, 2, 3)])(pq.read_table(recording)), bad
+    )
+    code, out, err = run(capsys, "estimate", str(bad))
+    assert (code == 0 and "[[Flags]]" in out and "moments" in out) or (code == 2 and "tau" in err)
+
+
+def test_no_motion_gives_no_number(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every channel frozen at its first value: a hold, so the mass is known, and nothing else."""
+    still, out = tmp_path / "still.parquet", tmp_path / "est.json"
+    pq.write_table(
+        columns(PHI + THETA + TAU, lambda v: np.full_like(v, v[0]))(pq.read_table(recording)), still
+    )
+    code, text, _ = run(capsys, "estimate", str(still), "--out", str(out))
+    estimate = json.loads(out.read_text())
+    assert code == 0
+    assert estimate["grasps"] is None
+    assert estimate["com"] is None
+    assert estimate["inertia"] is None
+    assert estimate["mass"]["m_kg"] == pytest.approx(11.672, rel=0.02)
+    assert len(estimate["undetermined"]) >= 6
+    assert "[[Not determined]]" in text
+
+
+def test_estimate_of_a_simulated_trial(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "est.json"
+    code, text, _ = run(capsys, "estimate", str(recording), "--out", str(out))
+    estimate = json.loads(out.read_text())
+    truth = json.loads(recording.with_suffix(".truth.json").read_text())
+    assert code == 0
+    assert estimate["method"] == "joint"
+    assert estimate["mass"]["m_kg"] == pytest.approx(truth["mass_kg"], rel=2e-3)
+    assert estimate["com"]["p_1c_m"] == pytest.approx(truth["p_1c_m"], abs=2e-3)
+    assert estimate["inertia"]["principal_kgm2"] == pytest.approx(truth["principal_inertia_kgm2"], rel=0.02)
+    assert "[[Mass and centre of mass" in text
+
+
+def test_same_seed_same_bytes(recording: Path, tmp_path: Path) -> None:
+    again, other = tmp_path / "again.parquet", tmp_path / "other.parquet"
+    for path, seed in ((again, "3"), (other, "4")):
+        main(["simulate", "--payload", "b", "--vias", "8", "--seed", seed, "--out", str(path)])
+    assert again.read_bytes() == recording.read_bytes()
+    assert other.read_bytes() != recording.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["simulate", "--payload", "z"], ["payload 'z'", "a, b, c, d"]),
+        (["simulate", "--preset", "best"], ["preset 'best'", "ideal, nominal, uncalibrated"]),
+        (["simulate", "--vias", "0"], ["vias is 0"]),
+        (["simulate", "--trajectory", "periodic", "--duration", "1"], ["duration is 1"]),
+        (["simulate", "--seed", "-1"], ["seed is -1"]),
+    ],
+)
+def test_simulate_refuses(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], words: list[str]
+) -> None:
+    message = refused(capsys, *arguments, "--out", str(tmp_path / "rec.parquet"))
+    for word in words:
+        assert word in message
+    assert not list(tmp_path.iterdir())
+
+
+def test_simulate_refuses_bad_targets(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert ".parquet" in refused(capsys, "simulate", "--out", str(tmp_path / "rec.csv"))
+    assert "no such folder" in refused(capsys, "simulate", "--out", str(tmp_path / "none" / "rec.parquet"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--payload", "a", "x"], ["payload 'x'"]),
+        (["--preset", "perfect"], ["preset 'perfect'"]),
+        (["--trials", "0"], ["trials is 0"]),
+        (["--jobs", "0"], ["jobs is 0"]),
+        (["--recordings"], ["--out"]),
+    ],
+)
+def test_paper_refuses(capsys: pytest.CaptureFixture[str], arguments: list[str], words: list[str]) -> None:
+    message = refused(capsys, "paper", *arguments)
+    for word in words:
+        assert word in message
+
+
+def test_help_of_the_installed_command() -> None:
+    for arguments in ([], ["paper"], ["estimate"], ["simulate"]):
+        command = [sys.executable, "-m", "mocobot", *arguments, "--help"]
+        done = subprocess.run(command, capture_output=True, text=True, check=True)
+        assert "usage: mocobot" in done.stdout
+        assert done.stderr == ""

@@ -1,0 +1,153 @@
+"""Claimed standard errors against the scatter of repeated experiments, with coloured noise."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from estimator.grasps import estimate_grasps
+from estimator.holds import find_holds
+from estimator.inertia import estimate_inertia
+from estimator.joint import estimate_joint
+from estimator.so3 import log, rotvec_covariance
+from estimator.statics import estimate_com, estimate_mass
+from estimator.uncertainty import (
+    block_covariance,
+    block_normals,
+    block_slices,
+    norm_se,
+    numerical_jacobian,
+)
+from rigid_body_data import GRAVITY, RATE, low_passed_noise, make_body, moving, still
+
+
+def test_blocks_cover_every_sample_once():
+    for samples, rate in ((6000, 100.0), (6001, 100.0), (700, 100.0), (5, 100.0), (1, 100.0)):
+        slices = block_slices(samples, rate)
+        assert slices[0].start == 0
+        assert slices[-1].stop == samples
+        assert all(a.stop == b.start for a, b in pairwise(slices))
+        assert all(part.stop > part.start for part in slices)
+    assert len(block_slices(6000, 100.0)) == 30
+    assert len(block_slices(700, 100.0)) == 12
+
+
+def test_mean_of_independent_numbers_by_hand():
+    """One parameter, one sample per block: the variance is that of a mean, s^2 / n with s^2 over n - 1."""
+    x = np.array([1.0, 4.0, 2.0, 7.0, 6.0])
+    J, r = np.ones((5, 1, 1)), (x - x.mean())[:, None]
+    covariance = block_covariance(*block_normals(J, r, [slice(k, k + 1) for k in range(5)]))
+    assert covariance[0, 0] == pytest.approx(np.var(x, ddof=1) / 5)
+
+
+def regression(rng, colour):
+    """A line through coloured noise; returns the fit, its block covariance and the textbook one."""
+    Q = 2000
+    t = np.arange(Q) / RATE
+    X = np.stack([np.ones(Q), np.sin(0.7 * t), t / 20], axis=1)
+    noise = low_passed_noise(rng, (Q, 1), 1.0)[:, 0] if colour else rng.normal(size=Q)
+    theta, *_ = np.linalg.lstsq(X, noise, rcond=None)
+    r = noise - X @ theta
+    blocks = block_covariance(*block_normals(X[:, None], r[:, None], block_slices(Q, RATE)))
+    textbook = np.linalg.inv(X.T @ X) * (r @ r) / (Q - 3)
+    return theta, np.diag(blocks), np.diag(textbook)
+
+
+@pytest.mark.parametrize("colour", [False, True], ids=["white", "5Hz"])
+def test_block_covariance_of_a_line_with_few_blocks(colour):
+    rng = np.random.default_rng(0)
+    runs = [regression(rng, colour) for _ in range(500)]
+    scatter = np.std([run[0] for run in runs], axis=0)
+    claimed = np.sqrt(np.mean([run[1] for run in runs], axis=0))
+    textbook = np.sqrt(np.mean([run[2] for run in runs], axis=0))
+    assert np.all(np.abs(claimed / scatter - 1) < 0.15)
+    if colour:  # why the textbook formula will not do
+        assert np.all(textbook / scatter < 0.5)
+
+
+def test_numerical_jacobian():
+    A = np.arange(6.0).reshape(2, 3)
+    J = numerical_jacobian(lambda x: A @ x + (x @ x) * np.ones(2), np.array([1.0, -2.0, 0.5]))
+    np.testing.assert_allclose(J, A + 2 * np.array([1.0, -2.0, 0.5]), atol=1e-8)
+    assert numerical_jacobian(lambda x: A[0], np.zeros(0)).shape == (3, 0)
+
+
+def test_standard_error_of_a_length():
+    covariance = np.diag([0.01, 0.04, 0.09])
+    assert norm_se(np.array([0.0, 5.0, 0.0]), covariance) == pytest.approx(0.2)
+    assert norm_se(np.array([3.0, 4.0, 0.0]), covariance) == pytest.approx(np.sqrt(0.36 * 0.01 + 0.64 * 0.04))
+    assert norm_se(np.zeros(3), covariance) > 0
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-8, 0.3, 2.0, 3.0])
+def test_covariance_of_a_rotation_vector(angle):
+    from scipy.spatial.transform import Rotation
+
+    R = Rotation.from_rotvec(angle * np.array([0.6, 0.0, 0.8]))
+    rng = np.random.default_rng(1)
+    root = rng.normal(0, 0.005, (3, 3))
+    samples = (Rotation.from_rotvec(rng.normal(size=(20000, 3)) @ root.T) * R).as_matrix()
+    claimed = np.sqrt(np.diag(rotvec_covariance(R.as_matrix(), root @ root.T)))
+    np.testing.assert_allclose(np.std(log(samples), axis=0), claimed, rtol=0.05)
+
+
+def noisy(data, rng, angular, linear, force):
+    """A copy with low-passed noise in rates, velocities and wrenches, as filtered sensors have."""
+    Q, N = data.samples, data.robots
+    e = low_passed_noise(rng, (Q, N, 6), 1.0) * np.repeat([angular, linear], 3)
+    f = low_passed_noise(rng, (Q, N, 6), force) * np.repeat([0.2, 1.0], 3)
+    return replace(
+        data,
+        twist=data.twist + e,
+        twist_dot=data.twist_dot + np.gradient(e, 1 / data.rate_hz, axis=0),
+        wrench=data.wrench + f,
+    )
+
+
+def summary(grasps, mass, com, inertia):
+    """Everything reported, with its claimed standard error."""
+    values, errors = [mass.mass, *com.p_1c], [mass.se, *np.sqrt(np.diag(com.covariance)[1:])]
+    for i, j in ((1, 2), (2, 3), (3, 1)):
+        pair = grasps.pair(i, j)
+        values += [*pair.axis_angle_rad, *pair.p_ij, np.linalg.norm(pair.p_ij)]
+        errors += [*pair.axis_angle_se_rad, *pair.p_se_m, pair.distance_se_m]
+    values += [np.linalg.norm(com.p_1c)]
+    errors += [norm_se(com.p_1c, com.covariance[1:, 1:])]
+    order = ([0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2])
+    values += [*inertia.inertia[order], *inertia.principal.moments, *inertia.principal.axis_angle_rad]
+    errors += [*np.sqrt(np.diag(inertia.covariance)), *inertia.principal.moments_se]
+    errors += [*inertia.principal.axis_angle_se_rad]
+    return values, errors
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("dominant", ["encoders", "torques"])
+def test_every_standard_error_against_the_scatter(dominant):
+    """The whole chain, staged and joint, 150 repetitions: claimed within a quarter of the scatter.
+
+    Noise of the rates, or of the forces, dominates in turn, so that no part of the propagation can hide.
+    """
+    body = make_body(3)
+    motion = moving(body, 24)
+    holds = still(body, [(0, 0), (0.08, 0), (-0.08, 0), (0, 0.08), (0, -0.08)], seconds=7.5, travel=1.5)
+    noise = (4e-3, 1e-3, 0.02) if dominant == "encoders" else (5e-4, 1e-4, 0.2)
+    runs = {"staged": [], "joint": []}
+    for seed in range(150):
+        rng = np.random.default_rng(seed)
+        trial = noisy(motion, rng, *noise)
+        grasps, _ = estimate_grasps([trial])
+        found = find_holds(noisy(holds, rng, *noise))
+        assert len(found) == 5
+        mass = estimate_mass(found, GRAVITY)
+        com, _ = estimate_com(found, mass, grasps, GRAVITY)
+        upstream = com.own_covariance[1:, 1:], com.grasp_jacobian
+        inertia, _ = estimate_inertia([trial], grasps, com.p_1c, upstream)
+        runs["staged"].append(summary(grasps, mass, com, inertia))
+        joint, _ = estimate_joint([trial], grasps)
+        runs["joint"].append(summary(grasps, joint.mass, joint.com, joint.inertia))
+    for method, results in runs.items():
+        values, errors = np.array(results).transpose(1, 0, 2)
+        ratio = np.sqrt(np.mean(errors**2, axis=0)) / np.std(values, axis=0, ddof=1)
+        assert ratio.shape == (38,)
+        assert np.all(np.abs(ratio - 1) < 0.25), (method, np.round(ratio, 2))
