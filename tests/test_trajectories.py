@@ -234,3 +234,9 @@ def test_six_distinct_still_orientations(shipped, name):
 def test_bad_arguments_are_named(shipped, make, sentence):
     with pytest.raises(InputError, match=sentence):
         make(shipped["a"].wrist_home_b, shipped["a"].X_1i)
+
+
+@pytest.mark.parametrize("motion", [sphere_motion, static_orientations])
+def test_one_robot_cannot_turn_a_payload_about_a_point(motion, teams):
+    with pytest.raises(InputError, match="two or more"):
+        motion(teams[1].wrist_home_b, teams[1].X_1i)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from closed_loop import ClosedLoop, base_poses
 from estimator.errors import InputError
 from mocobot_sim import trial as trial_module
-from mocobot_sim.as_built import AsBuilt, CalibrationSpread
+from mocobot_sim.as_built import CalibrationSpread
 from mocobot_sim.control import ControlGains, wrist
 from mocobot_sim.models import omnid_design
 from mocobot_sim.scene import TeamScene, build_team
@@ -324,11 +324,6 @@ def test_commands_for_another_team_are_refused(team_a, teams):
         run_trial(team_a, _still(teams[2]))
 
 
-def test_wrong_number_of_units_is_refused(team_a):
-    with pytest.raises(InputError, match="as_built has 2 units; the payload has 3 grasps"):
-        run_trial(team_a, _still(team_a), as_built=[AsBuilt()] * 2)
-
-
 @pytest.mark.parametrize(
     ("rate_hz", "timestep_s", "sentence"),
     [
@@ -412,7 +407,7 @@ def test_eighty_vias_with_the_heaviest_share():
 def test_uncalibrated_units_run_too(seed):
     units = CalibrationSpread(np.deg2rad(1.0), 0.02, 1e-3, 0.02).draw(3, np.random.default_rng(seed))
     scene = build_team("b", units)
-    log = run_trial(scene, _paper_trial(scene, "random", seed), as_built=units)
+    log = run_trial(scene, _paper_trial(scene, "random", seed))
     assert log.rod_error_m < 0.5 * 0.02e-3
     assert log.weld_error_m < 0.6 * 0.01e-3
     drift = np.linalg.norm(_wrists_from_phi(log.phi[0]) - _wrists_from_phi(log.phi[-1]), axis=-1)

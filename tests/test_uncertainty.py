@@ -1,7 +1,6 @@
 """Claimed standard errors against the scatter of repeated experiments, with coloured noise."""
 
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -13,57 +12,59 @@ from estimator.joint import estimate_joint
 from estimator.so3 import log, rotvec_covariance
 from estimator.statics import estimate_com, estimate_mass
 from estimator.uncertainty import (
-    block_covariance,
-    block_normals,
-    block_slices,
     norm_se,
     numerical_jacobian,
+    window_covariance,
+    window_normals,
+    windows,
 )
 from rigid_body_data import GRAVITY, RATE, low_passed_noise, make_body, moving, still
 
 
-def test_blocks_cover_every_sample_once():
-    for samples, rate in ((6000, 100.0), (6001, 100.0), (700, 100.0), (5, 100.0), (1, 100.0)):
-        slices = block_slices(samples, rate)
-        assert slices[0].start == 0
-        assert slices[-1].stop == samples
-        assert all(a.stop == b.start for a, b in pairwise(slices))
-        assert all(part.stop > part.start for part in slices)
-    assert len(block_slices(6000, 100.0)) == 30
-    assert len(block_slices(700, 100.0)) == 12
+@pytest.mark.parametrize(("samples", "window_s"), [(6000, 4.0), (6001, 3.3), (700, 4.0), (5, 4.0), (1, 4.0)])
+def test_windows_weigh_every_sample_alike(samples, window_s):
+    total, squares = np.zeros(samples), np.zeros(samples)
+    for window in windows(samples, 100.0, window_s, first=0):
+        total[window.part] += window.weights
+        squares[window.part] += window.weights**2
+    np.testing.assert_allclose(total, 2.0)
+    np.testing.assert_allclose(squares, 1.5)
+    shifted = windows(samples, 100.0, window_s, first=10)
+    assert min(window.part.start for window in shifted) == 10
+    assert max(window.part.stop for window in shifted) == samples + 10
 
 
-def test_mean_of_independent_numbers_by_hand():
-    """One parameter, one sample per block: the variance is that of a mean, s^2 / n with s^2 over n - 1."""
-    x = np.array([1.0, 4.0, 2.0, 7.0, 6.0])
-    J, r = np.ones((5, 1, 1)), (x - x.mean())[:, None]
-    covariance = block_covariance(*block_normals(J, r, [slice(k, k + 1) for k in range(5)]))
-    assert covariance[0, 0] == pytest.approx(np.var(x, ddof=1) / 5)
+def coloured(rng, colour, Q):
+    if colour == "white":
+        return rng.normal(size=Q)
+    noise = low_passed_noise(rng, (Q, 1), 1.0)[:, 0]
+    return np.gradient(noise, 1 / RATE) if colour == "blue" else noise
 
 
 def regression(rng, colour):
-    """A line through coloured noise; returns the fit, its block covariance and the textbook one."""
+    """A fit to coloured noise alone; returns it, our covariance and the textbook one."""
     Q = 2000
     t = np.arange(Q) / RATE
-    X = np.stack([np.ones(Q), np.sin(0.7 * t), t / 20], axis=1)
-    noise = low_passed_noise(rng, (Q, 1), 1.0)[:, 0] if colour else rng.normal(size=Q)
+    X = np.stack([np.sin(3.0 * t), np.cos(2.2 * t), np.sin(4.1 * t + 1)], axis=1)
+    noise = coloured(rng, colour, Q)
     theta, *_ = np.linalg.lstsq(X, noise, rcond=None)
     r = noise - X @ theta
-    blocks = block_covariance(*block_normals(X[:, None], r[:, None], block_slices(Q, RATE)))
+    ours = window_covariance(*window_normals(X[:, None], r[:, None], windows(Q, RATE)))
     textbook = np.linalg.inv(X.T @ X) * (r @ r) / (Q - 3)
-    return theta, np.diag(blocks), np.diag(textbook)
+    return theta, np.diag(ours), np.diag(textbook)
 
 
-@pytest.mark.parametrize("colour", [False, True], ids=["white", "5Hz"])
-def test_block_covariance_of_a_line_with_few_blocks(colour):
+@pytest.mark.parametrize("colour", ["white", "5 Hz", "blue"])
+def test_covariance_of_a_short_fit_with_coloured_noise(colour):
     rng = np.random.default_rng(0)
     runs = [regression(rng, colour) for _ in range(500)]
     scatter = np.std([run[0] for run in runs], axis=0)
     claimed = np.sqrt(np.mean([run[1] for run in runs], axis=0))
     textbook = np.sqrt(np.mean([run[2] for run in runs], axis=0))
     assert np.all(np.abs(claimed / scatter - 1) < 0.15)
-    if colour:  # why the textbook formula will not do
-        assert np.all(textbook / scatter < 0.5)
+    wrong = textbook / scatter
+    expected = {"white": (0.9, 1.1), "5 Hz": (0.2, 0.5), "blue": (1.1, 5.0)}[colour]
+    assert np.all((expected[0] < wrong) & (wrong < expected[1]))  # why the textbook formula will not do
 
 
 def test_numerical_jacobian():
@@ -131,7 +132,7 @@ def test_every_standard_error_against_the_scatter(dominant):
     body = make_body(3)
     motion = moving(body, 24)
     holds = still(body, [(0, 0), (0.08, 0), (-0.08, 0), (0, 0.08), (0, -0.08)], seconds=7.5, travel=1.5)
-    noise = (4e-3, 1e-3, 0.02) if dominant == "encoders" else (5e-4, 1e-4, 0.2)
+    noise = (1e-3, 2.5e-4, 0.005) if dominant == "encoders" else (2e-4, 5e-5, 0.1)
     runs = {"staged": [], "joint": []}
     for seed in range(150):
         rng = np.random.default_rng(seed)

@@ -110,7 +110,7 @@ class Simulate:
         with bar(None, "simulating", "sample") as advance:
             done = simulate(request, [sensor_preset(self.preset)], progress=advance)
         write_recording(done.recordings[self.preset], self.out)
-        write_truth(done.truth, self.out, done.as_built)
+        write_truth(done.truth, self.out)
         print(f"{self.out}: {done.log.time[-1]:.1f} s of {self.trajectory} motion, {self.preset} sensors")
 
 

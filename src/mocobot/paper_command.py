@@ -75,10 +75,9 @@ def _write(folder: Path, plan: PaperPlan, result: PaperResult, tables: str) -> N
 
 def _write_recordings(folder: Path, plan: PaperPlan, result: PaperResult) -> None:
     for payload in plan.payloads:
-        truth = GroundTruth.of(build_team(payload))
         for preset in plan.presets:
-            units = draw_units(payload, sensor_preset(preset), plan.seed)
+            truth = GroundTruth.of(build_team(payload, draw_units(payload, sensor_preset(preset), plan.seed)))
             for recording in result.recordings[preset][payload]:
                 path = folder / f"{recording.name}.parquet"
                 write_recording(recording, path)
-                write_truth(truth, path, units)
+                write_truth(truth, path)

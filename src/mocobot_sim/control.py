@@ -237,10 +237,8 @@ def wrist(phi, reach, proximal, rod):
         half * (aa * bn[1] + bb * na[1]),
         half * (aa * bn[2] + bb * na[2]),
     )
-    # Out of reach there is no root; the trial's range checks report such a state.
+    # The normal points up for every phi in range. Out of reach there is no root; the trial's checks report it.
     rise = np.sqrt(max(rod * rod - _dot(centre, centre), 1e-8) / nn)
-    if n[2] < 0.0:
-        rise = -rise
     h = (
         c0[0] + centre[0] + rise * n[0],
         c0[1] + centre[1] + rise * n[1],

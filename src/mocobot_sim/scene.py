@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,28 +9,19 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 from estimator.errors import InputError
 from mocobot_sim.as_built import AsBuilt, units_of
-from mocobot_sim.models import models_dir, omnid_design, payload_path
-
-# dm_control loads a renderer when imported and warns or fails without a display; composing needs none.
-_renderer = os.environ.get("MUJOCO_GL")
-os.environ["MUJOCO_GL"] = "disabled"
-try:
-    from dm_control import mjcf
-finally:
-    del os.environ["MUJOCO_GL"]
-    if _renderer is not None:
-        os.environ["MUJOCO_GL"] = _renderer
+from mocobot_sim.models import models_dir, omnid_design
+from mocobot_sim.payload import grasp_frames, load_payload
+from mocobot_sim.pymjcf import mjcf
 
 Array = NDArray[np.float64]
 
 TIMESTEP_S = 0.001
 STIFF = {"solref": [0.004, 1.0], "solimp": [0.9999, 0.9999, 0.001, 0.5, 2.0]}
 BASE_JOINTS = ("base_x", "base_y", "base_yaw")
-OWN_COMPILER_SETTINGS = ("angle", "autolimits", "eulerseq", "assetdir", "meshdir", "texturedir")
 WHEELS = ("wheel_front_left", "wheel_front_right", "wheel_rear_left", "wheel_rear_right")
 
 
@@ -45,6 +35,7 @@ class TeamScene:
         wrist_home_b: wrist position of every robot in its own {b} at home [m], shape (N, 3).
         theta_home: gimbal angles (z, y, x) at home [rad], shape (N, 3).
         X_1i: grasp frames in {1}, N transforms.
+        units: how each robot deviates from the design, N entries.
     """
 
     root: mjcf.RootElement
@@ -52,6 +43,7 @@ class TeamScene:
     wrist_home_b: Array
     theta_home: Array
     X_1i: RigidTransform
+    units: tuple[AsBuilt, ...]
 
     def to_xml(self) -> str:
         """The scene as one MJCF document that loads in plain MuJoCo."""
@@ -80,8 +72,8 @@ def build_team(
     Raises:
         InputError: the payload cannot be read, has no grasps, or ``as_built`` does not match their number.
     """
-    payload_root = _load_payload(payload)
-    X_1i = _grasps(payload_root, str(payload))
+    payload_root = load_payload(payload)
+    X_1i = grasp_frames(payload_root, str(payload))
     robots = len(X_1i)
     units = units_of(as_built, robots)
 
@@ -96,8 +88,7 @@ def build_team(
     for i in range(robots):
         omnid = mjcf.from_path(str(models_dir() / "omnid" / "omnid.xml"))
         omnid.model = f"omnid{i + 1}"
-        if as_built:
-            _deviate(omnid, units[i])
+        _deviate(omnid, units[i])
         _park(omnid)
         yaw = theta_home[i, 0]
         mount = root.worldbody.add(
@@ -119,71 +110,7 @@ def build_team(
             )  # fmt: skip
     theta_home = theta_home.copy()
     theta_home[:, 0] = 0.0
-    return TeamScene(root, robots, wrist_home_b, theta_home, X_1i)
-
-
-def _load_payload(payload: str | Path) -> mjcf.RootElement:
-    path = Path(payload) if Path(payload).suffix == ".xml" else payload_path(str(payload))
-    try:
-        root = mjcf.from_path(str(path))
-    except (OSError, ValueError, AttributeError, KeyError, SyntaxError) as error:
-        raise InputError(f"{path}: not a readable MJCF ({error})") from error
-    if root.compiler.angle != "radian":
-        # The composed scene has one compiler setting for all parts; degrees here would be read as radians.
-        raise InputError(f'{path}: compiler angle is {root.compiler.angle or "degree"}; it must be "radian"')
-    own = set(root.compiler.get_attributes()) - set(OWN_COMPILER_SETTINGS)
-    if own:
-        raise InputError(
-            f"{path}: compiler setting {min(own)!r} would act on the robots too; "
-            f"the payload may set {', '.join(OWN_COMPILER_SETTINGS)}"
-        )
-    root.model = "payload"
-    return root
-
-
-def _grasps(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
-    """Grasp frames X_1i, from the compiled payload so that every MJCF orientation attribute works."""
-    try:
-        model = mujoco.MjModel.from_xml_string(payload_root.to_xml_string(), payload_root.get_assets())
-    except ValueError as error:
-        raise InputError(
-            f"{where}: MuJoCo cannot compile the payload ({' '.join(str(error).split())})"
-        ) from error
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
-    numbers = sorted(
-        int(n) for i in range(model.nsite) if (n := model.site(i).name.removeprefix("grasp")).isdecimal()
-    )
-    if not numbers or numbers != list(range(1, len(numbers) + 1)):
-        missing = next(n for n in range(1, len(numbers) + 2) if n not in numbers)
-        raise InputError(f"{where}: the payload has no site 'grasp{missing}'; it needs grasp1 .. graspN")
-    ids = [model.site(f"grasp{n}").id for n in numbers]
-    _check_rigid(model, where)
-    if (
-        np.abs(data.site_xpos[ids[0]]).max() > 1e-9
-        or np.abs(data.site_xmat[ids[0]] - np.eye(3).ravel()).max() > 1e-9
-    ):
-        raise InputError(
-            f"{where}: site 'grasp1' must be at the origin of body 'payload', and that at the world's"
-        )
-    X_Wi = RigidTransform.from_components(
-        data.site_xpos[ids], Rotation.from_matrix(data.site_xmat[ids].reshape(-1, 3, 3))
-    )
-    return X_Wi[0].inv() * X_Wi
-
-
-def _check_rigid(model: mujoco.MjModel, where: str) -> None:
-    """The payload is one rigid body ``payload`` with all the mass: the ground truth is read from it."""
-    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "payload")
-    if body < 0:
-        raise InputError(f"{where}: the payload has no body 'payload'")
-    if model.njnt:
-        raise InputError(f"{where}: the payload has joints, {model.njnt} of them; it must be rigid")
-    if not model.body_mass[body] > 0 or model.body_mass.sum() != model.body_mass[body]:
-        raise InputError(
-            f"{where}: body 'payload' weighs {model.body_mass[body]:g} kg of {model.body_mass.sum():g} kg; "
-            "it must carry all the mass, and some"
-        )
+    return TeamScene(root, robots, wrist_home_b, theta_home, X_1i, units)
 
 
 def _park(omnid: mjcf.RootElement) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 from estimator.errors import InputError
 from estimator.recording import Recording
 from estimator.recording_metadata import RecordingMetadata
-from mocobot_sim.as_built import AsBuilt, CalibrationSpread, units_of
+from mocobot_sim.as_built import CalibrationSpread
 from mocobot_sim.models import omnid_design
 from mocobot_sim.trajectories import RATE_HZ
 from mocobot_sim.trial import TrialLog
@@ -79,7 +78,6 @@ def measure(
     log: TrialLog,
     preset: SensorPreset,
     rng: np.random.Generator,
-    as_built: Sequence[AsBuilt] = (),
     payload: str | None = None,
     seed: int | None = None,
     name: str = "simulated",
@@ -92,15 +90,12 @@ def measure(
         log: the trial.
         preset: quality of the sensors.
         rng: source of the noise.
-        as_built: the units' zeros and stiffness; empty for units as designed.
         payload: name of the payload, for the metadata.
         seed: seed, for the metadata.
         name: how messages call the recording.
 
-    Raises:
-        InputError: ``as_built`` does not match the number of robots.
     """
-    units = units_of(as_built, log.robots)
+    units = log.units
     phi = log.phi + np.array([unit.phi_zero_rad for unit in units])
     theta = log.theta + np.array([unit.theta_zero_rad for unit in units])
     stiffness_ratio = np.array([unit.stiffness_ratio for unit in units])

@@ -60,14 +60,12 @@ class Simulated:
     Attributes:
         recordings: one per sensor preset.
         log: what truly happened.
-        truth: the payload.
-        as_built: the units' deviations; empty for units as designed.
+        truth: the payload and the robots.
     """
 
     recordings: dict[str, Recording]
     log: TrialLog
     truth: GroundTruth
-    as_built: tuple[AsBuilt, ...]
 
 
 def simulate(
@@ -100,23 +98,21 @@ def simulate(
         raise InputError("presets of one trial must share their calibration spread")
     if request.seed < 0:
         raise InputError(f"seed is {request.seed}; it must be at least 0")
-    as_built = draw_units(request.payload, presets[0], request.seed)
-    scene = build_team(request.payload, as_built)
+    scene = build_team(request.payload, draw_units(request.payload, presets[0], request.seed))
     trajectory = make_trajectory(request, scene, grasps)
-    log = run_trial(scene, trajectory, gains, as_built, progress)
+    log = run_trial(scene, trajectory, gains, progress)
     recordings = {
         preset.name: measure(
             log,
             preset,
             request.rng(f"sensors {preset.name}"),
-            as_built,
             payload=request.label,
             seed=request.seed,
             name=f"{request.label}_{request.trial}{request.number}_{preset.name}",
         )
         for preset in presets
     }
-    return Simulated(recordings, log, GroundTruth.of(scene), as_built)
+    return Simulated(recordings, log, GroundTruth.of(scene))
 
 
 def draw_units(payload: str, preset: SensorPreset, seed: int) -> tuple[AsBuilt, ...]:

@@ -97,13 +97,13 @@ def sphere_motion(
     X_1i: RigidTransform,
     duration_s: float = 60.0,
     rng: np.random.Generator | None = None,
-    amplitude_rad: float = np.deg2rad(4.4),
+    amplitude_rad: float = np.deg2rad(3.4),
     frequency_hz: Sequence[float] = (0.7, 0.85, 0.6),
 ) -> Trajectory:
     """Periodic motion of all wrists on the sphere whose great circle runs through the grasps (section IV.C.3).
 
-    The payload turns about the centre of the circle through the grasps (their centroid where three grasps do not
-    define one), each axis at its own frequency, so every wrist stays on a common sphere.
+    The payload turns about the centre of the circle through three grasps, each axis at its own frequency, so every
+    wrist stays on that sphere. Other than three grasps need not lie on one circle: they turn about their centroid.
 
     Args:
         wrist_home_b: home wrist positions [m], shape (N, 3).
@@ -114,7 +114,7 @@ def sphere_motion(
         frequency_hz: frequency of each component [Hz].
 
     Raises:
-        InputError: the motion is shorter than its ramps, or endless.
+        InputError: the motion is shorter than its ramps, or endless, or there is one robot only.
     """
     ramp = 2.0
     if not 2.0 * ramp <= duration_s < np.inf:
@@ -146,7 +146,7 @@ def static_orientations(
         hold_s: time at each hold, settling included [s].
 
     Raises:
-        InputError: fewer than one orientation.
+        InputError: fewer than one orientation, or one robot only.
     """
     if orientations < 1:
         raise InputError(f"orientations is {orientations}; it must be at least 1")
@@ -166,6 +166,10 @@ def static_orientations(
 
 def _turn_about(wrist_home_b: Array, X_1i: RigidTransform, centre: Array, rotation: Array) -> Array:
     """Wrist positions in {b} when the payload turns by rotation vectors (Q, 3), given in {1} at home, about centre."""
+    if len(X_1i) < 2:
+        raise InputError(
+            "one robot cannot turn a payload about a point: periodic and static trials need two or more"
+        )
     turn = Rotation.from_rotvec(rotation)
     refs = []
     for home, X in zip(np.asarray(wrist_home_b), X_1i, strict=True):
@@ -177,8 +181,8 @@ def _turn_about(wrist_home_b: Array, X_1i: RigidTransform, centre: Array, rotati
 
 
 def _circumcentre(p: Array) -> Array:
-    """Centre of the circle through the first three points; their centroid if they are fewer or collinear."""
-    if len(p) >= 3:
+    """Centre of the circle through three points; the centroid of other than three, or of collinear ones."""
+    if len(p) == 3:
         a, b = p[1] - p[0], p[2] - p[0]
         n = np.cross(a, b)
         if np.linalg.norm(n) > 1e-3 * np.linalg.norm(a) * np.linalg.norm(b):

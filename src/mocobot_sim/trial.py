@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import mujoco
@@ -49,6 +49,7 @@ class TrialLog:
         R_W1: orientation of {1} (the payload) in the world, shape (Q, 3, 3).
         feed_forward: the controller's frozen load force in {b} [N], shape (N, 3).
         gains: control gains.
+        units: how each robot deviates from the design, N entries.
         rod_error_m: largest distance between a rod's tip and its platform joint [m].
         weld_error_m: largest distance between a flange and its grasp [m].
         weld_error_rad: largest angle between a flange and its grasp [rad].
@@ -64,6 +65,7 @@ class TrialLog:
     R_W1: Array
     feed_forward: Array
     gains: ControlGains
+    units: tuple[AsBuilt, ...]
     rod_error_m: float
     weld_error_m: float
     weld_error_rad: float
@@ -82,23 +84,21 @@ def run_trial(
     scene: TeamScene,
     trajectory: Trajectory,
     gains: ControlGains | None = None,
-    as_built: Sequence[AsBuilt] = (),
     progress: Callable[[int], object] | None = None,
 ) -> TrialLog:
     """Simulate one trial in closed loop.
 
     Args:
-        scene: the team; build it with the same ``as_built``.
+        scene: the team; its controllers misread what ``scene.units`` says.
         trajectory: commands.
         gains: control gains; None for the defaults.
-        as_built: what each unit's controller misreads; empty for robots as designed.
         progress: called with the number of samples done since the last call.
 
     Raises:
         TrialError: a constraint opens too far, a value is not finite, MuJoCo warns, or a joint or spring
             leaves its range.
         InputError: the team cannot be assembled, the trajectory is for another number of robots or leaves
-            the workspace, ``as_built`` does not match the robots, or the control rate does not divide into
+            the workspace, or the control rate does not divide into
             whole steps.
     """
     _check_commands(scene, trajectory)
@@ -108,7 +108,7 @@ def run_trial(
     index = TeamIndex.of(model)
     design = omnid_design()
     assemble_at_home(scene, model, data, index)
-    controller = TeamController(index, design, gains, data, as_built)
+    controller = TeamController(index, design, gains, data, scene.units)
     log = _Buffers(model, data, index, len(trajectory.ref_b))
 
     ticks = _whole("control rate over recording rate", gains.rate_hz / RATE_HZ)
@@ -133,7 +133,7 @@ def run_trial(
             if progress:
                 progress(sample + 1 - reported)
             reported = sample + 1
-    return log.finish(trajectory, controller, gains)
+    return log.finish(trajectory, controller.feed_forward, gains, scene.units)
 
 
 def _whole(name: str, ratio: float) -> int:
@@ -239,7 +239,9 @@ class _Buffers:
         _limit("weld error", weld[:, :, None], 0.0, WELD_LIMIT_M, "m", when)
         _limit("weld angle", angle[:, :, None], 0.0, WELD_LIMIT_RAD, "rad", when)
 
-    def finish(self, trajectory: Trajectory, controller: TeamController, gains: ControlGains) -> TrialLog:
+    def finish(
+        self, trajectory: Trajectory, feed_forward: Array, gains: ControlGains, units: tuple[AsBuilt, ...]
+    ) -> TrialLog:
         rows = slice(None)
         rod, weld, angle = self.errors(rows)
         return TrialLog(
@@ -251,8 +253,9 @@ class _Buffers:
             ref_b=trajectory.ref_b,
             p_W1=self.site_xpos[:, 0].copy(),
             R_W1=self.site_xmat[:, 0].reshape(-1, 3, 3).copy(),
-            feed_forward=controller.feed_forward.copy(),
+            feed_forward=feed_forward,
             gains=gains,
+            units=units,
             rod_error_m=float(rod.max()),
             weld_error_m=float(weld.max()),
             weld_error_rad=float(angle.max()),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class GroundTruth:
-    """The payload as MuJoCo simulates it.
+    """The payload, and the robots, as MuJoCo simulates them.
 
     Attributes:
         R_1i: grasp orientations in {1}, shape (N, 3, 3).
@@ -31,6 +30,7 @@ class GroundTruth:
         p_1c: centre of mass in {1} [m], shape (3,).
         R_1c: principal axes in {1}, moments ascending, shape (3, 3).
         principal_kgm2: principal moments of inertia, ascending, shape (3,).
+        units: how each robot deviates from the design, N entries.
     """
 
     R_1i: Array
@@ -39,6 +39,7 @@ class GroundTruth:
     p_1c: Array
     R_1c: Array
     principal_kgm2: Array
+    units: tuple[AsBuilt, ...]
 
     @classmethod
     def of(cls, scene: TeamScene) -> GroundTruth:
@@ -62,9 +63,10 @@ class GroundTruth:
             p_1c=R_1W @ (data.xipos[body] - p_W[0]),
             R_1c=R_1c,
             principal_kgm2=model.body_inertia[body][order].copy(),
+            units=scene.units,
         )
 
-    def to_dict(self, as_built: Sequence[AsBuilt] = ()) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Any]:
         """JSON-able form, units in the keys; orientations as rotation vectors in degrees."""
         return {
             "grasps": [
@@ -75,7 +77,7 @@ class GroundTruth:
             "p_1c_m": self.p_1c.tolist(),
             "R_1c_rotvec_deg": _rotvec_deg(self.R_1c),
             "principal_inertia_kgm2": self.principal_kgm2.tolist(),
-            "as_built": [{key: value.tolist() for key, value in asdict(unit).items()} for unit in as_built],
+            "as_built": [{key: value.tolist() for key, value in asdict(unit).items()} for unit in self.units],
         }
 
 
@@ -84,11 +86,11 @@ def truth_path(recording: Path) -> Path:
     return recording.with_suffix(".truth.json")
 
 
-def write_truth(truth: GroundTruth, recording: Path, as_built: Sequence[AsBuilt] = ()) -> None:
+def write_truth(truth: GroundTruth, recording: Path) -> None:
     """Write the sidecar beside a recording; the estimator never reads it."""
     path = truth_path(recording)
     temporary = path.with_suffix(".tmp")
-    temporary.write_text(json.dumps(truth.to_dict(as_built), indent=1) + "\n", encoding="utf-8")
+    temporary.write_text(json.dumps(truth.to_dict(), indent=1) + "\n", encoding="utf-8")
     temporary.replace(path)
 
 

@@ -171,7 +171,7 @@ def _trial(
     done = simulate(request, team, grasps)
     summary = TrialSummary(
         name=f"{request.payload} {request.trial} {request.number} {team[-1].name}",
-        rotation_deg=float(np.rad2deg(np.abs(done.log.payload_rotation()).max())),
+        rotation_deg=float(np.rad2deg(np.linalg.norm(done.log.payload_rotation(), axis=1).max())),
         torque_Nm=float(np.abs(done.log.tau).max()),
         rod_error_m=done.log.rod_error_m,
         weld_error_m=done.log.weld_error_m,
