@@ -17,7 +17,7 @@ def models_dir() -> Path:
         FileNotFoundError: the installation carries no models.
     """
     here = Path(__file__).resolve()
-    for folder in (here.parent / "models", here.parents[2] / "models"):
+    for folder in (here.parent / "mjcf", here.parents[2] / "models"):
         if (folder / "omnid" / "omnid.xml").is_file():
             return folder
     raise FileNotFoundError("the mocobot models are missing from this installation")
