@@ -12,7 +12,7 @@ from mocobot.files import make_folder, write_json, write_text
 from mocobot.progress import bar
 from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
 from mocobot_sim.paper.plots import save_plots
-from mocobot_sim.paper.tables import format_tables
+from mocobot_sim.paper.tables import format_summary, format_tables
 from mocobot_sim.scene import build_team
 from mocobot_sim.sensors import sensor_preset
 from mocobot_sim.simulate import draw_units
@@ -41,7 +41,7 @@ def run(options: Paper) -> None:
     start = time.perf_counter()
     with bar(plan.steps, "paper", "step") as advance:
         result = run_paper(plan, options.jobs, advance)
-    tables = format_tables(result.scores)
+    tables = f"{format_tables(result.scores)}\n\n{format_summary(result.scores)}"
     print(tables)
     print(f"\n{_summary(result)} Wall time {time.perf_counter() - start:.0f} s.")
     if options.out:

@@ -75,6 +75,34 @@ def format_tables(scores: Mapping[str, Mapping[str, Scores]]) -> str:
     )
 
 
+def format_summary(scores: Mapping[str, Mapping[str, Scores]]) -> str:
+    """The largest mean error of every kind over payloads (and pairs or moments), the paper's beside ours."""
+    payloads = list(next(iter(scores.values())))
+    columns = [("paper", {p: published_errors(p) for p in payloads}), *scores.items()]
+
+    def largest(column: Mapping[str, Scores], values: Callable[[Scores], list[float | None]]) -> str:
+        found = [value for payload in payloads for value in values(column[payload]) if value is not None]
+        return _number(max(found, default=None))
+
+    def moments(kind: str) -> Callable[[Scores], list[float | None]]:
+        return lambda s: [s[kind][name]["percent"] for name in MOMENTS] if kind in s else []
+
+    rows: list[tuple[str, Callable[[Scores], list[float | None]]]] = [
+        ("grasp rotation [deg]", lambda s: [s[f"R{pair}_deg"]["mean"] for pair in PAIRS]),
+        ("grasp position [mm]", lambda s: [1e3 * s[f"p{pair}_m"]["mean"] for pair in PAIRS]),
+        ("grasp position [%]", lambda s: [s[f"p{pair}_percent"]["mean"] for pair in PAIRS]),
+        ("mass [%]", lambda s: [s["m_percent"]]),
+        ("centre of mass [mm]", lambda s: [None if s["p1c_m"] is None else 1e3 * s["p1c_m"]]),
+        ("centre of mass [%]", lambda s: [s["p1c_percent"]]),
+        ("inertia, all trials [%]", moments("all")),
+        ("inertia, periodic trials [%]", moments("periodic")),
+        ("inertia, random trials [%]", moments("random")),
+    ]
+    cells = [["largest error over the payloads", *(name for name, _ in columns)]]
+    cells += [[label, *(largest(column, values) for _, column in columns)] for label, values in rows]
+    return _align(cells)
+
+
 def _spread(entry: Mapping[str, float | None]) -> str:
     return _pair(entry["mean"], entry["std"])
 
