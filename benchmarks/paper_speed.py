@@ -14,7 +14,9 @@ from mocobot_sim.paper.experiment import PaperPlan, run_paper
 def main() -> None:
     """Print the wall times and their ratio."""
     plan = PaperPlan(payloads=("a",), trials=2) if "--quick" in sys.argv[1:] else PaperPlan()
-    run_paper(PaperPlan(payloads=("a",), presets=("ideal",), trials=1, vias=2, duration_s=8.0))  # compile, warm up
+    run_paper(
+        PaperPlan(payloads=("a",), presets=("ideal",), trials=1, vias=2, duration_s=8.0)
+    )  # compile, warm up
     seconds = {}
     for jobs in (2, 1):
         start = time.perf_counter()

@@ -1,6 +1,6 @@
 """Five Omnids under a ring of your own: any payload MJCF with a body 'payload' and sites grasp1 .. graspN will do.
 
-    python scenarios/five_robots.py
+python scenarios/five_robots.py
 """
 
 from __future__ import annotations
@@ -52,16 +52,21 @@ def main() -> None:
         payload.write_text(ring_mjcf(), encoding="utf-8")
         trials = [
             simulate(request, [nominal])
-            for request in (TrialRequest(str(payload), "random", vias=30), TrialRequest(str(payload), "static"))
+            for request in (
+                TrialRequest(str(payload), "random", vias=30),
+                TrialRequest(str(payload), "static"),
+            )
         ]
     estimate = estimate_payload([trial.recordings["nominal"] for trial in trials])
-    assert estimate.grasps and estimate.mass and estimate.inertia and estimate.p_1c is not None
+    if not (estimate.grasps and estimate.mass and estimate.inertia) or estimate.p_1c is None:
+        raise SystemExit(f"not determined: {', '.join(map(str, estimate.undetermined))}")
+    moments, truth = estimate.inertia.principal.moments, trials[0].truth
     print(f"robots      {estimate.robots}")
     print(f"mass        {estimate.mass.mass:.4f} +- {estimate.mass.se:.4f} kg (true {MASS_KG})")
     print(f"p_1c        {np.round(estimate.p_1c, 5)} m (true {[-RADIUS_M, 0.0, 0.06]})")
-    print(f"moments     {np.round(estimate.inertia.principal.moments, 4)} kg m^2 (true {trials[0].truth.principal_kgm2})")
+    print(f"moments     {np.round(moments, 4)} kg m^2 (true {truth.principal_kgm2})")
     for j in range(2, ROBOTS + 1):
-        error = estimate.grasps.p_1i[j - 1] - trials[0].truth.p_1i[j - 1]
+        error = estimate.grasps.p_1i[j - 1] - truth.p_1i[j - 1]
         print(f"p_1{j} error  {1e3 * np.linalg.norm(error):.3f} mm")
 
 

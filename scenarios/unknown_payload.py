@@ -1,6 +1,6 @@
 """Carry payload (b), record, estimate it, and compare with the truth: the paper's experiment in one short script.
 
-    python scenarios/unknown_payload.py
+python scenarios/unknown_payload.py
 """
 
 from __future__ import annotations
@@ -14,7 +14,11 @@ from mocobot_sim.simulate import TrialRequest, simulate
 def main() -> None:
     """Three trials with 16-bit encoders and noisy torques, one estimate."""
     nominal = sensor_preset("nominal")
-    requests = [TrialRequest("b", "random", vias=40), TrialRequest("b", "periodic", duration_s=30), TrialRequest("b", "static")]
+    requests = [
+        TrialRequest("b", "random", vias=40),
+        TrialRequest("b", "periodic", duration_s=30),
+        TrialRequest("b", "static"),
+    ]
     trials = [simulate(request, [nominal]) for request in requests]
     estimate = estimate_payload([trial.recordings["nominal"] for trial in trials])
     print(format_estimate(estimate))

@@ -167,8 +167,11 @@ def test_torques_of_two_robots_exchanged_are_flagged(
     pq.write_table(
         exchange([(f"omnid2.tau{k}", f"omnid3.tau{k}") for k in (1, 2, 3)])(pq.read_table(recording)), bad
     )
-    code, out, err = run(capsys, "estimate", str(bad))
-    assert (code == 0 and "[[Flags]]" in out and "moments" in out) or (code == 2 and "tau" in err)
+    code, out, _ = run(capsys, "estimate", str(bad))
+    assert code == 0
+    assert "p_1c:         not determined" in out
+    assert "the wrenches contradict each other" in out
+    assert "check the signs and columns of the torques" in out
 
 
 def test_no_motion_gives_no_number(

@@ -130,6 +130,15 @@ def test_cross_information_is_the_normal_matrix_of_the_cross_product():
     np.testing.assert_allclose(cross_information(vectors), total / 30)
 
 
+def test_rounding_error_is_no_excitation():
+    """One oblique axis without noise: the smallest eigenvalue is rounding error, of either sign."""
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        vectors = rng.normal(size=(100, 1)) * rng.normal(size=3)
+        information = cross_information(vectors)
+        assert judge("s", ("x", "y", "z"), information, 0.0, unit="", reason="").rank == 2
+
+
 def test_judge_reports_values_rank_condition_and_words():
     report = judge("step", ("u", "v"), np.diag([4.0, 0.01]), 0.05, unit="m", reason="because", factor=3.0)
     assert report.singular_values == pytest.approx((2.0, 0.1))

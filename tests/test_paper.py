@@ -104,8 +104,18 @@ def test_paper_json(folder: Path) -> None:
     assert list(scores) == ["nominal"]
     assert list(scores["nominal"]) == ["d"]
     score = scores["nominal"]["d"]
-    grasp_keys = {f"{q}{pair}_{unit}" for pair in PAIRS for q, unit in (("R", "deg"), ("p", "m"), ("p", "percent"))}
-    assert set(score) == grasp_keys | {"m_kg", "m_percent", "p1c_m", "p1c_percent", "all", "random", "periodic"}
+    grasp_keys = {
+        f"{q}{pair}_{unit}" for pair in PAIRS for q, unit in (("R", "deg"), ("p", "m"), ("p", "percent"))
+    }
+    assert set(score) == grasp_keys | {
+        "m_kg",
+        "m_percent",
+        "p1c_m",
+        "p1c_percent",
+        "all",
+        "random",
+        "periodic",
+    }
     for key in grasp_keys:
         assert set(score[key]) == {"mean", "std"}
         assert score[key]["mean"] > 0
@@ -125,7 +135,9 @@ def test_everything_else_in_the_folder(folder: Path) -> None:
         for suffix in (".parquet", ".truth.json")
     }
     plots = {"grasps.png", "mass_com.png", "inertia.png"}
-    assert names == {"paper.json", "tables.txt", "trials.json", "estimates/d_nominal.json"} | plots | recordings
+    assert (
+        names == {"paper.json", "tables.txt", "trials.json", "estimates/d_nominal.json"} | plots | recordings
+    )
     for name in plots:
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
 
@@ -135,9 +147,14 @@ def test_recordings_give_the_same_estimate_again(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     again = tmp_path / "again.json"
-    files = [str(folder / "recordings" / f"d_{trial}0_nominal.parquet") for trial in ("random", "static", "periodic")]
+    files = [
+        str(folder / "recordings" / f"d_{trial}0_nominal.parquet")
+        for trial in ("random", "static", "periodic")
+    ]
     main(["estimate", *files, "--out", str(again)])
-    first, second = (json.loads(path.read_text()) for path in (folder / "estimates" / "d_nominal.json", again))
+    first, second = (
+        json.loads(path.read_text()) for path in (folder / "estimates" / "d_nominal.json", again)
+    )
     assert second["mass"] == first["mass"]
     assert second["com"] == first["com"]
     assert second["inertia"] == first["inertia"]

@@ -67,6 +67,23 @@ def test_covariance_of_a_short_fit_with_coloured_noise(colour):
     assert np.all((expected[0] < wrong) & (wrong < expected[1]))  # why the textbook formula will not do
 
 
+def test_few_windows_for_many_parameters():
+    """Six seconds and eight parameters: what the fit takes away of the noise is given back."""
+    rng = np.random.default_rng(1)
+    t = np.arange(600) / RATE
+    X = np.stack([np.sin(2 * np.pi * f * t + k) for k, f in enumerate(np.arange(1, 9) / 3.1)], axis=1)
+    estimates, claims = [], []
+    for _ in range(400):
+        noise = low_passed_noise(rng, (600, 1), 1.0)[:, 0]
+        theta, *_ = np.linalg.lstsq(X, noise, rcond=None)
+        r = noise - X @ theta
+        claims.append(np.diag(window_covariance(*window_normals(X[:, None], r[:, None], windows(600, RATE)))))
+        estimates.append(theta)
+    ratio = np.sqrt(np.mean(claims, axis=0)) / np.std(estimates, axis=0)
+    assert np.all(np.abs(ratio - 1) < 0.2), ratio
+    assert abs(np.mean(ratio) - 1) < 0.08  # 0.81 without the correction
+
+
 def test_numerical_jacobian():
     A = np.arange(6.0).reshape(2, 3)
     J = numerical_jacobian(lambda x: A @ x + (x @ x) * np.ones(2), np.array([1.0, -2.0, 0.5]))
@@ -151,4 +168,10 @@ def test_every_standard_error_against_the_scatter(dominant):
         values, errors = np.array(results).transpose(1, 0, 2)
         ratio = np.sqrt(np.mean(errors**2, axis=0)) / np.std(values, axis=0, ddof=1)
         assert ratio.shape == (38,)
-        assert np.all(np.abs(ratio - 1) < 0.25), (method, np.round(ratio, 2))
+        assert np.all(ratio > 0.75), (method, np.round(ratio, 2))
+        # Errors of the grasps leave moments that go with the tilt. Besides being propagated they count as
+        # noise of the staged inertia: on the safe side, where the encoders' noise dominates.
+        most = np.full(38, 1.25)
+        if method == "staged" and dominant == "encoders":
+            most[26:] = 1.5
+        assert np.all(ratio < most), (method, np.round(ratio, 2))

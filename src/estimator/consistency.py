@@ -19,6 +19,8 @@ from estimator.errors import InputError
 from estimator.fusion import fuse
 from estimator.grasp_data import GraspData
 from estimator.grasp_estimate import GraspEstimate
+from estimator.holds import STILL_RATE_RADPS, STILL_SPEED_MPS
+from estimator.identifiability import StepReport
 from estimator.inertia import InertiaEstimate, inertia_regressor
 from estimator.principal import inertia_parameters
 
@@ -105,6 +107,22 @@ def check_rigid(name: str, grasps: GraspEstimate) -> list[str]:
     return flags
 
 
+def check_disagreement_is_noise(name: str, steps: Sequence[StepReport]) -> None:
+    """For grasps that came out undetermined: is it for want of motion?
+
+    Raises:
+        InputError: the robots disagree by more than any encoder noise, so they are not on one rigid body.
+    """
+    for step in steps:
+        limit = STILL_RATE_RADPS if step.step.startswith("rotation") else STILL_SPEED_MPS
+        if step.noise > limit:
+            robot = step.step.split("_1")[1]
+            raise InputError(
+                f"{name}: robots 1 and {robot} do not move like one rigid body (they disagree by "
+                f"{step.noise:.2g} {step.unit.split(' per')[0]} rms); check their columns and units"
+            )
+
+
 def check_agreement(names: Sequence[str], grasps: Sequence[GraspEstimate]) -> None:
     """Do the recordings, each on its own, find the same grasps?
 
@@ -135,21 +153,23 @@ def check_agreement(names: Sequence[str], grasps: Sequence[GraspEstimate]) -> No
 
 def wrench_balance(
     data: GraspData, grasps: GraspEstimate, mass: float, p_1c: Array, inertia: InertiaEstimate | None
-) -> tuple[float, float]:
-    """Force residual over weight, and moment residual about the CoM over weight [m]; rms over the trial."""
+) -> tuple[float, float | None]:
+    """Force residual over weight, and moment residual about the CoM over weight [m]; rms over the trial.
+
+    Without an inertia there is no telling what the moments should be, and the second result is None.
+    """
     motion = fuse(data, grasps)
     lever = np.cross(motion.alpha, p_1c) + np.cross(motion.omega, np.cross(motion.omega, p_1c))
     force = motion.force - mass * (motion.acceleration + lever + data.gravity_mps2 * motion.up)
-    moment = motion.moment - np.cross(p_1c, motion.force)
-    if inertia is not None:
-        X = inertia_regressor(motion.omega, motion.alpha)
-        moment = moment - X @ inertia_parameters(inertia.inertia)
     weight = mass * data.gravity_mps2
-    rms = [float(np.sqrt(np.mean(np.sum(x**2, axis=1)))) / weight for x in (force, moment)]
-    return rms[0], rms[1]
+    if inertia is None:
+        return _rms(force) / weight, None
+    X = inertia_regressor(motion.omega, motion.alpha)
+    moment = motion.moment - np.cross(p_1c, motion.force) - X @ inertia_parameters(inertia.inertia)
+    return _rms(force) / weight, _rms(moment) / weight
 
 
-def balance_flags(name: str, force: float, moment_m: float, grasps: GraspEstimate) -> list[str]:
+def balance_flags(name: str, force: float, moment_m: float | None, grasps: GraspEstimate) -> list[str]:
     """Flags for a recording whose wrenches do not add up to the payload's motion."""
     flags = []
     if force > FORCE_FLAG:
@@ -158,12 +178,16 @@ def balance_flags(name: str, force: float, moment_m: float, grasps: GraspEstimat
             "left over); check the signs and columns of the torques."
         )
     span = float(np.max(np.linalg.norm(grasps.p_1i, axis=1))) if grasps.robots > 1 else 1.0
-    if moment_m > MOMENT_FLAG * span:
+    if moment_m is not None and moment_m > MOMENT_FLAG * span:
         flags.append(
             f"{name}: the moments do not balance, as if the centre of mass were {moment_m:.2g} m elsewhere; "
             "check the torques' columns."
         )
     return flags
+
+
+def _rms(vectors: Array) -> float:
+    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))
 
 
 def _disagreement(a: GraspEstimate, b: GraspEstimate) -> str | None:

@@ -12,6 +12,7 @@ from estimator.consistency import (
     Trial,
     balance_flags,
     check_agreement,
+    check_disagreement_is_noise,
     check_rigid,
     check_same_payload,
     wrench_balance,
@@ -27,7 +28,7 @@ from estimator.payload_estimate import PayloadEstimate, RecordingEstimate
 from estimator.process import process_recording
 from estimator.recording import Recording
 from estimator.statics import ComEstimate, MassEstimate, estimate_com, estimate_mass
-from estimator.uncertainty import BLOCK_S
+from estimator.uncertainty import WINDOW_S
 
 Method = Literal["auto", "staged", "joint"]
 
@@ -40,7 +41,7 @@ def estimate_payload(
     method: Method = "auto",
     cutoff_hz: float = 5.0,
     trim_s: float = 2.0,
-    block_s: float = BLOCK_S,
+    window_s: float = WINDOW_S,
 ) -> PayloadEstimate:
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
 
@@ -51,7 +52,7 @@ def estimate_payload(
             ``"auto"``, staged when the holds determine the centre of mass, else joint.
         cutoff_hz: cut-off of the low-pass filter [Hz].
         trim_s: time dropped at both ends of each recording [s].
-        block_s: length of the blocks for standard errors [s].
+        window_s: length of the windows for standard errors [s].
 
     Raises:
         InputError: the recordings do not belong together or contradict each other, the method needs what
@@ -61,11 +62,11 @@ def estimate_payload(
         Trial(r.name, r.metadata.trial, r.metadata.payload, process_recording(r, cutoff_hz, trim_s))
         for r in recordings
     ]
-    return estimate_from_trials(trials, method, block_s)
+    return estimate_from_trials(trials, method, window_s)
 
 
 def estimate_from_trials(
-    trials: Sequence[Trial], method: Method = "auto", block_s: float = BLOCK_S
+    trials: Sequence[Trial], method: Method = "auto", window_s: float = WINDOW_S
 ) -> PayloadEstimate:
     """The same from processed data; see ``estimate_payload``."""
     if method not in ("auto", "staged", "joint"):
@@ -79,38 +80,37 @@ def estimate_from_trials(
         for t, h in zip(trials, holds, strict=True)
     ]
     flags: list[str] = []
-    grasps, steps = _grasps(trials, records, flags, block_s)
+    grasps, steps = _grasps(trials, records, flags, window_s)
 
     every_hold = [hold for found in holds for hold in found]
     mass, com, com_step = _from_holds(every_hold, grasps, trials[0].data.gravity_mps2)
+    if method == "staged" and not every_hold:
+        raise InputError(
+            "method 'staged' needs static holds and the recordings have none; use 'joint' or 'auto'"
+        )
     if method == "auto":
         method = "joint" if com is None and grasps is not None else "staged"
     inertia: InertiaEstimate | None = None
     if method == "joint":
         if grasps is None:
             raise InputError(f"nothing can be estimated jointly: {_why(steps)}")
-        joint, joint_steps = estimate_joint([trial.data for trial in trials], grasps, block_s)
+        joint, joint_steps = estimate_joint([trial.data for trial in trials], grasps, window_s)
         mass, com, inertia = joint.mass, joint.com, joint.inertia
         steps += joint_steps
     else:
-        if not every_hold:
-            raise InputError(
-                "method 'staged' needs static holds and the recordings have none; use 'joint' or 'auto'"
-            )
         steps += [com_step] if com_step else []
     moving = _moving(trials, holds)
     if grasps is not None and com is not None:
         upstream = com.own_covariance[1:, 1:], com.grasp_jacobian
         if method == "staged":
             data = [trials[k].data for k in moving]
-            inertia, step = estimate_inertia(data, grasps, com.p_1c, upstream, block_s)
+            inertia, step = estimate_inertia(data, grasps, com.p_1c, upstream, window_s)
             steps.append(step)
         for k in moving:
-            records[k] = replace(records[k], inertia=_alone(trials[k], grasps, com, method, block_s))
+            records[k] = replace(records[k], inertia=_alone(trials[k], grasps, com, method, window_s))
         for k, trial in enumerate(trials):
-            force, moment = (
-                wrench_balance(trial.data, grasps, mass.mass, com.p_1c, inertia) if mass else (0, 0)
-            )
+            known = inertia or records[k].inertia
+            force, moment = wrench_balance(trial.data, grasps, com.mass, com.p_1c, known)
             records[k] = replace(records[k], force_residual=force, moment_residual_m=moment)
             flags += balance_flags(trial.name, force, moment, grasps)
     if inertia is not None:
@@ -133,17 +133,19 @@ def estimate_from_trials(
 
 
 def _grasps(
-    trials: Sequence[Trial], records: list[RecordingEstimate], flags: list[str], block_s: float
+    trials: Sequence[Trial], records: list[RecordingEstimate], flags: list[str], window_s: float
 ) -> tuple[GraspEstimate | None, list[StepReport]]:
     """Grasps of every recording alone (into ``records``), checked against each other, and pooled."""
     for k, trial in enumerate(trials):
-        alone, _ = estimate_grasps([trial.data], block_s)
+        alone, steps = estimate_grasps([trial.data], window_s)
         records[k] = replace(records[k], grasps=alone)
         if alone is not None:
             flags += check_rigid(trial.name, alone)
+        else:
+            check_disagreement_is_noise(trial.name, steps)
     found = [(record.name, record.grasps) for record in records if record.grasps is not None]
     check_agreement([name for name, _ in found], [grasps for _, grasps in found])
-    pooled, steps = estimate_grasps([trial.data for trial in trials], block_s)
+    pooled, steps = estimate_grasps([trial.data for trial in trials], window_s)
     return pooled, list(steps)
 
 
@@ -166,12 +168,12 @@ def _moving(trials: Sequence[Trial], holds: Sequence[Sequence[Hold]]) -> list[in
 
 
 def _alone(
-    trial: Trial, grasps: GraspEstimate, com: ComEstimate, method: str, block_s: float
+    trial: Trial, grasps: GraspEstimate, com: ComEstimate, method: str, window_s: float
 ) -> InertiaEstimate | None:
     if method == "joint":
-        return estimate_joint([trial.data], grasps, block_s)[0].inertia
+        return estimate_joint([trial.data], grasps, window_s)[0].inertia
     upstream = com.own_covariance[1:, 1:], com.grasp_jacobian
-    return estimate_inertia([trial.data], grasps, com.p_1c, upstream, block_s)[0]
+    return estimate_inertia([trial.data], grasps, com.p_1c, upstream, window_s)[0]
 
 
 def _inertia_flags(inertia: InertiaEstimate) -> list[str]:

@@ -11,7 +11,7 @@ R_1j omega_j. Noise in the angular velocity that multiplies p shortens the estim
 that noise power, treats the two robots of a pair alike, and renumbering the robots changes nothing.
 
 All residuals are linear in the stacked twists V = [V_1; ...; V_N] of a sample, so sums of their products
-depend on the samples only through V V^T: one triangular 6N x 6N factor per block of samples replaces them.
+depend on the samples only through V V^T: one triangular 6N x 6N factor per window of samples replaces them.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from estimator import so3
 from estimator.grasp_data import GraspData
 from estimator.grasp_estimate import GraspEstimate, single_robot
 from estimator.identifiability import StepReport, cross_information, judge
-from estimator.uncertainty import BLOCK_S, block_covariance, block_slices
+from estimator.uncertainty import WINDOW_S, window_covariance, windows
 
 Array = NDArray[np.float64]
 
@@ -61,13 +61,13 @@ def pair_position(twist_i: Array, twist_j: Array, R_ij: Array) -> Array:
 
 
 def estimate_grasps(
-    trials: Sequence[GraspData], block_s: float = BLOCK_S
+    trials: Sequence[GraspData], window_s: float = WINDOW_S
 ) -> tuple[GraspEstimate | None, tuple[StepReport, ...]]:
     """Grasp frames of all robots from one or several trials of the same payload.
 
     Args:
         trials: data of the same N robots and grasps; trials count by their samples and motion.
-        block_s: length of the blocks for the covariance [s].
+        window_s: length of the windows for the covariance [s].
 
     Returns:
         The estimate, or None when some T_1j is not determined, and two reports per robot j > 1 (rotation,
@@ -76,10 +76,10 @@ def estimate_grasps(
     N = trials[0].robots
     if N == 1:
         return single_robot(), ()
-    blocks = np.concatenate([_compressed_blocks(trial, block_s) for trial in trials])  # (B, 6N, 6N)
+    stacked = [trial.twist.reshape(trial.samples, -1) for trial in trials]  # (Q, 6N)
     samples = sum(trial.samples for trial in trials)
-    pooled = _triangle(blocks.reshape(-1, 6 * N))  # (6N, 6N), rows play the part of samples
-    V = pooled.reshape(-1, N, 6)
+    pooled = _triangle(np.concatenate([_triangle(V) for V in stacked]))  # (6N, 6N)
+    V = pooled.reshape(-1, N, 6)  # its rows play the part of samples
 
     R, p, reports = np.tile(np.eye(3), (N, 1, 1)), np.zeros((N, 3)), []
     for j in range(1, N):
@@ -95,12 +95,15 @@ def estimate_grasps(
         R, p = _refine(V, R, p, weights)
 
     normals, scores = [], []
-    for block in blocks:
-        V_b = block.reshape(-1, N, 6)
+    for V_b in (
+        _factor(V[window.part], window.weights).reshape(-1, N, 6)
+        for trial, V in zip(trials, stacked, strict=True)
+        for window in windows(trial.samples, trial.rate_hz, window_s)
+    ):
         J = (weights[..., None] * _jacobian(V_b, R, p)).reshape(-1, 6 * (N - 1))
         normals.append(J.T @ J)
         scores.append(J.T @ (weights * _residuals(V_b, R, p)).ravel())
-    covariance = block_covariance(np.array(normals), np.array(scores))
+    covariance = window_covariance(np.array(normals), np.array(scores))
 
     mean = 3 * samples
     pair_rms = np.zeros((2, N, N))
@@ -220,12 +223,13 @@ def _jacobian(V: Array, R: Array, p: Array) -> Array:
     return J[..., 1:, :].reshape(*J.shape[:4], 6 * (N - 1))
 
 
-def _compressed_blocks(trial: GraspData, block_s: float) -> Array:
-    V = trial.twist.reshape(trial.samples, -1)
-    return np.array([_triangle(V[part]) for part in block_slices(trial.samples, trial.rate_hz, block_s)])
-
-
 def _triangle(V: Array) -> Array:
     """Square factor R with R^T R = V^T V, shapes (Q, K) -> (K, K)."""
     R = np.linalg.qr(V, mode="r")
     return np.vstack([R, np.zeros((V.shape[1] - len(R), V.shape[1]))])
+
+
+def _factor(V: Array, weights: Array) -> Array:
+    """Square factor F with F^T F = V^T diag(weights) V: quicker than a triangle, exact in products."""
+    values, axes = np.linalg.eigh((V.T * weights) @ V)
+    return np.sqrt(np.maximum(values, 0.0))[:, None] * axes.T

@@ -18,7 +18,14 @@ from estimator.grasp_data import GraspData
 from estimator.grasp_estimate import GraspEstimate
 from estimator.identifiability import StepReport, WeakDirection, combination, judge
 from estimator.principal import PrincipalInertia, inertia_matrix, principal_inertia, project_positive
-from estimator.uncertainty import BLOCK_S, block_covariance, block_normals, block_slices, numerical_jacobian
+from estimator.uncertainty import (
+    WINDOW_S,
+    Window,
+    numerical_jacobian,
+    window_covariance,
+    window_normals,
+    windows,
+)
 
 Array = NDArray[np.float64]
 
@@ -71,7 +78,7 @@ def estimate_inertia(
     grasps: GraspEstimate,
     p_1c: Array,
     upstream: tuple[Array, Array] | None = None,
-    block_s: float = BLOCK_S,
+    window_s: float = WINDOW_S,
     step: str = "inertia",
 ) -> tuple[InertiaEstimate | None, StepReport]:
     """Inertia by (26) from one or several trials.
@@ -82,7 +89,7 @@ def estimate_inertia(
         p_1c: centre of mass in {1} [m], shape (3,).
         upstream: covariance of p_1c without the part due to the grasps, shape (3, 3), and derivative of p_1c
             by the grasp errors, shape (3, 6(N-1)); None takes p_1c as exact.
-        block_s: length of the blocks for the covariance [s].
+        window_s: length of the windows for the covariance [s].
         step: name of the step in the report.
 
     Returns:
@@ -101,8 +108,7 @@ def estimate_inertia(
         why = f"the moments do not follow the motion (explained {signal:.2g} N m, left {noise:.2g} N m)"
         return None, refuse(report, np.eye(6), why)
 
-    normals, scores = _blocks(parts, residual, [trial.rate_hz for trial in trials], block_s)
-    covariance = block_covariance(normals, scores)
+    covariance = window_covariance(*window_normals(X, residual, trial_windows(trials, window_s)))
     moment_scale, alpha_scale = np.sqrt(np.mean(y**2)), np.sqrt(np.mean(X[:, 0, 0] ** 2 + X[:, 1, 1] ** 2))
     typical = moment_scale / alpha_scale
     values, vectors = np.linalg.eigh(covariance)
@@ -117,6 +123,15 @@ def estimate_inertia(
         inertia, covariance, principal_inertia(inertia, covariance), projected, noise, signal
     )
     return estimate, report
+
+
+def trial_windows(trials: Sequence[GraspData], window_s: float) -> list[Window]:
+    """Windows over the samples of several trials put one after the other."""
+    out, first = [], 0
+    for trial in trials:
+        out += windows(trial.samples, trial.rate_hz, window_s, first)
+        first += trial.samples
+    return out
 
 
 def rotational_excitation(X: Array, alpha_noise: float, step: str) -> StepReport:
@@ -151,19 +166,6 @@ def _equations(trial: GraspData, grasps: GraspEstimate, p_1c: Array) -> tuple[Ar
 def _solve(X: Array, y: Array) -> Array:
     flat = X.reshape(-1, 6)
     return np.asarray(np.linalg.solve(flat.T @ flat, flat.T @ y.ravel()), dtype=float)
-
-
-def _blocks(
-    parts: Sequence[tuple[Array, Array]], residual: Array, rates: Sequence[float], block_s: float
-) -> tuple[Array, Array]:
-    normals, scores, first = [], [], 0
-    for (X, _), rate in zip(parts, rates, strict=True):
-        r = residual[first : first + len(X)]
-        first += len(X)
-        A, s = block_normals(X, r, block_slices(len(X), rate, block_s))
-        normals.append(A)
-        scores.append(s)
-    return np.concatenate(normals), np.concatenate(scores)
 
 
 def _upstream_covariance(

@@ -29,10 +29,11 @@ from estimator.inertia import (
     inertia_regressor,
     refuse,
     rotational_excitation,
+    trial_windows,
 )
 from estimator.principal import inertia_matrix, inertia_parameters, principal_inertia, project_positive
-from estimator.statics import ComEstimate, MassEstimate
-from estimator.uncertainty import BLOCK_S, block_covariance, block_normals, block_slices, numerical_jacobian
+from estimator.statics import ComEstimate, MassEstimate, weak_com_reason
+from estimator.uncertainty import WINDOW_S, numerical_jacobian, window_covariance, window_normals
 
 Array = NDArray[np.float64]
 
@@ -74,14 +75,14 @@ def newton_euler_regressor(omega: Array, alpha: Array, specific_force: Array) ->
 
 
 def estimate_joint(
-    trials: Sequence[GraspData], grasps: GraspEstimate, block_s: float = BLOCK_S, step: str = "inertia"
+    trials: Sequence[GraspData], grasps: GraspEstimate, window_s: float = WINDOW_S, step: str = "inertia"
 ) -> tuple[JointEstimate, tuple[StepReport, ...]]:
     """Ten inertial parameters from any motion; fewer when the motion is poor.
 
     Args:
         trials: one or several trials of the same payload and N >= 1 robots, holds included.
         grasps: the grasp frames.
-        block_s: length of the blocks for the covariance [s].
+        window_s: length of the windows for the covariance [s].
         step: name of the inertia step in the reports.
 
     Returns:
@@ -116,7 +117,9 @@ def estimate_joint(
         words="along",
         frame="{1}",
         floor=1e-9,
-        reason="the payload hardly tilts about any axis across it",
+        reason=weak_com_reason(
+            "the payload hardly tilts about any axis across it", float(rms[1]), theta[0] * gravity
+        ),
     )
     if not com_report.determined:
         K = 1
@@ -125,14 +128,10 @@ def estimate_joint(
         if inertia_report.determined:
             inertia_report = refuse(inertia_report, np.eye(6), "it needs the centre of mass")
 
-    slices, first = [], 0
-    for trial in trials:
-        parts = block_slices(trial.samples, trial.rate_hz, block_s)
-        slices += [slice(first + part.start, first + part.stop) for part in parts]
-        first += trial.samples
     scale = np.sqrt(np.einsum("qrk,qrk->k", Y[..., :K], Y[..., :K]) / used)
-    normals, scores = block_normals(weights[:, None] * Y[..., :K] / scale, weights * residual, slices)
-    covariance = block_covariance(normals, scores) / np.outer(scale, scale)
+    parts = trial_windows(trials, window_s)
+    normals, scores = window_normals(weights[:, None] * Y[..., :K] / scale, weights * residual, parts)
+    covariance = window_covariance(normals, scores) / np.outer(scale, scale)
 
     def moved(x: Array) -> Array:
         equations = _equations([fuse(trial, grasps.moved(x)) for trial in thin], thin)
@@ -149,7 +148,9 @@ def estimate_joint(
     mass = MassEstimate(float(values[0]), float(np.sqrt(covariance[0, 0])), float(rms[0]))
     com = inertia = None
     if K >= 4:
-        com = ComEstimate(values[1:4], covariance[:4, :4], own_covariance[:4, :4], J[1:4], float(rms[1]))
+        com = ComEstimate(
+            float(values[0]), values[1:4], covariance[:4, :4], own_covariance[:4, :4], J[1:4], float(rms[1])
+        )
     if K == 10:
         matrix, projected = project_positive(inertia_matrix(values[4:]))
         of_inertia = covariance[4:, 4:]

@@ -30,6 +30,9 @@ from estimator.uncertainty import numerical_jacobian
 
 Array = NDArray[np.float64]
 
+CONTRADICTION_M = 0.02
+"""Moment left over, per weight [m], that is more than noise and poor calibration leave."""
+
 
 @dataclass(frozen=True)
 class MassEstimate:
@@ -51,6 +54,7 @@ class ComEstimate:
     """Mass and centre of mass from the holds, with their common covariance.
 
     Attributes:
+        mass: the mass it goes with [kg].
         p_1c: centre of mass in {1} [m], shape (3,).
         covariance: of (m [kg], p_1c [m]), grasp errors included, shape (4, 4).
         own_covariance: the same without the part due to the grasps.
@@ -58,6 +62,7 @@ class ComEstimate:
         residual_rms: rms per component of the moment balance about {1} over the holds [N m].
     """
 
+    mass: float
     p_1c: Array
     covariance: Array
     own_covariance: Array
@@ -110,7 +115,7 @@ def estimate_com(
         words="along",
         frame="{1}",
         floor=1e-9,
-        reason="the holds hardly differ in tilt about any axis across it",
+        reason=weak_com_reason("the holds hardly differ in tilt about any axis across it", noise, weight),
     )
     if not report.determined:
         return None, report
@@ -146,7 +151,8 @@ def estimate_com(
     J = numerical_jacobian(com, np.zeros(len(grasps.covariance)))
     total = covariance.copy()
     total[1:, 1:] += J @ grasps.covariance @ J.T
-    return ComEstimate(p_1c, total, covariance, J, float(np.sqrt(np.mean(residual**2)))), report
+    rms = float(np.sqrt(np.mean(residual**2)))
+    return ComEstimate(mass.mass, p_1c, total, covariance, J, rms), report
 
 
 def horizontal_force(holds: Sequence[Hold], grasps: GraspEstimate) -> float:
@@ -156,6 +162,16 @@ def horizontal_force(holds: Sequence[Hold], grasps: GraspEstimate) -> float:
     force, _ = total_wrench(wrench, grasps)
     across = force - np.sum(force * up, axis=1, keepdims=True) * up
     return float(np.sqrt(np.mean(np.sum(across**2, axis=1))))
+
+
+def weak_com_reason(tilt: str, moment_rms: float, weight: float) -> str:
+    """Why the centre of mass is open: too little ``tilt`` [sentence], or moments [N m] that make no sense."""
+    if moment_rms < CONTRADICTION_M * weight:
+        return tilt
+    return (
+        f"the wrenches contradict each other ({moment_rms:.2g} N m rms are left over); "
+        "check the signs and columns of the torques"
+    )
 
 
 def vertical_force(R_bi: Array, wrench: Array) -> Array:
