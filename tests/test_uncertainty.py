@@ -142,7 +142,7 @@ def summary(grasps, mass, com, inertia):
 @pytest.mark.slow
 @pytest.mark.parametrize("dominant", ["encoders", "torques"])
 def test_every_standard_error_against_the_scatter(dominant):
-    """The whole chain, staged and joint, 150 repetitions: claimed within a quarter of the scatter.
+    """The whole chain, staged and joint, 110 repetitions: claimed within a quarter of the scatter.
 
     Noise of the rates, or of the forces, dominates in turn, so that no part of the propagation can hide.
     """
@@ -151,7 +151,7 @@ def test_every_standard_error_against_the_scatter(dominant):
     holds = still(body, [(0, 0), (0.08, 0), (-0.08, 0), (0, 0.08), (0, -0.08)], seconds=7.5, travel=1.5)
     noise = (1e-3, 2.5e-4, 0.005) if dominant == "encoders" else (2e-4, 5e-5, 0.1)
     runs = {"staged": [], "joint": []}
-    for seed in range(150):
+    for seed in range(110):
         rng = np.random.default_rng(seed)
         trial = noisy(motion, rng, *noise)
         grasps, _ = estimate_grasps([trial])

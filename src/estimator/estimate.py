@@ -27,7 +27,7 @@ from estimator.joint import estimate_joint
 from estimator.payload_estimate import PayloadEstimate, RecordingEstimate
 from estimator.process import process_recording
 from estimator.recording import Recording
-from estimator.statics import ComEstimate, MassEstimate, estimate_com, estimate_mass
+from estimator.statics import CONTRADICTION, ComEstimate, MassEstimate, estimate_com, estimate_mass
 from estimator.uncertainty import WINDOW_S
 
 Method = Literal["auto", "staged", "joint"]
@@ -115,6 +115,8 @@ def estimate_from_trials(
             flags += balance_flags(trial.name, force, moment, grasps)
     if inertia is not None:
         flags += _inertia_flags(inertia)
+    doubts = {weak.reason for step in steps for weak in step.weak if CONTRADICTION in weak.reason}
+    flags += [f"No centre of mass, and a doubtful mass: {doubt}." for doubt in sorted(doubts)[:1]]
     if mass is None and inertia is None and (grasps is None or grasps.robots == 1):
         raise InputError(f"nothing can be estimated from these recordings: {_why(steps)}")
     return PayloadEstimate(

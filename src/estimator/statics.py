@@ -30,6 +30,7 @@ from estimator.uncertainty import numerical_jacobian
 
 Array = NDArray[np.float64]
 
+CONTRADICTION = "the wrenches contradict each other"
 CONTRADICTION_M = 0.02
 """Moment left over, per weight [m], that is more than noise and poor calibration leave."""
 
@@ -169,7 +170,7 @@ def weak_com_reason(tilt: str, moment_rms: float, weight: float) -> str:
     if moment_rms < CONTRADICTION_M * weight:
         return tilt
     return (
-        f"the wrenches contradict each other ({moment_rms:.2g} N m rms are left over); "
+        f"{CONTRADICTION} ({moment_rms:.2g} N m rms are left over); "
         "check the signs and columns of the torques"
     )
 
