@@ -146,7 +146,7 @@ def between_commands(ref_b: Array, ticks: int) -> tuple[Array, Array]:
     """Commands at every control tick: the cubic spline through the recorded ones, at rest at both ends.
 
     Straight lines between commands would jump in velocity at every sample; the ripple this causes is locked to
-    the sampling, so it does not average out but aliases into the torques (0.08 % on inertia).
+    the sampling, so it does not average out but aliases into the torques (up to 0.12 % on inertia).
 
     Args:
         ref_b: commands at ``RATE_HZ`` [m], shape (Q, N, 3).
