@@ -90,3 +90,18 @@ def test_reversed_torques_are_an_error():
     data.wrench[:] *= -1
     with pytest.raises(InputError, match=r"mass is -11 kg.*sign of the torques"):
         estimate_joint([data], grasps)
+
+
+def test_turning_about_one_axis_leaves_the_inertia_open_and_nothing_else():
+    """The moments that such a motion takes belong to its part of the inertia, not to wrong torques."""
+    body = make_body(3)
+    grasps, _ = estimate_grasps([moving(body, 15)])
+    one_axis = moving(body, 15, pose_options={"angle_amplitude": (0.0, 0.0, 0.08)})
+    estimate, (com_report, inertia_report) = estimate_joint([one_axis], grasps)
+    assert com_report.determined
+    assert not inertia_report.determined
+    assert estimate.inertia is None
+    assert estimate.mass.mass == pytest.approx(body.mass, abs=1e-9)
+    np.testing.assert_allclose(estimate.com.p_1c, body.p_1c, atol=1e-8)
+    assert estimate.com.residual_rms < 1e-8
+    assert estimate.covariance.shape == (4, 4)

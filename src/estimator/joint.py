@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag, null_space
 
 from estimator import so3
 from estimator.errors import InputError
@@ -94,19 +95,18 @@ def estimate_joint(
     motions = [fuse(trial, grasps) for trial in trials]
     Y, w, used = _equations(motions, trials)
     gravity = trials[0].gravity_mps2
-    K = 10
-    theta, weights = _weighted_solve(Y, w, K)
     alpha_noise = float(np.sqrt(np.mean([acceleration_noise(trial, grasps) ** 2 for trial in trials])))
     inertia_report = rotational_excitation(Y[:, 3:, 4:], alpha_noise, step)
-    if not inertia_report.determined:
-        K = 4
-        theta, weights = _weighted_solve(Y, w, K)
+    # Directions without excitation leave the fit, the others of an open inertia stay: they explain moments.
+    turning = _excited(inertia_report)
+    basis = _blocks(np.eye(4), turning)
+    theta, weights = _weighted_solve(Y @ basis, w)
     if theta[0] <= 0:
         raise InputError(
             f"the estimated mass is {theta[0]:.3g} kg: the robots do not lift anything; "
             "check the sign of the torques"
         )
-    residual = w - Y[..., :K] @ theta
+    residual = w - Y @ basis @ theta
     rms = np.sqrt(np.mean(residual.reshape(-1, 2, 3) ** 2, axis=(0, 2)))  # force, moment
     com_report = judge(
         "centre of mass p_1c",
@@ -122,29 +122,32 @@ def estimate_joint(
         ),
     )
     if not com_report.determined:
-        K = 1
-        theta, weights = _weighted_solve(Y, w, K)
-        residual = w - Y[..., :K] @ theta
+        basis = _blocks(np.eye(1), _excited(com_report), turning)
+        theta, weights = _weighted_solve(Y @ basis, w)
+        residual = w - Y @ basis @ theta
         if inertia_report.determined:
             inertia_report = refuse(inertia_report, np.eye(6), "it needs the centre of mass")
+    # How many of (m, p_1c, inertia) are reported.
+    K = 1 if not com_report.determined else 4 if not inertia_report.determined else 10
+    Y_b = Y @ basis
 
-    scale = np.sqrt(np.einsum("qrk,qrk->k", Y[..., :K], Y[..., :K]) / used)
+    scale = np.sqrt(np.einsum("qrk,qrk->k", Y_b, Y_b) / used)
     parts = trial_windows(trials, window_s)
-    normals, scores = window_normals(weights[:, None] * Y[..., :K] / scale, weights * residual, parts)
+    normals, scores = window_normals(weights[:, None] * Y_b / scale, weights * residual, parts)
     covariance = window_covariance(normals, scores) / np.outer(scale, scale)
 
     def moved(x: Array) -> Array:
         equations = _equations([fuse(trial, grasps.moved(x)) for trial in thin], thin)
-        return _centred(_solve(equations[0], equations[1], K, weights))
+        return _centred(_solve(equations[0] @ basis, equations[1], weights), K)
 
     stride = max(1, used // _JACOBIAN_SAMPLES)
     thin = [every(trial, stride) for trial in trials]
-    J_own = numerical_jacobian(_centred, theta)
+    J_own = numerical_jacobian(lambda x: _centred(x, K), theta)
     J = numerical_jacobian(moved, np.zeros(len(grasps.covariance)))
     own_covariance = J_own @ covariance @ J_own.T
     covariance = own_covariance + J @ grasps.covariance @ J.T
 
-    values = _centred(theta)
+    values = _centred(theta, K)
     mass = MassEstimate(float(values[0]), float(np.sqrt(covariance[0, 0])), float(rms[0]))
     com = inertia = None
     if K >= 4:
@@ -179,9 +182,20 @@ def _equations(motions: Sequence[BodyMotion], trials: Sequence[GraspData]) -> tu
     return Y, w, len(w)
 
 
-def _solve(Y: Array, w: Array, K: int, weights: Array) -> Array:
-    """First K parameters by least squares with weights (6,) of the rows."""
-    A = (weights[:, None] * Y[..., :K]).reshape(-1, K)
+def _excited(report: StepReport) -> Array:
+    """Orthonormal basis of the directions that are not weak, shape (parameters, directions)."""
+    if report.determined:
+        return np.eye(len(report.parameters))
+    return np.asarray(null_space(np.array([direction.vector for direction in report.weak])), dtype=float)
+
+
+def _blocks(*blocks: Array) -> Array:
+    return np.asarray(block_diag(*blocks), dtype=float)
+
+
+def _solve(Y: Array, w: Array, weights: Array) -> Array:
+    """Least squares with weights (6,) of the rows."""
+    A = (weights[:, None] * Y).reshape(-1, Y.shape[-1])
     scale = np.linalg.norm(A, axis=0)
     scale[scale == 0] = 1.0
     normal = (A.T @ A) / np.outer(scale, scale)
@@ -189,26 +203,26 @@ def _solve(Y: Array, w: Array, K: int, weights: Array) -> Array:
     return np.asarray(np.linalg.lstsq(normal, right, rcond=1e-14)[0] / scale, dtype=float)
 
 
-def _weighted_solve(Y: Array, w: Array, K: int) -> tuple[Array, Array]:
+def _weighted_solve(Y: Array, w: Array) -> tuple[Array, Array]:
     """The same with weights from the residuals of forces and of moments; parameters and weights."""
     weights = np.ones(6)
     # Exact data leave rounding error only, which says nothing about weights.
     floor = 1e-9 * np.sqrt(np.mean(w.reshape(-1, 2, 3) ** 2, axis=(0, 2))) + 1e-12
     for _ in range(2):
-        residual = (w - Y[..., :K] @ _solve(Y, w, K, weights)).reshape(-1, 2, 3)
+        residual = (w - Y @ _solve(Y, w, weights)).reshape(-1, 2, 3)
         rms = np.maximum(np.sqrt(np.mean(residual**2, axis=(0, 2))), floor)
         weights = np.repeat(rms[0] / rms, 3)
-    return _solve(Y, w, K, weights), weights
+    return _solve(Y, w, weights), weights
 
 
-def _centred(parameters: Array) -> Array:
-    """(m, m c, J about {1}) -> (m, c, inertia about c), for the first 1, 4 or 10 parameters."""
+def _centred(parameters: Array, count: int) -> Array:
+    """(m, m c, J about {1}, ...) -> the first 1, 4 or 10 of (m, c, inertia about c)."""
     m = parameters[0]
-    if len(parameters) == 1:
-        return parameters
+    if count == 1:
+        return parameters[:1]
     c = parameters[1:4] / m
     out = np.concatenate([[m], c])
-    if len(parameters) == 4:
+    if count == 4:
         return out
     shift = m * (c @ c * np.eye(3) - np.outer(c, c))
     return np.concatenate([out, parameters[4:] - inertia_parameters(shift)])
