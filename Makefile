@@ -1,5 +1,5 @@
 # Two commands, each complete in a fresh clone: `make paper` (the main job) and `make test`.
-# They need Python >= 3.11 and make; everything else goes into .venv.
+# They need Python 3.11 or 3.12 and make; everything else goes into .venv.
 PYTHON ?= python3
 JOBS ?= 2
 BIN := .venv/bin
@@ -23,7 +23,7 @@ benchmark: $(MARK)
 	$(BIN)/python benchmarks/paper_speed.py
 
 $(MARK): pyproject.toml constraints.txt
-	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "mocobot needs Python 3.11 or newer")'
+	$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13) and "mocobot needs Python 3.11 or 3.12: make PYTHON=python3.12 ...")'
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --constraint constraints.txt --editable '.[dev]'
 	touch $(MARK)

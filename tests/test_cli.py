@@ -246,6 +246,7 @@ def test_simulate_refuses_bad_targets(tmp_path: Path, capsys: pytest.CaptureFixt
         (["--payload", "a", "x"], ["payload 'x'"]),
         (["--preset", "perfect"], ["preset 'perfect'"]),
         (["--trials", "0"], ["trials is 0"]),
+        (["--seed", "-1"], ["seed is -1"]),
         (["--jobs", "0"], ["jobs is 0"]),
         (["--recordings"], ["--out"]),
     ],

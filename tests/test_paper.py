@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 
 import pytest
@@ -165,6 +166,16 @@ def test_result_does_not_depend_on_jobs(folder: Path) -> None:
     plan = PaperPlan(payloads=("d",), presets=("nominal",), trials=1)
     alone = run_paper(plan, jobs=1)
     assert json.loads(json.dumps(alone.scores)) == json.loads((folder / "paper.json").read_text())
+    # Quantised readings hide a last bit; the extremes of the true trials do not.
+    trials = json.loads((folder / "trials.json").read_text())["trials"]
+    assert [asdict(trial) for trial in alone.trials] == trials
+
+
+def test_order_of_the_presets_does_not_matter() -> None:
+    """The grasps that construct the later trials come from the least ideal preset, whichever is named last."""
+    one, other = (PaperPlan(presets=order).teams() for order in (("nominal", "ideal"), ("ideal", "nominal")))
+    assert [[preset.name for preset in team] for team in one] == [["ideal", "nominal"]]
+    assert one == other
 
 
 def test_tables_show_the_published_figures() -> None:

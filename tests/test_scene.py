@@ -211,6 +211,7 @@ def _payload(body: str, compiler: str = RADIAN, extra: str = "") -> str:
 
 
 GRASP1 = '<site name="grasp1"/>'
+LOAD = f'<body name="payload">{INERTIAL}{GRASP1}'
 BAD = {
     "not xml": ("hello", "bad.xml: not a readable MJCF"),
     "empty": ("", "bad.xml: not a readable MJCF"),
@@ -250,9 +251,44 @@ BAD = {
         _payload(f'<body name="payload">{INERTIAL}{GRASP1}<body pos="0 0 -0.2">{INERTIAL}</body></body>'),
         "weighs 1 kg of 2 kg",
     ),
-    "option": (
-        _payload(f'<body name="payload">{INERTIAL}{GRASP1}</body>', extra='<option gravity="0 0 -1"/>'),
-        "does not fit into the team's scene .*gravity",
+    "visual": (
+        _payload(f"{LOAD}</body>", extra='<visual><global offwidth="7"/></visual>'),
+        "does not fit into the team's scene .*offwidth",
+    ),
+    "gravity": (_payload(f"{LOAD}</body>", extra='<option gravity="0 0 -1"/>'), "<option> would act on the"),
+    "flag": (
+        _payload(f"{LOAD}</body>", extra='<option><flag gravity="disable"/></option>'),
+        "<option> would act on the whole team",
+    ),
+    "wind": (
+        _payload(f"{LOAD}</body>", extra='<option wind="9 0 0" density="1"/>'),
+        "<option> would act on the",
+    ),
+    "weld to the world": (
+        _payload(f"{LOAD}</body>", extra='<equality><weld body1="payload"/></equality>'),
+        "<equality> would act on the whole team",
+    ),
+    "memory": (_payload(f"{LOAD}</body>", extra='<size memory="1K"/>'), "<size> would act on the whole team"),
+    "weightless": (
+        _payload(f'<body name="payload" gravcomp="1">{INERTIAL}{GRASP1}</body>'),
+        "no mocap, no gravcomp",
+    ),
+    "mocap": (
+        _payload(f'<body name="payload" mocap="true">{INERTIAL}{GRASP1}</body>'),
+        "no mocap, no gravcomp",
+    ),
+    "mass in the world": (
+        _payload(f'{LOAD}</body><geom size="0.1" mass="5"/>'),
+        "a geom stands in the world",
+    ),
+    "nan": (_payload(f'{LOAD}<site name="grasp2" pos="nan 0 0"/></body>'), "position is not finite"),
+    "infinite mass": (
+        _payload(f"{LOAD}</body>".replace('mass="1"', 'mass="inf"')),
+        "not finite",
+    ),
+    "tilted": (
+        _payload(f'{LOAD}<site name="grasp2" pos="1 0 0" euler="0 1.5 0"/></body>'),
+        r"grasp2 asks for gimbal angles \(y, x\) of \(85\.9, 0\.0\) deg at home; the gimbal ends at 57\.3",
     ),
 }
 
@@ -263,6 +299,13 @@ def test_bad_payload_is_refused_in_one_sentence(tmp_path, case):
     with pytest.raises(InputError, match=sentence) as caught:
         build_team(_write(tmp_path, text))
     assert "bad.xml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_team_that_does_not_compile_is_refused_in_one_sentence(tmp_path):
+    plane = _payload(f'{LOAD}<body><geom type="plane" size="1 1 1"/></body></body>')
+    with pytest.raises(InputError, match=r"MuJoCo cannot compile the team .*plane") as caught:
+        build_team(_write(tmp_path, plane)).compile()
     assert "\n" not in str(caught.value)
 
 

@@ -54,6 +54,7 @@ def test_ideal_sensors_pass_the_truth_bit_for_bit(random_a):
     np.testing.assert_array_equal(recording.time, random_a.time)
     for channel in CHANNELS:
         np.testing.assert_array_equal(getattr(recording, channel), getattr(random_a, channel))
+        assert getattr(recording, channel).flags.c_contiguous, "like one that is read from a file"
     np.testing.assert_array_equal(recording.ref, random_a.ref_b)
 
 

@@ -224,10 +224,15 @@ def test_six_distinct_still_orientations(shipped, name):
     ("make", "sentence"),
     [
         (lambda home, X: random_vias(home, np.random.default_rng(0), 0), "vias is 0; it must be at least 1"),
+        (
+            lambda home, X: random_vias(home, np.random.default_rng(0), 10**9),
+            "vias is 1000000000; that many could last longer than 3600 s",
+        ),
         (lambda home, X: random_vias(home, np.random.default_rng(0), 2, transit_s=(0, 1)), "transit is"),
         (lambda home, X: sphere_motion(home, X, 3.9), "duration is 3.9 s; it must be at least 4 s"),
         (lambda home, X: sphere_motion(home, X, float("nan")), "duration is nan s"),
         (lambda home, X: sphere_motion(home, X, float("inf")), "duration is inf s"),
+        (lambda home, X: sphere_motion(home, X, 1e9), "at least 4 s and at most 3600 s"),
         (lambda home, X: static_orientations(home, X, 0), "orientations is 0; it must be at least 1"),
     ],
 )

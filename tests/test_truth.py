@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from estimator.errors import InputError
 from mocobot_sim.as_built import CalibrationSpread
 from mocobot_sim.scene import build_team
 from mocobot_sim.truth import GroundTruth, truth_path, write_truth
@@ -125,6 +126,13 @@ def test_sidecar_holds_the_truth_in_plain_json(tmp_path):
     assert len(values["as_built"]) == 5
     for entry, unit in zip(values["as_built"], units, strict=True):
         assert entry == {f.name: getattr(unit, f.name).tolist() for f in dataclasses.fields(unit)}
+
+
+def test_sidecar_that_cannot_be_written_is_refused(tmp_path, truths):
+    (tmp_path / "rec.truth.json").mkdir()
+    with pytest.raises(InputError, match=r"rec\.truth\.json: cannot be written"):
+        write_truth(truths["a"], tmp_path / "rec.parquet")
+    assert [path.name for path in tmp_path.iterdir()] == ["rec.truth.json"]
 
 
 def test_sidecar_replaces_an_old_one_and_leaves_no_scraps(tmp_path, truths):

@@ -50,8 +50,15 @@ class TeamScene:
         return self.root.to_xml_string()
 
     def compile(self) -> mujoco.MjModel:
-        """Compile a fresh MuJoCo model."""
-        return mujoco.MjModel.from_xml_string(self.to_xml(), self.root.get_assets())
+        """Compile a fresh MuJoCo model.
+
+        Raises:
+            InputError: MuJoCo accepts the payload alone, but not in the team.
+        """
+        try:
+            return mujoco.MjModel.from_xml_string(self.to_xml(), self.root.get_assets())
+        except ValueError as error:
+            raise InputError(f"MuJoCo cannot compile the team ({' '.join(str(error).split())})") from error
 
 
 def build_team(
@@ -70,7 +77,8 @@ def build_team(
         timestep_s: integration step [s].
 
     Raises:
-        InputError: the payload cannot be read, has no grasps, or ``as_built`` does not match their number.
+        InputError: the payload cannot be read, has no grasps or one that is tilted beyond the gimbal's range, or
+            ``as_built`` does not match their number.
     """
     payload_root = load_payload(payload)
     X_1i = grasp_frames(payload_root, str(payload))
@@ -82,7 +90,8 @@ def build_team(
     root.option.timestep = timestep_s
 
     grasp_z = X_1i.translation[:, 2]
-    theta_home = X_1i.rotation.as_euler("ZYX")
+    theta_home = X_1i.rotation.as_euler("ZYX", suppress_warnings=True)
+    _check_tilts(theta_home[:, 1:], design.gimbal_limit_rad, str(payload))
     wrist_home_b = np.zeros((robots, 3))
     wrist_home_b[:, 2] = design.home_height_m + grasp_z - grasp_z.mean()
     for i in range(robots):
@@ -111,6 +120,16 @@ def build_team(
     theta_home = theta_home.copy()
     theta_home[:, 0] = 0.0
     return TeamScene(root, robots, wrist_home_b, theta_home, X_1i, units)
+
+
+def _check_tilts(tilts: Array, limit_rad: float, where: str) -> None:
+    over = np.flatnonzero(~(np.abs(tilts) <= limit_rad).all(axis=1))
+    if len(over):
+        degrees = ", ".join(f"{angle:.1f}" for angle in np.rad2deg(tilts[over[0]]))
+        raise InputError(
+            f"{where}: grasp{over[0] + 1} asks for gimbal angles (y, x) of ({degrees}) deg at home; "
+            f"the gimbal ends at {np.rad2deg(limit_rad):.1f} deg"
+        )
 
 
 def _park(omnid: mjcf.RootElement) -> None:

@@ -93,7 +93,6 @@ def measure(
         payload: name of the payload, for the metadata.
         seed: seed, for the metadata.
         name: how messages call the recording.
-
     """
     units = log.units
     phi = log.phi + np.array([unit.phi_zero_rad for unit in units])
@@ -124,4 +123,5 @@ def measure(
 
 
 def _round_to(values: Array, step: float) -> Array:
-    return np.round(values / step) * step if step else values
+    # In C order like a recording from a file or another process, so that sums over it have the same bits.
+    return np.ascontiguousarray(np.round(values / step) * step if step else values)

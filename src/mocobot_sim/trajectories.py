@@ -18,6 +18,7 @@ from estimator.errors import InputError
 Array = NDArray[np.float64]
 
 RATE_HZ = 100.0
+LONGEST_S = 3600.0  # a trial and its log are kept in memory
 SETTLE_S = 2.5  # at rest before the motion (load take-up) and after it; the estimator trims 2 s of each end
 
 
@@ -63,10 +64,13 @@ def random_vias(
         transit_s, dwell_s: uniform ranges of the time between and at vias [s].
 
     Raises:
-        InputError: fewer than one via, or a transit that takes no time.
+        InputError: fewer than one via, so many that the motion would last over an hour, or a transit that takes
+            no time.
     """
     if vias < 1:
         raise InputError(f"vias is {vias}; it must be at least 1")
+    if vias * (transit_s[1] + dwell_s[1]) > LONGEST_S:
+        raise InputError(f"vias is {vias}; that many could last longer than {LONGEST_S:g} s")
     if not min(transit_s) > 0:
         raise InputError(f"transit is {transit_s} s; it must be greater than 0")
     paths = []
@@ -114,11 +118,13 @@ def sphere_motion(
         frequency_hz: frequency of each component [Hz].
 
     Raises:
-        InputError: the motion is shorter than its ramps, or endless, or there is one robot only.
+        InputError: the motion is shorter than its ramps or longer than an hour, or there is one robot only.
     """
     ramp = 2.0
-    if not 2.0 * ramp <= duration_s < np.inf:
-        raise InputError(f"duration is {duration_s} s; it must be at least {2.0 * ramp:g} s")
+    if not 2.0 * ramp <= duration_s <= LONGEST_S:
+        raise InputError(
+            f"duration is {duration_s} s; it must be at least {2.0 * ramp:g} s and at most {LONGEST_S:g} s"
+        )
     time = np.arange(round((duration_s + 2.0 * SETTLE_S) * RATE_HZ) + 1) / RATE_HZ - SETTLE_S
     envelope = minimum_jerk(time / ramp) * minimum_jerk((duration_s - time) / ramp)
     phase = np.zeros(3) if rng is None else rng.uniform(0.0, 2.0 * np.pi, 3)

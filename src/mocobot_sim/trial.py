@@ -98,8 +98,7 @@ def run_trial(
         TrialError: a constraint opens too far, a value is not finite, MuJoCo warns, or a joint or spring
             leaves its range.
         InputError: the team cannot be assembled, the trajectory is for another number of robots or leaves
-            the workspace, or the control rate does not divide into
-            whole steps.
+            the workspace, or the control rate does not divide into whole steps.
     """
     _check_commands(scene, trajectory)
     gains = gains or ControlGains()

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from estimator.errors import InputError
 from mocobot_sim.as_built import AsBuilt
 from mocobot_sim.scene import TeamScene
 from mocobot_sim.team_index import TeamIndex
@@ -87,11 +88,19 @@ def truth_path(recording: Path) -> Path:
 
 
 def write_truth(truth: GroundTruth, recording: Path) -> None:
-    """Write the sidecar beside a recording; the estimator never reads it."""
+    """Write the sidecar beside a recording; the estimator never reads it.
+
+    Raises:
+        InputError: it cannot be written.
+    """
     path = truth_path(recording)
     temporary = path.with_suffix(".tmp")
-    temporary.write_text(json.dumps(truth.to_dict(), indent=1) + "\n", encoding="utf-8")
-    temporary.replace(path)
+    try:
+        temporary.write_text(json.dumps(truth.to_dict(), indent=1) + "\n", encoding="utf-8")
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
 def _rotvec_deg(R: Array) -> list[float]:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
+from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.errors import InputError
@@ -24,10 +25,12 @@ from estimator.process import process_recording
 from estimator.recording import Recording
 from estimator.scoring import score
 from mocobot_sim.models import payload_path
-from mocobot_sim.sensors import SensorPreset, sensor_preset
+from mocobot_sim.sensors import PRESETS, SensorPreset, sensor_preset
 from mocobot_sim.simulate import TrialRequest, simulate
 
 Progress = Callable[[int], object]
+# Positions p_1i and orientations R_1i between processes: arrays keep their bits there, a RigidTransform is normalised.
+Grasps = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -63,6 +66,8 @@ class PaperPlan:
         for name, values in (("payload", self.payloads), ("preset", self.presets)):
             if not values or len(set(values)) != len(values):
                 raise InputError(f"{name} is {' '.join(values) or 'empty'!r}; give at least one, each once")
+        if self.seed < 0:
+            raise InputError(f"seed is {self.seed}; it must be at least 0")
         if self.trials < 1:
             raise InputError(f"trials is {self.trials}; it must be at least 1")
 
@@ -78,9 +83,9 @@ class PaperPlan:
         return teams * (self.trials + self.inertia_trials + 2) + len(self.presets) * len(self.payloads)
 
     def teams(self) -> list[list[SensorPreset]]:
-        """Presets that share their robots, and so their trials."""
+        """Presets that share their robots, and so their trials; the least ideal last, however they were asked for."""
         groups: dict[Any, list[SensorPreset]] = {}
-        for name in self.presets:
+        for name in sorted(self.presets, key=list(PRESETS).index):
             groups.setdefault(sensor_preset(name).spread, []).append(sensor_preset(name))
         return list(groups.values())
 
@@ -140,8 +145,8 @@ def run_paper(plan: PaperPlan, jobs: int = 1, progress: Progress | None = None) 
         randoms = [recordings[payload, team[-1].name] for payload, team in teams]
         grasps = list(_watch(pool(delayed(_grasps)(group) for group in randoms), progress))
         second = [
-            (_request(plan, payload, trial, k), team, X_1i)
-            for (payload, team), X_1i in zip(teams, grasps, strict=True)
+            (_request(plan, payload, trial, k), team, held)
+            for (payload, team), held in zip(teams, grasps, strict=True)
             for trial, count in (("static", 1), ("periodic", plan.inertia_trials))
             for k in range(count)
         ]
@@ -166,9 +171,10 @@ def _request(plan: PaperPlan, payload: str, trial: str, number: int) -> TrialReq
 
 
 def _trial(
-    request: TrialRequest, team: Sequence[SensorPreset], grasps: RigidTransform | None
+    request: TrialRequest, team: Sequence[SensorPreset], grasps: Grasps | None
 ) -> tuple[dict[str, Recording], TrialSummary]:
-    done = simulate(request, team, grasps)
+    X_1i = grasps and RigidTransform.from_components(grasps[0], Rotation.from_matrix(grasps[1]))
+    done = simulate(request, team, X_1i)
     summary = TrialSummary(
         name=f"{request.payload} {request.trial} {request.number} {team[-1].name}",
         rotation_deg=float(np.rad2deg(np.linalg.norm(done.log.payload_rotation(), axis=1).max())),
@@ -181,7 +187,7 @@ def _trial(
 
 
 def _collect(
-    tasks: Sequence[tuple[TrialRequest, Sequence[SensorPreset], RigidTransform | None]],
+    tasks: Sequence[tuple[TrialRequest, Sequence[SensorPreset], Grasps | None]],
     outcomes: Iterable[tuple[dict[str, Recording], TrialSummary]],
     result: PaperResult,
 ) -> dict[tuple[str, str], list[Recording]]:
@@ -194,12 +200,12 @@ def _collect(
     return recordings
 
 
-def _grasps(recordings: Sequence[Recording]) -> RigidTransform:
+def _grasps(recordings: Sequence[Recording]) -> Grasps:
     estimate, steps = estimate_grasps([process_recording(recording) for recording in recordings])
     if estimate is None:
         weak = [str(direction) for step in steps for direction in step.weak]
         raise InputError(f"the random trials do not determine the grasps: {weak[0]}")
-    return RigidTransform.from_components(estimate.p_1i, Rotation.from_matrix(estimate.R_1i))
+    return estimate.p_1i, estimate.R_1i
 
 
 def _watch(outcomes: Iterable[Any], progress: Progress) -> Iterable[Any]:
