@@ -32,6 +32,13 @@ def resting(rows: int = 1500, **changes) -> Recording:
     )
 
 
+def turning() -> Recording:
+    """One robot that turns and lifts something."""
+    recording = resting(robots=1)
+    time = recording.time[:, None, None]
+    return dataclasses.replace(recording, theta=0.1 * np.sin(time * np.array([3.0, 4.0, 5.0])))
+
+
 @pytest.fixture
 def rec(tmp_path: Path) -> Path:
     path = tmp_path / "rec.parquet"
@@ -130,17 +137,34 @@ def test_torques_in_another_unit() -> None:
     check_recording(dataclasses.replace(good, tau=np.full_like(good.tau, -2 * limit)))
 
 
-@pytest.mark.parametrize("change", [{"gravity_mps2": 1e-300}, {"rod_mass_kg": 1e308}])
-def test_design_beyond_arithmetic(change: dict[str, float]) -> None:
-    recording = resting(design=dataclasses.replace(DESIGN, **change))
-    with pytest.raises(InputError, match="design"):
-        estimate_payload([recording])
+@pytest.mark.parametrize(
+    ("recording", "change"),
+    [(turning(), {"gravity_mps2": 1e-300}), (resting(), {"rod_mass_kg": 1e308})],
+)
+def test_design_beyond_arithmetic(recording: Recording, change: dict[str, float]) -> None:
+    design = dataclasses.replace(DESIGN, **change)
+    odd = dataclasses.replace(recording, metadata=dataclasses.replace(recording.metadata, design=design))
+    with pytest.raises(InputError, match="cannot be solved"):
+        estimate_payload([odd])
+
+
+def test_interrupted_before_anything_ran(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tyro.cli", interrupt)
+    with pytest.raises(SystemExit) as stop:
+        main(["estimate"])
+    assert stop.value.code == 130
+    assert capsys.readouterr().err == "mocobot: interrupted\n"
 
 
 def test_labels_are_printable() -> None:
     values = json.loads(metadata(payload="a").to_json())
     for label in ("\ud800", "\x1b[31mred", "two\nlines", "nul\0"):
-        with pytest.raises(InputError, match="payload is .*; it must be printable text or null"):
+        with pytest.raises(InputError, match=r"payload is .*; it must be text or null, all of it printable"):
             RecordingMetadata.from_json(json.dumps({**values, "payload": label}))
     assert RecordingMetadata.from_json(json.dumps({**values, "payload": "Träger 1"})).payload == "Träger 1"
 

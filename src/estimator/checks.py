@@ -17,11 +17,12 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 SPACING_TOLERANCE = 0.5  # of one sample period: a time stamp may jitter by so much
+TORQUE_FACTOR = 2.0  # of torque_limit_Nm: no spring reads beyond, so it is another unit or a spike
 RATE_TOLERANCE = 1e-3  # of rate_hz: enters accelerations, and so inertia, twice
 
 
 def check_recording(recording: Recording) -> None:
-    """Check number of rows, finiteness, time axis, joint ranges and leg geometry of a recording.
+    """Check number of rows, finiteness, time axis, joint ranges, torques and leg geometry of a recording.
 
     Raises:
         InputError: names the recording, the column, the row (counted from 0), the value and what is allowed.
@@ -35,6 +36,7 @@ def check_recording(recording: Recording) -> None:
     _check_range(recording, ("phi1", "phi2", "phi3"), design.phi_min_rad, design.phi_max_rad)
     limit = design.gimbal_limit_rad
     _check_range(recording, ("theta_z", "theta_y", "theta_x"), -limit, limit)
+    _check_torques(recording)
     _check_legs(recording)
 
 
@@ -114,6 +116,19 @@ def _check_range(recording: Recording, suffixes: tuple[str, ...], low: float, hi
                 f"{recording.name}: column {name!r} reaches {worst:.6g} rad (outside in {len(bad)} of "
                 f"{len(values)} rows, first in row {bad[0]}); its range is {low:.6g} to {high:.6g} rad"
                 + (" - the values look like degrees" if in_degrees else "")
+            )
+
+
+def _check_torques(recording: Recording) -> None:
+    limit = recording.metadata.design.torque_limit_Nm
+    for name, values in recording.columns().items():
+        bad = np.flatnonzero(np.abs(values) > TORQUE_FACTOR * limit) if ".tau" in name else []
+        if len(bad):
+            worst = values[bad[np.argmax(np.abs(values[bad]))]]
+            raise InputError(
+                f"{recording.name}: column {name!r} reaches {worst:.6g} N m (in {len(bad)} of {len(values)} "
+                f"rows, first in row {bad[0]}), more than {TORQUE_FACTOR:g} times the design's "
+                f"torque_limit_Nm of {limit:g}"
             )
 
 

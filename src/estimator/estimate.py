@@ -56,13 +56,20 @@ def estimate_payload(
 
     Raises:
         InputError: the recordings do not belong together or contradict each other, the method needs what
-            they lack, or nothing can be estimated from them.
+            they lack, nothing can be estimated from them, or their numbers are beyond arithmetic.
     """
-    trials = [
-        Trial(r.name, r.metadata.trial, r.metadata.payload, process_recording(r, cutoff_hz, trim_s))
-        for r in recordings
-    ]
-    return estimate_from_trials(trials, method, window_s)
+    try:
+        with np.errstate(over="raise", divide="raise"):
+            trials = [
+                Trial(r.name, r.metadata.trial, r.metadata.payload, process_recording(r, cutoff_hz, trim_s))
+                for r in recordings
+            ]
+            return estimate_from_trials(trials, method, window_s)
+    except (FloatingPointError, np.linalg.LinAlgError) as error:
+        names = ", ".join(r.name for r in recordings)
+        raise InputError(
+            f"{names}: the equations cannot be solved ({error}); are the numbers in 'design' plausible?"
+        ) from error
 
 
 def estimate_from_trials(

@@ -7,6 +7,7 @@ import numpy as np
 from estimator.arm_dynamics import wrench_on_payload
 from estimator.checks import check_duration, check_recording
 from estimator.delta import leg_geometry, wrist_motion
+from estimator.errors import InputError
 from estimator.filtering import differentiate, low_pass, trim_slice
 from estimator.gimbal import angular_motion, rotation
 from estimator.grasp_data import GraspData
@@ -22,7 +23,8 @@ def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: floa
 
     Args:
         recording: one trial.
-        cutoff_hz: cut-off of the Butterworth filter [Hz].
+        cutoff_hz: cut-off of the Butterworth filter [Hz], at least 1/trim_s: transients die as
+            exp(-pi cutoff t), and what a lower cut-off leaves of them after trim_s is no motion.
         trim_s: time dropped at each end against filter transients [s].
 
     Raises:
@@ -30,6 +32,11 @@ def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: floa
     """
     check_recording(recording)
     check_duration(recording, trim_s)
+    if cutoff_hz > 0.0 and 0.0 < cutoff_hz * trim_s < 1.0:
+        raise InputError(
+            f"cutoff_hz is {cutoff_hz!r}; with {trim_s:g} s dropped at each end it must be at least "
+            f"{1.0 / trim_s:g} Hz, or the filter's transients remain"
+        )
     rate_hz, design = recording.metadata.rate_hz, recording.metadata.design
     keep = trim_slice(len(recording.time), rate_hz, trim_s)
     sensors = recording.phi, recording.theta, recording.tau

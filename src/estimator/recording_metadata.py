@@ -124,7 +124,9 @@ def _check_values(values: dict[str, Any], where: str) -> None:
     require("rate_hz", "a number of hertz, greater than 0 and less than 1e9", good=is_rate)
     require("trial", f"one of {', '.join(TRIALS)}", good=values["trial"] in TRIALS)
     require("source", "text", good=isinstance(values["source"], str))
-    require("payload", "text or null", good=payload is None or isinstance(payload, str))
+    # It is printed; control characters and half surrogates are not for terminals.
+    is_label = payload is None or (isinstance(payload, str) and payload.isprintable())
+    require("payload", "text or null, all of it printable", good=is_label)
     require("seed", "a whole number or null", good=seed is None or type(seed) is int)
     require("design", "an object", good=isinstance(values["design"], dict))
     if "control" in values:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import io
+import os
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,7 +13,7 @@ from typing import Annotated, Literal
 import tyro
 
 from estimator.errors import InputError
-from mocobot.files import write_json
+from mocobot.files import check_target, write_json
 
 
 @dataclass(frozen=True)
@@ -62,6 +64,7 @@ class Estimate:
 
         if not self.rec:
             raise InputError("no recording given; name at least one file")
+        _check_files(self.rec, self.out)
         with bar(len(self.rec), "reading", "file") as advance:
             recordings = []
             for path in self.rec:
@@ -102,8 +105,7 @@ class Simulate:
 
         if self.out.suffix != ".parquet":
             raise InputError(f"{self.out}: the file's name must end in .parquet")
-        if not self.out.parent.is_dir():
-            raise InputError(f"{self.out.parent}: there is no such folder")
+        check_target(self.out)
         request = TrialRequest(
             self.payload, self.trajectory, self.seed, vias=self.vias, duration_s=self.duration
         )
@@ -114,10 +116,42 @@ class Simulate:
         print(f"{self.out}: {done.log.time[-1]:.1f} s of {self.trajectory} motion, {self.preset} sensors")
 
 
+def _check_files(recordings: Sequence[Path], out: Path | None) -> None:
+    """Each recording once, and an output that overwrites none of them."""
+    seen: set[str] = set()
+    for path in recordings:
+        real = os.path.realpath(path)
+        if real in seen:
+            raise InputError(f"{path} is given twice, and would count twice")
+        seen.add(real)
+    if out is not None:
+        if os.path.realpath(out) in seen:
+            raise InputError(f"{out}: is one of the recordings; write the estimate to another file")
+        check_target(out)
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Entry point: exit code 0, or 2 after one sentence on standard error."""
+    """Entry point: exit code 0, or 2 after one sentence on standard error.
+
+    130 when interrupted, and 1 when standard output was closed before everything was printed.
+    """
+    try:
+        _run(arguments)
+        sys.stdout.flush()
+    except KeyboardInterrupt:
+        print("mocobot: interrupted", file=sys.stderr)
+        sys.exit(130)
+    except BrokenPipeError:
+        # Python flushes again on its way out; that must not fail a second time.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+
+
+def _run(arguments: Sequence[str] | None) -> None:
     from mocobot_sim.trial import TrialError
 
+    if isinstance(sys.stdout, io.TextIOWrapper):  # names may hold what the terminal cannot show
+        sys.stdout.reconfigure(errors="backslashreplace")
     parsed = tyro.cli(
         Annotated[Paper, tyro.conf.subcommand("paper")]
         | Annotated[Estimate, tyro.conf.subcommand("estimate")]
@@ -132,9 +166,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except (InputError, TrialError) as error:
         print(f"mocobot: {error}", file=sys.stderr)
         sys.exit(2)
-    except KeyboardInterrupt:
-        print("mocobot: interrupted", file=sys.stderr)
-        sys.exit(130)
 
 
 if __name__ == "__main__":
