@@ -223,6 +223,11 @@ def test_same_seed_same_bytes(recording: Path, tmp_path: Path) -> None:
         (["simulate", "--vias", "0"], ["vias is 0"]),
         (["simulate", "--trajectory", "periodic", "--duration", "1"], ["duration is 1"]),
         (["simulate", "--seed", "-1"], ["seed is -1"]),
+        (["simulate", "--duration", "10"], ["--duration is for a periodic", "this one is random"]),
+        (
+            ["simulate", "--trajectory", "static", "--vias", "5"],
+            ["--vias is for a random", "this one is static"],
+        ),
     ],
 )
 def test_simulate_refuses(

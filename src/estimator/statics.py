@@ -156,15 +156,6 @@ def estimate_com(
     return ComEstimate(mass.mass, p_1c, total, covariance, J, rms), report
 
 
-def horizontal_force(holds: Sequence[Hold], grasps: GraspEstimate) -> float:
-    """Rms of the horizontal force sum over the holds [N]: zero in equilibrium, and used by no estimate."""
-    up, _ = _loads(holds, grasps)
-    wrench = np.array([hold.wrench for hold in holds])
-    force, _ = total_wrench(wrench, grasps)
-    across = force - np.sum(force * up, axis=1, keepdims=True) * up
-    return float(np.sqrt(np.mean(np.sum(across**2, axis=1))))
-
-
 def weak_com_reason(tilt: str, moment_rms: float, weight: float) -> str:
     """Why the centre of mass is open: too little ``tilt`` [sentence], or moments [N m] that make no sense."""
     if moment_rms < CONTRADICTION_M * weight:

@@ -6,7 +6,7 @@ import io
 import os
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -86,10 +86,10 @@ class Simulate:
     """Payload configuration, or the path of a payload MJCF (body 'payload', sites grasp1 .. graspN)."""
     trajectory: Literal["random", "periodic", "static"] = "random"
     """Kind of motion."""
-    vias: int = 80
-    """Vias of a random trial."""
-    duration: float = 60.0
-    """Length of a periodic motion [s]."""
+    vias: int | None = None
+    """Vias of a random trial; 80 if not given."""
+    duration: float | None = None
+    """Length of a periodic motion [s]; 60 if not given."""
     preset: str = "nominal"
     """Sensors: ideal, nominal or uncalibrated."""
     seed: int = 0
@@ -106,9 +106,15 @@ class Simulate:
         if self.out.suffix != ".parquet":
             raise InputError(f"{self.out}: the file's name must end in .parquet")
         check_target(self.out)
-        request = TrialRequest(
-            self.payload, self.trajectory, self.seed, vias=self.vias, duration_s=self.duration
-        )
+        for option, value, trajectory in (
+            ("--vias", self.vias, "random"),
+            ("--duration", self.duration, "periodic"),
+        ):
+            if value is not None and self.trajectory != trajectory:
+                raise InputError(f"{option} is for a {trajectory} trajectory; this one is {self.trajectory}")
+        given = {"vias": self.vias, "duration_s": self.duration}
+        request = TrialRequest(self.payload, self.trajectory, self.seed)
+        request = replace(request, **{name: value for name, value in given.items() if value is not None})
         with bar(None, "simulating", "sample") as advance:
             done = simulate(request, [sensor_preset(self.preset)], progress=advance)
         write_recording(done.recordings[self.preset], self.out)
