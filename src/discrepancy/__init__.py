@@ -1,0 +1,1 @@
+"""What a simulation gets wrong: residuals, causes, evidence, extended model, gain."""

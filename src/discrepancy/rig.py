@@ -1,0 +1,164 @@
+"""What the diagnosis needs to know of a rig: rows, unknowns, causes, and how to run it again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a cause.
+
+    Attributes:
+        name: as in the JSON, its unit as suffix.
+        tolerance: standard deviation that is normal for such a rig; 0 where the cause is an event, not a tolerance.
+        scale: a typical size, in which columns are expressed where the tolerance is 0.
+    """
+
+    name: str
+    tolerance: float
+    scale: float
+
+    @property
+    def unit(self) -> float:
+        """The size in which the diagnosis counts it."""
+        return self.tolerance if self.tolerance > 0 else self.scale
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One cause at one place.
+
+    Attributes:
+        cause: name of the cause.
+        family: causes of one family look alike.
+        robot, joint: where, counted from 1; None where the cause has no such place.
+        parameters: its numbers, in the order of its columns.
+        shape: further numbers that change the columns themselves, by name.
+        detail: for a transient, when and in which trial.
+    """
+
+    cause: str
+    family: str
+    robot: int | None
+    joint: int | None
+    parameters: tuple[Parameter, ...]
+    shape: Mapping[str, float] = field(default_factory=dict)
+    detail: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def units(self) -> Array:
+        """Unit of every parameter, shape (k,)."""
+        return np.array([p.unit for p in self.parameters])
+
+    @property
+    def place(self) -> str:
+        """The place in words."""
+        words = [f"robot {self.robot}"] if self.robot else []
+        words += [f"joint {self.joint}"] if self.joint else []
+        return ", ".join(words) or "payload"
+
+    @property
+    def label(self) -> str:
+        """Cause and place."""
+        return f"{self.cause} ({self.place})"
+
+    @property
+    def key(self) -> tuple[str, int | None, int | None]:
+        """Identity: cause and place."""
+        return self.cause, self.robot, self.joint
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """One trial's whitened residual and its columns, n rows of C channels.
+
+    Attributes:
+        name: the trial.
+        residual: shape (n, C); unit variance and independent if nothing is wrong.
+        local: columns of the trial's own unknowns, shape (n, C, l).
+        shared: columns of the unknowns of all trials, shape (n, C, s).
+        causes: one array per candidate, what one unit of each parameter adds, shape (n, C, k).
+        time: of every row [s], shape (n,).
+    """
+
+    name: str
+    residual: Array
+    local: Array
+    shared: Array
+    causes: Sequence[Array]
+    time: Array
+
+
+class Rig(Protocol):
+    """A machine and its simulation, seen by the diagnosis."""
+
+    @property
+    def trials(self) -> Sequence[str]:
+        """Names of the trials."""
+        ...
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """The residual's channels."""
+        ...
+
+    def candidates(self) -> list[Candidate]:
+        """Every cause at every place."""
+        ...
+
+    def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
+        """Whitened rows of every trial at the nominal unknowns."""
+        ...
+
+    def columns(self, candidate: Candidate) -> list[Array]:
+        """Whitened columns of one candidate (its shape may differ from the catalogue's), one array per trial."""
+        ...
+
+    def residual(
+        self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
+    ) -> list[Array]:
+        """Exact whitened residual of every trial.
+
+        Args:
+            shared: displacement of the shared unknowns.
+            local: of every trial's own unknowns.
+            active: causes with the values of their parameters, to be taken out of the data or added to the model.
+        """
+        ...
+
+    def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
+        """Causes that act for a while in one trial only, where the whitened residuals (n, C) are worst."""
+        ...
+
+    def refinements(self, candidate: Candidate) -> list[Candidate]:
+        """The same candidate with other shapes, to choose the best from."""
+        ...
+
+    def undecidable(self) -> list[dict[str, Any]]:
+        """What recordings of this rig cannot decide, whatever the data: statements with a reason and a remedy."""
+        ...
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One residual channel.
+
+    Attributes:
+        name: such as ``grasp 2 rotation x``.
+        kind: group that is reported together, such as ``kinematic``.
+        robot: whose channel it is, counted from 1, or None.
+        unit: physical unit of the unwhitened residual.
+    """
+
+    name: str
+    kind: str
+    robot: int | None
+    unit: str

@@ -1,0 +1,281 @@
+"""Look for causes: scan, sharpen the best, confirm on held-out trials, look again in what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.problem import Evidence, Fit, Problem
+from discrepancy.rig import Candidate, Rig
+
+Array = NDArray[np.float64]
+
+SIGNIFICANT = -6.0
+"""log10 p of the best of about a hundred candidates (a thousand intervals for a push) to be looked at."""
+INTERVALS_LOG10 = 3.0
+"""Intervals searched for a push, as powers of ten: its evidence pays for them."""
+NEXT_SHARE = 0.25
+"""A further cause has to take away this share of what the ones before it left."""
+MOST_CAUSES = 3
+CLEAN = 1.25
+"""chi-square per number below which nothing is left to explain: clean recordings give 1.05 to 1.15."""
+ENOUGH = 0.8
+"""Share of the misfit that causes must explain on held-out trials, or the verdict is not ``explained``."""
+RIVAL_SHARE = 0.5
+"""A rival explains at least this share of what the best does."""
+FOLDS = 0.75
+"""Share of the trials on which a cause must help when it was fitted to the others."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A cause that the data speak for.
+
+    Attributes:
+        candidate: what and where, with its best shape.
+        values, covariance: its parameters and their covariance, in their own units.
+        evidence: when it was chosen.
+        rivals: other candidates then, best first, with the gap of their score [nats].
+        in_sample, held_out: share of the nominal model's misfit that it removes (see ``_shares``).
+        folds: gain of chi-square on every trial when fitted to the others.
+    """
+
+    candidate: Candidate
+    values: Array
+    covariance: Array
+    evidence: Evidence
+    rivals: tuple[tuple[Candidate, float], ...]
+    in_sample: float
+    held_out: float | None
+    folds: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """What the search found.
+
+    Attributes:
+        found: causes in the order of discovery.
+        rejected: significant candidates that held-out trials did not confirm.
+        before, after: misfit of the background alone, and with the causes.
+        samples: number of residuals.
+        fit: the last fit.
+        problem: the last problem (with the causes' shapes and residual).
+        shared, local: displacements of the unknowns with the causes in the model.
+    """
+
+    found: tuple[Found, ...]
+    rejected: tuple[Candidate, ...]
+    before: float
+    after: float
+    samples: int
+    fit: Fit
+    problem: Problem
+    shared: Array
+    local: tuple[Array, ...]
+
+    @property
+    def explained(self) -> float:
+        """Share of the misfit above clean data that the causes remove."""
+        return share(self.before, self.after, self.samples)
+
+
+def share(before: float, after: float, samples: int) -> float:
+    """Share of the misfit above what clean data leave, that goes from ``before`` to ``after``."""
+    floor = min(after, CLEAN * samples)
+    return float(np.clip((before - after) / max(before - floor, 1e-9), 0.0, 1.0))
+
+
+def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] | None = None) -> Explanation:
+    """Explain the misfit of a rig's recordings by as few causes as possible.
+
+    Args:
+        rig: the rig.
+        most: largest number of causes.
+        progress: called with what is being done.
+    """
+    say = progress or (lambda what: None)
+    candidates = rig.candidates()
+    say("columns")
+    problem = Problem.of(rig.rows(candidates), candidates)
+    say("scan")
+    free: list[int] = []
+    found: list[Found] = []
+    rejected: list[Candidate] = []
+    fit = problem.fit()
+    before = fit.misfit
+    while len(found) < most:
+        inflation = max(1.0, fit.misfit / (CLEAN * problem.samples))
+        problem, evidence = _with_transients(rig, problem, fit, fit.evidence(inflation), inflation)
+        problem, evidence = _sharpen(rig, problem, free, evidence, inflation)
+        barred = {c.key for c in rejected}
+        evidence = [e for e in evidence if problem.candidates[e.index].key not in barred]
+        if not evidence or _log10_p(problem, evidence[0]) > SIGNIFICANT:
+            break
+        best = evidence[0]
+        excess = fit.misfit - min(fit.misfit, CLEAN * problem.samples)
+        if found and best.gain * inflation < NEXT_SHARE * excess:
+            break
+        candidate = problem.candidates[best.index]
+        say(f"refit {candidate.label}")
+        folds = _folds(problem, free, best.index, candidate)
+        if not _confirmed(folds):
+            rejected.append(candidate)
+            continue
+        rivals = tuple(
+            (problem.candidates[e.index], 0.5 * (best.score - e.score))
+            for e in evidence[1:]
+            if e.gain > RIVAL_SHARE * best.gain
+        )[:6]
+        before_it = list(free)
+        free.append(best.index)
+        problem, fit = _refit(rig, problem, free)
+        in_sample, held_out = _shares(problem, before_it, best.index)
+        found.append(
+            Found(candidate, np.zeros(0), np.zeros((0, 0)), best, rivals, in_sample, held_out, tuple(folds))
+        )
+    results = []
+    for index, item in zip(free, found, strict=True):
+        values, covariance = fit.part(index)
+        units = problem.candidates[index].units
+        results.append(replace(item, values=values * units, covariance=covariance * np.outer(units, units)))
+    shared = fit.coefficients[: problem.shared]
+    local = tuple(fit.local(t) for t in range(len(problem.rows)))
+    return Explanation(
+        tuple(results), tuple(rejected), before, fit.misfit, problem.samples, fit, problem, -shared,
+        tuple(-x for x in local),
+    )  # fmt: skip
+
+
+def _log10_p(problem: Problem, evidence: Evidence) -> float:
+    transient = bool(problem.candidates[evidence.index].detail)
+    return evidence.log10_p + (INTERVALS_LOG10 if transient else 0.0)
+
+
+def _confirmed(folds: Sequence[float]) -> bool:
+    if len(folds) < 2:
+        return True
+    return sum(gain > 0 for gain in folds) >= FOLDS * len(folds) and sum(folds) > 0
+
+
+def _folds(problem: Problem, free: Sequence[int], index: int, candidate: Candidate) -> list[float]:
+    """How much rather every trial has a cause as the other trials fitted it than all within its tolerance."""
+    if candidate.detail:
+        return _interleaved(problem, free, index, int(candidate.detail["trial"]))
+    trials = range(len(problem.rows))
+    if len(problem.rows) < 2:
+        return []
+    gains = []
+    for t in trials:
+        values, _ = problem.fit([*free, index], [k for k in trials if k != t]).part(index)
+        tolerated = problem.fit(free, [t])
+        gains.append(tolerated.misfit - problem.fit(free, [t], fixed=(index, values)).misfit)
+    return gains
+
+
+def _shares(problem: Problem, free: Sequence[int], index: int) -> tuple[float, float | None]:
+    """Share of the nominal model's misfit that a cause removes, in sample and on trials left out of the fit.
+
+    Nominal is the model with the causes before it and nothing else off; the room for improvement ends where the
+    cause and every tolerance together leave the data.
+    """
+    after = [*free, index]
+    full = problem.fit(after)
+    nominal, with_it = (problem.fit(chosen, background=False) for chosen in (free, after))
+    trials = range(len(problem.rows))
+    floor = sum(full.held_out(t) for t in trials)
+    in_sample = (nominal.misfit - with_it.misfit) / max(nominal.misfit - floor, 1e-9)
+    if len(trials) < 2 or problem.candidates[index].detail:
+        return float(np.clip(in_sample, 0.0, 1.0)), None
+    gained, room = 0.0, 0.0
+    for t in trials:
+        others = [k for k in trials if k != t]
+        before, after_it, best = (
+            problem.fit(free, others, background=False).held_out(t),
+            problem.fit(after, others, background=False).held_out(t),
+            problem.fit(after, others).held_out(t),
+        )
+        gained, room = gained + before - after_it, room + before - best
+    return float(np.clip(in_sample, 0.0, 1.0)), float(np.clip(gained / max(room, 1e-9), 0.0, 1.0))
+
+
+def _interleaved(
+    problem: Problem, free: Sequence[int], index: int, trial: int, blocks: int = 4
+) -> list[float]:
+    """The same within the trial of a transient: fitted to all but every fourth block of it."""
+    rows = problem.rows[trial]
+    inside = np.flatnonzero(np.abs(rows[..., problem.spans[index]]).sum(axis=(1, 2)) > 1e-6)
+    width = max(1, len(inside) // (2 * blocks))
+    gains = []
+    for b in range(blocks):
+        out = np.zeros(len(rows), dtype=bool)
+        out[inside[(np.arange(len(inside)) // width) % blocks == b]] = True
+        apart = np.einsum("nck,ncl->kl", rows[out], rows[out], optimize=True)
+        gram = problem.grams.sum(axis=0) - apart
+        ends = []
+        for chosen in (tuple(free), (*free, index)):
+            x = np.append(-Fit.of(problem, gram, chosen).coefficients, 1.0)
+            ends.append(float(x @ apart @ x))
+        gains.append(ends[0] - ends[1])
+    return gains
+
+
+def _with_transients(
+    rig: Rig, problem: Problem, fit: Fit, evidence: list[Evidence], inflation: float
+) -> tuple[Problem, list[Evidence]]:
+    """Add the best transient to the problem."""
+    best: tuple[float, Problem] | None = None
+    for candidate in rig.transients([fit.remaining(t) for t in range(len(problem.rows))]):
+        if any(c.detail and dict(c.detail) == dict(candidate.detail) for c in problem.candidates):
+            continue
+        wider = problem.extended(candidate, rig.columns(candidate))
+        gain = wider.fit(fit.free).evidence_of(len(wider.candidates) - 1, inflation)
+        if gain is not None and (best is None or gain.score > best[0]):
+            best = (gain.score, wider)
+    if best is None:
+        return problem, evidence
+    return best[1], best[1].fit(fit.free).evidence(inflation)
+
+
+def _sharpen(
+    rig: Rig, problem: Problem, free: Sequence[int], evidence: list[Evidence], inflation: float
+) -> tuple[Problem, list[Evidence]]:
+    """Give the leading candidates their best shape."""
+    if not evidence or _log10_p(problem, evidence[0]) > SIGNIFICANT:
+        return problem, evidence
+    for leader in [e for e in evidence[:8] if e.gain > RIVAL_SHARE * evidence[0].gain]:
+        best, best_gain = problem, leader.gain
+        for other in rig.refinements(problem.candidates[leader.index]):
+            changed = problem.with_columns(leader.index, other, rig.columns(other))
+            judged = changed.fit(free).evidence_of(leader.index, inflation)
+            if judged is not None and judged.gain > best_gain + 1.0:
+                best, best_gain = changed, judged.gain
+        problem = best
+    return problem, problem.fit(free).evidence(inflation)
+
+
+def _refit(rig: Rig, problem: Problem, free: Sequence[int], rounds: int = 3) -> tuple[Problem, Fit]:
+    """Gauss-Newton on causes and unknowns: exact residuals, the catalogue's columns."""
+    fit = problem.fit(free)
+    for _ in range(rounds):
+        coefficients = fit.coefficients
+        shared = coefficients[: problem.shared]
+        local = [fit.local(t) for t in range(len(problem.rows))]
+        active = [(problem.candidates[i], fit.part(i)[0] * problem.candidates[i].units) for i in free]
+        exact = rig.residual(-shared, [-x for x in local], active)
+        # The problem counts total values, so what its columns stand for is added back.
+        back = []
+        for t, r in enumerate(exact):
+            total = r + problem.raw[t][..., : problem.shared] @ shared + problem.local[t] @ local[t]
+            for i in free:
+                total = total + problem.raw[t][..., problem.spans[i]] @ fit.part(i)[0]
+            back.append(total)
+        moved = problem.with_residual(back)
+        new = moved.fit(free)
+        if new.misfit > 1.5 * fit.misfit + problem.samples:  # diverges: the linear answer is the better one
+            break
+        problem, fit = moved, new
+    return problem, fit

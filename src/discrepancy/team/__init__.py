@@ -1,0 +1,1 @@
+"""The mocobot team as a rig of the diagnosis."""

@@ -1,0 +1,26 @@
+"""A base that gives way to the horizontal force on it."""
+
+import numpy as np
+
+from discrepancy.team.causes.base import Cause, stack
+from estimator.delta import leg_geometry, wrist_motion
+
+
+class BaseCompliance(Cause):
+    """The base moves by compliance times the horizontal force, which is the reaction to arm and payload."""
+
+    name = "base_compliance"
+    family = "compliance"
+    parameters = ("compliance_m_per_N",)
+    per = "robot"
+    separate = (
+        "Vertical forces (lifting against each other) separate a base, which yields sideways, from a grasp."
+    )
+
+    def columns(self, trial, robot, joint, shape):  # noqa: D102
+        design, s = trial.design, trial.s[:, robot]
+        force = np.einsum("qij,qj->qi", trial.data.R_bi[:, robot], trial.data.wrench[:, robot, 3:])
+        _, h_ddot = wrist_motion(leg_geometry(s[:, :3], design), s[:, 3:6], s[:, 6:9])
+        force = force + (design.wrist_mass_kg + 1.5 * design.rod_mass_kg) * h_ddot
+        horizontal = -force * np.array([1.0, 1.0, 0.0])
+        return stack([trial.of_pose(robot, None, horizontal @ trial.bases.R[robot].T)])

@@ -1,0 +1,23 @@
+"""Viscous drag on the payload."""
+
+import numpy as np
+
+from discrepancy.team.causes.base import Cause, stack
+from estimator.fusion import fuse, fusion_matrix
+
+
+class Drag(Cause):
+    """Force -c v on the payload at its centre of mass."""
+
+    name = "drag"
+    family = "dissipation"
+    parameters = ("coefficient_Ns_per_m",)
+    per = "payload"
+    separate = "Translation at constant attitude separates drag of the payload from friction of the gimbals."
+
+    def columns(self, trial, robot, joint, shape):  # noqa: D102
+        motion = fuse(trial.data, trial.shared.grasps)
+        twist = trial.data.twist.reshape(len(trial.s), -1) @ fusion_matrix(trial.shared.grasps).T
+        com = trial.shared.pi[1:4] / trial.shared.pi[0]
+        force = -(twist[:, 3:] + np.cross(motion.omega, com))
+        return stack([trial.of_wrench(force, np.cross(com, force))])

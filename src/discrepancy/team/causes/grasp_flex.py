@@ -1,0 +1,21 @@
+"""A grasp that yields."""
+
+import numpy as np
+
+from discrepancy.team.causes.base import Cause, stack
+
+
+class GraspFlex(Cause):
+    """The payload's grasp site lags behind the flange by compliance times the force on the payload."""
+
+    name = "grasp_flex"
+    family = "compliance"
+    parameters = ("compliance_m_per_N",)
+    per = "robot"
+    separate = (
+        "Vertical forces (lifting against each other) separate a grasp from a base, which yields sideways."
+    )
+
+    def columns(self, trial, robot, joint, shape):  # noqa: D102
+        force = np.einsum("qij,qj->qi", trial.data.R_bi[:, robot], trial.data.wrench[:, robot, 3:])
+        return stack([trial.of_pose(robot, None, -force @ trial.bases.R[robot].T)])

@@ -1,0 +1,21 @@
+"""Zero of a driven joint's encoder."""
+
+import numpy as np
+
+from discrepancy.team.causes.base import Cause, one_robot, stack
+
+
+class PhiZero(Cause):
+    """phi reads too much by a constant."""
+
+    name = "phi_zero"
+    family = "arm_geometry"
+    parameters = ("zero_rad",)
+    separate = "Poses spread over the whole workspace separate a zero from a wrong length."
+
+    def columns(self, trial, robot, joint, shape):  # noqa: D102
+        return stack([trial.of_signals(robot, phi=np.eye(3)[joint])])
+
+    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+        error = np.tile(values[0] * np.eye(3)[joint], (len(signals.time), 1))
+        return signals.minus(phi=one_robot(error, trial.robots, robot))

@@ -1,0 +1,28 @@
+"""A push: a constant force on the payload during an interval of one trial."""
+
+import numpy as np
+
+from discrepancy.team.causes.base import Cause, stack
+
+
+class Push(Cause):
+    """Force (axes of {b1}) at a payload point, as force and moment at the origin of {1}."""
+
+    name = "push"
+    family = "push"
+    parameters = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nm", "moment_y_Nm", "moment_z_Nm")
+    scales = (0.1, 0.1, 0.1, 0.1, 0.1, 0.1)
+    per = "payload"
+    separate = "Another trial: a push does not repeat."
+
+    def columns(self, trial, robot, joint, shape):  # noqa: D102
+        time = trial.signals.time
+        window = ((time >= shape["start_s"]) & (time < shape["start_s"] + shape["duration_s"])).astype(float)
+        none = np.zeros((len(time), 3))
+        columns = []
+        for axis in np.eye(3):
+            force = np.einsum("qji,j->qi", trial.data.R_bi[:, 0], axis) * window[:, None]
+            columns.append(trial.of_wrench(force, none))
+        for axis in np.eye(3):
+            columns.append(trial.of_wrench(none, np.outer(window, axis)))
+        return stack(columns)

@@ -1,0 +1,25 @@
+"""A spring that grows stiffer with deflection."""
+
+from discrepancy.team.causes.base import Cause, one_joint, one_robot, stack
+
+
+class SeaHardening(Cause):
+    """Torque k d + k3 d^3 of deflection d, read as k d."""
+
+    name = "sea_hardening"
+    family = "sea_torque"
+    parameters = ("cubic_Nm_per_rad3",)
+    separate = "Loads of both signs on the joint (a known added weight) separate bias, scale and hardening."
+
+    def columns(self, trial, robot, joint, shape):  # noqa: D102
+        return stack(
+            [trial.of_signals(robot, tau=one_joint(_error(trial.s[:, robot, 18 + joint], trial), joint))]
+        )
+
+    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+        error = one_joint(values[0] * _error(signals.tau[:, robot, joint], trial), joint)
+        return signals.minus(tau=one_robot(error, trial.robots, robot))
+
+
+def _error(tau, trial):
+    return -((tau / trial.design.sea_stiffness_Nm_per_rad) ** 3)

@@ -1,0 +1,22 @@
+"""Stiffness of a spring: scale of a torque reading."""
+
+from discrepancy.team.causes.base import Cause, one_joint, one_robot, stack
+
+
+class SeaScale(Cause):
+    """The spring is stiffer than believed by a factor 1 + scale, so the reading is low by it.
+
+    A scale common to all springs cannot be told from the payload's mass; a single one can.
+    """
+
+    name = "sea_scale"
+    family = "sea_torque"
+    parameters = ("scale",)
+    separate = "Loads of both signs on the joint (a known added weight) separate bias, scale and hardening."
+
+    def columns(self, trial, robot, joint, shape):  # noqa: D102
+        return stack([trial.of_signals(robot, tau=one_joint(-trial.s[:, robot, 18 + joint], joint))])
+
+    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+        error = one_joint(-values[0] * signals.tau[:, robot, joint], joint)
+        return signals.minus(tau=one_robot(error, trial.robots, robot))

@@ -1,0 +1,44 @@
+"""A spring from a grasp to a fixed point: a hose, a cable."""
+
+import numpy as np
+
+from discrepancy.team.causes.base import Cause, stack
+
+
+class Tether(Cause):
+    """Force k (anchor - grasp) on the payload at a robot's grasp, anchor fixed in that robot's {b}.
+
+    The columns are the force at the home position and the stiffness.
+    """
+
+    name = "tether"
+    family = "sea_torque"
+    parameters = ("force_x_N", "force_y_N", "force_z_N", "stiffness_N_per_m")
+    scales = (0.1, 0.1, 0.1, 1.0)
+    per = "robot"
+    separate = "A run without payload, or a second payload at the same place, separates an outside force from a sensor."
+
+    def columns(self, trial, robot, joint, shape):  # noqa: D102
+        data, grasps = trial.data, trial.shared.grasps
+        home = np.array([0.0, 0.0, trial.design.home_height_m])
+        samples = len(trial.s)
+        forces = [np.tile(axis, (samples, 1)) for axis in np.eye(3)] + [home - data.p_bi[:, robot]]
+        columns = []
+        for force_b in forces:
+            force = np.einsum("qji,qj->qi", data.R_bi[:, robot], force_b) @ grasps.R_1i[robot].T
+            columns.append(trial.of_wrench(force, np.cross(grasps.p_1i[robot], force)))
+        return stack(columns)
+
+    home_height_m = 0.355
+
+    def report(self, values, covariance):  # noqa: D102
+        k = values[3]
+        anchor = values[:3] / k + np.array([0.0, 0.0, self.home_height_m])
+        J = np.zeros((4, 4))
+        J[0, 3] = 1.0
+        J[1:, :3], J[1:, 3] = np.eye(3) / k, -values[:3] / k**2
+        se = np.sqrt(np.diag(J @ covariance @ J.T))
+        names = ("stiffness_N_per_m", "anchor_x_m", "anchor_y_m", "anchor_z_m")
+        return dict(zip(names, [float(k), *anchor.tolist()], strict=True)), dict(
+            zip(names, se.tolist(), strict=True)
+        )

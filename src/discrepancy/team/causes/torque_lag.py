@@ -1,0 +1,23 @@
+"""A first-order lag inside the torque sensors."""
+
+from discrepancy.team.causes.base import Cause, one_robot, stack
+from discrepancy.team.signals import with_rates
+
+
+class TorqueLag(Cause):
+    """All torques of a robot lag by a first-order filter, which the controller sees as well."""
+
+    name = "torque_lag"
+    family = "dissipation"
+    parameters = ("time_constant_s",)
+    per = "robot"
+    separate = "The commands separate a lag inside the sensor from a late log."
+
+    def columns(self, trial, robot, joint, shape):  # noqa: D102
+        rate = with_rates(trial.signals.tau[:, robot], trial.signals.rate_hz)[1]
+        return stack([trial.of_signals(robot, tau=-rate)])
+
+    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+        # truth = reading + T d(reading)/dt
+        rate = with_rates(signals.tau[:, robot], signals.rate_hz)[1]
+        return signals.minus(tau=one_robot(-values[0] * rate, trial.robots, robot))

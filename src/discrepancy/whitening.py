@@ -1,0 +1,88 @@
+"""Make a residual's rows independent and of unit variance, from draws of the noise alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+
+Array = NDArray[np.float64]
+
+AR_ORDER = 2
+SHRINKAGE = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """Channels are decorrelated at each row, then every channel of the moving rows along time (autoregressive).
+
+    Attributes:
+        moving: number of leading rows that follow each other at one rate; the rest stand alone.
+        chol_moving, chol_alone: lower Cholesky factors of the channels' covariance, shape (C, C).
+        ar: autoregressive coefficients of every whitened channel, shape (C, p).
+        innovation: standard deviation of what they leave, shape (C,).
+    """
+
+    moving: int
+    chol_moving: Array
+    chol_alone: Array
+    ar: Array
+    innovation: Array
+
+    @classmethod
+    def of(cls, draws: Array, moving: int) -> Whitening:
+        """Whitening from noise draws, shape (D, n, C), of which the first ``moving`` rows are a series."""
+        channels = draws.shape[2]
+        chol_moving = _cholesky(draws[:, :moving])
+        chol_alone = _cholesky(draws[:, moving:])
+        ar, innovation = np.zeros((channels, AR_ORDER)), np.ones(channels)
+        if moving > 10 * AR_ORDER:
+            white = _per_row(chol_moving, draws[:, :moving])
+            lag = [np.mean(white[:, k:] * white[:, : moving - k], axis=(0, 1)) for k in range(AR_ORDER + 1)]
+            for c in range(channels):
+                toeplitz = np.array([[lag[abs(i - j)][c] for j in range(AR_ORDER)] for i in range(AR_ORDER)])
+                right = np.array([lag[i + 1][c] for i in range(AR_ORDER)])
+                ar[c] = np.linalg.solve(toeplitz, right)
+                innovation[c] = np.sqrt(max(lag[0][c] - ar[c] @ right, 1e-6))
+        return cls(moving, chol_moving, chol_alone, ar, innovation)
+
+    def __call__(self, x: Array) -> Array:
+        """Whiten rows and channels, shape (n, C, ...) -> the same."""
+        y = np.empty_like(x, dtype=float)
+        y[self.moving :] = _per_row(self.chol_alone, x[self.moving :])
+        z = _per_row(self.chol_moving, x[: self.moving])
+        shape = (1, -1) + (1,) * (x.ndim - 2)
+        series = z.copy()
+        for k in range(AR_ORDER):
+            series[k + 1 :] -= self.ar[:, k].reshape(shape) * z[: len(z) - k - 1]
+        scale = self.innovation.reshape(shape)
+        # The first rows have no past to predict them from; they keep their own variance of one.
+        series[AR_ORDER:] /= scale
+        series[:AR_ORDER] = z[:AR_ORDER]
+        y[: self.moving] = series
+        return y
+
+
+def _cholesky(draws: Array) -> Array:
+    channels = draws.shape[2]
+    rows = draws.reshape(-1, channels)
+    if not len(rows):
+        return np.eye(channels)
+    covariance = rows.T @ rows / len(rows)
+    weight = SHRINKAGE + (1.0 - SHRINKAGE) * min(1.0, channels / len(rows))
+    diagonal = np.diag(np.diag(covariance) + 1e-30)
+    return np.linalg.cholesky((1.0 - weight) * covariance + weight * diagonal)
+
+
+def _per_row(chol: Array, x: Array) -> Array:
+    """chol^-1 applied to axis -2 or, for plain rows, the last axis: shapes (..., C) or (n, C, k)."""
+    if not x.size:
+        return np.asarray(x, dtype=float)
+    channels = len(chol)
+    axis = 1 if x.ndim > 2 and x.shape[1] == channels else x.ndim - 1
+    flat = np.moveaxis(x, axis, 0)
+    return np.moveaxis(
+        solve_triangular(chol, flat.reshape(channels, -1), lower=True).reshape(flat.shape), 0, axis
+    )
