@@ -10,7 +10,10 @@ from estimator.errors import InputError
 from mocobot_sim.as_built import AsBuilt, CalibrationSpread
 from mocobot_sim.control import ControlGains
 from mocobot_sim.models import omnid_design
+from mocobot_sim.scene import build_team
 from mocobot_sim.sensors import PRESETS, SensorPreset, measure, sensor_preset
+from mocobot_sim.trajectories import random_vias
+from mocobot_sim.trial import run_trial
 
 CHANNELS = ("phi", "theta", "tau")
 
@@ -61,7 +64,7 @@ def test_ideal_sensors_pass_the_truth_bit_for_bit(random_a):
 def test_readings_lie_on_the_grid(random_a):
     recording = measure(random_a, sensor_preset("nominal"), _rng())
     for channel, step in (("phi", 2 * np.pi / 65536), ("theta", 2 * np.pi / 65536), ("tau", 0.01)):
-        counts = getattr(recording, channel) / step
+        counts = (getattr(recording, channel) - getattr(recording, channel)[0]) / step
         np.testing.assert_allclose(counts, np.round(counts), rtol=0, atol=1e-6)
         assert len(np.unique(np.round(counts))) > 100
     step = 2 * np.pi / 65536
@@ -72,11 +75,26 @@ def test_readings_lie_on_the_grid(random_a):
         assert abs(error.mean()) < 0.1 * step
 
 
+def test_every_channel_has_its_own_grid(random_a):
+    """Robots that stand alike must not round alike: where the grids lie is uniform within a step."""
+    phases = []
+    for seed in range(60):
+        recording = measure(random_a, sensor_preset("nominal"), _rng(seed))
+        for channel, step in (("phi", 2 * np.pi / 65536), ("theta", 2 * np.pi / 65536), ("tau", 0.01)):
+            phases.append(np.ravel(getattr(recording, channel)[0] / step % 1.0))
+    phases = np.ravel(phases)
+    assert len(phases) == 60 * 27
+    counts = np.histogram(phases, bins=10, range=(0, 1))[0]
+    assert chi2.sf(np.sum((counts - 162) ** 2 / 162), 9) > 1e-4
+    one = np.array(phases).reshape(60, 27)
+    assert np.abs(np.corrcoef(np.exp(2j * np.pi * one).T) - np.eye(27)).max() < 0.6
+
+
 @pytest.mark.parametrize("bits", [8, 14, 17])
 def test_resolution_follows_the_bits(random_a, bits):
     recording = measure(random_a, SensorPreset("test", encoder_bits=bits), _rng())
     step = 360.0 / 2**bits
-    counts = np.rad2deg(recording.phi) / step
+    counts = np.rad2deg(recording.phi - recording.phi[0]) / step
     np.testing.assert_allclose(counts, np.round(counts), rtol=0, atol=1e-6)
     assert abs(np.diff(np.unique(np.round(counts))).min() - 1) < 1e-9
     np.testing.assert_array_equal(recording.tau, random_a.tau)
@@ -118,15 +136,16 @@ def test_zeros_shift_the_readings_of_their_own_channel(random_a):
         assert not shift[:, [0, 2]].any()
 
 
-def test_a_stiff_spring_reads_low(random_a):
+def test_a_stiff_spring_reads_low():
+    """Design stiffness (100 N m/rad) times the deflection that the true torque causes in the true spring."""
     ratio = np.array([0.05, -0.02, 0.0])
-    recording = measure(
-        dataclasses.replace(random_a, units=_units(stiffness_ratio=ratio)), sensor_preset("ideal"), _rng()
-    )
-    deflection = random_a.tau[:, 1] / (100.0 * (1 + ratio))
+    scene = build_team("a", _units(stiffness_ratio=ratio))
+    log = run_trial(scene, random_vias(scene.wrist_home_b, _rng(), 1))
+    recording = measure(log, sensor_preset("ideal"), _rng())
+    deflection = log.tau[:, 1] / (100.0 * (1 + ratio))
     np.testing.assert_allclose(recording.tau[:, 1], 100.0 * deflection, rtol=1e-14)
-    assert np.all(np.abs(recording.tau[:, 1, 0]) < np.abs(random_a.tau[:, 1, 0]))
-    np.testing.assert_array_equal(recording.tau[:, 0], random_a.tau[:, 0])
+    assert np.all(np.abs(recording.tau[:, 1, 0]) < np.abs(log.tau[:, 1, 0]))
+    np.testing.assert_array_equal(recording.tau[:, 0], log.tau[:, 0])
 
 
 def test_geometry_does_not_reach_the_sensors(random_a):

@@ -120,6 +120,13 @@ class Problem:
             candidates, tuple(raw), tuple(rows), self.local, grams, self.shared, self.spans, self.tolerant
         )
 
+    def with_unknowns(self, unknowns: Sequence[Array]) -> Problem:
+        """The problem with further unknowns of every trial, shape (n, C, k) each."""
+        if not any(u.shape[2] for u in unknowns):
+            return self
+        local = [np.concatenate([a, b], axis=2) for a, b in zip(self.local, unknowns, strict=True)]
+        return Problem._from(self.candidates, self.raw, local, self.shared)
+
     def extended(self, candidate: Candidate, columns: Sequence[Array]) -> Problem:
         """The problem with one candidate more."""
         raw, rows, grams = [], [], []
@@ -319,6 +326,7 @@ def _project(x: Array, onto: Array) -> Array:
     """Take the columns ``onto`` out of x; shapes (n, C, k), (n, C, l)."""
     if onto.shape[2] == 0:
         return x
-    q = np.linalg.qr(onto.reshape(-1, onto.shape[2]))[0]
+    u, d, _ = np.linalg.svd(onto.reshape(-1, onto.shape[2]), full_matrices=False)
+    q = u[:, d > 1e-10 * d[0]]
     flat = x.reshape(-1, x.shape[2])
     return (flat - q @ (q.T @ flat)).reshape(x.shape)

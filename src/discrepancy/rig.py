@@ -110,6 +110,11 @@ class Rig(Protocol):
         """The residual's channels."""
         ...
 
+    @property
+    def local_unknowns(self) -> int:
+        """Number of unknowns that every trial has of its own."""
+        ...
+
     def candidates(self) -> list[Candidate]:
         """Every cause at every place."""
         ...
@@ -132,6 +137,10 @@ class Rig(Protocol):
             local: of every trial's own unknowns.
             active: causes with the values of their parameters, to be taken out of the data or added to the model.
         """
+        ...
+
+    def unknowns(self, candidate: Candidate) -> list[Array]:
+        """Whitened columns of what a cause leaves open in every trial, shape (n, C, k), possibly k = 0."""
         ...
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:

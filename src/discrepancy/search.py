@@ -26,6 +26,7 @@ ENOUGH = 0.8
 """Share of the misfit that causes must explain on held-out trials, or the verdict is not ``explained``."""
 RIVAL_SHARE = 0.5
 """A rival explains at least this share of what the best does."""
+MOST_REJECTED = 4
 FOLDS = 0.75
 """Share of the trials on which a cause must help when it was fitted to the others."""
 
@@ -121,9 +122,13 @@ def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] 
             break
         candidate = problem.candidates[best.index]
         say(f"refit {candidate.label}")
+        narrower, problem = problem, problem.with_unknowns(rig.unknowns(candidate))
         folds = _folds(problem, free, best.index, candidate)
         if not _confirmed(folds):
             rejected.append(candidate)
+            problem = narrower
+            if len(rejected) > MOST_REJECTED:
+                break
             continue
         rivals = tuple(
             (problem.candidates[e.index], 0.5 * (best.score - e.score))
@@ -143,7 +148,7 @@ def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] 
         units = problem.candidates[index].units
         results.append(replace(item, values=values * units, covariance=covariance * np.outer(units, units)))
     shared = fit.coefficients[: problem.shared]
-    local = tuple(fit.local(t) for t in range(len(problem.rows)))
+    local = tuple(fit.local(t)[: rig.local_unknowns] for t in range(len(problem.rows)))
     return Explanation(
         tuple(results), tuple(rejected), before, fit.misfit, problem.samples, fit, problem, -shared,
         tuple(-x for x in local),
@@ -264,12 +269,13 @@ def _refit(rig: Rig, problem: Problem, free: Sequence[int], rounds: int = 3) -> 
         coefficients = fit.coefficients
         shared = coefficients[: problem.shared]
         local = [fit.local(t) for t in range(len(problem.rows))]
+        own = rig.local_unknowns
         active = [(problem.candidates[i], fit.part(i)[0] * problem.candidates[i].units) for i in free]
-        exact = rig.residual(-shared, [-x for x in local], active)
+        exact = rig.residual(-shared, [-x[:own] for x in local], active)
         # The problem counts total values, so what its columns stand for is added back.
         back = []
         for t, r in enumerate(exact):
-            total = r + problem.raw[t][..., : problem.shared] @ shared + problem.local[t] @ local[t]
+            total = r + problem.raw[t][..., : problem.shared] @ shared + problem.local[t][..., :own] @ local[t][:own]
             for i in free:
                 total = total + problem.raw[t][..., problem.spans[i]] @ fit.part(i)[0]
             back.append(total)

@@ -82,8 +82,11 @@ class Simulate:
 
     out: Annotated[Path, tyro.conf.arg(metavar="REC.parquet")]
     """Recording to write; the truth goes beside it as REC.truth.json."""
-    payload: str = "a"
-    """Payload configuration, or the path of a payload MJCF (body 'payload', sites grasp1 .. graspN)."""
+    payload: str | None = None
+    """Payload configuration, or the path of a payload MJCF (body 'payload', sites grasp1 .. graspN); 'a' if neither
+    this nor a model is given."""
+    model: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Extended model to simulate in place of a payload on robots as designed."""
     trajectory: Literal["random", "periodic", "static"] = "random"
     """Kind of motion."""
     vias: int | None = None
@@ -99,6 +102,7 @@ class Simulate:
         """Run the command."""
         from estimator.recording import write_recording
         from mocobot.progress import bar
+        from mocobot_sim.extended import load_extended
         from mocobot_sim.sensors import sensor_preset
         from mocobot_sim.simulate import TrialRequest, simulate
         from mocobot_sim.truth import write_truth
@@ -112,11 +116,17 @@ class Simulate:
         ):
             if value is not None and self.trajectory != trajectory:
                 raise InputError(f"{option} is for a {trajectory} trajectory; this one is {self.trajectory}")
+        if self.model is not None and self.payload is not None:
+            raise InputError(
+                "--payload and --model are both given; the model has its own payload, so leave one out"
+            )
+        scene = load_extended(self.model) if self.model is not None else None
+        label = self.payload or "a" if self.model is None else os.path.basename(os.path.realpath(self.model))
         given = {"vias": self.vias, "duration_s": self.duration}
-        request = TrialRequest(self.payload, self.trajectory, self.seed)
+        request = TrialRequest(label, self.trajectory, self.seed)
         request = replace(request, **{name: value for name, value in given.items() if value is not None})
         with bar(None, "simulating", "sample") as advance:
-            done = simulate(request, [sensor_preset(self.preset)], progress=advance)
+            done = simulate(request, [sensor_preset(self.preset)], progress=advance, scene=scene)
         write_recording(done.recordings[self.preset], self.out)
         write_truth(done.truth, self.out)
         print(f"{self.out}: {done.log.time[-1]:.1f} s of {self.trajectory} motion, {self.preset} sensors")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
+import mujoco
+
 from estimator.design import OmnidDesign, load_design
 from estimator.errors import InputError
 
@@ -43,3 +45,12 @@ def payload_path(name: str) -> Path:
 def omnid_design() -> OmnidDesign:
     """Design numbers of the shipped Omnid model."""
     return load_design(models_dir() / "omnid" / "design.toml")
+
+
+@cache
+def base_height_m() -> float:
+    """Height of {b} over the floor mount of an Omnid, whose axes it shares [m]."""
+    model = mujoco.MjModel.from_xml_path(str(models_dir() / "omnid" / "omnid.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return float(data.body("base").xpos[2])

@@ -85,28 +85,32 @@ def measure(
     """Read a trial through the sensors.
 
     A torque reading is the spring's deflection times its design stiffness, so a stiffer spring reads low.
+    Every encoder and torque channel that rounds has a grid of its own, placed at random, so that robots which stand
+    alike do not round alike.
 
     Args:
         log: the trial.
         preset: quality of the sensors.
-        rng: source of the noise.
+        rng: source of the noise and of the grids.
         payload: name of the payload, for the metadata.
         seed: seed, for the metadata.
         name: how messages call the recording.
     """
     units = log.units
-    phi = log.phi + np.array([unit.phi_zero_rad for unit in units])
-    theta = log.theta + np.array([unit.theta_zero_rad for unit in units])
-    stiffness_ratio = np.array([unit.stiffness_ratio for unit in units])
-    tau = log.tau / (1.0 + stiffness_ratio) + np.array([unit.tau_zero_Nm for unit in units])
+    clock_s = np.array(log.sensors.of("clock_delay_s", log.robots))
+    torque_s = clock_s + log.sensors.of("torque_delay_s", log.robots)
+    phi = log.sensed.sampled("phi", clock_s) + np.array([unit.phi_zero_rad for unit in units])
+    theta = log.sensed.sampled("theta", clock_s) + np.array([unit.theta_zero_rad for unit in units])
+    tau = log.sensed.sampled("tau", torque_s) + np.array([unit.tau_zero_Nm for unit in units])
+    encoder_step = 2.0 * np.pi / 2**preset.encoder_bits if preset.encoder_bits else 0.0
+    grids = [_grid(step, log.robots, rng) for step in (encoder_step, encoder_step, preset.tau_step_Nm)]
     if preset.tau_noise_Nm:
         tau = tau + preset.tau_noise_Nm * rng.standard_normal(tau.shape)
-    encoder_step = 2.0 * np.pi / 2**preset.encoder_bits if preset.encoder_bits else 0.0
     return Recording(
         time=log.time,
-        phi=_round_to(phi, encoder_step),
-        theta=_round_to(theta, encoder_step),
-        tau=_round_to(tau, preset.tau_step_Nm),
+        phi=_round_to(phi, encoder_step, grids[0]),
+        theta=_round_to(theta, encoder_step, grids[1]),
+        tau=_round_to(tau, preset.tau_step_Nm, grids[2]),
         ref=log.ref_b,
         metadata=RecordingMetadata(
             robots=log.robots,
@@ -122,6 +126,11 @@ def measure(
     )
 
 
-def _round_to(values: Array, step: float) -> Array:
+def _grid(step: float, robots: int, rng: np.random.Generator) -> Array:
+    """Where each channel's grid lies relative to zero, within half a step, shape (N, 3)."""
+    return step * rng.uniform(-0.5, 0.5, (robots, 3)) if step else np.zeros((robots, 3))
+
+
+def _round_to(values: Array, step: float, grid: Array) -> Array:
     # In C order like a recording from a file or another process, so that sums over it have the same bits.
-    return np.ascontiguousarray(np.round(values / step) * step if step else values)
+    return np.ascontiguousarray(np.round((values + grid) / step) * step - grid if step else values)

@@ -14,7 +14,7 @@ from estimator.recording import Recording
 from mocobot_sim.as_built import AsBuilt
 from mocobot_sim.control import ControlGains
 from mocobot_sim.scene import TeamScene, build_team
-from mocobot_sim.sensors import SensorPreset, measure
+from mocobot_sim.sensors import PRESETS, SensorPreset, measure
 from mocobot_sim.trajectories import Trajectory, random_vias, sphere_motion, static_orientations
 from mocobot_sim.trial import TrialLog, run_trial
 from mocobot_sim.truth import GroundTruth
@@ -74,6 +74,7 @@ def simulate(
     grasps: RigidTransform | None = None,
     gains: ControlGains | None = None,
     progress: Callable[[int], object] | None = None,
+    scene: TeamScene | None = None,
 ) -> Simulated:
     """Run one trial and read it through one or several sensor presets.
 
@@ -87,6 +88,8 @@ def simulate(
             trajectories, N transforms; None for the true ones.
         gains: control gains; None for the defaults.
         progress: called with the number of samples done since the last call.
+        scene: the team, in place of one built from ``request.payload``, which then is its label only; its robots are
+            what they are, so the presets must be calibrated ones.
 
     Raises:
         InputError: a request or preset that cannot be met.
@@ -98,9 +101,15 @@ def simulate(
         raise InputError("presets of one trial must share their calibration spread")
     if request.seed < 0:
         raise InputError(f"seed is {request.seed}; it must be at least 0")
-    scene = build_team(request.payload, draw_units(request.payload, presets[0], request.seed))
+    if scene is None:
+        scene = build_team(request.payload, draw_units(request.payload, presets[0], request.seed))
+    elif not presets[0].calibrated:
+        raise InputError(
+            f"preset {presets[0].name!r} draws robots of its own, but the model already says how its robots deviate; "
+            f"use {' or '.join(name for name, preset in PRESETS.items() if preset.calibrated)}"
+        )
     trajectory = make_trajectory(request, scene, grasps)
-    log = run_trial(scene, trajectory, gains, progress)
+    log = run_trial(scene, trajectory, gains, progress, trial_number=request.number + 1)
     recordings = {
         preset.name: measure(
             log,

@@ -13,6 +13,7 @@ Index = NDArray[np.intp]
 GIMBAL_AXES = ("z", "y", "x")
 SLIDES = ("platform_x", "platform_y", "platform_z")
 PAYLOAD_PREFIX = "omnid1/payload/"
+YIELDING = ("creep", "compliance", "flex", "play")
 
 
 @dataclass(frozen=True)
@@ -26,6 +27,8 @@ class TeamIndex:
         grasp_site: the flange's site of every robot, shape (N,).
         payload_site: the payload's grasp site of every robot, shape (N,).
         payload_body: body id of the payload.
+        yielding_dof: slides of bases and grasps that yield, are loose or creep; none in a team as designed.
+        slosh_dof: hinges of a pendulum in the payload.
     """
 
     motor_qpos: Index
@@ -41,6 +44,8 @@ class TeamIndex:
     grasp_site: Index
     payload_site: Index
     payload_body: int
+    yielding_dof: Index
+    slosh_dof: Index
 
     @property
     def robots(self) -> int:
@@ -93,4 +98,13 @@ class TeamIndex:
                 [model.site(f"{PAYLOAD_PREFIX}grasp{i + 1}").id for i in range(robots)], dtype=np.intp
             ),
             payload_body=model.body(f"{PAYLOAD_PREFIX}payload").id,
+            yielding_dof=_named(model, YIELDING),
+            slosh_dof=_named(model, ("slosh",)),
         )
+
+
+def _named(model: mujoco.MjModel, kinds: tuple[str, ...]) -> Index:
+    """Positions in ``qvel`` of joints called ``.../{kind}_{axis}``."""
+    names = {f"{kind}_{axis}" for kind in kinds for axis in "xyz"}
+    found = [j for j in range(model.njnt) if model.joint(j).name.rsplit("/", 1)[-1] in names]
+    return model.jnt_dofadr[np.array(found, dtype=int)].astype(np.intp)

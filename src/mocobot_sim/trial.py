@@ -18,6 +18,8 @@ from mocobot_sim.assemble import assemble_at_home
 from mocobot_sim.control import ControlGains, TeamController, home_phi
 from mocobot_sim.models import omnid_design
 from mocobot_sim.scene import TeamScene
+from mocobot_sim.sensed import SensedLog
+from mocobot_sim.sensor_effects import SensorEffects
 from mocobot_sim.team_index import TeamIndex
 from mocobot_sim.trajectories import RATE_HZ, Trajectory
 
@@ -43,13 +45,15 @@ class TrialLog:
         time: [s], shape (Q,).
         phi: driven angles [rad], shape (Q, N, 3).
         theta: gimbal angles (z, y, x) [rad], shape (Q, N, 3).
-        tau: spring torque on the proximal links, positive raising them [N m], shape (Q, N, 3).
+        tau: true torque of the springs on the proximal links, positive raising them [N m], shape (Q, N, 3).
         ref_b: commanded wrist positions in {b} [m], shape (Q, N, 3).
         p_W1: origin of {1} in the world [m], shape (Q, 3).
         R_W1: orientation of {1} (the payload) in the world, shape (Q, 3, 3).
         feed_forward: the controller's frozen load force in {b} [N], shape (N, 3).
         gains: control gains.
         units: how each robot deviates from the design, N entries.
+        sensors: timing faults of the sensors.
+        sensed: what the joint sensors see, at the control rate.
         rod_error_m: largest distance between a rod's tip and its platform joint [m].
         weld_error_m: largest distance between a flange and its grasp [m].
         weld_error_rad: largest angle between a flange and its grasp [rad].
@@ -66,6 +70,8 @@ class TrialLog:
     feed_forward: Array
     gains: ControlGains
     units: tuple[AsBuilt, ...]
+    sensors: SensorEffects
+    sensed: SensedLog
     rod_error_m: float
     weld_error_m: float
     weld_error_rad: float
@@ -85,6 +91,10 @@ def run_trial(
     trajectory: Trajectory,
     gains: ControlGains | None = None,
     progress: Callable[[int], object] | None = None,
+    *,
+    trial_number: int | None = None,
+    feed_forward: Array | None = None,
+    timestep_s: float | None = None,
 ) -> TrialLog:
     """Simulate one trial in closed loop.
 
@@ -93,6 +103,9 @@ def run_trial(
         trajectory: commands.
         gains: control gains; None for the defaults.
         progress: called with the number of samples done since the last call.
+        trial_number: which trial this is, from 1: the scene's pushes for other trials do not act; None lets all act.
+        feed_forward: F_ff of every robot in its {b} [N], shape (N, 3), held from the start; None to take it up.
+        timestep_s: integration step [s]; None for the scene's.
 
     Raises:
         TrialError: a constraint opens too far, a value is not finite, MuJoCo warns, or a joint or spring
@@ -103,20 +116,28 @@ def run_trial(
     _check_commands(scene, trajectory)
     gains = gains or ControlGains()
     model = scene.compile()
+    if timestep_s is not None:
+        model.opt.timestep = timestep_s
     data = mujoco.MjData(model)
     index = TeamIndex.of(model)
     design = omnid_design()
     assemble_at_home(scene, model, data, index)
-    controller = TeamController(index, design, gains, data, scene.units)
-    log = _Buffers(model, data, index, len(trajectory.ref_b))
-
     ticks = _whole("control rate over recording rate", gains.rate_hz / RATE_HZ)
     substeps = _whole("control period over time step", 1.0 / (gains.rate_hz * model.opt.timestep))
     ref, ref_dot = between_commands(trajectory.ref_b, ticks)
+    sensed = np.empty((len(ref), index.robots, 3, 3))
+    controller = TeamController(index, design, gains, data, scene.units, scene.sensors, feed_forward, sensed)
+    log = _Buffers(model, data, index, len(trajectory.ref_b), scene.grasp_slack_m)
+    pushes = [push for push in scene.pushes if trial_number in (None, push.trial)]
+    R_Wb1 = scene.mounts.rotation[0].as_matrix()
     reported, last = 0, len(trajectory.ref_b) - 1
     for sample in range(last + 1):
         for tick in range(sample * ticks, (sample + 1) * ticks):
             controller.update(ref[tick], ref_dot[tick])
+            if pushes:
+                data.xfrc_applied[index.payload_body] = 0.0
+                for push in pushes:
+                    push.act(model, data, index.payload_body, R_Wb1)
             if tick == sample * ticks:
                 # A step first evaluates forces and frames at the state it starts from: one instant for all.
                 log.before_step(sample)
@@ -132,7 +153,10 @@ def run_trial(
             if progress:
                 progress(sample + 1 - reported)
             reported = sample + 1
-    return log.finish(trajectory, controller.feed_forward, gains, scene.units)
+    phi, theta, tau = (np.ascontiguousarray(sensed[:, :, k]) for k in range(3))
+    return log.finish(
+        trajectory, controller.feed_forward, gains, scene, SensedLog(gains.rate_hz, ticks, phi, theta, tau)
+    )
 
 
 def _whole(name: str, ratio: float) -> int:
@@ -178,9 +202,13 @@ def _check_commands(scene: TeamScene, trajectory: Trajectory) -> None:
 class _Buffers:
     """Rows of a trial as they are written, and the checks on them."""
 
-    def __init__(self, model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex, samples: int) -> None:
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex, samples: int,
+        slack_m: tuple[float, ...] = (),
+    ) -> None:  # fmt: skip
         self.model, self.data, self.index = model, data, index
         robots = index.robots
+        self.weld_limit_m = WELD_LIMIT_M + np.array(slack_m or (0.0,) * robots)
         tip, platform = [], []
         for i in range(robots):
             for k in (1, 2, 3):
@@ -235,11 +263,17 @@ class _Buffers:
         _limit("theta (z, y, x)", theta, -design.gimbal_limit_rad, design.gimbal_limit_rad, "rad", when)
         _limit("SEA torque", tau, -design.torque_limit_Nm, design.torque_limit_Nm, "N m", when)
         _limit("rod error", rod.reshape(len(rod), -1, 3), 0.0, ROD_LIMIT_M, "m", when)
-        _limit("weld error", weld[:, :, None], 0.0, WELD_LIMIT_M, "m", when)
+        for i, limit in enumerate(self.weld_limit_m):
+            _limit("weld error", weld[:, i : i + 1, None], 0.0, limit, "m", when, robot=i)
         _limit("weld angle", angle[:, :, None], 0.0, WELD_LIMIT_RAD, "rad", when)
 
     def finish(
-        self, trajectory: Trajectory, feed_forward: Array, gains: ControlGains, units: tuple[AsBuilt, ...]
+        self,
+        trajectory: Trajectory,
+        feed_forward: Array,
+        gains: ControlGains,
+        scene: TeamScene,
+        sensed: SensedLog,
     ) -> TrialLog:
         rows = slice(None)
         rod, weld, angle = self.errors(rows)
@@ -254,19 +288,21 @@ class _Buffers:
             R_W1=self.site_xmat[:, 0].reshape(-1, 3, 3).copy(),
             feed_forward=feed_forward,
             gains=gains,
-            units=units,
+            units=scene.units,
+            sensors=scene.sensors,
+            sensed=sensed,
             rod_error_m=float(rod.max()),
             weld_error_m=float(weld.max()),
             weld_error_rad=float(angle.max()),
         )
 
 
-def _limit(name: str, values: Array, low: float, high: float, unit: str, when: Array) -> None:
-    """Raise for the first value, shape (rows, N, k), outside [low, high]."""
+def _limit(name: str, values: Array, low: float, high: float, unit: str, when: Array, robot: int = 0) -> None:
+    """Raise for the first value, shape (rows, N, k), outside [low, high]; the values' robots count from ``robot``."""
     bad = ~((values >= low) & (values <= high))
     if bad.any():
-        row, robot, k = (int(axis[0]) for axis in np.nonzero(bad))
+        row, i, k = (int(axis[0]) for axis in np.nonzero(bad))
         raise TrialError(
-            f"omnid{robot + 1}: {name} {k + 1} is {values[row, robot, k]:.4g} {unit} at t = {when[row]:.2f} s; "
+            f"omnid{robot + i + 1}: {name} {k + 1} is {values[row, i, k]:.4g} {unit} at t = {when[row]:.2f} s; "
             f"the allowed range is {low:.4g} .. {high:.4g} {unit}"
         )

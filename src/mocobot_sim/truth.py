@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
 from mocobot_sim.as_built import AsBuilt
+from mocobot_sim.effects import Effect, effect_to_dict
 from mocobot_sim.scene import TeamScene
 from mocobot_sim.team_index import TeamIndex
 
@@ -32,6 +33,7 @@ class GroundTruth:
         R_1c: principal axes in {1}, moments ascending, shape (3, 3).
         principal_kgm2: principal moments of inertia, ascending, shape (3,).
         units: how each robot deviates from the design, N entries.
+        effects: what else was hidden in the team.
     """
 
     R_1i: Array
@@ -41,6 +43,7 @@ class GroundTruth:
     R_1c: Array
     principal_kgm2: Array
     units: tuple[AsBuilt, ...]
+    effects: tuple[Effect, ...] = ()
 
     @classmethod
     def of(cls, scene: TeamScene) -> GroundTruth:
@@ -65,6 +68,7 @@ class GroundTruth:
             R_1c=R_1c,
             principal_kgm2=model.body_inertia[body][order].copy(),
             units=scene.units,
+            effects=scene.effects,
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -79,6 +83,7 @@ class GroundTruth:
             "R_1c_rotvec_deg": _rotvec_deg(self.R_1c),
             "principal_inertia_kgm2": self.principal_kgm2.tolist(),
             "as_built": [{key: value.tolist() for key, value in asdict(unit).items()} for unit in self.units],
+            "effects": [effect_to_dict(effect) for effect in self.effects],
         }
 
 

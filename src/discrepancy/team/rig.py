@@ -110,6 +110,11 @@ class TeamRig:
         return self.linear[0].robots
 
     @property
+    def local_unknowns(self) -> int:
+        """Number of unknowns that every trial has of its own."""
+        return self.linear[0].by_bases.shape[2]
+
+    @property
     def channels(self) -> Sequence[Channel]:
         """Names of the residual's channels, in order."""
         out = []
@@ -152,6 +157,16 @@ class TeamRig:
         cause = CAUSES[candidate.cause]
         robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
         return self.whitening[trial](cause.columns(linear, robot, joint, candidate.shape))
+
+    def unknowns(self, candidate: Candidate) -> list[Array]:
+        """What a cause leaves open in every trial, whitened columns, shape (n, C, k) each."""
+        out = []
+        robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
+        for linear, white in zip(self.linear, self.whitening, strict=True):
+            columns = CAUSES[candidate.cause].unknowns(linear, robot, joint, candidate.shape)
+            empty = np.zeros((*linear.residual.shape, 0))
+            out.append(white(np.stack(columns, axis=-1)) if columns else empty)
+        return out
 
     def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
         """Whitened rows of every trial."""
@@ -199,7 +214,8 @@ class TeamRig:
                     candidate.shape["start_s"], candidate.shape["duration_s"]
                 )
             ]
-        return [replace(candidate, shape=dict(shape)) for shape in CAUSES[candidate.cause].shapes[1:]]
+        shapes = CAUSES[candidate.cause].shapes
+        return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
 
     def push(self, trial: int, start_s: float, duration_s: float) -> Candidate:
         """A push in one trial."""

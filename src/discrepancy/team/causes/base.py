@@ -53,6 +53,10 @@ class Cause(ABC):
         """The signals as they would be without the cause, or None where it is not an error of the signals."""
         return None
 
+    def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> list[Array]:
+        """Columns (n, C) of what the cause leaves open in one trial, such as the friction of a joint at rest."""
+        return []
+
     def report(self, values: Array, covariance: Array) -> tuple[dict[str, float], dict[str, float]]:
         """Values and standard errors by the effect's parameter names."""
         return (

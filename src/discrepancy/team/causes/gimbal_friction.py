@@ -3,9 +3,7 @@
 import numpy as np
 
 from discrepancy.team.causes.base import Cause, stack
-from discrepancy.team.causes.hysteresis import stop_operator
-from discrepancy.team.noise import SMOOTH_HZ
-from estimator.filtering import differentiate, low_pass
+from discrepancy.team.causes.sliding import rests, sliding
 from estimator.gimbal import rate_matrix
 
 
@@ -18,20 +16,22 @@ class GimbalFriction(Cause):
     name = "gimbal_friction"
     family = "dissipation"
     parameters = ("coulomb_Nm", "viscous_Nms_per_rad")
-    shapes = ({"width_rad": 5e-4}, {"width_rad": 2e-3}, {"width_rad": 1e-4})
+    shapes = ({"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3})
     separate = "Which robot's gimbal rubs shows only with one robot released at a time."
 
     def columns(self, trial, robot, joint, shape):  # noqa: D102
         rate = trial.signals.rate_hz
-        theta = low_pass(trial.signals.theta[:, robot, joint], rate, SMOOTH_HZ)
-        axes_T = np.swapaxes(rate_matrix(trial.s[:, robot, 9:12]), -1, -2)
-        moment = np.linalg.solve(axes_T, np.tile(np.eye(3)[joint][:, None], (len(theta), 1, 1)))[..., 0]
-        moment = moment @ trial.shared.grasps.R_1i[robot].T
-        nothing = np.zeros_like(moment)
-        # The payload is turned by less than the balance believes: an outside moment of the other sign.
-        return stack(
-            [
-                trial.of_wrench(nothing, -moment * state[:, None])
-                for state in (stop_operator(theta, shape["width_rad"]), differentiate(theta, rate))
-            ]
-        )
+        states = sliding(trial.signals.theta[:, robot, joint], rate, shape["slow_rad_per_s"])
+        return stack([_moment(trial, robot, joint, state) for state in states])
+
+    def unknowns(self, trial, robot, joint, shape):  # noqa: D102
+        theta, rate = trial.signals.theta[:, robot, joint], trial.signals.rate_hz
+        return [_moment(trial, robot, joint, rest) for rest in rests(theta, rate, shape["slow_rad_per_s"])]
+
+
+def _moment(trial, robot, joint, torque):
+    """The payload is turned by less than the balance believes: an outside moment against the axis."""
+    axes_T = np.swapaxes(rate_matrix(trial.s[:, robot, 9:12]), -1, -2)
+    moment = np.linalg.solve(axes_T, np.tile(np.eye(3)[joint][:, None], (len(torque), 1, 1)))[..., 0]
+    moment = moment @ trial.shared.grasps.R_1i[robot].T
+    return trial.of_wrench(np.zeros_like(moment), -moment * torque[:, None])

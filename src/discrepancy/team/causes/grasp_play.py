@@ -15,7 +15,7 @@ class GraspPlay(Cause):
     family = "compliance"
     parameters = ("play_m",)
     per = "robot"
-    shapes = ({"force_N": 0.5}, {"force_N": 0.1}, {"force_N": 2.0})
+    shapes = ({"force_N": 0.1}, {"force_N": 0.02}, {"force_N": 0.5})
     separate = "Internal forces of both signs at rest separate play from flexibility."
 
     def columns(self, trial, robot, joint, shape):  # noqa: D102

@@ -1,18 +1,16 @@
 """Coulomb and viscous friction of a driven joint, between spring and link."""
 
 from discrepancy.team.causes.base import Cause, one_joint, one_robot, stack
-from discrepancy.team.causes.hysteresis import stop_operator
-from discrepancy.team.noise import SMOOTH_HZ
-from estimator.filtering import differentiate, low_pass
+from discrepancy.team.causes.sliding import rests, sliding
 
 
 class JointFriction(Cause):
-    """The link gets less than the spring gives while it moves; ``width_rad`` is the travel that turns it over."""
+    """The link gets less than the spring gives while it moves; below ``slow_rad_per_s`` it rests."""
 
     name = "joint_friction"
     family = "dissipation"
     parameters = ("coulomb_Nm", "viscous_Nms_per_rad")
-    shapes = ({"width_rad": 5e-4}, {"width_rad": 2e-3}, {"width_rad": 1e-4})
+    shapes = ({"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3})
     separate = "An arm-only run (payload released) shows friction of the joint alone."
 
     def columns(self, trial, robot, joint, shape):  # noqa: D102
@@ -25,6 +23,12 @@ class JointFriction(Cause):
         return signals.minus(tau=one_robot(error, trial.robots, robot))
 
 
+    def unknowns(self, trial, robot, joint, shape):  # noqa: D102
+        phi, rate = trial.signals.phi[:, robot, joint], trial.signals.rate_hz
+        return [
+            trial.of_signals(robot, tau=one_joint(rest, joint)) for rest in rests(phi, rate, shape["slow_rad_per_s"])
+        ]
+
+
 def _errors(signals, robot, joint, shape):
-    phi = low_pass(signals.phi[:, robot, joint], signals.rate_hz, SMOOTH_HZ)
-    return stop_operator(phi, shape["width_rad"]), differentiate(phi, signals.rate_hz)
+    return sliding(signals.phi[:, robot, joint], signals.rate_hz, shape["slow_rad_per_s"])

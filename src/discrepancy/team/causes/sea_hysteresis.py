@@ -1,21 +1,19 @@
 """Dry friction inside a spring."""
 
 from discrepancy.team.causes.base import Cause, one_joint, one_robot, stack
-from discrepancy.team.causes.hysteresis import stop_operator
-from discrepancy.team.noise import SMOOTH_HZ
-from estimator.filtering import low_pass
+from discrepancy.team.causes.sliding import rests, sliding
 
 
 class SeaHysteresis(Cause):
     """Friction parallel to the spring: the link gets more than the deflection tells while the torque grows.
 
-    ``width_Nm`` is how far the torque turns back before the friction has turned over.
+    Torque that changes more slowly than ``slow_Nm_per_s`` counts as at rest.
     """
 
     name = "sea_hysteresis"
     family = "dissipation"
     parameters = ("friction_Nm",)
-    shapes = ({"width_Nm": 0.05}, {"width_Nm": 0.15}, {"width_Nm": 0.5})
+    shapes = ({"slow_Nm_per_s": 0.2}, {"slow_Nm_per_s": 0.6})
     separate = (
         "Motion with load reversals at rest separates friction in the spring from friction in the joint."
     )
@@ -30,6 +28,12 @@ class SeaHysteresis(Cause):
         return signals.minus(tau=one_robot(error, trial.robots, robot))
 
 
+    def unknowns(self, trial, robot, joint, shape):  # noqa: D102
+        tau, rate = trial.signals.tau[:, robot, joint], trial.signals.rate_hz
+        return [
+            trial.of_signals(robot, tau=one_joint(rest, joint)) for rest in rests(tau, rate, shape["slow_Nm_per_s"])
+        ]
+
+
 def _error(signals, robot, joint, shape):
-    tau = low_pass(signals.tau[:, robot, joint], signals.rate_hz, SMOOTH_HZ)
-    return -stop_operator(tau, shape["width_Nm"])
+    return -sliding(signals.tau[:, robot, joint], signals.rate_hz, shape["slow_Nm_per_s"])[0]

@@ -19,7 +19,11 @@ class Slosh(Cause):
     parameters = ("mass_kg", "moment_x_kgm", "moment_y_kgm", "moment_z_kgm")
     scales = (0.01, 0.005, 0.005, 0.005)
     per = "payload"
-    shapes = tuple({"length_m": length, "damping_ratio": 0.05} for length in (0.2, 0.1, 0.4, 0.05, 0.8))
+    shapes = tuple(
+        {"length_m": length, "damping_ratio": damping}
+        for length in (0.2, 0.05, 0.065, 0.085, 0.11, 0.145, 0.27, 0.37, 0.5, 0.7)
+        for damping in (0.05, 0.15)
+    )
     separate = "Motion near the pendulum's own frequency."
 
     def columns(self, trial, robot, joint, shape):  # noqa: D102

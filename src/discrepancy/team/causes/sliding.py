@@ -1,0 +1,35 @@
+"""Dry friction while it slides, and when it does not."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.team.noise import SMOOTH_HZ
+from estimator.filtering import differentiate, low_pass
+
+Array = NDArray[np.float64]
+
+SHORTEST_REST_S = 0.15
+
+
+def sliding(x: Array, rate_hz: float, slow: float) -> tuple[Array, Array]:
+    """Direction of motion in [-1, 1] and rate of a displacement x, each of shape (Q,).
+
+    Below the rate ``slow`` the direction fades to zero: at rest friction may have any value up to its limit.
+    """
+    rate = differentiate(low_pass(x, rate_hz, SMOOTH_HZ), rate_hz)
+    return np.clip(rate / slow, -1.0, 1.0), rate
+
+
+def rests(x: Array, rate_hz: float, slow: float) -> list[Array]:
+    """One indicator (Q,) per interval of rest: there friction has an unknown value of its own."""
+    still = np.abs(sliding(x, rate_hz, slow)[0]) < 1.0
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int))).reshape(-1, 2)
+    out = []
+    for start, stop in edges:
+        if stop - start >= SHORTEST_REST_S * rate_hz:
+            indicator = np.zeros(len(x))
+            indicator[start:stop] = 1.0
+            out.append(indicator)
+    return out

@@ -1,0 +1,77 @@
+"""What all effects have in common: checked numbers, a place, and how they are put into a scene."""
+
+from __future__ import annotations
+
+import math
+import sys
+from abc import ABC, abstractmethod
+from dataclasses import dataclass, fields
+from typing import ClassVar
+
+from estimator.errors import InputError
+from mocobot_sim.scene import TeamScene
+from mocobot_sim.soft import tuned
+
+PLACE = ("robot", "joint")
+JOINTS = 3
+
+
+@dataclass(frozen=True)
+class Effect(ABC):
+    """One cause at one place; the fields besides ``robot`` and ``joint`` are its parameters.
+
+    Attributes:
+        cause: name of the cause, as in the catalogue.
+        ranges: allowed range (low, high) of the parameters that may not be any finite number, both ends included.
+    """
+
+    cause: ClassVar[str]
+    ranges: ClassVar[dict[str, tuple[float, float]]] = {}
+
+    def __post_init__(self) -> None:
+        """Check every number.
+
+        Raises:
+            InputError: a value is not a number or out of its range.
+        """
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if entry.name in (*PLACE, "trial"):
+                allowed = "1, 2 or 3" if entry.name == "joint" else "a whole number of at least 1"
+                good = type(value) is int and value >= 1 and (entry.name != "joint" or value <= JOINTS)
+            else:
+                low, high = self.ranges.get(entry.name, (-sys.float_info.max, sys.float_info.max))
+                allowed = "a finite number"
+                if entry.name in self.ranges:
+                    allowed += f" of at least {low:g}" + (f" and at most {high:g}" if high < math.inf else "")
+                number = isinstance(value, int | float) and not isinstance(value, bool)
+                good = number and low <= value <= high and math.isfinite(value)
+            if not good:
+                raise InputError(f"{self.cause}: {entry.name} is {value!r}; it must be {allowed}")
+
+    @classmethod
+    def place_names(cls) -> tuple[str, ...]:
+        """``robot`` and ``joint``, as far as this cause has them."""
+        return tuple(entry.name for entry in fields(cls) if entry.name in PLACE)
+
+    @classmethod
+    def parameter_names(cls) -> tuple[str, ...]:
+        """Names of the parameters, units in their suffixes."""
+        return tuple(entry.name for entry in fields(cls) if entry.name not in PLACE)
+
+    def apply(self, scene: TeamScene) -> TeamScene:
+        """Put the effect into a scene and return it; the scene's PyMJCF tree is edited in place.
+
+        Raises:
+            InputError: the scene has no such robot, or cannot be edited.
+        """
+        if scene.root is None:
+            raise InputError(f"{self.cause}: a scene read from an extended model takes no further effects")
+        robot = getattr(self, "robot", 1)
+        if robot > scene.robots:
+            raise InputError(f"{self.cause}: robot is {robot}; the team has robots 1 .. {scene.robots}")
+        return tuned(self._edit(scene))
+
+    @abstractmethod
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        """The edit itself."""

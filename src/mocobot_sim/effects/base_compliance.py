@@ -1,0 +1,31 @@
+"""A base that gives way sideways."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from mocobot_sim.effects.base import Effect
+from mocobot_sim.effects.slides import SPRUNG_ARMATURE_KG, add_springs, base_slides
+from mocobot_sim.effects.solver import precise
+from mocobot_sim.scene import TeamScene
+
+
+@dataclass(frozen=True)
+class BaseCompliance(Effect):
+    """A base on horizontal springs of ``compliance_m_per_N``, the same in x and y [m/N].
+
+    Two slides under the chassis, held by soft ``joint`` equalities (see ``mocobot_sim.soft``), critically damped.
+    """
+
+    cause = "base_compliance"
+    ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-2)}
+    robot: int
+    compliance_m_per_N: float
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        if not self.compliance_m_per_N:
+            return scene
+        precise(scene)
+        slides = base_slides(scene, self.robot, "compliance", armature=SPRUNG_ARMATURE_KG)
+        return add_springs(scene, slides, f"base{self.robot}", self.compliance_m_per_N)

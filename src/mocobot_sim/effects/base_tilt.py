@@ -1,0 +1,33 @@
+"""A base that does not stand level."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from scipy.spatial.transform import Rotation
+
+from mocobot_sim.effects.base import Effect
+from mocobot_sim.effects.slides import level_slides
+from mocobot_sim.scene import TeamScene
+
+
+@dataclass(frozen=True)
+class BaseTilt(Effect):
+    """A base turned by the rotation vector (roll, pitch, 0), in its own untilted axes, about its floor mount [rad].
+
+    The chassis body's ``quat``.
+    """
+
+    cause = "base_tilt"
+    ranges: ClassVar = {"roll_rad": (-0.2, 0.2), "pitch_rad": (-0.2, 0.2)}
+    robot: int
+    roll_rad: float
+    pitch_rad: float
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        tilt = Rotation.from_rotvec([self.roll_rad, self.pitch_rad, 0.0])
+        chassis = scene.root.find("body", f"omnid{self.robot}/chassis")
+        chassis.quat = tilt.as_quat(scalar_first=True)
+        level_slides(chassis)
+        return scene

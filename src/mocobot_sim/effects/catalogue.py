@@ -1,0 +1,133 @@
+"""All causes by name, and effects as plain data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
+from typing import Any
+
+from estimator.errors import InputError
+from mocobot_sim.effects.base import PLACE, Effect
+from mocobot_sim.effects.base_compliance import BaseCompliance
+from mocobot_sim.effects.base_creep import BaseCreep
+from mocobot_sim.effects.base_tilt import BaseTilt
+from mocobot_sim.effects.clock_delay import ClockDelay
+from mocobot_sim.effects.drag import Drag
+from mocobot_sim.effects.gimbal_friction import GimbalFriction
+from mocobot_sim.effects.grasp_flex import GraspFlex
+from mocobot_sim.effects.grasp_play import GraspPlay
+from mocobot_sim.effects.joint_friction import JointFriction
+from mocobot_sim.effects.link_length import LinkLength
+from mocobot_sim.effects.phi_zero import PhiZero
+from mocobot_sim.effects.push import Push
+from mocobot_sim.effects.sea_bias import SeaBias
+from mocobot_sim.effects.sea_hardening import SeaHardening
+from mocobot_sim.effects.sea_hysteresis import SeaHysteresis
+from mocobot_sim.effects.sea_scale import SeaScale
+from mocobot_sim.effects.slosh import Slosh
+from mocobot_sim.effects.tether import Tether
+from mocobot_sim.effects.theta_zero import ThetaZero
+from mocobot_sim.effects.torque_lag import TorqueLag
+from mocobot_sim.effects.torque_skew import TorqueSkew
+from mocobot_sim.scene import TeamScene
+
+EFFECTS: dict[str, type[Effect]] = {
+    kind.cause: kind
+    for kind in (
+        PhiZero, ThetaZero, LinkLength, BaseTilt, BaseCreep, BaseCompliance, GraspFlex, GraspPlay, SeaBias, SeaScale,
+        SeaHardening, SeaHysteresis, JointFriction, GimbalFriction, TorqueSkew, TorqueLag, ClockDelay, Tether, Push,
+        Drag, Slosh,
+    )
+}  # fmt: skip
+
+
+def make_effect(
+    cause: str, parameters: Mapping[str, float], robot: int | None = None, joint: int | None = None
+) -> Effect:
+    """Make an effect from its name, parameters and place.
+
+    Args:
+        cause: a key of ``EFFECTS``.
+        parameters: values by name, units in the names.
+        robot: 1-based robot, for causes that have one.
+        joint: 1-based joint (legs 1, 2, 3; gimbal z, y, x), for causes that have one.
+
+    Raises:
+        InputError: no such cause, a parameter or place that is unknown, missing or out of its range.
+    """
+    if cause not in EFFECTS:
+        raise InputError(f"cause {cause!r} does not exist; the causes are {', '.join(EFFECTS)}")
+    kind = EFFECTS[cause]
+    place = {name: value for name, value in zip(PLACE, (robot, joint), strict=True) if value is not None}
+    for name in PLACE:
+        if (name in place) != (name in kind.place_names()):
+            problem = "is missing" if name not in place else "does not belong here"
+            rule = ", ".join(kind.place_names()) or "none"
+            raise InputError(f"{cause}: {name} {problem}; the places are {rule}")
+    _check_keys(cause, parameters, kind)
+    values = dict(parameters)
+    if isinstance(values.get("trial"), float) and float(values["trial"]).is_integer():
+        values["trial"] = int(values["trial"])
+    return kind(**place, **values)
+
+
+def _check_keys(cause: str, parameters: Mapping[str, float], kind: type[Effect]) -> None:
+    names = kind.parameter_names()
+    required = [entry.name for entry in fields(kind) if entry.name in names and not _has_default(entry)]
+    unknown = [name for name in parameters if name not in names]
+    missing = [name for name in required if name not in parameters]
+    if unknown or missing:
+        problem = f"unknown parameter {unknown[0]!r}" if unknown else f"missing parameter {missing[0]!r}"
+        raise InputError(f"{cause}: {problem}; the parameters are {', '.join(names)}")
+
+
+def _has_default(entry: Any) -> bool:
+    return isinstance(entry.default, float)
+
+
+def effect_to_dict(effect: Effect) -> dict[str, Any]:
+    """Plain JSON values: ``cause``, ``robot`` and ``joint`` where there are, ``parameters``."""
+    place = {name: getattr(effect, name) for name in effect.place_names()}
+    parameters = {name: getattr(effect, name) for name in effect.parameter_names()}
+    return {"cause": effect.cause, **place, "parameters": parameters}
+
+
+def effect_from_dict(values: Mapping[str, Any]) -> Effect:
+    """The reverse of ``effect_to_dict``.
+
+    Raises:
+        InputError: a key is unknown or missing, or its value is not allowed.
+    """
+    if not isinstance(values, Mapping):
+        raise InputError(f"effect is {values!r:.60}; it must be an object")
+    keys = ("cause", *PLACE, "parameters")
+    for key in values:
+        if key not in keys:
+            raise InputError(f"effect: unknown key {key!r}; the keys are {', '.join(keys)}")
+    for key in ("cause", "parameters"):
+        if key not in values:
+            raise InputError(f"effect: missing key {key!r}; the keys are {', '.join(keys)}")
+    if not isinstance(values["cause"], str) or not isinstance(values["parameters"], Mapping):
+        raise InputError("effect: cause must be text and parameters an object")
+    return make_effect(values["cause"], values["parameters"], values.get("robot"), values.get("joint"))
+
+
+def apply_effects(scene: TeamScene, effects: Sequence[Effect]) -> TeamScene:
+    """Put effects into a freshly built scene (its PyMJCF tree is edited in place) and return it.
+
+    Raises:
+        InputError: a place does not exist, or has the same cause twice (pushes may repeat).
+    """
+    places = [
+        (effect.cause, *(getattr(effect, name) for name in effect.place_names())) for effect in scene.effects
+    ]
+    for effect in effects:
+        place = (effect.cause, *(getattr(effect, name) for name in effect.place_names()))
+        if place in places and not isinstance(effect, Push):
+            where = " ".join(f"{name} {at}" for name, at in zip(effect.place_names(), place[1:], strict=True))
+            raise InputError(
+                f"{effect.cause} is given twice{where and f' for {where}'}; each place takes it once"
+            )
+        places.append(place)
+        scene = effect.apply(scene)
+    return replace(scene, effects=(*scene.effects, *effects))

@@ -1,0 +1,26 @@
+"""A robot whose clock is off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from mocobot_sim.effects.base import Effect
+from mocobot_sim.scene import TeamScene
+
+
+@dataclass(frozen=True)
+class ClockDelay(Effect):
+    """Everything one robot logs was sampled ``delay_s`` before its time stamp [s]; commands are not shifted.
+
+    An entry of the scene's ``sensors``; no MJCF edit.
+    """
+
+    cause = "clock_delay"
+    ranges: ClassVar = {"delay_s": (-1.0, 1.0)}
+    robot: int
+    delay_s: float
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        sensors = scene.sensors.added("clock_delay_s", self.robot, self.delay_s, scene.robots)
+        return replace(scene, sensors=sensors)

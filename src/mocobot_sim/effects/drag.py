@@ -1,0 +1,41 @@
+"""Something that resists the payload's motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import mujoco
+
+from mocobot_sim.effects.base import Effect
+from mocobot_sim.scene import TeamScene
+
+
+@dataclass(frozen=True)
+class Drag(Effect):
+    """A force -c v on the payload at its centre of mass, c in N s/m.
+
+    Three ``general`` actuators with a site transmission relative to a site of the world, affine bias (0, 0, -c) and no
+    use for their control.
+    """
+
+    cause = "drag"
+    ranges: ClassVar = {"coefficient_Ns_per_m": (0.0, 1e3)}
+    coefficient_Ns_per_m: float
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        if not self.coefficient_Ns_per_m:
+            return scene
+        model, root = scene.compile(), scene.root
+        com = model.body_ipos[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "omnid1/payload/payload")]
+        payload = root.find("body", "omnid1/payload/payload")
+        site = payload.add("site", name="drag", pos=com.tolist(), group=4, size=[0.006])
+        still = root.worldbody.add("site", name="drag", group=4, size=[0.006])
+        for k, axis in enumerate("xyz"):
+            gear = [0.0] * 6
+            gear[k] = 1.0
+            root.actuator.add(
+                "general", name=f"drag_{axis}", site=site, refsite=still, gear=gear,
+                gaintype="fixed", gainprm=[0.0], biastype="affine", biasprm=[0.0, 0.0, -self.coefficient_Ns_per_m],
+            )  # fmt: skip
+        return scene

@@ -1,0 +1,44 @@
+"""Friction of a driven joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from mocobot_sim.effects.base import Effect
+from mocobot_sim.effects.friction import STICK
+from mocobot_sim.effects.solver import precise
+from mocobot_sim.scene import TeamScene
+from mocobot_sim.soft import SoftRow
+
+
+@dataclass(frozen=True)
+class JointFriction(Effect):
+    """Coulomb [N m] and viscous [N m s/rad] friction between a driven link and the chassis, past its spring.
+
+    A fixed tendon of motor plus spring (so its length is phi) with ``frictionloss``, and a soft ``tendon`` equality
+    (see ``mocobot_sim.soft``) as its damper. The sensor does not feel it.
+    """
+
+    cause = "joint_friction"
+    ranges: ClassVar = {"coulomb_Nm": (0.0, 20.0), "viscous_Nms_per_rad": (0.0, 100.0)}
+    robot: int
+    joint: int
+    coulomb_Nm: float
+    viscous_Nms_per_rad: float
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        if not (self.coulomb_Nm or self.viscous_Nms_per_rad):
+            return scene
+        precise(scene)
+        root, name = scene.root, f"friction{self.robot}_{self.joint}"
+        tendon = root.tendon.add("fixed", name=name)
+        for part in ("motor", "spring"):
+            joint = root.find("joint", f"omnid{self.robot}/{part}{self.joint}")
+            tendon.add("joint", joint=joint, coef=1.0)
+        if self.coulomb_Nm:
+            tendon.set_attributes(frictionloss=self.coulomb_Nm, **STICK)
+        if self.viscous_Nms_per_rad:
+            root.equality.add("tendon", name=name, tendon1=tendon)
+            scene = replace(scene, soft=(*scene.soft, SoftRow(name, damping=self.viscous_Nms_per_rad)))
+        return scene

@@ -1,0 +1,52 @@
+"""Somebody pushes the payload."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+import mujoco
+import numpy as np
+
+from mocobot_sim.effects.base import Effect
+from mocobot_sim.scene import TeamScene
+
+
+@dataclass(frozen=True)
+class Push(Effect):
+    """A constant force during an interval of one trial.
+
+    MJCF has no such thing: the trial writes ``xfrc_applied``. The force is given in the axes of robot 1's {b} without
+    any tilt [N], the point where it acts is fixed to the payload and given in {1} [m].
+    """
+
+    cause = "push"
+    ranges: ClassVar = {"start_s": (0.0, 1e9), "duration_s": (0.0, 1e9)}
+    trial: int
+    start_s: float
+    duration_s: float
+    force_x_N: float
+    force_y_N: float
+    force_z_N: float
+    point_x_m: float
+    point_y_m: float
+    point_z_m: float
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        return replace(scene, pushes=(*scene.pushes, self))
+
+    def act(self, model: mujoco.MjModel, data: mujoco.MjData, body: int, R_Wb1: np.ndarray) -> None:
+        """Add the force to ``data.xfrc_applied`` of the payload's body if ``data.time`` is in the interval.
+
+        Args:
+            model, data: the trial's; kinematics are brought up to date.
+            body: the payload's body id.
+            R_Wb1: axes of robot 1's {b} in the world, shape (3, 3).
+        """
+        if not self.start_s <= data.time + 1e-9 < self.start_s + self.duration_s:
+            return
+        mujoco.mj_kinematics(model, data)
+        force = R_Wb1 @ [self.force_x_N, self.force_y_N, self.force_z_N]
+        arm = data.xmat[body].reshape(3, 3) @ [self.point_x_m, self.point_y_m, self.point_z_m]
+        data.xfrc_applied[body, :3] += force
+        data.xfrc_applied[body, 3:] += np.cross(data.xpos[body] + arm - data.xipos[body], force)

@@ -1,0 +1,39 @@
+"""Something elastic that ties a grasp to the room."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from mocobot_sim.effects.base import Effect
+from mocobot_sim.scene import TeamScene
+
+
+@dataclass(frozen=True)
+class Tether(Effect):
+    """A spring of rest length zero from the payload's grasp at one robot to a fixed point.
+
+    A spatial tendon with ``stiffness`` and ``springlength`` 0 between the payload's site ``grasp{i}`` and a site of the
+    world. The anchor is given in the robot's {b} as its floor mount has it, without any tilt [m].
+    """
+
+    cause = "tether"
+    ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4)}
+    robot: int
+    stiffness_N_per_m: float
+    anchor_x_m: float
+    anchor_y_m: float
+    anchor_z_m: float
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        if not self.stiffness_N_per_m:
+            return scene
+        at = scene.X_Wb[self.robot - 1].apply([self.anchor_x_m, self.anchor_y_m, self.anchor_z_m])
+        name = f"tether{self.robot}"
+        anchor = scene.root.worldbody.add("site", name=name, pos=at, group=4, size=[0.006])
+        tendon = scene.root.tendon.add(
+            "spatial", name=name, stiffness=self.stiffness_N_per_m, springlength=[0.0, 0.0], width=0.002
+        )
+        tendon.add("site", site=scene.root.find("site", f"omnid1/payload/grasp{self.robot}"))
+        tendon.add("site", site=anchor)
+        return scene
