@@ -98,6 +98,13 @@ class Problem:
         """Number of whitened residuals in all trials."""
         return sum(r.shape[0] * r.shape[1] for r in self.rows)
 
+    def index_of(self, candidate: Candidate) -> int | None:
+        """Where a candidate of the same cause and place (and interval) is, or None."""
+        for index, other in enumerate(self.candidates):
+            if other.key == candidate.key and dict(other.detail) == dict(candidate.detail):
+                return index
+        return None
+
     def with_residual(self, residuals: Sequence[Array]) -> Problem:
         """The same columns with another residual, shape (n, C) per trial."""
         return self._with(len(self.tolerant) + self.shared, [r[..., None] for r in residuals], self.candidates)

@@ -151,6 +151,26 @@ class Rig(Protocol):
         """The same candidate with other shapes, to choose the best from."""
         ...
 
+    def can_run_again(self) -> str | None:
+        """Why the recordings cannot be simulated again, or None."""
+        ...
+
+    def run_again(
+        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
+    ) -> dict[str, Array] | None:
+        """Recorded minus simulated response of one trial to its own commands, by channel; None if impossible."""
+        ...
+
+    def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
+        """Standard deviation of the noise and of the motion, by channel; shapes broadcast with the response."""
+        ...
+
+    def effect_parameters(
+        self, candidate: Candidate, values: Array, covariance: Array
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """Parameters of the simulator's effect, and their standard errors."""
+        ...
+
     def undecidable(self) -> list[dict[str, Any]]:
         """What recordings of this rig cannot decide, whatever the data: statements with a reason and a remedy."""
         ...

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.problem import Evidence, Fit, Problem
+from discrepancy.problem import COMPLEXITY, Evidence, Fit, Problem
 from discrepancy.rig import Candidate, Rig
 
 Array = NDArray[np.float64]
@@ -27,6 +27,7 @@ ENOUGH = 0.8
 RIVAL_SHARE = 0.5
 """A rival explains at least this share of what the best does."""
 MOST_REJECTED = 4
+LEADERS = 8
 FOLDS = 0.75
 """Share of the trials on which a cause must help when it was fitted to the others."""
 
@@ -111,48 +112,84 @@ def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] 
     while len(found) < most:
         inflation = max(1.0, fit.misfit / (CLEAN * problem.samples))
         problem, evidence = _with_transients(rig, problem, fit, fit.evidence(inflation), inflation)
-        problem, evidence = _sharpen(rig, problem, free, evidence, inflation)
         barred = {c.key for c in rejected}
         evidence = [e for e in evidence if problem.candidates[e.index].key not in barred]
-        if not evidence or _log10_p(problem, evidence[0]) > SIGNIFICANT:
+        leaders = _leaders(rig, problem, free, evidence, inflation)
+        excess = max(fit.misfit - CLEAN * problem.samples, 0.0)
+        leaders = [k for k in leaders if fit.misfit - k.misfit >= _least(k, excess, first=not found)]
+        if not leaders:
             break
-        best = evidence[0]
-        excess = fit.misfit - min(fit.misfit, CLEAN * problem.samples)
-        if found and best.gain * inflation < NEXT_SHARE * excess:
-            break
-        candidate = problem.candidates[best.index]
+        best = leaders[0]
+        candidate = best.candidate
         say(f"refit {candidate.label}")
-        narrower, problem = problem, problem.with_unknowns(rig.unknowns(candidate))
-        folds = _folds(problem, free, best.index, candidate)
+        folds = _folds(best.problem, free, best.evidence.index, candidate)
         if not _confirmed(folds):
             rejected.append(candidate)
-            problem = narrower
             if len(rejected) > MOST_REJECTED:
                 break
             continue
         rivals = tuple(
-            (problem.candidates[e.index], 0.5 * (best.score - e.score))
-            for e in evidence[1:]
-            if e.gain > RIVAL_SHARE * best.gain
-        )[:6]
-        before_it = list(free)
-        free.append(best.index)
-        problem, fit = _refit(rig, problem, free)
-        in_sample, held_out = _shares(problem, before_it, best.index)
-        found.append(
-            Found(candidate, np.zeros(0), np.zeros((0, 0)), best, rivals, in_sample, held_out, tuple(folds))
+            (k.candidate, 0.5 * (k.misfit - best.misfit))
+            for k in leaders[1:]
+            if fit.misfit - k.misfit > RIVAL_SHARE * (fit.misfit - best.misfit)
         )
+        problem = best.problem
+        before_it = list(free)
+        free.append(best.evidence.index)
+        problem, fit = _refit(rig, problem, free)
+        in_sample, held_out = _shares(problem, before_it, best.evidence.index)
+        found.append(
+            Found(candidate, np.zeros(0), np.zeros((0, 0)), best.evidence, rivals, in_sample, held_out, tuple(folds))
+        )
+    start = Explanation(
+        tuple(found), tuple(rejected), before, fit.misfit, problem.samples, fit, problem, np.zeros(0), ()
+    )
+    return _finished(rig, start)
+
+
+def refitted(rig: Rig, explanation: Explanation, free: Sequence[int]) -> Explanation:
+    """The same explanation with other candidates (indices into its problem) in place of those found."""
+    problem = explanation.problem
+    for index in free:
+        if index not in explanation.fit.free:
+            problem = problem.with_unknowns(rig.unknowns(problem.candidates[index]))
+    problem, fit = _refit(rig, problem, free)
+    found = []
+    for place, index in enumerate(free):
+        candidate, old = problem.candidates[index], explanation.found[place]
+        if candidate.key == old.candidate.key:
+            found.append(old)
+            continue
+        others = [i for i in free if i != index]
+        evidence = problem.fit(others).evidence_of(index) or old.evidence
+        in_sample, held_out = _shares(problem, others, index)
+        rivals = tuple((old.candidate, -gap) if c.key == candidate.key else (c, gap) for c, gap in old.rivals)
+        folds = tuple(_folds(problem, others, index, candidate))
+        found.append(replace(old, candidate=candidate, evidence=evidence, rivals=rivals, in_sample=in_sample,
+                             held_out=held_out, folds=folds))  # fmt: skip
+    return _finished(
+        rig, replace(explanation, found=tuple(found), after=fit.misfit, fit=fit, problem=problem)
+    )
+
+
+def _finished(rig: Rig, explanation: Explanation) -> Explanation:
+    """Values, covariances and unknowns from the last fit."""
+    fit, problem = explanation.fit, explanation.problem
     results = []
-    for index, item in zip(free, found, strict=True):
+    for index, item in zip(fit.free, explanation.found, strict=True):
         values, covariance = fit.part(index)
         units = problem.candidates[index].units
         results.append(replace(item, values=values * units, covariance=covariance * np.outer(units, units)))
     shared = fit.coefficients[: problem.shared]
-    local = tuple(fit.local(t)[: rig.local_unknowns] for t in range(len(problem.rows)))
-    return Explanation(
-        tuple(results), tuple(rejected), before, fit.misfit, problem.samples, fit, problem, -shared,
-        tuple(-x for x in local),
-    )  # fmt: skip
+    local = tuple(-fit.local(t)[: rig.local_unknowns] for t in range(len(problem.rows)))
+    return replace(explanation, found=tuple(results), shared=-shared, local=local)
+
+
+def _least(leader: _Leader, excess: float, *, first: bool) -> float:
+    """Least improvement of chi-square that is worth a cause: a share of what is left, if much is left."""
+    if first and not leader.candidate.detail:
+        return -np.inf
+    return NEXT_SHARE * excess
 
 
 def _log10_p(problem: Problem, evidence: Evidence) -> float:
@@ -245,21 +282,53 @@ def _with_transients(
     return best[1], best[1].fit(fit.free).evidence(inflation)
 
 
-def _sharpen(
-    rig: Rig, problem: Problem, free: Sequence[int], evidence: list[Evidence], inflation: float
-) -> tuple[Problem, list[Evidence]]:
-    """Give the leading candidates their best shape."""
-    if not evidence or _log10_p(problem, evidence[0]) > SIGNIFICANT:
-        return problem, evidence
-    for leader in [e for e in evidence[:8] if e.gain > RIVAL_SHARE * evidence[0].gain]:
-        best, best_gain = problem, leader.gain
-        for other in rig.refinements(problem.candidates[leader.index]):
-            changed = problem.with_columns(leader.index, other, rig.columns(other))
-            judged = changed.fit(free).evidence_of(leader.index, inflation)
-            if judged is not None and judged.gain > best_gain + 1.0:
-                best, best_gain = changed, judged.gain
-        problem = best
-    return problem, problem.fit(free).evidence(inflation)
+@dataclass(frozen=True, eq=False)
+class _Leader:
+    """A candidate at its best: with its best shape, and with what it leaves open.
+
+    Attributes:
+        evidence: that its parameters leave their tolerance.
+        problem: the problem with that shape and those unknowns.
+        misfit: chi-square with its parameters free, plus the penalty for them and for its unknowns.
+    """
+
+    evidence: Evidence
+    problem: Problem
+    misfit: float
+
+    @property
+    def candidate(self) -> Candidate:
+        return self.problem.candidates[self.evidence.index]
+
+
+def _leaders(
+    rig: Rig, problem: Problem, free: Sequence[int], evidence: Sequence[Evidence], inflation: float
+) -> list[_Leader]:
+    """Significant candidates at their best, the least misfit first."""
+    significant = [e for e in evidence if _log10_p(problem, e) <= SIGNIFICANT][:LEADERS]
+    leaders = []
+    for first in significant:
+        index = first.index
+        best: _Leader | None = None
+        for shape in (problem.candidates[index], *rig.refinements(problem.candidates[index])):
+            changed = problem
+            if shape is not problem.candidates[index]:
+                changed = problem.with_columns(index, shape, rig.columns(shape))
+            penalty = 0.0
+            if best is None or not shape.detail:
+                unknowns = rig.unknowns(shape)
+                changed = changed.with_unknowns(unknowns)
+                penalty = COMPLEXITY * np.log(problem.samples) * sum(u.shape[2] for u in unknowns)
+            judged = changed.fit(free).evidence_of(index, inflation)
+            if judged is None:
+                continue
+            penalty += COMPLEXITY * np.log(problem.samples) * judged.parameters
+            misfit = changed.fit([*free, index]).misfit + penalty
+            if best is None or misfit < best.misfit:
+                best = _Leader(judged, changed, misfit)
+        if best is not None and _log10_p(best.problem, best.evidence) <= SIGNIFICANT:
+            leaders.append(best)
+    return sorted(leaders, key=lambda leader: leader.misfit)
 
 
 def _refit(rig: Rig, problem: Problem, free: Sequence[int], rounds: int = 3) -> tuple[Problem, Fit]:

@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 
 from discrepancy.rig import Candidate, Channel, Parameter, Rows
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes.base import Context
 from discrepancy.team.linear import TrialLinear, linearise, noise_rows, start_bases
 from discrepancy.team.noise import Noise
 from discrepancy.team.reduction import Reduction
+from discrepancy.team.resimulate import errors_of_rerun
 from discrepancy.team.residual import Bases, Shared, balance, grasp_data, pose_residual
 from discrepancy.team.signals import Signals, with_rates
 from discrepancy.whitening import Whitening
@@ -23,10 +25,14 @@ from estimator.errors import InputError
 from estimator.payload_estimate import PayloadEstimate
 from estimator.principal import inertia_parameters
 from estimator.recording import Recording
+from mocobot_sim.effects.base import Effect
+from mocobot_sim.effects.catalogue import make_effect
+from mocobot_sim.models import omnid_design
 
 Array = NDArray[np.float64]
 
-LONGEST_PUSH_S = 8.0
+# What the integrator does to the closed loop at 1 ms (docs/diagnosis.md).
+PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,6 +163,77 @@ class TeamRig:
         cause = CAUSES[candidate.cause]
         robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
         return self.whitening[trial](cause.columns(linear, robot, joint, candidate.shape))
+
+    def effect_parameters(
+        self, candidate: Candidate, values: Array, covariance: Array
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """Parameters of the simulator's effect, and their standard errors."""
+        pi = self.linear[0].shared.pi
+        context = Context(
+            pi[1:4] / pi[0],
+            self.linear[0].design.home_height_m,
+            candidate.shape,
+            int(candidate.detail["trial"]) + 1 if candidate.detail else None,
+        )
+        return CAUSES[candidate.cause].report(values, covariance, context)
+
+    def effect(self, candidate: Candidate, values: Array) -> Effect | None:
+        """The simulator's effect, or None where the values are none that it can have (a negative friction)."""
+        k = len(values)
+        parameters = self.effect_parameters(candidate, values, np.zeros((k, k)))[0]
+        for name in ("coulomb_Nm", "viscous_Nms_per_rad"):
+            if name in parameters:
+                parameters[name] = max(parameters[name], 0.0)
+        try:
+            return make_effect(candidate.cause, parameters, candidate.robot, candidate.joint)
+        except InputError:
+            return None
+
+    def can_run_again(self) -> str | None:
+        """Why the recordings cannot be simulated again, or None."""
+        for recording in self.recordings:
+            if recording.ref is None:
+                return f"{recording.name} has no commands (ref_x, ref_y, ref_z)"
+            if not recording.metadata.control or "feed_forward_N" not in recording.metadata.control:
+                return f"{recording.name} has no control gains and feed-forward in its metadata"
+            if recording.metadata.design != omnid_design():
+                return f"{recording.name} is of another design than the simulated Omnid"
+        return None
+
+    def run_again(
+        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
+    ) -> dict[str, Array] | None:
+        """Recorded minus simulated response of one trial to its own commands, by channel.
+
+        Args:
+            trial: index of the trial.
+            shared, local: displacements of the unknowns.
+            active: causes in the simulation, with values.
+
+        Returns:
+            ``phi``, ``theta`` [rad] and ``tau`` [N m], shape (Q, N, 3), or None if it cannot be simulated.
+        """
+        linear = self.linear[trial]
+        effects = [self.effect(candidate, values) for candidate, values in active]
+        if any(effect is None for effect in effects):
+            return None
+        return errors_of_rerun(
+            self.recordings[trial],
+            linear.shared.moved(shared),
+            linear.bases.moved(local),
+            [effect for effect in effects if effect is not None],
+            trial + 1,
+            linear.signals.keep,
+        )
+
+    def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
+        """Standard deviation of the noise and of the motion, by channel, shape (N, 3) each."""
+        linear, floor = self.linear[trial], {"phi": PHI_FLOOR_RAD, "theta": THETA_FLOOR_RAD, "tau": TAU_FLOOR_NM}
+        out = {}
+        for k, name in enumerate(("phi", "theta", "tau")):
+            noise = np.sqrt(self.noise.sigma[k] ** 2 + self.noise.step[k] ** 2 / 12.0 + floor[name] ** 2)
+            out[name] = noise, np.std(getattr(linear.signals, name)[linear.signals.keep], axis=0)
+        return out
 
     def unknowns(self, candidate: Candidate) -> list[Array]:
         """What a cause leaves open in every trial, whitened columns, shape (n, C, k) each."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -14,6 +15,23 @@ from discrepancy.team.signals import Signals
 
 Array = NDArray[np.float64]
 Shape = Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Context:
+    """What turns columns' values into an effect's parameters.
+
+    Attributes:
+        p_1c: centre of mass of the payload in {1} [m], shape (3,).
+        home_height_m: height of the wrist at home in {b}.
+        shape: the candidate's shape.
+        trial: number of a transient's trial, from 1, or None.
+    """
+
+    p_1c: Array
+    home_height_m: float
+    shape: Shape
+    trial: int | None
 
 
 class Cause(ABC):
@@ -57,12 +75,26 @@ class Cause(ABC):
         """Columns (n, C) of what the cause leaves open in one trial, such as the friction of a joint at rest."""
         return []
 
-    def report(self, values: Array, covariance: Array) -> tuple[dict[str, float], dict[str, float]]:
-        """Values and standard errors by the effect's parameter names."""
-        return (
-            dict(zip(self.parameters, values.tolist(), strict=True)),
-            dict(zip(self.parameters, np.sqrt(np.diag(covariance)).tolist(), strict=True)),
-        )
+    def physical(self, values: Array, context: Context) -> dict[str, float]:
+        """The effect's parameters (names as in the simulator) from the columns' values."""
+        return dict(zip(self.parameters, values.tolist(), strict=True))
+
+    def report(
+        self, values: Array, covariance: Array, context: Context
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """The effect's parameters and their standard errors; those of a chosen shape have none (NaN)."""
+        physical = self.physical(values, context)
+        se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        squares = {name: 0.0 for name in physical}
+        vectors = np.linalg.eigh(covariance)
+        for variance, direction in zip(vectors[0], vectors[1].T, strict=True):
+            step = np.sqrt(max(variance, 0.0)) * direction
+            if not np.any(np.abs(step) > 1e-12 * se.max(initial=0.0)):
+                continue
+            ahead, behind = self.physical(values + 0.1 * step, context), self.physical(values - 0.1 * step, context)
+            for name in physical:
+                squares[name] += ((ahead[name] - behind[name]) / 0.2) ** 2
+        return physical, {name: float(np.sqrt(v)) if v else float("nan") for name, v in squares.items()}
 
 
 def one_joint(values: Array, joint: int) -> Array:

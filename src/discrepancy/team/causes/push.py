@@ -26,3 +26,15 @@ class Push(Cause):
         for axis in np.eye(3):
             columns.append(trial.of_wrench(none, np.outer(window, axis)))
         return stack(columns)
+
+    def physical(self, values, context):  # noqa: D102
+        force, moment = values[:3], values[3:]
+        # Only the line of action shows; the point on it nearest to the centre of mass is named.
+        lever = np.cross(force, moment - np.cross(context.p_1c, force)) / max(force @ force, 1e-12)
+        point = context.p_1c + lever
+        return (
+            {"trial": context.trial or 1, "start_s": context.shape["start_s"]}
+            | {"duration_s": context.shape["duration_s"]}
+            | {f"force_{axis}_N": float(x) for axis, x in zip("xyz", force, strict=True)}
+            | {f"point_{axis}_m": float(x) for axis, x in zip("xyz", point, strict=True)}
+        )

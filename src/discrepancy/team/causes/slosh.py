@@ -40,6 +40,13 @@ class Slosh(Cause):
         columns += [trial.of_wrench(none, np.cross(axis, force)) for axis in np.eye(3)]
         return stack(columns)
 
+    def physical(self, values, context):  # noqa: D102
+        mass = values[0] if abs(values[0]) > 1e-6 else 1e-6
+        point = context.p_1c + values[1:] / mass
+        return {"mass_kg": float(mass), **context.shape} | {
+            f"point_{axis}_m": float(x) for axis, x in zip("xyz", point, strict=True)
+        }
+
 
 def _swing(a, rate_hz, gravity, shape):
     """Relative acceleration of the swinging mass [m/s^2], shape (Q, 3)."""

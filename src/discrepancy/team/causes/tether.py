@@ -29,16 +29,9 @@ class Tether(Cause):
             columns.append(trial.of_wrench(force, np.cross(grasps.p_1i[robot], force)))
         return stack(columns)
 
-    home_height_m = 0.355
-
-    def report(self, values, covariance):  # noqa: D102
-        k = values[3]
-        anchor = values[:3] / k + np.array([0.0, 0.0, self.home_height_m])
-        J = np.zeros((4, 4))
-        J[0, 3] = 1.0
-        J[1:, :3], J[1:, 3] = np.eye(3) / k, -values[:3] / k**2
-        se = np.sqrt(np.diag(J @ covariance @ J.T))
-        names = ("stiffness_N_per_m", "anchor_x_m", "anchor_y_m", "anchor_z_m")
-        return dict(zip(names, [float(k), *anchor.tolist()], strict=True)), dict(
-            zip(names, se.tolist(), strict=True)
-        )
+    def physical(self, values, context):  # noqa: D102
+        k = values[3] if abs(values[3]) > 1e-6 else 1e-6
+        anchor = values[:3] / k + np.array([0.0, 0.0, context.home_height_m])
+        return {"stiffness_N_per_m": float(k)} | {
+            f"anchor_{axis}_m": float(x) for axis, x in zip("xyz", anchor, strict=True)
+        }

@@ -1,0 +1,184 @@
+"""The whole diagnosis: search, closed-loop confirmation against rivals, verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from discrepancy.gain import Gain, Response, mean_chi2, responses
+from discrepancy.rig import Candidate, Rig
+from discrepancy.search import CLEAN, ENOUGH, Explanation, Found, refitted, search
+
+Verdict = Literal["consistent", "explained", "partly_explained", "unexplained"]
+
+MARGIN = 0.02
+"""Two simulations whose chi-square differs by less than this share are equally good."""
+CLOSE_NATS = 20.0
+"""Rivals that the rows alone put closer than this are simulated, too."""
+LEAST_SHARE = 0.3
+"""Causes that explain less than this of a large misfit are no explanation."""
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """A rival of a named cause.
+
+    Attributes:
+        candidate: the rival.
+        evidence_gap: by which the rows prefer the named cause [nats].
+        chi2_per_n: of the closed loop with the rival in place of the cause, or None if not simulated.
+        ambiguous: whether neither rows nor closed loop can tell it from the cause.
+    """
+
+    candidate: Candidate
+    evidence_gap: float
+    chi2_per_n: float | None
+    ambiguous: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The verdict and what it rests on.
+
+    Attributes:
+        verdict: one of the four.
+        explanation: the search's result, causes in the order of discovery.
+        alternatives: per cause, its rivals.
+        gain: closed-loop responses without and with the causes, or None.
+        not_simulated: why there is no closed-loop comparison, or None.
+        notes: sentences about what the data could not decide or validate.
+    """
+
+    verdict: Verdict
+    explanation: Explanation
+    alternatives: tuple[tuple[Alternative, ...], ...]
+    gain: Gain | None
+    not_simulated: str | None
+    notes: tuple[str, ...]
+
+    @property
+    def causes(self) -> tuple[Found, ...]:
+        """The named causes."""
+        return self.explanation.found
+
+
+def diagnose(
+    rig: Rig,
+    *,
+    closed_loop: bool = True,
+    jobs: int = 1,
+    say: Callable[[str], object] | None = None,
+    simulated: Callable[[int], object] | None = None,
+) -> Diagnosis:
+    """Diagnose a rig's recordings.
+
+    Args:
+        rig: recordings and causes.
+        closed_loop: whether to run the recorded commands again.
+        jobs: parallel processes of the simulations.
+        say: called with what is being done.
+        simulated: called with 1 for every simulated trial.
+    """
+    explanation = search(rig, progress=say)
+    why_not = rig.can_run_again() if closed_loop else "the closed loop was left out on request"
+    alternatives: list[tuple[Alternative, ...]] = [_unsimulated(found) for found in explanation.found]
+    gain: Gain | None = None
+    notes: list[str] = []
+    if why_not is None and explanation.found:
+        if say:
+            say("simulate")
+        explanation, alternatives, gain, notes = _confirm(rig, explanation, jobs, simulated)
+    elif why_not is None:
+        before = responses(rig, explanation.problem, [[]], jobs, simulated)[0]
+        gain = Gain(before, before, len(rig.trials) > 1)
+    if explanation.found and why_not is not None:
+        notes.append(
+            f"The named causes were not tried in closed loop ({why_not}), so look-alikes that only the response to "
+            "the commands separates remain possible."
+        )
+    if len(rig.trials) == 1:
+        notes.append("One trial only: nothing could be validated on data that was not used for the fit.")
+    return Diagnosis(
+        _verdict(explanation), explanation, tuple(alternatives), gain, why_not, tuple(notes)
+    )
+
+
+def _unsimulated(found: Found) -> tuple[Alternative, ...]:
+    return tuple(Alternative(c, gap, None, gap < CLOSE_NATS / 4) for c, gap in found.rivals)
+
+
+def _verdict(explanation: Explanation) -> Verdict:
+    clean = explanation.after <= CLEAN * explanation.samples
+    if not explanation.found:
+        return "consistent" if clean else "unexplained"
+    if clean or explanation.explained >= ENOUGH:
+        return "explained"
+    if explanation.explained >= LEAST_SHARE:
+        return "partly_explained"
+    return "unexplained"
+
+
+def _confirm(
+    rig: Rig, explanation: Explanation, jobs: int, simulated: Callable[[int], object] | None
+) -> tuple[Explanation, list[tuple[Alternative, ...]], Gain, list[str]]:
+    """Simulate without causes, with them, and with each close rival in a cause's place; keep what does best."""
+    notes: list[str] = []
+    problem = explanation.problem
+    free = list(explanation.fit.free)
+    hypotheses: list[list[int]] = [[], free]
+    trials: list[tuple[int, Candidate, float]] = []  # place in free, rival, gap
+    for place, found in enumerate(explanation.found):
+        for rival, gap in found.rivals:
+            index = problem.index_of(rival)
+            if index is None or index in free or gap > CLOSE_NATS or rival.detail:
+                continue
+            problem = problem.with_columns(index, rival, rig.columns(rival))
+            trials.append((place, rival, gap))
+            hypotheses.append([*free[:place], index, *free[place + 1 :]])
+    results = responses(rig, problem, hypotheses, jobs, simulated)
+    before, after, others = results[0], results[1], results[2:]
+    chosen, best = free, mean_chi2(after)
+    for (place, rival, _), hypothesis, result in zip(trials, hypotheses[2:], others, strict=True):
+        value = mean_chi2(result)
+        if value < best * (1.0 - MARGIN) and _wins(result, after):
+            named = explanation.found[place].candidate
+            notes.append(
+                f"The rows alone could not tell {named.label} from {rival.label}; in closed loop the latter does "
+                f"better (chi2/n {value:.3g} against {best:.3g})."
+            )
+            chosen, best, after = hypothesis, value, result
+    if chosen is not free:
+        explanation = refitted(rig, replace(explanation, problem=problem), chosen)
+    if mean_chi2(after) > mean_chi2(before) * (1.0 + MARGIN):
+        dropped = ", ".join(found.candidate.label for found in explanation.found)
+        notes.append(f"{dropped}: makes the response to the commands worse, so it is not named.")
+        after, chosen = before, []
+        explanation = refitted(rig, explanation, [])
+    alternatives = []
+    for place, found in enumerate(explanation.found):
+        listed = []
+        for rival, gap in found.rivals:
+            result = next(
+                (
+                    r
+                    for (p, c, _), r in zip(trials, others, strict=True)
+                    if p == place and c.key == rival.key
+                ),
+                None,
+            )
+            value = None if result is None else mean_chi2(result)
+            apart = value is not None and value > best * (1.0 + MARGIN)
+            listed.append(Alternative(rival, gap, value, gap < CLOSE_NATS / 4 and not apart))
+        alternatives.append(tuple(listed))
+    return explanation, alternatives, Gain(before, after, len(rig.trials) > 1), notes
+
+
+def _wins(rival: Sequence[Response | None], named: Sequence[Response | None]) -> bool:
+    """Whether the rival is better on most trials, not on one by much."""
+    better = [
+        a is not None and (b is None or a.chi2_per_n < b.chi2_per_n) for a, b in zip(rival, named, strict=True)
+    ]
+    return float(np.mean(better)) >= 0.5

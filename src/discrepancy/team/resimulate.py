@@ -1,0 +1,76 @@
+"""Run the recorded commands again, with the estimated payload and bases, with or without causes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from discrepancy.team.residual import Bases, Shared
+from estimator.errors import InputError
+from estimator.principal import inertia_matrix
+from estimator.recording import Recording
+from mocobot_sim.effects.base import Effect
+from mocobot_sim.effects.catalogue import apply_effects
+from mocobot_sim.payload_mjcf import payload_mjcf
+from mocobot_sim.rerun import predicted, rerun
+from mocobot_sim.scene import TeamScene, build_team
+from mocobot_sim.trial import TrialError
+
+Array = NDArray[np.float64]
+
+TIMESTEP_S = 1e-3
+SMALLEST = 1e-3
+"""Least principal moment of a simulated payload over the largest: a body needs some."""
+
+
+def team_of(
+    shared: Shared, bases: Bases, effects: Sequence[Effect], initial: tuple[Array, Array] | None = None
+) -> TeamScene:
+    """The team that the unknowns describe, effects applied.
+
+    Args:
+        shared: grasps and inertial parameters.
+        bases: where the robots stand, in {b1}.
+        effects: what is off.
+        initial: posture near which trials start, (phi, theta), (N, 3) each.
+    """
+    grasps = shared.grasps
+    mass, p_1c = float(shared.pi[0]), shared.pi[1:4] / shared.pi[0]
+    about_c = inertia_matrix(shared.pi[4:]) - mass * (p_1c @ p_1c * np.eye(3) - np.outer(p_1c, p_1c))
+    X_1i = RigidTransform.from_components(grasps.p_1i, Rotation.from_matrix(grasps.R_1i))
+    payload = payload_mjcf(mass, p_1c, physical_inertia(about_c), X_1i)
+    mounts = RigidTransform.from_components(bases.p, Rotation.from_matrix(bases.R))
+    scene = build_team(payload, mounts=mounts, initial=initial, timestep_s=TIMESTEP_S)
+    return apply_effects(scene, effects)
+
+
+def physical_inertia(inertia: Array) -> Array:
+    """The nearest inertia that a rigid body can have: principal moments positive, none above the others' sum."""
+    moments, axes = np.linalg.eigh(inertia)
+    moments = np.maximum(moments, SMALLEST * max(moments[-1], 1e-9))
+    excess = moments[2] - moments[0] - moments[1]
+    if excess > 0:  # moved to the sum of the others in equal parts
+        moments = moments + np.array([1.0, 1.0, -1.0]) * excess / 3.0 * 1.001
+    return (axes * moments) @ axes.T
+
+
+def errors_of_rerun(
+    recording: Recording, shared: Shared, bases: Bases, effects: Sequence[Effect], number: int, keep: slice
+) -> dict[str, Array] | None:
+    """Recorded minus simulated phi, theta [rad] and tau [N m] of one trial, shape (Q, N, 3) each.
+
+    None where the simulation of these effects cannot be trusted or assembled.
+    """
+    try:
+        scene = team_of(shared, bases, effects, (recording.phi[0], recording.theta[0]))
+        log = rerun(recording, replace(scene), timestep_s=TIMESTEP_S, trial_number=number)
+    except (TrialError, InputError):
+        return None
+    simulated = predicted(log)
+    return {
+        name: (getattr(recording, name) - getattr(simulated, name))[keep] for name in ("phi", "theta", "tau")
+    }
