@@ -101,9 +101,7 @@ def diagnose(
         )
     if len(rig.trials) == 1:
         notes.append("One trial only: nothing could be validated on data that was not used for the fit.")
-    return Diagnosis(
-        _verdict(explanation), explanation, tuple(alternatives), gain, why_not, tuple(notes)
-    )
+    return Diagnosis(_verdict(explanation), explanation, tuple(alternatives), gain, why_not, tuple(notes))
 
 
 def _unsimulated(found: Found) -> tuple[Alternative, ...]:
@@ -138,6 +136,7 @@ def _confirm(
             problem = problem.with_columns(index, rival, rig.columns(rival))
             trials.append((place, rival, gap))
             hypotheses.append([*free[:place], index, *free[place + 1 :]])
+    first = [found.candidate.key for found in explanation.found]
     results = responses(rig, problem, hypotheses, jobs, simulated)
     before, after, others = results[0], results[1], results[2:]
     chosen, best = free, mean_chi2(after)
@@ -157,19 +156,13 @@ def _confirm(
         notes.append(f"{dropped}: makes the response to the commands worse, so it is not named.")
         after, chosen = before, []
         explanation = refitted(rig, explanation, [])
+    tried = {(p, c.key): mean_chi2(r) for (p, c, _), r in zip(trials, others, strict=True)}
+    tried |= {(p, c): mean_chi2(results[1]) for p, c in enumerate(first)}
     alternatives = []
     for place, found in enumerate(explanation.found):
         listed = []
         for rival, gap in found.rivals:
-            result = next(
-                (
-                    r
-                    for (p, c, _), r in zip(trials, others, strict=True)
-                    if p == place and c.key == rival.key
-                ),
-                None,
-            )
-            value = None if result is None else mean_chi2(result)
+            value = tried.get((place, rival.key))
             apart = value is not None and value > best * (1.0 + MARGIN)
             listed.append(Alternative(rival, gap, value, gap < CLOSE_NATS / 4 and not apart))
         alternatives.append(tuple(listed))
@@ -179,6 +172,7 @@ def _confirm(
 def _wins(rival: Sequence[Response | None], named: Sequence[Response | None]) -> bool:
     """Whether the rival is better on most trials, not on one by much."""
     better = [
-        a is not None and (b is None or a.chi2_per_n < b.chi2_per_n) for a, b in zip(rival, named, strict=True)
+        a is not None and (b is None or a.chi2_per_n < b.chi2_per_n)
+        for a, b in zip(rival, named, strict=True)
     ]
     return float(np.mean(better)) >= 0.5

@@ -107,7 +107,9 @@ class Problem:
 
     def with_residual(self, residuals: Sequence[Array]) -> Problem:
         """The same columns with another residual, shape (n, C) per trial."""
-        return self._with(len(self.tolerant) + self.shared, [r[..., None] for r in residuals], self.candidates)
+        return self._with(
+            len(self.tolerant) + self.shared, [r[..., None] for r in residuals], self.candidates
+        )
 
     def with_columns(self, index: int, candidate: Candidate, columns: Sequence[Array]) -> Problem:
         """One candidate replaced by another of as many parameters."""
@@ -261,7 +263,8 @@ class Fit:
         """Values of a trial's own unknowns that go with the solution, shape (l,)."""
         columns = self.problem.local[trial]
         left = self.problem.raw[trial] @ np.append(-self.coefficients, 1.0)
-        return np.linalg.lstsq(columns.reshape(-1, columns.shape[2]), left.ravel(), rcond=None)[0]
+        flat = columns.reshape(-1, columns.shape[2])
+        return np.asarray(np.linalg.lstsq(flat, left.ravel(), rcond=None)[0], dtype=np.float64)
 
     def remaining(self, trial: int) -> Array:
         """Whitened residual that the solution leaves in one trial, shape (n, C)."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -147,8 +148,8 @@ class Rig(Protocol):
         """Causes that act for a while in one trial only, where the whitened residuals (n, C) are worst."""
         ...
 
-    def refinements(self, candidate: Candidate) -> list[Candidate]:
-        """The same candidate with other shapes, to choose the best from."""
+    def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
+        """The same candidate with other shapes, to choose the best from; ``finer`` ones around its own."""
         ...
 
     def can_run_again(self) -> str | None:
@@ -169,6 +170,22 @@ class Rig(Protocol):
         self, candidate: Candidate, values: Array, covariance: Array
     ) -> tuple[dict[str, float], dict[str, float]]:
         """Parameters of the simulator's effect, and their standard errors."""
+        ...
+
+    def quantities(self, trial: int) -> dict[str, Array]:
+        """What a misfit may depend on, per row of a trial, shape (n,); one of them is ``speed``."""
+        ...
+
+    def row_rate_hz(self, trial: int) -> float:
+        """Rate of a trial's moving rows [Hz]."""
+        ...
+
+    def directions(self, trial: int) -> dict[str, Array]:
+        """Orthonormal directions in the whitened channels of what single sources can do, shape (n, C, k)."""
+        ...
+
+    def write_extended(self, explanation: Any, folder: Path) -> None:
+        """Write the model with the causes in it, for the user to take away."""
         ...
 
     def undecidable(self) -> list[dict[str, Any]]:

@@ -139,7 +139,16 @@ def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] 
         problem, fit = _refit(rig, problem, free)
         in_sample, held_out = _shares(problem, before_it, best.evidence.index)
         found.append(
-            Found(candidate, np.zeros(0), np.zeros((0, 0)), best.evidence, rivals, in_sample, held_out, tuple(folds))
+            Found(
+                candidate,
+                np.zeros(0),
+                np.zeros((0, 0)),
+                best.evidence,
+                rivals,
+                in_sample,
+                held_out,
+                tuple(folds),
+            )
         )
     start = Explanation(
         tuple(found), tuple(rejected), before, fit.misfit, problem.samples, fit, problem, np.zeros(0), ()
@@ -310,25 +319,39 @@ def _leaders(
     for first in significant:
         index = first.index
         best: _Leader | None = None
-        for shape in (problem.candidates[index], *rig.refinements(problem.candidates[index])):
-            changed = problem
-            if shape is not problem.candidates[index]:
-                changed = problem.with_columns(index, shape, rig.columns(shape))
-            penalty = 0.0
-            if best is None or not shape.detail:
-                unknowns = rig.unknowns(shape)
-                changed = changed.with_unknowns(unknowns)
-                penalty = COMPLEXITY * np.log(problem.samples) * sum(u.shape[2] for u in unknowns)
-            judged = changed.fit(free).evidence_of(index, inflation)
-            if judged is None:
-                continue
-            penalty += COMPLEXITY * np.log(problem.samples) * judged.parameters
-            misfit = changed.fit([*free, index]).misfit + penalty
-            if best is None or misfit < best.misfit:
-                best = _Leader(judged, changed, misfit)
+        start = problem.candidates[index]
+        for shape in (start, *rig.refinements(start)):
+            best = _better(rig, problem, free, index, shape, best, inflation)
+        for shape in rig.refinements(best.candidate, finer=True) if best is not None else []:
+            best = _better(rig, problem, free, index, shape, best, inflation)
         if best is not None and _log10_p(best.problem, best.evidence) <= SIGNIFICANT:
             leaders.append(best)
     return sorted(leaders, key=lambda leader: leader.misfit)
+
+
+def _better(
+    rig: Rig,
+    problem: Problem,
+    free: Sequence[int],
+    index: int,
+    shape: Candidate,
+    best: _Leader | None,
+    inflation: float,
+) -> _Leader | None:
+    """The better of a candidate with a given shape and the best so far."""
+    changed = problem
+    if shape is not problem.candidates[index]:
+        changed = problem.with_columns(index, shape, rig.columns(shape))
+    unknowns = [] if shape.detail else rig.unknowns(shape)
+    if unknowns:
+        changed = changed.with_unknowns(unknowns)
+    judged = changed.fit(free).evidence_of(index, inflation)
+    if judged is None:
+        return best
+    count = judged.parameters + sum(u.shape[2] for u in unknowns)
+    penalty = COMPLEXITY * np.log(problem.samples) * count
+    misfit = changed.fit([*free, index]).misfit + penalty
+    return _Leader(judged, changed, misfit) if best is None or misfit < best.misfit else best
 
 
 def _refit(rig: Rig, problem: Problem, free: Sequence[int], rounds: int = 3) -> tuple[Problem, Fit]:
@@ -344,7 +367,11 @@ def _refit(rig: Rig, problem: Problem, free: Sequence[int], rounds: int = 3) -> 
         # The problem counts total values, so what its columns stand for is added back.
         back = []
         for t, r in enumerate(exact):
-            total = r + problem.raw[t][..., : problem.shared] @ shared + problem.local[t][..., :own] @ local[t][:own]
+            total = (
+                r
+                + problem.raw[t][..., : problem.shared] @ shared
+                + problem.local[t][..., :own] @ local[t][:own]
+            )
             for i in free:
                 total = total + problem.raw[t][..., problem.spans[i]] @ fit.part(i)[0]
             back.append(total)

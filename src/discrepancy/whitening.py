@@ -64,6 +64,13 @@ class Whitening:
         y[: self.moving] = series
         return y
 
+    def rows_only(self, x: Array) -> Array:
+        """Decorrelate the channels of every row, not the rows, shape (n, C) -> (n, C)."""
+        y = np.empty_like(x)
+        y[self.moving :] = _per_row(self.chol_alone, x[self.moving :])
+        y[: self.moving] = _per_row(self.chol_moving, x[: self.moving])
+        return y
+
 
 def _cholesky(draws: Array) -> Array:
     channels = draws.shape[2]
@@ -79,10 +86,11 @@ def _cholesky(draws: Array) -> Array:
 def _per_row(chol: Array, x: Array) -> Array:
     """chol^-1 applied to axis -2 or, for plain rows, the last axis: shapes (..., C) or (n, C, k)."""
     if not x.size:
-        return np.asarray(x, dtype=float)
+        return np.array(x, dtype=np.float64)
     channels = len(chol)
     axis = 1 if x.ndim > 2 and x.shape[1] == channels else x.ndim - 1
     flat = np.moveaxis(x, axis, 0)
-    return np.moveaxis(
+    moved = np.moveaxis(
         solve_triangular(chol, flat.reshape(channels, -1), lower=True).reshape(flat.shape), 0, axis
     )
+    return np.asarray(moved, dtype=np.float64)

@@ -49,14 +49,14 @@ class Noise:
 
     def draw(self, signals: Signals, rng: np.random.Generator) -> Signals:
         """One realisation of the sensors' errors on a trial: what they would add to its smooth signals."""
-        errors = []
+        errors: list[Array] = []
         for k, field in enumerate(("phi", "theta", "tau")):
             x = low_pass(getattr(signals, field), signals.rate_hz, SMOOTH_HZ)
             step = np.where(self.step[k] > 0, self.step[k], 1.0)
             x = x + step * _phase(x / step, rng)
             read = x + self.sigma[k] * rng.standard_normal(x.shape)
             errors.append(np.where(self.step[k] > 0, np.round(read / step) * step, read) - x)
-        return Signals(signals.time, *errors, signals.rate_hz)
+        return Signals(signals.time, errors[0], errors[1], errors[2], signals.rate_hz)
 
 
 def _phase(x: Array, rng: np.random.Generator) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,26 +12,49 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from discrepancy.rig import Candidate, Channel, Parameter, Rows
+from discrepancy.search import Explanation
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
-from discrepancy.team.linear import TrialLinear, linearise, noise_rows, start_bases
+from discrepancy.team.linear import TrialLinear, start_bases
 from discrepancy.team.noise import Noise
+from discrepancy.team.pushes import intervals_near, push, worst_intervals
 from discrepancy.team.reduction import Reduction
-from discrepancy.team.resimulate import errors_of_rerun
-from discrepancy.team.residual import Bases, Shared, balance, grasp_data, pose_residual
-from discrepancy.team.signals import Signals, with_rates
+from discrepancy.team.resimulate import errors_of_rerun, team_of
+from discrepancy.team.signals import Signals
+from discrepancy.team.start import exact_residual, gauss_newton, linearised, start_shared
 from discrepancy.whitening import Whitening
-from estimator.design import OmnidDesign
 from estimator.errors import InputError
 from estimator.payload_estimate import PayloadEstimate
-from estimator.principal import inertia_parameters
 from estimator.recording import Recording
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.catalogue import make_effect
+from mocobot_sim.extended import write_extended
 from mocobot_sim.models import omnid_design
 
 Array = NDArray[np.float64]
 
+UNDECIDABLE = (
+    (
+        "zero of the last gimbal axis (theta_zero, joint 3)",
+        "it turns the grasp frame by a constant, and the grasp frame is itself unknown",
+        "a grasp whose orientation is known",
+    ),
+    (
+        "mass of the gimbal and the platform",
+        "a point mass at the wrist is a part of the payload",
+        "a run of the arm alone",
+    ),
+    (
+        "a scale common to all torques (sea_scale everywhere)",
+        "it scales the payload's mass and inertia and nothing else",
+        "a known weight on the payload",
+    ),
+    (
+        "which robot's gimbal rubs (gimbal_friction)",
+        "a pure moment about parallel axes is the same wherever it acts; only the axis shows",
+        "one robot released at a time",
+    ),
+)
 # What the integrator does to the closed loop at 1 ms (docs/diagnosis.md).
 PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4
 
@@ -87,12 +111,17 @@ class TeamRig:
         run = Parallel(n_jobs=jobs, prefer="processes" if jobs > 1 else "threads")
         tasks = [(s, b, r, k) for k, (s, b, r) in enumerate(zip(signals, bases, reductions, strict=True))]
         linear, whitening = zip(
-            *run(delayed(_linear)(s, shared, b, design, r, noise, k) for s, b, r, k in tasks), strict=True
+            *run(delayed(linearised)(s, shared, b, design, r, noise, k) for s, b, r, k in tasks), strict=True
         )
         for _ in range(2):
-            shared, bases = _gauss_newton(linear, whitening)
+            shared, bases = gauss_newton(linear, whitening)
             linear = tuple(
-                replace(t, shared=shared, bases=b, residual=_exact(t.signals, shared, b, design, t.reduction))
+                replace(
+                    t,
+                    shared=shared,
+                    bases=b,
+                    residual=exact_residual(t.signals, shared, b, design, t.reduction),
+                )
                 for t, b in zip(linear, bases, strict=True)
             )
         return cls(
@@ -228,7 +257,10 @@ class TeamRig:
 
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
         """Standard deviation of the noise and of the motion, by channel, shape (N, 3) each."""
-        linear, floor = self.linear[trial], {"phi": PHI_FLOOR_RAD, "theta": THETA_FLOOR_RAD, "tau": TAU_FLOOR_NM}
+        linear, floor = (
+            self.linear[trial],
+            {"phi": PHI_FLOOR_RAD, "theta": THETA_FLOOR_RAD, "tau": TAU_FLOOR_NM},
+        )
         out = {}
         for k, name in enumerate(("phi", "theta", "tau")):
             noise = np.sqrt(self.noise.sigma[k] ** 2 + self.noise.step[k] ** 2 / 12.0 + floor[name] ** 2)
@@ -276,30 +308,22 @@ class TeamRig:
                     modelled += cause.columns(linear, robot, joint, candidate.shape) @ values
                 else:
                     signals = corrected
-            residual = _exact(
+            residual = exact_residual(
                 signals, linear.shared.moved(shared), linear.bases.moved(x), linear.design, linear.reduction
             )
             out.append(self.whitening[t](residual - modelled))
         return out
 
-    def refinements(self, candidate: Candidate) -> list[Candidate]:
+    def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a transient with its interval moved."""
         if candidate.detail:
-            return [
-                self.push(int(candidate.detail["trial"]), start, duration)
-                for start, duration in _intervals_near(
-                    candidate.shape["start_s"], candidate.shape["duration_s"]
-                )
-            ]
-        shapes = CAUSES[candidate.cause].shapes
+            if finer:
+                return []
+            near = intervals_near(candidate.shape["start_s"], candidate.shape["duration_s"])
+            return [push(int(candidate.detail["trial"]), start, duration) for start, duration in near]
+        cause = CAUSES[candidate.cause]
+        shapes = cause.finer(candidate.shape) if finer else cause.shapes
         return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
-
-    def push(self, trial: int, start_s: float, duration_s: float) -> Candidate:
-        """A push in one trial."""
-        cause = CAUSES["push"]
-        parameters = tuple(Parameter(n, 0.0, s) for n, s in zip(cause.parameters, cause.scales, strict=True))
-        interval = {"start_s": start_s, "duration_s": duration_s}
-        return Candidate("push", "push", None, None, parameters, interval, {"trial": trial, **interval})
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the wrench balance is worst.
@@ -311,103 +335,75 @@ class TeamRig:
             return []
         out = []
         for t, z in enumerate(remaining):
-            moving = self.linear[t].reduction.moving
-            time, square = self.linear[t].reduction.time[:moving], np.sum(z[:moving, -6:] ** 2, axis=1)
-            if not len(time):
-                continue
-            total = np.concatenate([[0.0], np.cumsum(square - np.median(square))])
-            best = []
-            for duration in (0.4, 0.8, 1.6, 3.2, 6.4):
-                width = max(2, round(duration * len(time) / max(time[-1] - time[0], 1e-9)))
-                if width >= len(time):
-                    continue
-                sums = (total[width:] - total[:-width]) / np.sqrt(width)
-                at = int(np.argmax(sums))
-                best.append((sums[at], time[at], duration))
-            out += [self.push(t, start, duration) for _, start, duration in sorted(best)[-2:]]
+            moving, time = self.linear[t].reduction.moving, self.linear[t].reduction.time
+            found = worst_intervals(time[:moving], np.sum(z[:moving, -6:] ** 2, axis=1))
+            out += [push(t, start, duration) for start, duration in found]
         return out
 
+    def quantities(self, trial: int) -> dict[str, Array]:
+        """Speed of the payload [m/s], its distance from where it started [m], load [N m]: shape (n,) each."""
+        linear = self.linear[trial]
+        at = linear.reduction.sample
+        twist = linear.data.twist[at]
+        h = linear.data.p_bi[at]
+        return {
+            "speed": np.sqrt(np.mean(twist[..., 3:] ** 2, axis=(1, 2))),
+            "position": np.sqrt(np.mean((h - h.mean(axis=0)) ** 2, axis=(1, 2))),
+            "load": np.sqrt(np.mean(linear.s[at, :, 18:] ** 2, axis=(1, 2))),
+        }
 
-def _intervals_near(start_s: float, duration_s: float) -> list[tuple[float, float]]:
-    end = start_s + duration_s
-    steps = np.array([-0.4, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2, 0.4]) * duration_s
-    return [
-        (start_s + a, end + b - start_s - a)
-        for a in steps
-        for b in steps
-        if (a or b) and end + b - start_s - a > 0.1
-    ]
+    def row_rate_hz(self, trial: int) -> float:
+        """Rate of a trial's moving rows [Hz]."""
+        return self.linear[trial].signals.rate_hz / self.linear[trial].reduction.step
+
+    def directions(self, trial: int) -> dict[str, Array]:
+        """Directions of every spring torque and every gimbal axis, from the linearisation."""
+        linear, white = self.linear[trial], self.whitening[trial]
+        at = linear.reduction.sample
+        out = {}
+        for robot in range(self.robots):
+            J = linear.J[robot][at]
+            for k in range(3):
+                out[f"robot {robot + 1}'s torque channel {k + 1}"] = _unit(white.rows_only(J[:, :, 18 + k]))
+                out[f"robot {robot + 1}'s driven angle {k + 1}"] = _unit(white.rows_only(J[:, :, k]))
+                out[f"robot {robot + 1}'s gimbal angle {'zyx'[k]}"] = _unit(white.rows_only(J[:, :, 9 + k]))
+        return out
+
+    def write_extended(self, explanation: Explanation, folder: Path) -> None:
+        """Write the estimated team with the named causes in it; ``mocobot simulate --model`` takes it.
+
+        Raises:
+            InputError: the folder cannot be written, or a cause has values that no effect can have.
+        """
+        effects = []
+        for found in explanation.found:
+            effect = self.effect(found.candidate, found.values)
+            if effect is None:
+                raise InputError(
+                    f"{found.candidate.label}: no effect has the values found; nothing to extend"
+                )
+            effects.append(effect)
+        fit = explanation.problem.fit(explanation.fit.free, background=False)
+        shared = self.linear[0].shared.moved(-fit.coefficients[: explanation.problem.shared])
+        bases = self.linear[0].bases.moved(-fit.local(0)[: self.local_unknowns])
+        first = self.recordings[0]
+        scene = team_of(shared, bases, effects, (first.phi[0], first.theta[0]))
+        causes = [found.candidate.label for found in explanation.found]
+        write_extended(scene, effects, folder, {"recordings": list(self.trials), "causes": causes})
+
+    def undecidable(self) -> list[dict[str, Any]]:
+        """What recordings of a parked team with a rigid payload cannot decide."""
+        said: list[dict[str, Any]] = [
+            {"what": what, "why": why, "remedy": remedy} for what, why, remedy in UNDECIDABLE
+        ]
+        if self.robots == 1:
+            what = "every error of angles, lengths, bases and grasps of a single robot"
+            said.append(
+                {"what": what, "why": "no other robot tells where the payload is", "remedy": "a second robot"}
+            )
+        return said
 
 
-def start_shared(estimate: PayloadEstimate) -> Shared:
-    """Unknowns from the estimate.
-
-    Raises:
-        InputError: grasps, mass or centre of mass are missing.
-    """
-    missing = [
-        name
-        for name, value in (
-            ("grasps", estimate.grasps),
-            ("mass", estimate.mass),
-            ("centre of mass", estimate.p_1c),
-        )
-        if value is None
-    ]
-    if missing:
-        raise InputError(
-            f"these recordings do not determine the {missing[0]}, so there is nothing to hold the data against; "
-            "add a recording with motion in all axes"
-        )
-    mass, c = estimate.mass.mass, estimate.p_1c
-    inertia = estimate.inertia.inertia if estimate.inertia else np.zeros((3, 3))
-    about_1 = inertia + mass * (c @ c * np.eye(3) - np.outer(c, c))
-    return Shared(estimate.grasps, np.concatenate([[mass], mass * c, inertia_parameters(about_1)]))
-
-
-def _linear(
-    signals: Signals,
-    shared: Shared,
-    bases: Bases,
-    design: OmnidDesign,
-    reduction: Reduction,
-    noise: Noise,
-    k: int,
-) -> tuple[TrialLinear, Whitening]:
-    linear = linearise(signals, shared, bases, design, reduction, full=True)
-    draws = noise_rows(linear, noise, np.random.default_rng([20250, k]))
-    return linear, Whitening.of(draws, reduction.moving)
-
-
-def _exact(
-    signals: Signals, shared: Shared, bases: Bases, design: OmnidDesign, reduction: Reduction
-) -> Array:
-    rate = signals.rate_hz
-    Q, N = signals.phi.shape[:2]
-    parts = with_rates(signals.phi, rate), with_rates(signals.theta, rate), with_rates(signals.tau, rate)[:1]
-    s = np.concatenate(parts).transpose(1, 2, 0, 3).reshape(Q, N, -1)
-    force = balance(grasp_data(s, design, rate), shared)[0]
-    pose = pose_residual(signals.phi, signals.theta, shared, bases, design)
-    return reduction(np.concatenate([pose, force], axis=1))
-
-
-def _gauss_newton(
-    linear: Sequence[TrialLinear], whitening: Sequence[Whitening]
-) -> tuple[Shared, list[Bases]]:
-    """One step of all unknowns, with no cause in the model."""
-    own = linear[0].by_bases.shape[2]
-    shared_columns = linear[0].by_shared.shape[2]
-    total = shared_columns + own * len(linear)
-    gram, right = np.zeros((total, total)), np.zeros(total)
-    for t, (trial, white) in enumerate(zip(linear, whitening, strict=True)):
-        at = np.r_[np.arange(shared_columns), shared_columns + own * t + np.arange(own)]
-        columns = np.concatenate([white(trial.by_shared), white(trial.by_bases)], axis=2)
-        columns = columns.reshape(-1, columns.shape[2])
-        gram[np.ix_(at, at)] += columns.T @ columns
-        right[at] += columns.T @ white(trial.residual).ravel()
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), 1e-300))
-    step = -np.linalg.lstsq(gram * np.outer(scale, scale), right * scale, rcond=1e-12)[0] * scale
-    return linear[0].shared.moved(step[:shared_columns]), [
-        trial.bases.moved(step[shared_columns + own * t : shared_columns + own * (t + 1)])
-        for t, trial in enumerate(linear)
-    ]
+def _unit(x: Array) -> Array:
+    """Rows (n, C) to unit length, as one direction each, shape (n, C, 1)."""
+    return (x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-300))[..., None]

@@ -71,6 +71,10 @@ class Cause(ABC):
         """The signals as they would be without the cause, or None where it is not an error of the signals."""
         return None
 
+    def finer(self, shape: Shape) -> list[Shape]:
+        """Shapes near a chosen one, for a second look."""
+        return []
+
     def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> list[Array]:
         """Columns (n, C) of what the cause leaves open in one trial, such as the friction of a joint at rest."""
         return []
@@ -91,7 +95,10 @@ class Cause(ABC):
             step = np.sqrt(max(variance, 0.0)) * direction
             if not np.any(np.abs(step) > 1e-12 * se.max(initial=0.0)):
                 continue
-            ahead, behind = self.physical(values + 0.1 * step, context), self.physical(values - 0.1 * step, context)
+            ahead, behind = (
+                self.physical(values + 0.1 * step, context),
+                self.physical(values - 0.1 * step, context),
+            )
             for name in physical:
                 squares[name] += ((ahead[name] - behind[name]) / 0.2) ** 2
         return physical, {name: float(np.sqrt(v)) if v else float("nan") for name, v in squares.items()}

@@ -17,7 +17,7 @@ class BaseCompliance(Cause):
         "Vertical forces (lifting against each other) separate a base, which yields sideways, from a grasp."
     )
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         design, s = trial.design, trial.s[:, robot]
         force = np.einsum("qij,qj->qi", trial.data.R_bi[:, robot], trial.data.wrench[:, robot, 3:])
         _, h_ddot = wrist_motion(leg_geometry(s[:, :3], design), s[:, 3:6], s[:, 6:9])

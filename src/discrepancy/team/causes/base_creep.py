@@ -14,7 +14,7 @@ class BaseCreep(Cause):
     per = "robot"
     separate = "A longer recording at rest."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         time = trial.signals.time - trial.signals.time[0]
         return stack(
             [

@@ -15,7 +15,7 @@ class BaseTilt(Cause):
     per = "robot"
     separate = "Larger tilts of the payload, and holds."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         return stack([self._column(trial, robot, np.eye(3)[k]) for k in range(2)])
 
     @staticmethod

@@ -14,12 +14,12 @@ class ClockDelay(Cause):
     per = "robot"
     separate = "Fast motion of all robots at once."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         s, rate = trial.signals, trial.signals.rate_hz
         parts = [-with_rates(x[:, robot], rate)[1] for x in (s.phi, s.theta, s.tau)]
         return stack([trial.of_signals(robot, *parts)])
 
-    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+    def undo(self, signals, trial, robot, joint, values, shape):
         late = [
             one_robot(x[:, robot] - advanced(x[:, robot], signals.rate_hz, values[0]), trial.robots, robot)
             for x in (signals.phi, signals.theta, signals.tau)

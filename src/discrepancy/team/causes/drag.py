@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from discrepancy.team.causes.base import Cause, stack
+from discrepancy.team.causes.base import Array, Cause, stack
 from estimator.fusion import fuse, fusion_matrix
 
 
@@ -15,9 +15,9 @@ class Drag(Cause):
     per = "payload"
     separate = "Translation at constant attitude separates drag of the payload from friction of the gimbals."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         motion = fuse(trial.data, trial.shared.grasps)
-        twist = trial.data.twist.reshape(len(trial.s), -1) @ fusion_matrix(trial.shared.grasps).T
+        twist: Array = trial.data.twist.reshape(len(trial.s), -1) @ fusion_matrix(trial.shared.grasps).T
         com = trial.shared.pi[1:4] / trial.shared.pi[0]
-        force = -(twist[:, 3:] + np.cross(motion.omega, com))
-        return stack([trial.of_wrench(force, np.cross(com, force))])
+        force = np.asarray(-(twist[:, 3:] + np.cross(motion.omega, com)), dtype=np.float64)
+        return stack([trial.of_wrench(force, np.cross(com, force).astype(np.float64))])

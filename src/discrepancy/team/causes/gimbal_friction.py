@@ -19,12 +19,12 @@ class GimbalFriction(Cause):
     shapes = ({"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3})
     separate = "Which robot's gimbal rubs shows only with one robot released at a time."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         rate = trial.signals.rate_hz
         states = sliding(trial.signals.theta[:, robot, joint], rate, shape["slow_rad_per_s"])
         return stack([_moment(trial, robot, joint, state) for state in states])
 
-    def unknowns(self, trial, robot, joint, shape):  # noqa: D102
+    def unknowns(self, trial, robot, joint, shape):
         theta, rate = trial.signals.theta[:, robot, joint], trial.signals.rate_hz
         return [_moment(trial, robot, joint, rest) for rest in rests(theta, rate, shape["slow_rad_per_s"])]
 

@@ -16,6 +16,6 @@ class GraspFlex(Cause):
         "Vertical forces (lifting against each other) separate a grasp from a base, which yields sideways."
     )
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         force = np.einsum("qij,qj->qi", trial.data.R_bi[:, robot], trial.data.wrench[:, robot, 3:])
         return stack([trial.of_pose(robot, None, -force @ trial.bases.R[robot].T)])

@@ -18,7 +18,7 @@ class GraspPlay(Cause):
     shapes = ({"force_N": 0.1}, {"force_N": 0.02}, {"force_N": 0.5})
     separate = "Internal forces of both signs at rest separate play from flexibility."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         at_end = -np.tanh(trial.data.wrench[:, robot, 3:] / shape["force_N"])
         in_b = np.einsum("qij,qj->qi", trial.data.R_bi[:, robot], at_end)
         return stack([trial.of_pose(robot, None, in_b @ trial.bases.R[robot].T)])

@@ -13,20 +13,20 @@ class JointFriction(Cause):
     shapes = ({"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3})
     separate = "An arm-only run (payload released) shows friction of the joint alone."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         errors = _errors(trial.signals, robot, joint, shape)
         return stack([trial.of_signals(robot, tau=one_joint(error, joint)) for error in errors])
 
-    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+    def undo(self, signals, trial, robot, joint, values, shape):
         coulomb, viscous = _errors(signals, robot, joint, shape)
         error = one_joint(values[0] * coulomb + values[1] * viscous, joint)
         return signals.minus(tau=one_robot(error, trial.robots, robot))
 
-
-    def unknowns(self, trial, robot, joint, shape):  # noqa: D102
+    def unknowns(self, trial, robot, joint, shape):
         phi, rate = trial.signals.phi[:, robot, joint], trial.signals.rate_hz
         return [
-            trial.of_signals(robot, tau=one_joint(rest, joint)) for rest in rests(phi, rate, shape["slow_rad_per_s"])
+            trial.of_signals(robot, tau=one_joint(rest, joint))
+            for rest in rests(phi, rate, shape["slow_rad_per_s"])
         ]
 
 

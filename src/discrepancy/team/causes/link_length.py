@@ -18,36 +18,34 @@ class LinkLength(Cause):
     parameters = ("proximal_m", "rod_m", "base_radius_m")
     separate = "Poses spread over the whole workspace separate a wrong length from an encoder's zero."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         phi, tau = trial.s[:, robot, :3], trial.s[:, robot, 18:]
-        error = _phi_error(phi, joint, trial.design)
         columns = []
-        for k in range(3):
-            slope = np.empty_like(phi)
-            for leg in range(3):
-                step = 1e-5 * np.eye(3)[leg]
-                ahead, behind = (_phi_error(phi + s, joint, trial.design)[k] for s in (step, -step))
-                slope[:, leg] = (ahead - behind) / 2e-5
+        errors, slopes = _phi_error(phi, joint, trial.design), _slopes(phi, joint, trial.design)
+        for error, slope in zip(errors, slopes, strict=True):
             # (I - d(error)/d(phi))^-T on the torque, to first order.
             torque = -slope * tau[:, joint, None]
-            columns.append(trial.of_signals(robot, phi=one_joint(error[k], joint), tau=torque))
+            columns.append(trial.of_signals(robot, phi=one_joint(error, joint), tau=torque))
         return stack(columns)
 
-    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+    def undo(self, signals, trial, robot, joint, values, shape):
         phi = signals.phi[:, robot]
         error = values @ np.array(_phi_error(phi, joint, trial.design))
-        slope = np.empty_like(phi)
-        for leg in range(3):
-            step = 1e-5 * np.eye(3)[leg]
-            ahead, behind = (
-                values @ np.array(_phi_error(phi + s, joint, trial.design)) for s in (step, -step)
-            )
-            slope[:, leg] = (ahead - behind) / 2e-5
+        slope = np.tensordot(values, _slopes(phi, joint, trial.design), axes=1)
         torque = -slope * signals.tau[:, robot, joint, None]
         return signals.minus(
             phi=one_robot(one_joint(error, joint), trial.robots, robot),
             tau=one_robot(torque, trial.robots, robot),
         )
+
+
+def _slopes(phi, joint, design, step=1e-5):
+    """Derivative of ``_phi_error`` by the three angles, shape (3, Q, 3)."""
+    slopes = np.empty((3, *phi.shape))
+    for leg, direction in enumerate(np.eye(3)):
+        ahead, behind = (_phi_error(phi + s * direction, joint, design) for s in (step, -step))
+        slopes[:, :, leg] = (np.array(ahead) - np.array(behind)) / (2.0 * step)
+    return slopes
 
 
 def _phi_error(phi, joint, design):

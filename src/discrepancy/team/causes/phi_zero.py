@@ -13,9 +13,9 @@ class PhiZero(Cause):
     parameters = ("zero_rad",)
     separate = "Poses spread over the whole workspace separate a zero from a wrong length."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         return stack([trial.of_signals(robot, phi=np.eye(3)[joint])])
 
-    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+    def undo(self, signals, trial, robot, joint, values, shape):
         error = np.tile(values[0] * np.eye(3)[joint], (len(signals.time), 1))
         return signals.minus(phi=one_robot(error, trial.robots, robot))

@@ -15,7 +15,7 @@ class Push(Cause):
     per = "payload"
     separate = "Another trial: a push does not repeat."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         time = trial.signals.time
         window = ((time >= shape["start_s"]) & (time < shape["start_s"] + shape["duration_s"])).astype(float)
         none = np.zeros((len(time), 3))
@@ -27,7 +27,7 @@ class Push(Cause):
             columns.append(trial.of_wrench(none, np.outer(window, axis)))
         return stack(columns)
 
-    def physical(self, values, context):  # noqa: D102
+    def physical(self, values, context):
         force, moment = values[:3], values[3:]
         # Only the line of action shows; the point on it nearest to the centre of mass is named.
         lever = np.cross(force, moment - np.cross(context.p_1c, force)) / max(force @ force, 1e-12)

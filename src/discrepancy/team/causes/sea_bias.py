@@ -13,9 +13,9 @@ class SeaBias(Cause):
     parameters = ("bias_Nm",)
     separate = "Loads of both signs on the joint (a known added weight) separate bias, scale and hardening."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         return stack([trial.of_signals(robot, tau=np.eye(3)[joint])])
 
-    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+    def undo(self, signals, trial, robot, joint, values, shape):
         error = np.tile(values[0] * np.eye(3)[joint], (len(signals.time), 1))
         return signals.minus(tau=one_robot(error, trial.robots, robot))

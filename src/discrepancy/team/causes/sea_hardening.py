@@ -11,12 +11,12 @@ class SeaHardening(Cause):
     parameters = ("cubic_Nm_per_rad3",)
     separate = "Loads of both signs on the joint (a known added weight) separate bias, scale and hardening."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         return stack(
             [trial.of_signals(robot, tau=one_joint(_error(trial.s[:, robot, 18 + joint], trial), joint))]
         )
 
-    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+    def undo(self, signals, trial, robot, joint, values, shape):
         error = one_joint(values[0] * _error(signals.tau[:, robot, joint], trial), joint)
         return signals.minus(tau=one_robot(error, trial.robots, robot))
 

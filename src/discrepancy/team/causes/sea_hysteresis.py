@@ -18,20 +18,20 @@ class SeaHysteresis(Cause):
         "Motion with load reversals at rest separates friction in the spring from friction in the joint."
     )
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         return stack(
             [trial.of_signals(robot, tau=one_joint(_error(trial.signals, robot, joint, shape), joint))]
         )
 
-    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+    def undo(self, signals, trial, robot, joint, values, shape):
         error = one_joint(values[0] * _error(signals, robot, joint, shape), joint)
         return signals.minus(tau=one_robot(error, trial.robots, robot))
 
-
-    def unknowns(self, trial, robot, joint, shape):  # noqa: D102
+    def unknowns(self, trial, robot, joint, shape):
         tau, rate = trial.signals.tau[:, robot, joint], trial.signals.rate_hz
         return [
-            trial.of_signals(robot, tau=one_joint(rest, joint)) for rest in rests(tau, rate, shape["slow_Nm_per_s"])
+            trial.of_signals(robot, tau=one_joint(rest, joint))
+            for rest in rests(tau, rate, shape["slow_Nm_per_s"])
         ]
 
 

@@ -14,9 +14,9 @@ class SeaScale(Cause):
     parameters = ("scale",)
     separate = "Loads of both signs on the joint (a known added weight) separate bias, scale and hardening."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         return stack([trial.of_signals(robot, tau=one_joint(-trial.s[:, robot, 18 + joint], joint))])
 
-    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+    def undo(self, signals, trial, robot, joint, values, shape):
         error = one_joint(-values[0] * signals.tau[:, robot, joint], joint)
         return signals.minus(tau=one_robot(error, trial.robots, robot))

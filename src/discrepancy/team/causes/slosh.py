@@ -1,9 +1,9 @@
 """A mass that swings in the payload."""
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter
+from scipy.signal import StateSpace, lsim
 
-from discrepancy.team.causes.base import Cause, stack
+from discrepancy.team.causes.base import Array, Cause, Shape, stack
 from estimator.fusion import fuse
 
 
@@ -29,18 +29,34 @@ class Slosh(Cause):
     def columns(self, trial, robot, joint, shape):  # noqa: D102
         motion = fuse(trial.data, trial.shared.grasps)
         com = trial.shared.pi[1:4] / trial.shared.pi[0]
-        R_b1 = trial.data.R_bi[:, 0]
-        a = motion.acceleration + np.cross(motion.alpha, com)
-        a += np.cross(motion.omega, np.cross(motion.omega, com))
-        a = np.einsum("qij,qj->qi", R_b1, a) * np.array([1.0, 1.0, 0.0])
-        swing = _swing(a, trial.signals.rate_hz, trial.data.gravity_mps2, shape)
-        force = np.einsum("qji,qj->qi", R_b1, -swing)
-        none = np.zeros_like(force)
-        columns = [trial.of_wrench(force, np.cross(com, force))]
-        columns += [trial.of_wrench(none, np.cross(axis, force)) for axis in np.eye(3)]
+        omega, alpha = motion.omega, motion.alpha
+
+        def reaction(a: Array) -> Array:
+            """Force on the payload, in {1}, of 1 kg that hangs from a point with acceleration a."""
+            R_b1 = trial.data.R_bi[:, 0]
+            across = np.einsum("qij,qj->qi", R_b1, a) * np.array([1.0, 1.0, 0.0])
+            swing = _swing(across, trial.signals.rate_hz, trial.data.gravity_mps2, shape)
+            return np.asarray(np.einsum("qji,qj->qi", R_b1, -swing), dtype=np.float64)
+
+        def relative(r: Array) -> Array:
+            return np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))
+
+        force = reaction(motion.acceleration + relative(com))
+        columns = [trial.of_wrench(force, _moment(com, force))]
+        for axis in np.eye(3):
+            # Moving the point by r moves the force, and changes what drives the pendulum.
+            more = reaction(relative(axis))
+            columns.append(trial.of_wrench(more, _moment(com, more) + _moment(axis, force)))
         return stack(columns)
 
-    def physical(self, values, context):  # noqa: D102
+    def finer(self, shape):
+        lengths = shape["length_m"] * np.array([0.85, 0.9, 0.95, 0.975, 1.025, 1.05, 1.1, 1.15])
+        return [{**shape, "length_m": float(x)} for x in lengths] + [
+            {**shape, "length_m": float(x), "damping_ratio": 0.5 * shape["damping_ratio"]}
+            for x in lengths[2:6]
+        ]
+
+    def physical(self, values, context):
         mass = values[0] if abs(values[0]) > 1e-6 else 1e-6
         point = context.p_1c + values[1:] / mass
         return {"mass_kg": float(mass), **context.shape} | {
@@ -48,9 +64,18 @@ class Slosh(Cause):
         }
 
 
+def _moment(r: Array, force: Array) -> Array:
+    return np.asarray(np.cross(r, force), dtype=np.float64)
+
+
 def _swing(a, rate_hz, gravity, shape):
     """Relative acceleration of the swinging mass [m/s^2], shape (Q, 3)."""
     w = np.sqrt(gravity / shape["length_m"])
-    system = ([-1.0, 0.0, 0.0], [1.0, 2.0 * shape["damping_ratio"] * w, w**2])
-    b, poles, _ = cont2discrete(system, 1.0 / rate_hz, method="foh")
-    return lfilter(b.ravel(), poles, a, axis=0)
+    pendulum = StateSpace(
+        [[0.0, 1.0], [-(w**2), -2.0 * shape["damping_ratio"] * w]],
+        [[0.0], [-1.0]],
+        [[-(w**2), -2.0 * shape["damping_ratio"] * w]],
+        [[-1.0]],
+    )
+    time = np.arange(len(a)) / rate_hz
+    return np.stack([np.asarray(lsim(pendulum, axis, time)[1]) for axis in a.T], axis=1)

@@ -18,7 +18,7 @@ class Tether(Cause):
     per = "robot"
     separate = "A run without payload, or a second payload at the same place, separates an outside force from a sensor."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         data, grasps = trial.data, trial.shared.grasps
         home = np.array([0.0, 0.0, trial.design.home_height_m])
         samples = len(trial.s)
@@ -29,7 +29,7 @@ class Tether(Cause):
             columns.append(trial.of_wrench(force, np.cross(grasps.p_1i[robot], force)))
         return stack(columns)
 
-    def physical(self, values, context):  # noqa: D102
+    def physical(self, values, context):
         k = values[3] if abs(values[3]) > 1e-6 else 1e-6
         anchor = values[:3] / k + np.array([0.0, 0.0, context.home_height_m])
         return {"stiffness_N_per_m": float(k)} | {

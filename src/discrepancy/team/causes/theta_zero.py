@@ -15,9 +15,9 @@ class ThetaZero(Cause):
         "The zero of the last gimbal axis is part of the grasp frame; only a known grasp would show it."
     )
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         return stack([trial.of_signals(robot, theta=np.eye(3)[joint])])
 
-    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+    def undo(self, signals, trial, robot, joint, values, shape):
         error = np.tile(values[0] * np.eye(3)[joint], (len(signals.time), 1))
         return signals.minus(theta=one_robot(error, trial.robots, robot))

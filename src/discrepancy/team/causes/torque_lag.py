@@ -13,11 +13,11 @@ class TorqueLag(Cause):
     per = "robot"
     separate = "The commands separate a lag inside the sensor from a late log."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         rate = with_rates(trial.signals.tau[:, robot], trial.signals.rate_hz)[1]
         return stack([trial.of_signals(robot, tau=-rate)])
 
-    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+    def undo(self, signals, trial, robot, joint, values, shape):
         # truth = reading + T d(reading)/dt
         rate = with_rates(signals.tau[:, robot], signals.rate_hz)[1]
         return signals.minus(tau=one_robot(-values[0] * rate, trial.robots, robot))

@@ -14,11 +14,11 @@ class TorqueSkew(Cause):
     per = "robot"
     separate = "The commands separate a late log from a lag inside the sensor, which the controller sees too."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         rate = with_rates(trial.signals.tau[:, robot], trial.signals.rate_hz)[1]
         return stack([trial.of_signals(robot, tau=-rate)])
 
-    def undo(self, signals, trial, robot, joint, values, shape):  # noqa: D102
+    def undo(self, signals, trial, robot, joint, values, shape):
         tau = signals.tau[:, robot]
         error = tau - advanced(tau, signals.rate_hz, values[0])
         return signals.minus(tau=one_robot(error, trial.robots, robot))

@@ -1,0 +1,181 @@
+"""JSON form of a diagnosis: plain types, no NaN, units in the keys; null is what could not be had.
+
+format, version     "mocobot-diagnosis", 1
+recordings          names of the trials
+verdict             "consistent", "explained", "partly_explained" or "unexplained"
+causes              list, in the order of discovery, of
+    cause, family, robot, joint    robot and joint from 1, or null
+    place, sentence                in words
+    parameters                     {name: {value, se}}; se is null for what was chosen, not fitted
+    explained                      {in_sample, held_out}: share of the nominal model's misfit that the cause removes
+    log10_p                        of so much evidence in clean data
+    folds                          gain of chi-square on every trial when fitted to the others
+    shape                          numbers that change the cause's columns, such as a pendulum's length
+    separate                       what would tell the cause from its look-alikes
+    alternatives                   list of {cause, family, robot, joint, place, evidence_gap [nats], chi2_per_n,
+                                   ambiguous, separate}; chi2_per_n of its closed loop, null if not simulated
+rejected            significant candidates that other trials did not confirm: list of {cause, robot, joint, place}
+gain                null where the closed loop was not simulated and there is nothing to estimate, or
+    held_out        {before, after}: {<channel>_nrmse, <channel>_rms, chi2_per_n}, means over trials, null if failed
+    units           of the channels' rms
+    removed         share of the excess error removed, with interval [low, high] over trials, or null
+    trials          list of {name, before, after}
+    validated       false for a single trial, which was compared with what it was fitted to
+    estimates       {before, after}, as the rig has them
+    errors          {before, after} against the truth, only where it is known
+not_simulated       why there is no closed-loop comparison, or null
+undecidable         list of {what, why, remedy}
+residual            {chi2_per_n, signature} of what the causes (with tolerances) leave; chi2_per_n_tolerated with
+                    tolerances and no cause; nominal: {chi2_per_n, signature} of the simulation as it is
+notes               sentences
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from discrepancy.diagnose import Alternative, Diagnosis
+from discrepancy.gain import Gain, Response
+from discrepancy.rig import Candidate, Rig
+from discrepancy.search import Found
+from discrepancy.signature import signature
+from discrepancy.words import Words
+
+FORMAT, VERSION = "mocobot-diagnosis", 1
+LEAST_LOG10_P = -1e6
+
+
+def diagnosis_to_dict(
+    diagnosis: Diagnosis, rig: Rig, words: Words, estimates: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """The diagnosis as documented above.
+
+    Args:
+        diagnosis: the verdict.
+        rig: what was diagnosed.
+        words: of the rig.
+        estimates: what the rig estimates ``before`` and ``after``, plain JSON values; ``errors`` may lie beside them.
+    """
+    explanation = diagnosis.explanation
+    nominal = explanation.problem.fit(background=False)
+    gain = None if diagnosis.gain is None else _gain(diagnosis.gain, rig, words)
+    if estimates is not None:
+        gain = gain or {"held_out": {"before": None, "after": None}, "removed": None, "trials": []}
+        gain["estimates"] = {name: estimates[name] for name in ("before", "after")}
+        if "errors" in estimates:
+            gain["errors"] = estimates["errors"]
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "recordings": list(rig.trials),
+        "verdict": diagnosis.verdict,
+        "causes": [
+            _cause(found, alternatives, rig, words)
+            for found, alternatives in zip(diagnosis.causes, diagnosis.alternatives, strict=True)
+        ],
+        "rejected": [_where(candidate) for candidate in explanation.rejected],
+        "gain": gain,
+        "not_simulated": diagnosis.not_simulated,
+        "undecidable": rig.undecidable(),
+        "residual": {
+            "chi2_per_n": explanation.after / explanation.samples,
+            "signature": plain(signature(rig, explanation)),
+            "chi2_per_n_tolerated": explanation.before / explanation.samples,
+            "nominal": {
+                "chi2_per_n": nominal.misfit / explanation.samples,
+                "signature": plain(signature(rig, replace(explanation, fit=nominal))),
+            },
+        },
+        "notes": list(diagnosis.notes),
+    }
+
+
+def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: Words) -> dict[str, Any]:
+    candidate = found.candidate
+    values, se = rig.effect_parameters(candidate, found.values, found.covariance)
+    return {
+        **_where(candidate),
+        "sentence": words.describe(candidate, values, se),
+        "parameters": {
+            name: {"value": float(value), "se": _finite(se.get(name))} for name, value in values.items()
+        },
+        "explained": {"in_sample": found.in_sample, "held_out": found.held_out},
+        "log10_p": max(float(np.nan_to_num(found.evidence.log10_p, nan=0.0)), LEAST_LOG10_P),
+        "folds": [float(gain) for gain in found.folds],
+        "shape": plain(dict(candidate.shape)),
+        "separate": words.separate(candidate.cause),
+        "alternatives": [
+            {
+                **_where(rival.candidate),
+                "evidence_gap": float(rival.evidence_gap),
+                "chi2_per_n": _finite(rival.chi2_per_n),
+                "ambiguous": bool(rival.ambiguous),
+                "separate": words.separate(rival.candidate.cause),
+            }
+            for rival in alternatives
+        ],
+    }
+
+
+def _where(candidate: Candidate) -> dict[str, Any]:
+    return {
+        "cause": candidate.cause,
+        "family": candidate.family,
+        "robot": candidate.robot,
+        "joint": candidate.joint,
+        "place": candidate.place,
+    }
+
+
+def _gain(gain: Gain, rig: Rig, words: Words) -> dict[str, Any]:
+    channels = list(next((a.rms for a, _ in gain.pairs), {}))
+    removed = gain.removed()
+    both = zip(rig.trials, gain.before, gain.after, strict=True)
+    return {
+        "held_out": {
+            name: _mean([pair[k] for pair in gain.pairs])
+            for k, name in enumerate(("before", "after"))
+        },
+        "units": {name: words.unit(name) for name in channels},
+        "removed": None
+        if removed is None
+        else {"share": removed[0], "interval": [_finite(removed[1]), _finite(removed[2])]},
+        "validated": gain.held_out,
+        "trials": [{"name": name, "before": _response(a), "after": _response(b)} for name, a, b in both],
+    }
+
+
+def _response(response: Response | None) -> dict[str, float] | None:
+    if response is None:
+        return None
+    return (
+        {f"{name}_nrmse": float(v) for name, v in response.nrmse.items()}
+        | {f"{name}_rms": float(v) for name, v in response.rms.items()}
+        | {"chi2_per_n": float(response.chi2_per_n)}
+    )
+
+
+def _mean(responses: Sequence[Response]) -> dict[str, float] | None:
+    each = [values for values in map(_response, responses) if values is not None]
+    return {key: float(np.mean([values[key] for values in each])) for key in each[0]} if each else None
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not np.isfinite(value) else float(value)
+
+
+def plain(value: Any) -> Any:
+    """numpy numbers and arrays to plain JSON values; what is not finite becomes null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(item) for item in value]
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    return _finite(value) if isinstance(value, float | np.floating) else value

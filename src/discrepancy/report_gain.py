@@ -1,0 +1,86 @@
+"""The part of the report that says what the causes are worth: response to the commands, and payload estimates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+import numpy as np
+
+Values = Mapping[str, Any]
+
+SMALL_UNITS = {"rad": ("mrad", 1e3), "N m": ("mN m", 1e3), "m": ("mm", 1e3)}
+ERRORS = {
+    "mass_percent": "mass [%]",
+    "com_mm": "centre of mass [mm]",
+    "principal_inertia_percent": "principal inertia [%]",
+    "grasp_rotation_deg": "grasp rotation [deg]",
+    "grasp_position_mm": "grasp position [mm]",
+}
+
+
+def gain_lines(values: Values) -> list[str]:
+    """Closed loop and estimates, before and after, as lines of at most 100 columns."""
+    gain = values["gain"]
+    if gain is None:
+        return []
+    named = bool(values["causes"])
+    lines = list(_closed_loop(gain, named=named))
+    if "errors" in gain:
+        lines += ["", "[[Error of the payload's estimate (the truth is known)]]"]
+        lines += _table(gain["errors"], ERRORS, named=named)
+    if "estimates" in gain and named:
+        lines += ["", "[[Payload's estimate]]", *_table(*_rows(gain["estimates"]), named=True)]
+    return lines
+
+
+def _closed_loop(gain: Values, *, named: bool) -> Iterable[str]:
+    before, after = (gain["held_out"][name] for name in ("before", "after"))
+    if before is None or after is None:
+        return
+    what = "on trials left out of the fit" if gain["validated"] else "on the trial itself: not validated"
+    yield from ("", f"[[Response to the recorded commands, simulated again ({what})]]")
+    yield f"    {'':<26}{'before':>12}{'after':>12}" if named else f"    {'':<26}{'error':>12}"
+    for channel, unit in gain["units"].items():
+        shown, scale = SMALL_UNITS.get(unit, (unit, 1.0))
+        for label, key, factor in (
+            (f"{channel} rms [{shown}]", f"{channel}_rms", scale),
+            (f"{channel} rms / motion [%]", f"{channel}_nrmse", 100.0),
+        ):
+            yield _row(label, [factor * before[key], factor * after[key]], named=named)
+    yield _row("chi2/n", [before["chi2_per_n"], after["chi2_per_n"]], named=named)
+    if gain["removed"] is not None and named:
+        low, high = gain["removed"]["interval"]
+        count = sum(t["before"] is not None and t["after"] is not None for t in gain["trials"])
+        text = f"    {100 * gain['removed']['share']:.1f} % of the excess error removed"
+        if low is not None and high is not None and count > 1:
+            text += f" (95 % interval over {count} trials: {100 * low:.1f} to {100 * high:.1f} %)"
+        yield text
+
+
+def _rows(estimates: Values) -> tuple[dict[str, dict[str, float]], dict[str, str]]:
+    """Numbers of an estimate by label: mass, centre of mass, moments, distances of the grasps."""
+    table: dict[str, dict[str, float]] = {}
+    for name, estimate in estimates.items():
+        row = {"mass [kg]": estimate["mass_kg"]}
+        row |= {
+            f"centre of mass {a} [m]": v for a, v in zip("xyz", estimate["p_1c_m"], strict=True)
+        }
+        row |= {
+            f"principal {k} [kg m^2]": v for k, v in enumerate(estimate["principal_inertia_kgm2"], start=1)
+        }
+        for i, grasp in enumerate(estimate["grasps"], start=1):
+            if i > 1:
+                row[f"distance of grasp {i} [m]"] = float(np.linalg.norm(grasp["p_1i_m"]))
+        table[name] = row
+    return table, {label: label for label in table["before"]}
+
+
+def _table(values: Values, labels: Mapping[str, str], *, named: bool) -> Iterable[str]:
+    yield f"    {'':<26}{'before':>12}{'after':>12}" if named else f"    {'':<26}{'':>12}"
+    for key, label in labels.items():
+        yield _row(label, [values["before"][key], values["after"][key]], named=named)
+
+
+def _row(label: str, numbers: list[float], *, named: bool) -> str:
+    return f"    {label:<26}" + "".join(f"{x:>12.5g}" for x in (numbers if named else numbers[:1]))

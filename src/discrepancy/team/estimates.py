@@ -1,0 +1,80 @@
+"""What a diagnosis does to the payload's estimate: values without and with the causes, and errors where truth is known."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.search import Explanation
+from discrepancy.team.residual import Shared
+from discrepancy.team.rig import TeamRig
+from estimator import so3
+from estimator.principal import inertia_matrix
+
+Array = NDArray[np.float64]
+Estimate = dict[str, Any]
+
+
+def estimates(rig: TeamRig, explanation: Explanation) -> dict[str, Estimate]:
+    """Payload estimates of the same least squares ``before`` (nothing is off) and ``after`` (the causes are in it).
+
+    Returns:
+        Two dictionaries ``mass_kg``, ``p_1c_m`` [3], ``principal_inertia_kgm2`` [3] ascending, and ``grasps``: a list
+        of ``p_1i_m`` [3] and ``R_1i_rotvec_deg`` [3].
+    """
+    problem = explanation.problem
+    out = {}
+    for name, free in (("before", ()), ("after", explanation.fit.free)):
+        fit = problem.fit(free, background=False)
+        out[name] = to_dict(rig.linear[0].shared.moved(-fit.coefficients[: problem.shared]))
+    return out
+
+
+def to_dict(shared: Shared) -> Estimate:
+    """Mass, centre of mass, principal moments and grasps of the unknowns, as plain numbers."""
+    mass = float(shared.pi[0])
+    p_1c = shared.pi[1:4] / mass
+    about_c = inertia_matrix(shared.pi[4:]) - mass * (p_1c @ p_1c * np.eye(3) - np.outer(p_1c, p_1c))
+    return {
+        "mass_kg": mass,
+        "p_1c_m": p_1c.tolist(),
+        "principal_inertia_kgm2": np.linalg.eigvalsh(about_c).tolist(),
+        "grasps": [
+            {"p_1i_m": p.tolist(), "R_1i_rotvec_deg": np.rad2deg(so3.log(R)).tolist()}
+            for p, R in zip(shared.grasps.p_1i, shared.grasps.R_1i, strict=True)
+        ],
+    }
+
+
+def errors(estimate: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, float]:
+    """Errors of an estimate against a truth of the same form, the largest of several robots or axes each.
+
+    Raises:
+        ValueError, KeyError, TypeError: the truth lacks something, or is of another number of robots.
+    """
+    moments, true_moments = (_array(x["principal_inertia_kgm2"], (3,)) for x in (estimate, truth))
+    turns, places = [0.0], [0.0]
+    for mine, true in zip(estimate["grasps"], truth["grasps"], strict=True):
+        R, R_true = (so3.exp(np.deg2rad(_array(x["R_1i_rotvec_deg"], (3,)))) for x in (mine, true))
+        turns.append(float(np.rad2deg(np.linalg.norm(so3.log(R_true.T @ R)))))
+        places.append(
+            1e3 * float(np.linalg.norm(_array(mine["p_1i_m"], (3,)) - _array(true["p_1i_m"], (3,))))
+        )
+    return {
+        "mass_percent": 100 * abs(estimate["mass_kg"] / float(truth["mass_kg"]) - 1.0),
+        "com_mm": 1e3
+        * float(np.linalg.norm(_array(estimate["p_1c_m"], (3,)) - _array(truth["p_1c_m"], (3,)))),
+        "principal_inertia_percent": 100 * float(np.max(np.abs(moments / true_moments - 1.0))),
+        "grasp_rotation_deg": max(turns),
+        "grasp_position_mm": max(places),
+    }
+
+
+def _array(values: Any, shape: tuple[int, ...]) -> Array:
+    array = np.asarray(values, dtype=float)
+    if array.shape != shape or not np.all(np.isfinite(array)):
+        raise ValueError(f"shape {array.shape}, not {shape}, or not finite")
+    return array
