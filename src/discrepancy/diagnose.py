@@ -10,7 +10,7 @@ import numpy as np
 
 from discrepancy.gain import Gain, Response, mean_chi2, responses
 from discrepancy.rig import Candidate, Rig
-from discrepancy.search import CLEAN, ENOUGH, Explanation, Found, refitted, search
+from discrepancy.search import ENOUGH, Explanation, Found, refitted, search
 
 Verdict = Literal["consistent", "explained", "partly_explained", "unexplained"]
 
@@ -109,14 +109,30 @@ def _unsimulated(found: Found) -> tuple[Alternative, ...]:
 
 
 def _verdict(explanation: Explanation) -> Verdict:
-    clean = explanation.after <= CLEAN * explanation.samples
     if not explanation.found:
-        return "consistent" if clean else "unexplained"
-    if clean or explanation.explained >= ENOUGH:
+        return "consistent" if explanation.clean else "unexplained"
+    if _add_up(explanation):
+        return "unexplained"
+    if explanation.clean or explanation.explained >= ENOUGH:
         return "explained"
-    if explanation.explained >= LEAST_SHARE:
-        return "partly_explained"
-    return "unexplained"
+    return "partly_explained" if explanation.explained >= LEAST_SHARE else "unexplained"
+
+
+def _add_up(explanation: Explanation) -> bool:
+    """Three causes at one robot (or on the payload) imitate another that the catalogue does not have."""
+    robots = {found.candidate.robot for found in explanation.found} - {None}
+    return len(explanation.found) > 2 and len(robots) <= 1
+
+
+def _without_suspects(rig: Rig, explanation: Explanation) -> tuple[Explanation, str]:
+    """No forced choice: causes that explain too little are not named."""
+    labels = ", ".join(found.candidate.label for found in explanation.found)
+    if _add_up(explanation):
+        note = f"{labels}: only all together fit, as if they imitated something else, so none is named."
+    else:
+        note = f"{labels}: explains only {100 * explanation.explained:.0f} % of the misfit, so it is not named."
+    rejected = (*explanation.rejected, *(found.candidate for found in explanation.found))
+    return replace(refitted(rig, explanation, []), rejected=rejected), note
 
 
 def _confirm(

@@ -18,6 +18,7 @@ rejected            significant candidates that other trials did not confirm: li
 gain                null where the closed loop was not simulated and there is nothing to estimate, or
     held_out        {before, after}: {<channel>_nrmse, <channel>_rms, chi2_per_n}, means over trials, null if failed
     units           of the channels' rms
+    noise           {<channel>_rms}: what noise and integration error alone would leave
     removed         share of the excess error removed, with interval [low, high] over trials, or null
     trials          list of {name, before, after}
     validated       false for a single trial, which was compared with what it was fitted to
@@ -64,7 +65,14 @@ def diagnosis_to_dict(
     nominal = explanation.problem.fit(background=False)
     gain = None if diagnosis.gain is None else _gain(diagnosis.gain, rig, words)
     if estimates is not None:
-        gain = gain or {"held_out": {"before": None, "after": None}, "removed": None, "trials": []}
+        gain = gain or {
+            "held_out": {"before": None, "after": None},
+            "units": {},
+            "noise": {},
+            "removed": None,
+            "validated": False,
+            "trials": [],
+        }
         gain["estimates"] = {name: estimates[name] for name in ("before", "after")}
         if "errors" in estimates:
             gain["errors"] = estimates["errors"]
@@ -137,16 +145,21 @@ def _gain(gain: Gain, rig: Rig, words: Words) -> dict[str, Any]:
     both = zip(rig.trials, gain.before, gain.after, strict=True)
     return {
         "held_out": {
-            name: _mean([pair[k] for pair in gain.pairs])
-            for k, name in enumerate(("before", "after"))
+            name: _mean([pair[k] for pair in gain.pairs]) for k, name in enumerate(("before", "after"))
         },
         "units": {name: words.unit(name) for name in channels},
+        "noise": {f"{name}_rms": _noise(rig, name) for name in channels},
         "removed": None
         if removed is None
         else {"share": removed[0], "interval": [_finite(removed[1]), _finite(removed[2])]},
         "validated": gain.held_out,
         "trials": [{"name": name, "before": _response(a), "after": _response(b)} for name, a, b in both],
     }
+
+
+def _noise(rig: Rig, channel: str) -> float:
+    squares = [np.mean(rig.response_scale(t)[channel][0] ** 2) for t in range(len(rig.trials))]
+    return float(np.sqrt(np.mean(squares)))
 
 
 def _response(response: Response | None) -> dict[str, float] | None:
@@ -178,4 +191,4 @@ def plain(value: Any) -> Any:
         return bool(value)
     if isinstance(value, int | np.integer):
         return int(value)
-    return _finite(value) if isinstance(value, float | np.floating) else value
+    return _finite(float(value)) if isinstance(value, float | np.floating) else value

@@ -254,6 +254,18 @@ class Fit:
         at = np.searchsorted(self.used, np.arange(*self.problem.spans[index].indices(1 << 30)))
         return self.solution[at], self.covariance[np.ix_(at, at)]
 
+    @property
+    def strain(self) -> tuple[float, float, float]:
+        """How hard the tolerances are used: their chi-square, its degrees of freedom, log10 p of as much."""
+        prior = np.zeros(self.gram.shape[0] - 1, dtype=bool)
+        prior[self.problem.shared :] = self.problem.tolerant
+        for index in self.free:
+            prior[self.problem.spans[index]] = False
+        at = prior[self.used]
+        value = float(np.sum(self.solution[at] ** 2))
+        freedom = float(np.sum(1.0 - np.minimum(np.diag(self.covariance)[at], 1.0)))
+        return value, freedom, float(chi2.logsf(value, max(freedom, 1e-9)) / np.log(10.0))
+
     def held_out(self, trial: int) -> float:
         """Chi-square of one trial under this solution, without the priors' part."""
         x = np.append(-self.coefficients, 1.0)

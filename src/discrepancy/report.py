@@ -114,6 +114,4 @@ def _power(log10_p: float) -> str:
 
 
 def _wrapped(text: str, indent: str = "    ") -> Sequence[str]:
-    return textwrap.wrap(
-        text, WIDTH, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False
-    )
+    return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)

@@ -40,15 +40,16 @@ def _closed_loop(gain: Values, *, named: bool) -> Iterable[str]:
         return
     what = "on trials left out of the fit" if gain["validated"] else "on the trial itself: not validated"
     yield from ("", f"[[Response to the recorded commands, simulated again ({what})]]")
-    yield f"    {'':<26}{'before':>12}{'after':>12}" if named else f"    {'':<26}{'error':>12}"
+    heads = ["before", "after", "noise alone"] if named else ["error", "noise alone"]
+    yield f"    {'':<26}" + "".join(f"{head:>14}" for head in heads)
     for channel, unit in gain["units"].items():
         shown, scale = SMALL_UNITS.get(unit, (unit, 1.0))
-        for label, key, factor in (
-            (f"{channel} rms [{shown}]", f"{channel}_rms", scale),
-            (f"{channel} rms / motion [%]", f"{channel}_nrmse", 100.0),
-        ):
-            yield _row(label, [factor * before[key], factor * after[key]], named=named)
-    yield _row("chi2/n", [before["chi2_per_n"], after["chi2_per_n"]], named=named)
+        noise = scale * gain["noise"][f"{channel}_rms"]
+        rms = [scale * which[f"{channel}_rms"] for which in (before, after)]
+        share = [100.0 * which[f"{channel}_nrmse"] for which in (before, after)]
+        yield _row(f"{channel} rms [{shown}]", rms, named=named, last=noise)
+        yield _row(f"{channel} rms / motion [%]", share, named=named)
+    yield _row("chi2/n", [before["chi2_per_n"], after["chi2_per_n"]], named=named, last=1.0)
     if gain["removed"] is not None and named:
         low, high = gain["removed"]["interval"]
         count = sum(t["before"] is not None and t["after"] is not None for t in gain["trials"])
@@ -63,9 +64,7 @@ def _rows(estimates: Values) -> tuple[dict[str, dict[str, float]], dict[str, str
     table: dict[str, dict[str, float]] = {}
     for name, estimate in estimates.items():
         row = {"mass [kg]": estimate["mass_kg"]}
-        row |= {
-            f"centre of mass {a} [m]": v for a, v in zip("xyz", estimate["p_1c_m"], strict=True)
-        }
+        row |= {f"centre of mass {a} [m]": v for a, v in zip("xyz", estimate["p_1c_m"], strict=True)}
         row |= {
             f"principal {k} [kg m^2]": v for k, v in enumerate(estimate["principal_inertia_kgm2"], start=1)
         }
@@ -77,10 +76,12 @@ def _rows(estimates: Values) -> tuple[dict[str, dict[str, float]], dict[str, str
 
 
 def _table(values: Values, labels: Mapping[str, str], *, named: bool) -> Iterable[str]:
-    yield f"    {'':<26}{'before':>12}{'after':>12}" if named else f"    {'':<26}{'':>12}"
+    if named:
+        yield f"    {'':<26}{'before':>14}{'after':>14}"
     for key, label in labels.items():
         yield _row(label, [values["before"][key], values["after"][key]], named=named)
 
 
-def _row(label: str, numbers: list[float], *, named: bool) -> str:
-    return f"    {label:<26}" + "".join(f"{x:>12.5g}" for x in (numbers if named else numbers[:1]))
+def _row(label: str, numbers: list[float], *, named: bool, last: float | None = None) -> str:
+    shown = (numbers if named else numbers[:1]) + ([] if last is None else [last])
+    return f"    {label:<26}" + "".join(f"{x:>14.4g}" for x in shown)

@@ -62,7 +62,9 @@ class Explanation:
     Attributes:
         found: causes in the order of discovery.
         rejected: significant candidates that held-out trials did not confirm.
-        before, after: misfit of the background alone, and with the causes.
+        nominal: misfit of the nominal model, nothing off.
+        before, after: misfit with tolerances alone, and with the causes as well.
+        plain: misfit with the causes and no tolerances.
         samples: number of residuals.
         fit: the last fit.
         problem: the last problem (with the causes' shapes and residual).
@@ -71,8 +73,10 @@ class Explanation:
 
     found: tuple[Found, ...]
     rejected: tuple[Candidate, ...]
+    nominal: float
     before: float
     after: float
+    plain: float
     samples: int
     fit: Fit
     problem: Problem
@@ -81,14 +85,14 @@ class Explanation:
 
     @property
     def explained(self) -> float:
-        """Share of the misfit above clean data that the causes remove."""
-        return share(self.before, self.after, self.samples)
+        """Share of the nominal model's misfit above clean data that the causes alone remove."""
+        floor = min(self.plain, CLEAN * self.samples)
+        return float(np.clip((self.nominal - self.plain) / max(self.nominal - floor, 1e-9), 0.0, 1.0))
 
-
-def share(before: float, after: float, samples: int) -> float:
-    """Share of the misfit above what clean data leave, that goes from ``before`` to ``after``."""
-    floor = min(after, CLEAN * samples)
-    return float(np.clip((before - after) / max(before - floor, 1e-9), 0.0, 1.0))
+    @property
+    def clean(self) -> bool:
+        """Whether what is left is noise, and tolerances used as they usually are."""
+        return self.after <= CLEAN * self.samples and self.fit.strain[2] > SIGNIFICANT
 
 
 def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] | None = None) -> Explanation:
@@ -108,7 +112,7 @@ def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] 
     found: list[Found] = []
     rejected: list[Candidate] = []
     fit = problem.fit()
-    before = fit.misfit
+    before, nominal = fit.misfit, problem.fit(background=False).misfit
     while len(found) < most:
         inflation = max(1.0, fit.misfit / (CLEAN * problem.samples))
         problem, evidence = _with_transients(rig, problem, fit, fit.evidence(inflation), inflation)
@@ -151,7 +155,17 @@ def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] 
             )
         )
     start = Explanation(
-        tuple(found), tuple(rejected), before, fit.misfit, problem.samples, fit, problem, np.zeros(0), ()
+        tuple(found),
+        tuple(rejected),
+        nominal,
+        before,
+        fit.misfit,
+        0.0,
+        problem.samples,
+        fit,
+        fit.problem,
+        np.zeros(0),
+        (),
     )
     return _finished(rig, start)
 
@@ -191,7 +205,8 @@ def _finished(rig: Rig, explanation: Explanation) -> Explanation:
         results.append(replace(item, values=values * units, covariance=covariance * np.outer(units, units)))
     shared = fit.coefficients[: problem.shared]
     local = tuple(-fit.local(t)[: rig.local_unknowns] for t in range(len(problem.rows)))
-    return replace(explanation, found=tuple(results), shared=-shared, local=local)
+    plain = problem.fit(fit.free, background=False).misfit
+    return replace(explanation, found=tuple(results), plain=plain, shared=-shared, local=local)
 
 
 def _least(leader: _Leader, excess: float, *, first: bool) -> float:

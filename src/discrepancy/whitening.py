@@ -93,4 +93,4 @@ def _per_row(chol: Array, x: Array) -> Array:
     moved = np.moveaxis(
         solve_triangular(chol, flat.reshape(channels, -1), lower=True).reshape(flat.shape), 0, axis
     )
-    return np.asarray(moved, dtype=np.float64)
+    return moved.astype(np.float64)

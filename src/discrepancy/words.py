@@ -21,8 +21,8 @@ class Words(Protocol):
         """Which experiment would tell a cause from its look-alikes, one sentence, or nothing."""
         ...
 
-    def unit(self, channel: str) -> str:
-        """Unit of a closed-loop channel."""
+    def unit(self, name: str) -> str:
+        """Unit of a closed-loop channel, or of a quantity that a misfit may depend on."""
         ...
 
 

@@ -1,4 +1,4 @@
-"""What a diagnosis does to the payload's estimate: values without and with the causes, and errors where truth is known."""
+"""What a diagnosis does to the payload's estimate: without and with the causes, and errors where truth is known."""
 
 from __future__ import annotations
 

@@ -14,7 +14,7 @@ from discrepancy.words import number
 
 GIMBAL_AXES = {1: "z (first)", 2: "y (middle)", 3: "x (last)"}
 GIMBAL_CAUSES = ("theta_zero", "gimbal_friction")
-UNITS = {"phi": "rad", "theta": "rad", "tau": "N m"}
+UNITS = {"phi": "rad", "theta": "rad", "tau": "N m", "speed": "m/s", "position": "m", "load": "N m"}
 
 
 @dataclass(frozen=True)
@@ -139,9 +139,9 @@ class TeamWords:
         """The catalogue's advice."""
         return CAUSES[cause].separate
 
-    def unit(self, channel: str) -> str:
-        """rad or N m."""
-        return UNITS[channel]
+    def unit(self, name: str) -> str:
+        """Unit of a closed-loop channel or an explanatory quantity."""
+        return UNITS[name]
 
 
 def _place(candidate: Candidate) -> str:

@@ -71,7 +71,7 @@ class Cause(ABC):
         """The signals as they would be without the cause, or None where it is not an error of the signals."""
         return None
 
-    def finer(self, shape: Shape) -> list[Shape]:
+    def finer(self, shape: Shape) -> Sequence[Shape]:
         """Shapes near a chosen one, for a second look."""
         return []
 
