@@ -26,8 +26,10 @@ gain                null where the closed loop was not simulated and there is no
     errors          {before, after} against the truth, only where it is known
 not_simulated       why there is no closed-loop comparison, or null
 undecidable         list of {what, why, remedy}
-residual            {chi2_per_n, signature} of what the causes (with tolerances) leave; chi2_per_n_tolerated with
-                    tolerances and no cause; nominal: {chi2_per_n, signature} of the simulation as it is
+residual            {chi2_per_n, signature} of what the causes (with tolerances) leave, and
+    chi2_per_n_tolerated           with tolerances and no cause
+    tolerances                     {chi2, freedom, log10_p}: how hard they are used
+    nominal                        {chi2_per_n, signature} of the simulation as it is
 notes               sentences
 """
 
@@ -42,7 +44,7 @@ import numpy as np
 from discrepancy.diagnose import Alternative, Diagnosis
 from discrepancy.gain import Gain, Response
 from discrepancy.rig import Candidate, Rig
-from discrepancy.search import Found
+from discrepancy.search import Explanation, Found
 from discrepancy.signature import signature
 from discrepancy.words import Words
 
@@ -93,6 +95,7 @@ def diagnosis_to_dict(
             "chi2_per_n": explanation.after / explanation.samples,
             "signature": plain(signature(rig, explanation)),
             "chi2_per_n_tolerated": explanation.before / explanation.samples,
+            "tolerances": dict(zip(("chi2", "freedom", "log10_p"), _strain(explanation), strict=True)),
             "nominal": {
                 "chi2_per_n": nominal.misfit / explanation.samples,
                 "signature": plain(signature(rig, replace(explanation, fit=nominal))),
@@ -100,6 +103,15 @@ def diagnosis_to_dict(
         },
         "notes": list(diagnosis.notes),
     }
+
+
+def _strain(explanation: Explanation) -> tuple[float, float, float]:
+    chi2, freedom, log10_p = explanation.fit.strain
+    return chi2, freedom, _log10_p(log10_p)
+
+
+def _log10_p(value: float) -> float:
+    return max(float(np.nan_to_num(value, nan=0.0)), LEAST_LOG10_P)
 
 
 def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: Words) -> dict[str, Any]:
@@ -112,7 +124,7 @@ def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: W
             name: {"value": float(value), "se": _finite(se.get(name))} for name, value in values.items()
         },
         "explained": {"in_sample": found.in_sample, "held_out": found.held_out},
-        "log10_p": max(float(np.nan_to_num(found.evidence.log10_p, nan=0.0)), LEAST_LOG10_P),
+        "log10_p": _log10_p(found.evidence.log10_p),
         "folds": [float(gain) for gain in found.folds],
         "shape": plain(dict(candidate.shape)),
         "separate": words.separate(candidate.cause),

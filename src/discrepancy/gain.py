@@ -96,7 +96,7 @@ def responses(
             tasks.append((t, -shared, -local, active))
     run = Parallel(n_jobs=jobs, return_as="generator")
     done = []
-    for errors, task in zip(run(delayed(rig.run_again)(*task) for task in tasks), tasks, strict=True):
+    for errors, task in zip(run(delayed(rig.simulation(*task))() for task in tasks), tasks, strict=True):
         done.append(None if errors is None else _response(errors, rig.response_scale(task[0])))
         if progress:
             progress(1)

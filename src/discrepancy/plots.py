@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 PLOTS = ("residual_*.png", "evidence.png", "closed_loop.png")
 BEFORE, AFTER, CLEAN_BAND = "#c8553d", "#2f6fd0", "#d9dde3"
-COMPONENTS = ("#2f6fd0", "#e07b39", "#2a9d8f")
+COMPONENTS = ("#7a5195", "#d99a2b", "#2a9d8f")
 RUNNING_S = 1.0
 
 

@@ -10,6 +10,8 @@ from discrepancy.report_gain import gain_lines
 from discrepancy.search import CLEAN
 
 WIDTH = 100
+STRAINED = -6.0
+"""log10 of the probability below which tolerances are no explanation."""
 Values = Mapping[str, Any]
 
 
@@ -76,14 +78,15 @@ def _cause(cause: Values) -> Iterable[str]:
         advice = dict.fromkeys(text for rival in [cause, *alike] if (text := rival["separate"]))
         yield from _wrapped("To tell them apart: " + " ".join(advice)) if advice else ()
     if ruled_out:
-        yield from _wrapped("Rivals that are ruled out: " + ", ".join(_rival(r) for r in ruled_out[:4]) + ".")
+        yield from _wrapped("Fits worse: " + ", ".join(_rival(r) for r in ruled_out[:4]) + ".")
     if not cause["alternatives"]:
         yield from _wrapped("No other cause comes near.")
 
 
 def _rival(rival: Values) -> str:
     loop = "" if rival["chi2_per_n"] is None else f", closed loop chi2/n {rival['chi2_per_n']:.3g}"
-    return f"{_label(rival)} ({rival['evidence_gap']:.0f} nats worse{loop})"
+    gap = rival["evidence_gap"]
+    return f"{_label(rival)} ({abs(gap):.0f} nats {'worse' if gap >= 0 else 'better in the rows'}{loop})"
 
 
 def _residual(values: Values) -> Iterable[str]:
@@ -95,6 +98,12 @@ def _residual(values: Values) -> Iterable[str]:
     if values["causes"]:
         text += f", {residual['chi2_per_n']:.3g} with what is named"
     yield f"{text} (clean recordings: 1.05 to 1.15)."
+    tolerances = residual["tolerances"]
+    if values["verdict"] != "consistent" and tolerances["log10_p"] < STRAINED:
+        yield (
+            f"The tolerances are used harder than chance allows: chi2 {tolerances['chi2']:.0f} of "
+            f"{tolerances['freedom']:.0f} (probability {_power(tolerances['log10_p'])})."
+        )
     if values["verdict"] != "consistent":
         yield f"As simulated: {residual['nominal']['signature']['sentence']}"
     if residual["chi2_per_n"] > CLEAN:

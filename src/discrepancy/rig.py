@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
@@ -156,10 +156,13 @@ class Rig(Protocol):
         """Why the recordings cannot be simulated again, or None."""
         ...
 
-    def run_again(
+    def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
-    ) -> dict[str, Array] | None:
-        """Recorded minus simulated response of one trial to its own commands, by channel; None if impossible."""
+    ) -> Callable[[], dict[str, Array] | None]:
+        """What runs one trial's commands again, in any process.
+
+        It returns recorded minus simulated response by channel, or None where that cannot be simulated.
+        """
         ...
 
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:

@@ -80,7 +80,8 @@ def _cholesky(draws: Array) -> Array:
     covariance = rows.T @ rows / len(rows)
     weight = SHRINKAGE + (1.0 - SHRINKAGE) * min(1.0, channels / len(rows))
     diagonal = np.diag(np.diag(covariance) + 1e-30)
-    return np.linalg.cholesky((1.0 - weight) * covariance + weight * diagonal)
+    factor = np.linalg.cholesky((1.0 - weight) * covariance + weight * diagonal)
+    return np.array(factor, dtype=np.float64)
 
 
 def _per_row(chol: Array, x: Array) -> Array:

@@ -26,7 +26,8 @@ class Reduction:
     """A linear map from the samples of a trial to its rows, the same for residuals and all their columns.
 
     In motion the residual is filtered at 5 Hz and taken at 12.5 Hz, which leaves it nearly white. While
-    everything rests, an encoder repeats one rounding error for seconds, so a hold counts as one row: its mean.
+    everything rests, an encoder repeats one rounding error for seconds, so a hold counts as one row: its mean; rests
+    too short for that are left out.
 
     Attributes:
         operator: rows from samples, shape (n, Q); moving rows first.
@@ -53,11 +54,8 @@ class Reduction:
         kernel = _kernel(rate)
         half = len(kernel) // 2
         step = max(1, round(rate / DECIMATED_HZ))
-        holds = _holds(signals)
+        holds, in_hold = _holds(signals)
         rows, columns, values, sample = [], [], [], []
-        in_hold = np.zeros(len(signals.time), dtype=bool)
-        for start, stop in holds:
-            in_hold[start:stop] = True
         first, last = max(keep.start, half), min(keep.stop, len(signals.time) - half)
         for centre in range(first, last, step):
             if not in_hold[centre]:
@@ -87,8 +85,8 @@ def _kernel(rate_hz: float) -> Array:
     return response / response.sum()
 
 
-def _holds(signals: Signals) -> list[tuple[int, int]]:
-    """Spans of samples during which no joint of any robot moves."""
+def _holds(signals: Signals) -> tuple[list[tuple[int, int]], NDArray[np.bool_]]:
+    """Spans of samples during which no joint of any robot moves, and all samples at rest, shape (Q,)."""
     rate = signals.rate_hz
     # Rounding moves a resting joint too; below 2 Hz that is a twentieth of the threshold.
     angles = np.concatenate([signals.phi, signals.theta], axis=1).reshape(len(signals.time), -1)
@@ -99,4 +97,4 @@ def _holds(signals: Signals) -> list[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
     settle, shortest = round(SETTLING_S * rate), round(SHORTEST_HOLD_S * rate)
     spans = [(start + settle, stop - settle) for start, stop in edges.reshape(-1, 2)]
-    return [(start, stop) for start, stop in spans if stop - start >= shortest]
+    return [(start, stop) for start, stop in spans if stop - start >= shortest], still

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,8 @@ from discrepancy.team.reduction import Reduction
 from discrepancy.team.resimulate import errors_of_rerun, team_of
 from discrepancy.team.signals import Signals
 from discrepancy.team.start import exact_residual, gauss_newton, linearised, start_shared
+from discrepancy.team.tolerances import DEFAULTS
+from discrepancy.team.undecidable import statements
 from discrepancy.whitening import Whitening
 from estimator.errors import InputError
 from estimator.payload_estimate import PayloadEstimate
@@ -33,28 +36,6 @@ from mocobot_sim.models import omnid_design
 
 Array = NDArray[np.float64]
 
-UNDECIDABLE = (
-    (
-        "zero of the last gimbal axis (theta_zero, joint 3)",
-        "it turns the grasp frame by a constant, and the grasp frame is itself unknown",
-        "a grasp whose orientation is known",
-    ),
-    (
-        "mass of the gimbal and the platform",
-        "a point mass at the wrist is a part of the payload",
-        "a run of the arm alone",
-    ),
-    (
-        "a scale common to all torques (sea_scale everywhere)",
-        "it scales the payload's mass and inertia and nothing else",
-        "a known weight on the payload",
-    ),
-    (
-        "which robot's gimbal rubs (gimbal_friction)",
-        "a pure moment about parallel axes is the same wherever it acts; only the axis shows",
-        "one robot released at a time",
-    ),
-)
 # What the integrator does to the closed loop at 1 ms (docs/diagnosis.md).
 PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4
 
@@ -174,7 +155,9 @@ class TeamRig:
 
     def _split(self, cause: Any, robot: int | None, joint: int | None) -> list[Candidate]:
         given = self.tolerances.get(cause.name, {})
-        scales = cause.scales or tuple(given[name] or 1.0 for name in cause.parameters)
+        scales = cause.scales or tuple(
+            given.get(name) or DEFAULTS[cause.name][name] for name in cause.parameters
+        )
         parameters = tuple(
             Parameter(name, given.get(name, 0.0), scale)
             for name, scale in zip(cause.parameters, scales, strict=True)
@@ -229,24 +212,20 @@ class TeamRig:
                 return f"{recording.name} is of another design than the simulated Omnid"
         return None
 
-    def run_again(
+    def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
-    ) -> dict[str, Array] | None:
-        """Recorded minus simulated response of one trial to its own commands, by channel.
+    ) -> Callable[[], dict[str, Array] | None]:
+        """What runs one trial's commands again, with the unknowns moved and causes in the simulation.
 
-        Args:
-            trial: index of the trial.
-            shared, local: displacements of the unknowns.
-            active: causes in the simulation, with values.
-
-        Returns:
-            ``phi``, ``theta`` [rad] and ``tau`` [N m], shape (Q, N, 3), or None if it cannot be simulated.
+        It returns recorded minus simulated ``phi``, ``theta`` [rad] and ``tau`` [N m], shape (Q, N, 3), or None if
+        that cannot be simulated. It carries the recording and numbers only, so that processes can take it.
         """
         linear = self.linear[trial]
         effects = [self.effect(candidate, values) for candidate, values in active]
         if any(effect is None for effect in effects):
-            return None
-        return errors_of_rerun(
+            return _impossible
+        return partial(
+            errors_of_rerun,
             self.recordings[trial],
             linear.shared.moved(shared),
             linear.bases.moved(local),
@@ -393,15 +372,11 @@ class TeamRig:
 
     def undecidable(self) -> list[dict[str, Any]]:
         """What recordings of a parked team with a rigid payload cannot decide."""
-        said: list[dict[str, Any]] = [
-            {"what": what, "why": why, "remedy": remedy} for what, why, remedy in UNDECIDABLE
-        ]
-        if self.robots == 1:
-            what = "every error of angles, lengths, bases and grasps of a single robot"
-            said.append(
-                {"what": what, "why": "no other robot tells where the payload is", "remedy": "a second robot"}
-            )
-        return said
+        return statements(self.robots)
+
+
+def _impossible() -> None:
+    return None
 
 
 def _unit(x: Array) -> Array:

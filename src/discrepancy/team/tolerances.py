@@ -57,4 +57,10 @@ def read_tolerances(path: Path | None) -> dict[str, dict[str, float]]:
             if not number or not 0 <= value < 1e6:
                 raise InputError(f"{path}: {cause}.{name} is {value!r}; it must be a number of at least 0")
             tolerances[cause][name] = float(value)
+        zeros = [name for name, value in tolerances[cause].items() if value == 0]
+        if zeros and len(zeros) < len(tolerances[cause]):
+            raise InputError(
+                f"{path}: {cause}.{zeros[0]} is 0; either all parameters of a cause have a tolerance or none "
+                f"({', '.join(tolerances[cause])})"
+            )
     return tolerances

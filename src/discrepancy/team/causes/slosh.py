@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import StateSpace, lsim
 
-from discrepancy.team.causes.base import Array, Cause, Shape, stack
+from discrepancy.team.causes.base import Array, Cause, stack
 from estimator.fusion import fuse
 
 
@@ -26,7 +26,7 @@ class Slosh(Cause):
     )
     separate = "Motion near the pendulum's own frequency."
 
-    def columns(self, trial, robot, joint, shape):  # noqa: D102
+    def columns(self, trial, robot, joint, shape):
         motion = fuse(trial.data, trial.shared.grasps)
         com = trial.shared.pi[1:4] / trial.shared.pi[0]
         omega, alpha = motion.omega, motion.alpha

@@ -1,0 +1,39 @@
+"""What recordings of a parked team that holds one rigid payload cannot decide, whatever the data."""
+
+from __future__ import annotations
+
+from typing import Any
+
+UNDECIDABLE = (
+    (
+        "zero of the last gimbal axis (theta_zero, joint 3)",
+        "it turns the grasp frame by a constant, and the grasp frame is itself unknown",
+        "a grasp whose orientation is known",
+    ),
+    (
+        "mass of the gimbal and the platform",
+        "a point mass at the wrist is a part of the payload",
+        "a run of the arm alone",
+    ),
+    (
+        "a scale common to all torques (sea_scale everywhere)",
+        "it scales the payload's mass and inertia and nothing else",
+        "a known weight on the payload",
+    ),
+    (
+        "which robot's gimbal rubs (gimbal_friction)",
+        "a pure moment about parallel axes is the same wherever it acts; only the axis shows",
+        "one robot released at a time",
+    ),
+)
+
+
+def statements(robots: int) -> list[dict[str, Any]]:
+    """What, why, and what would decide it, for a team of N robots."""
+    said = [{"what": what, "why": why, "remedy": remedy} for what, why, remedy in UNDECIDABLE]
+    if robots == 1:
+        what = "every error of angles, lengths, bases and grasps of a single robot"
+        said.append(
+            {"what": what, "why": "no other robot tells where the payload is", "remedy": "a second robot"}
+        )
+    return said
