@@ -45,6 +45,7 @@ def against_figure(traces: Sequence[Trace], grouped: Sequence[Group], words: Wor
         axis.set_xlabel(f"{name} [{words.unit(name)}]")
     axes[-1][-1].set_xlabel("frequency [Hz]")
     handles, labels = axes[0][0].get_legend_handles_labels()
+    labels[-1] = "with causes and tolerances" if named else "with tolerances"
     figure.legend(handles, labels, loc="outside upper right", ncols=2, frameon=False, fontsize=9)
     title = "Residual (whitened rms) in multiples of clean data" + ("" if named else "; nothing is named")
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)

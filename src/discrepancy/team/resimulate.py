@@ -14,7 +14,9 @@ from estimator.errors import InputError
 from estimator.principal import inertia_matrix
 from estimator.recording import Recording
 from mocobot_sim.effects.base import Effect
+from mocobot_sim.effects.base_tilt import BaseTilt
 from mocobot_sim.effects.catalogue import apply_effects
+from mocobot_sim.models import base_height_m
 from mocobot_sim.payload_mjcf import payload_mjcf
 from mocobot_sim.rerun import predicted, rerun
 from mocobot_sim.scene import TeamScene, build_team
@@ -43,9 +45,23 @@ def team_of(
     about_c = inertia_matrix(shared.pi[4:]) - mass * (p_1c @ p_1c * np.eye(3) - np.outer(p_1c, p_1c))
     X_1i = RigidTransform.from_components(grasps.p_1i, Rotation.from_matrix(grasps.R_1i))
     payload = payload_mjcf(mass, p_1c, physical_inertia(about_c), X_1i)
-    mounts = RigidTransform.from_components(bases.p, Rotation.from_matrix(bases.R))
+    mounts = RigidTransform.from_components(_mounts(bases, effects), Rotation.from_matrix(bases.R))
     scene = build_team(payload, mounts=mounts, initial=initial, timestep_s=TIMESTEP_S)
     return apply_effects(scene, effects)
+
+
+def _mounts(bases: Bases, effects: Sequence[Effect]) -> Array:
+    """Where the robots stand on the floor, shape (N, 3), so that tilts leave the origins of {b} where they are.
+
+    The bases are known in {b1}, whose axes tilt with robot 1; the simulated tilt turns a base about its mount.
+    """
+    tilt = np.zeros((len(bases.p), 3))
+    for effect in effects:
+        if isinstance(effect, BaseTilt):
+            tilt[effect.robot - 1, :2] += effect.roll_rad, effect.pitch_rad
+    height = np.array([0.0, 0.0, base_height_m()])
+    swing = Rotation.from_rotvec(tilt).apply(np.tile(height, (len(tilt), 1))) - height
+    return Rotation.from_rotvec(tilt[0]).apply(bases.p) - np.einsum("nij,nj->ni", bases.R, swing)
 
 
 def physical_inertia(inertia: Array) -> Array:
