@@ -26,6 +26,8 @@ ENOUGH = 0.8
 """Share of the misfit that causes must explain on held-out trials, or the verdict is not ``explained``."""
 RIVAL_SHARE = 0.5
 """A rival explains at least this share of what the best does."""
+SHORT_ROWS = 24
+"""A transient of fewer rows (2 s) cannot be split and tested on its own; its evidence has to do."""
 MOST_REJECTED = 4
 LEADERS = 8
 FOLDS = 0.75
@@ -274,6 +276,8 @@ def _interleaved(
     """The same within the trial of a transient: fitted to all but every fourth block of it."""
     rows = problem.rows[trial]
     inside = np.flatnonzero(np.abs(rows[..., problem.spans[index]]).sum(axis=(1, 2)) > 1e-6)
+    if len(inside) < SHORT_ROWS:
+        return []
     width = max(1, len(inside) // (2 * blocks))
     gains = []
     for b in range(blocks):

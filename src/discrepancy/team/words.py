@@ -107,7 +107,8 @@ SENTENCES: dict[str, Callable[[_Numbers], str]] = {
     ),
     "push": lambda n: (
         f"something pushed the payload in trial {n.values['trial']:.0f} from {n.values['start_s']:.2f} s on for "
-        f"{n.values['duration_s']:.2f} s, with {n.vector('force', 'N', 'N')} along a line through {n.vector('point', 'm', 'm')} in {{1}}"
+        f"{n.values['duration_s']:.2f} s, with {n.vector('force', 'N', 'N')} along a line "
+        f"through {n.vector('point', 'm', 'm')} in {{1}}"
     ),
     "drag": lambda n: (
         f"the payload's motion is resisted by {n('coefficient_Ns_per_m', 'N s/m', signed=True)}"
