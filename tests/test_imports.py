@@ -54,3 +54,41 @@ def test_estimator_runs_without_mujoco() -> None:
         "assert not {'mujoco', 'dm_control', 'numba', 'mocobot_sim'} & set(sys.modules)\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def imported_modules(path: Path) -> set[str]:
+    """Full names of the modules, and of what is taken from them."""
+    modules = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            modules |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            modules |= {node.module or ""} | {f"{node.module}.{alias.name}" for alias in node.names}
+    return modules
+
+
+def test_engine_of_the_diagnosis_knows_no_rig() -> None:
+    """What looks for causes works for any rig: it sees neither the team of Omnids nor the simulator."""
+    files = sorted((SRC / "discrepancy").glob("*.py"))
+    assert len(files) > 8
+    for path in files:
+        names = imported_modules(path)
+        roots = {name.split(".")[0] for name in names}
+        assert not roots & {"mocobot_sim", "mujoco", "dm_control"}, path
+        assert not any(f"{name}.".startswith("discrepancy.team.") for name in names), path
+
+
+def test_causes_need_no_simulator() -> None:
+    """Traces of causes come from mechanics, not from the simulator that the diagnosis is tried on."""
+    files = sorted((SRC / "discrepancy" / "team" / "causes").glob("*.py"))
+    assert len(files) > 20
+    for path in files:
+        assert not imported_roots(path) & {"mocobot_sim", "mujoco", "dm_control"}, path
+
+
+def test_engine_of_the_diagnosis_runs_without_the_simulator() -> None:
+    code = (
+        "import sys, discrepancy.diagnose\n"
+        "assert not {'mujoco', 'mocobot_sim', 'discrepancy.team'} & set(sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)

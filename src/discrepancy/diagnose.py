@@ -94,6 +94,12 @@ def diagnose(
     elif why_not is None:
         before = responses(rig, explanation.problem, [[]], jobs, simulated)[0]
         gain = Gain(before, before, len(rig.trials) > 1)
+    verdict = _verdict(explanation)
+    if verdict == "unexplained" and explanation.found:
+        explanation, note = _without_suspects(rig, explanation)
+        notes.append(note)
+        alternatives = []
+        gain = None if gain is None else Gain(gain.before, gain.before, gain.held_out)
     if explanation.found and why_not is not None:
         notes.append(
             f"The named causes were not tried in closed loop ({why_not}), so look-alikes that only the response to "
@@ -101,7 +107,7 @@ def diagnose(
         )
     if len(rig.trials) == 1:
         notes.append("One trial only: nothing could be validated on data that was not used for the fit.")
-    return Diagnosis(_verdict(explanation), explanation, tuple(alternatives), gain, why_not, tuple(notes))
+    return Diagnosis(verdict, explanation, tuple(alternatives), gain, why_not, tuple(notes))
 
 
 def _unsimulated(found: Found) -> tuple[Alternative, ...]:
@@ -130,7 +136,9 @@ def _without_suspects(rig: Rig, explanation: Explanation) -> tuple[Explanation, 
     if _add_up(explanation):
         note = f"{labels}: only all together fit, as if they imitated something else, so none is named."
     else:
-        note = f"{labels}: explains only {100 * explanation.explained:.0f} % of the misfit, so it is not named."
+        note = (
+            f"{labels}: explains only {100 * explanation.explained:.0f} % of the misfit, so it is not named."
+        )
     rejected = (*explanation.rejected, *(found.candidate for found in explanation.found))
     return replace(refitted(rig, explanation, []), rejected=rejected), note
 

@@ -71,8 +71,8 @@ def _bars(axis: Axes, strongest: list[Evidence], labels: list[str], colours: lis
     axis.set_ylim(-0.7, max(len(gains), 1) - 0.3)
     axis.set_xscale("log")
     axis.set_xlim(1.0, 3.0 * max([DOUBTFUL_GAIN, *gains]))
-    for y, gain in zip(at, gains, strict=True):
-        axis.text(1.05 * gain, y, f"{gain:.3g}", va="center", fontsize=8)
+    for y, gain, evidence in zip(at, gains, strongest, strict=True):
+        axis.text(1.05 * gain, y, f"{evidence.gain:.3g}", va="center", fontsize=8)
     axis.axvline(DOUBTFUL_GAIN, color="black", linewidth=0.8, linestyle="--")
     axis.set_xlabel("gain of chi-square (dashed: what chance can do)")
     axis.grid(axis="x", alpha=0.25)

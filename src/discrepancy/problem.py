@@ -275,7 +275,7 @@ class Fit:
         """Values of a trial's own unknowns that go with the solution, shape (l,)."""
         columns = self.problem.local[trial]
         left = self.problem.raw[trial] @ np.append(-self.coefficients, 1.0)
-        flat = columns.reshape(-1, columns.shape[2])
+        flat = columns.reshape(left.size, columns.shape[2])
         return np.asarray(np.linalg.lstsq(flat, left.ravel(), rcond=None)[0], dtype=np.float64)
 
     def remaining(self, trial: int) -> Array:
@@ -326,12 +326,14 @@ class Fit:
             keep = lam > LEAST_INFORMATION
             weight = lam[keep] / (1.0 + lam[keep]) if tolerant else lam[keep]
             power = np.einsum("ik,k,ik->i", V[:, keep], weight, V[:, keep])
-            out.append(candidate.units * np.sqrt(gain / np.maximum(power, 1e-300)))
+            size = np.sqrt(gain / np.maximum(power, 1e-300))
+            out.append(np.where(power > 0, candidate.units * size, np.inf))
         return out
 
     def _information(self, span: slice) -> tuple[Array, Array, bool]:
         """Information about a candidate given all else in the model, its score vector, and whether it has a prior."""
-        if self.problem.tolerant[span.start - self.problem.shared]:
+        start = self.problem.shared
+        if self.problem.tolerant[span.start - start : span.stop - start].all():
             at = np.searchsorted(self.used, np.arange(span.start, span.stop))
             inverse = np.linalg.inv(self.covariance[np.ix_(at, at)])
             return inverse - np.eye(len(at)), inverse @ self.solution[at], True

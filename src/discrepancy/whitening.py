@@ -39,9 +39,12 @@ class Whitening:
         chol_alone = _cholesky(draws[:, moving:])
         ar, innovation = np.zeros((channels, AR_ORDER)), np.ones(channels)
         if moving > 10 * AR_ORDER:
-            white = _per_row(chol_moving, draws[:, :moving])
+            flat = _per_row(chol_moving, draws[:, :moving].reshape(-1, channels))
+            white = flat.reshape(len(draws), moving, channels)
             lag = [np.mean(white[:, k:] * white[:, : moving - k], axis=(0, 1)) for k in range(AR_ORDER + 1)]
             for c in range(channels):
+                if lag[0][c] < 1e-12:  # a channel without noise
+                    continue
                 toeplitz = np.array([[lag[abs(i - j)][c] for j in range(AR_ORDER)] for i in range(AR_ORDER)])
                 right = np.array([lag[i + 1][c] for i in range(AR_ORDER)])
                 ar[c] = np.linalg.solve(toeplitz, right)

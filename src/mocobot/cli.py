@@ -64,7 +64,7 @@ class Estimate:
 
         if not self.rec:
             raise InputError("no recording given; name at least one file")
-        _check_files(self.rec, self.out)
+        check_recordings(self.rec, self.out)
         with bar(len(self.rec), "reading", "file") as advance:
             recordings = []
             for path in self.rec:
@@ -74,6 +74,30 @@ class Estimate:
         if self.out:
             write_json(self.out, estimate.to_dict())
         print(format_estimate(estimate))
+
+
+@dataclass(frozen=True)
+class Diagnose:
+    """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth."""
+
+    rec: tyro.conf.Positional[tuple[Path, ...]]
+    """Recordings (Parquet), all of one payload; several, so that what is named can be validated."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for diagnosis.json, report.txt, the extended model and plots; an earlier diagnosis is replaced."""
+    jobs: int = 2
+    """Parallel processes."""
+    tolerances: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """How far a healthy robot may be off; see docs/diagnosis.md."""
+    exclude: Annotated[tuple[str, ...], tyro.conf.arg(metavar="CAUSE...")] = ()
+    """Causes not to consider."""
+    closed_loop: bool = True
+    """Run the recorded commands again, without and with what is found."""
+
+    def run(self) -> None:
+        """Run the command."""
+        from mocobot.diagnose_command import run
+
+        run(self)
 
 
 @dataclass(frozen=True)
@@ -132,7 +156,7 @@ class Simulate:
         print(f"{self.out}: {done.log.time[-1]:.1f} s of {self.trajectory} motion, {self.preset} sensors")
 
 
-def _check_files(recordings: Sequence[Path], out: Path | None) -> None:
+def check_recordings(recordings: Sequence[Path], out: Path | None = None) -> None:
     """Each recording once, and an output that overwrites none of them."""
     seen: set[str] = set()
     for path in recordings:
@@ -171,9 +195,11 @@ def _run(arguments: Sequence[str] | None) -> None:
     parsed = tyro.cli(
         Annotated[Paper, tyro.conf.subcommand("paper")]
         | Annotated[Estimate, tyro.conf.subcommand("estimate")]
+        | Annotated[Diagnose, tyro.conf.subcommand("diagnose")]
         | Annotated[Simulate, tyro.conf.subcommand("simulate")],
         prog="mocobot",
-        description="Simulate mobile cobots that carry an unknown payload together, and estimate it.",
+        description="Simulate mobile cobots that carry an unknown payload together, estimate it, and find out what "
+        "the simulation gets wrong.",
         args=arguments,
         config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes),
     )

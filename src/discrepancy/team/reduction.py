@@ -45,7 +45,8 @@ class Reduction:
 
     def __call__(self, x: Array) -> Array:
         """Reduce samples, shape (Q, ...) -> (n, ...)."""
-        return (self.operator @ x.reshape(len(x), -1)).reshape(-1, *x.shape[1:])
+        rows = self.operator @ x.reshape(len(x), int(np.prod(x.shape[1:])))
+        return rows.reshape(len(self.time), *x.shape[1:])
 
     @classmethod
     def of(cls, signals: Signals) -> Reduction:

@@ -1,0 +1,184 @@
+"""``mocobot diagnose``: read recordings, find out what the simulation gets wrong, report and write it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from contextlib import nullcontext
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from discrepancy.diagnose import Diagnosis, diagnose
+from discrepancy.diagnosis_json import FORMAT, diagnosis_to_dict
+from discrepancy.plots import PLOTS, save_plots
+from discrepancy.report import format_diagnosis
+from discrepancy.team.causes import CAUSES
+from discrepancy.team.estimates import errors, estimates
+from discrepancy.team.rig import TeamRig
+from discrepancy.team.team_traces import traces
+from discrepancy.team.tolerances import read_tolerances
+from discrepancy.team.words import TeamWords
+from estimator.errors import InputError
+from estimator.estimate import estimate_payload
+from estimator.payload_estimate import PayloadEstimate
+from estimator.recording import Recording, read_recording
+from estimator.statics import CONTRADICTION
+from mocobot.files import write_json, write_text
+from mocobot.folders import check_folder, whole_folder
+from mocobot.progress import bar, stages
+from mocobot_sim.truth import truth_path
+
+if TYPE_CHECKING:
+    from mocobot.cli import Diagnose
+
+JSON, REPORT, EXTENDED = "diagnosis.json", "report.txt", "extended"
+MASS_TOLERANCE = 0.05
+"""Trials whose masses differ by more than this share are not of one payload."""
+
+
+def run(options: Diagnose) -> None:
+    """Run the command.
+
+    Raises:
+        InputError: recordings, tolerances or options that cannot be used, or an output that cannot be written.
+    """
+    _check(options)
+    tolerances = read_tolerances(options.tolerances)
+    with whole_folder(options.out) if options.out else nullcontext() as folder:
+        with bar(len(options.rec), "reading", "file") as advance:
+            recordings = []
+            for path in options.rec:
+                recordings.append(read_recording(path))
+                advance(1)
+        _check_recordings(recordings)
+        with stages() as (say, advance):
+            say("estimate")
+            estimate = estimate_payload(recordings)
+            _check_masses(recordings)
+            _check_estimate(estimate)
+            say("linearise")
+            rig = TeamRig.of(recordings, estimate, tolerances, options.exclude, options.jobs)
+            diagnosis = diagnose(
+                rig, closed_loop=options.closed_loop, jobs=options.jobs, say=say, simulated=advance
+            )
+            values = _values(diagnosis, rig, options.rec)
+            if folder is not None:
+                say("write")
+                _write(folder, values, diagnosis, rig)
+        print(format_diagnosis(values))
+    if options.out:
+        print(f"\nWritten to {options.out}.")
+
+
+def _check(options: Diagnose) -> None:
+    """Everything that can be refused before a recording is read."""
+    from mocobot.cli import check_recordings
+
+    if not options.rec:
+        hint = "; name them before --exclude" if options.exclude else "; name at least one file"
+        raise InputError(f"no recording given{hint}")
+    if options.jobs < 1:
+        raise InputError(f"jobs is {options.jobs}; it must be at least 1")
+    check_recordings(options.rec)
+    for name in options.exclude:
+        if name not in CAUSES:
+            raise InputError(f"cause {name!r} does not exist; the causes are {', '.join(CAUSES)}")
+    if set(CAUSES) <= set(options.exclude):
+        raise InputError("every cause is excluded; nothing is left to look for")
+    if options.out:
+        inputs = [*options.rec, *([options.tolerances] if options.tolerances else [])]
+        check_folder(options.out, inputs, _is_diagnosis, "an earlier diagnosis")
+
+
+def _is_diagnosis(folder: Path) -> bool:
+    """Whether a folder holds a diagnosis and nothing that someone else put there."""
+    try:
+        ours = json.loads((folder / JSON).read_text(encoding="utf-8"))["format"] == FORMAT
+    except (OSError, ValueError, TypeError, KeyError):
+        return False
+    known = [JSON, REPORT, EXTENDED, *PLOTS]
+    return ours and all(any(path.match(pattern) for pattern in known) for path in folder.iterdir())
+
+
+def _check_recordings(recordings: Sequence[Recording]) -> None:
+    first = recordings[0]
+    if first.metadata.robots < 2:
+        raise InputError(
+            f"{first.name} has one robot; without a second one nothing tells where the payload really is, so there is "
+            "nothing to diagnose"
+        )
+    for other in recordings[1:]:
+        if other.metadata.robots != first.metadata.robots:
+            raise InputError(
+                f"{other.name} has {other.metadata.robots} robots and {first.name} has {first.metadata.robots}; "
+                "recordings of one payload must have the same robots"
+            )
+        if other.metadata.design != first.metadata.design:
+            raise InputError(
+                f"{other.name} and {first.name} are of robots of different design; diagnose one at a time"
+            )
+
+
+def _check_estimate(estimate: PayloadEstimate) -> None:
+    """Without a payload there is no model; say why, where wrenches that contradict each other are the reason."""
+    if estimate.p_1c is None and any(CONTRADICTION in flag for flag in estimate.flags):
+        names = ", ".join(recording.name for recording in estimate.recordings)
+        raise InputError(
+            f"{names}: the robots' wrenches do not add up to one payload, so there is nothing to hold the data "
+            "against; is a robot missing, or a torque's sign or column wrong?"
+        )
+
+
+def _check_masses(recordings: Sequence[Recording]) -> None:
+    """Recordings without a label may still be of different payloads in the same grasps."""
+    masses = []
+    for recording in recordings if len(recordings) > 1 else ():
+        try:
+            alone = estimate_payload([recording])
+        except InputError:  # too little motion to tell on its own
+            continue
+        if alone.mass is not None:
+            masses.append((alone.mass.mass, alone.mass.se, recording.name))
+    if not masses:
+        return
+    (low, low_se, light), (high, high_se, heavy) = min(masses), max(masses)
+    if high - low > max(MASS_TOLERANCE * high, 6.0 * (low_se + high_se)):
+        raise InputError(
+            f"{light} says {low:.2f} kg and {heavy} says {high:.2f} kg; recordings must be of one payload"
+        )
+
+
+def _values(diagnosis: Diagnosis, rig: TeamRig, paths: Sequence[Path]) -> dict[str, Any]:
+    found: dict[str, Any] = dict(estimates(rig, diagnosis.explanation))
+    truth = _truth(paths)
+    if truth is not None:
+        try:
+            found["errors"] = {name: errors(found[name], truth) for name in ("before", "after")}
+        except (KeyError, TypeError, ValueError, IndexError):  # a sidecar of something else
+            found.pop("errors", None)
+    return diagnosis_to_dict(diagnosis, rig, TeamWords(), found)
+
+
+def _truth(paths: Sequence[Path]) -> dict[str, Any] | None:
+    """The truth beside the recordings, opened after the verdict, if all have the same."""
+    keys = ("grasps", "mass_kg", "p_1c_m", "principal_inertia_kgm2")
+    found = []
+    for path in paths:
+        try:
+            values = json.loads(truth_path(path).read_text(encoding="utf-8"))
+            found.append({key: values[key] for key in keys})
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+    return found[0] if all(values == found[0] for values in found) else None
+
+
+def _write(folder: Path, values: dict[str, Any], diagnosis: Diagnosis, rig: TeamRig) -> None:
+    if diagnosis.causes:
+        try:
+            rig.write_extended(diagnosis.explanation, folder / EXTENDED)
+        except InputError as error:  # values that no effect can have, such as a negative friction
+            values["notes"].append(f"There is no extended model: {error}.")
+    shown = traces(rig, diagnosis.explanation)
+    save_plots(values, diagnosis.explanation, shown, rig.channels, TeamWords(), folder)
+    write_json(folder / JSON, values)
+    write_text(folder / REPORT, format_diagnosis(values) + "\n")
