@@ -1,11 +1,25 @@
 """Trials that several tests look at, each run once."""
 
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+# Matrices are small here: threads only wait for each other. Before numpy is loaded.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
+from diagnose_run import BIAS_NM, Edit
+from estimator.recording import write_recording
+from mocobot_sim.effects import apply_effects, make_effect
 from mocobot_sim.scene import TeamScene, build_team
-from mocobot_sim.trajectories import random_vias
+from mocobot_sim.sensors import PRESETS, measure
+from mocobot_sim.trajectories import random_vias, sphere_motion
 from mocobot_sim.trial import TrialLog, run_trial
+from mocobot_sim.truth import GroundTruth, write_truth
 from payload_mjcf import TEAMS
 
 
@@ -25,3 +39,34 @@ def team_a() -> TeamScene:
 def random_a(team_a) -> TrialLog:
     """Ten random vias with payload (a)."""
     return run_trial(team_a, random_vias(team_a.wrist_home_b, np.random.default_rng(3), vias=10))
+
+
+@pytest.fixture(scope="session")
+def biased_trials(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
+    """A random and a periodic trial of payload (b); the torque of robot 2, joint 1 reads too much."""
+    folder, rng = tmp_path_factory.mktemp("hidden"), np.random.default_rng(5)
+    plain = build_team("b")
+    motions = [
+        random_vias(plain.wrist_home_b, rng, vias=14),
+        sphere_motion(plain.wrist_home_b, plain.X_1i, duration_s=18.0, rng=rng),
+    ]
+    paths = []
+    for k, motion in enumerate(motions):
+        scene = apply_effects(build_team("b"), [make_effect("sea_bias", {"bias_Nm": BIAS_NM}, 2, 1)])
+        log, path = run_trial(scene, motion, trial_number=k + 1), folder / f"trial{k + 1}.parquet"
+        write_recording(measure(log, PRESETS["nominal"], rng, payload="b", name=path.stem), path)
+        write_truth(GroundTruth.of(scene), path)
+        paths.append(path)
+    return paths
+
+
+@pytest.fixture(scope="session")
+def edited(biased_trials: list[Path], tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, Edit], str]:
+    """Write a changed copy of the first trial."""
+    folder = tmp_path_factory.mktemp("edited")
+
+    def write(name: str, edit: Edit) -> str:
+        pq.write_table(edit(pq.read_table(biased_trials[0])), folder / name)
+        return str(folder / name)
+
+    return write

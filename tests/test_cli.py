@@ -262,7 +262,7 @@ def test_paper_refuses(capsys: pytest.CaptureFixture[str], arguments: list[str],
 
 
 def test_help_of_the_installed_command() -> None:
-    for arguments in ([], ["paper"], ["estimate"], ["simulate"]):
+    for arguments in ([], ["paper"], ["estimate"], ["diagnose"], ["simulate"]):
         command = [sys.executable, "-m", "mocobot", *arguments, "--help"]
         done = subprocess.run(command, capture_output=True, text=True, check=True)
         assert "usage: mocobot" in done.stdout

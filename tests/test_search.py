@@ -218,8 +218,21 @@ def test_three_causes_at_one_robot_only_add_up():
     assert explanation.clean
     assert _verdict(explanation) == "unexplained"
     assert _verdict(replace(explanation, found=explanation.found[:2])) == "explained"
-    at_two = replace(explanation.found[0], candidate=replace(explanation.found[0].candidate, robot=2))
-    assert _verdict(replace(explanation, found=(at_two, *explanation.found[1:]))) == "explained"
+
+
+def test_three_causes_at_several_robots_are_believed_if_they_are_of_three_families():
+    explanation = search(FakeRig({k: 30.0 for k in (1, 2, 3)}))
+    first, *others = explanation.found
+
+    def verdict(*families):
+        moved = [
+            replace(found, candidate=replace(found.candidate, robot=robot, family=family))
+            for robot, (found, family) in enumerate(zip((first, *others), families, strict=True), start=1)
+        ]
+        return _verdict(replace(explanation, found=tuple(moved)))
+
+    assert verdict("a", "b", "c") == "explained"
+    assert verdict("a", "b", "a") == "unexplained"
 
 
 def test_strained_tolerances_are_not_clean():

@@ -22,7 +22,8 @@ def test_wheel_simulates_on_its_own(tmp_path: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(site)
     code = (
-        "import mocobot.cli, mocobot_sim.models as m, estimator.paper_tables as t; print(m.models_dir());"
+        "import mocobot.cli, mocobot.diagnose_command, mocobot_sim.models as m, estimator.paper_tables as t;"
+        "print(m.models_dir());"
         "t.payload_truth('a'); mocobot.cli.main(['simulate', '--vias', '1', '--out', 'rec.parquet'])"
     )
     done = subprocess.run(

@@ -18,6 +18,8 @@ MARGIN = 0.02
 """Two simulations whose chi-square differs by less than this share are equally good."""
 CLOSE_NATS = 20.0
 """Rivals that the rows alone put closer than this are simulated, too."""
+VISIBLE = 3.0
+"""A closed-loop chi-square from which a named cause has to improve it."""
 LEAST_SHARE = 0.3
 """Causes that explain less than this of a large misfit are no explanation."""
 
@@ -125,9 +127,10 @@ def _verdict(explanation: Explanation) -> Verdict:
 
 
 def _add_up(explanation: Explanation) -> bool:
-    """Three causes at one robot (or on the payload) imitate another that the catalogue does not have."""
+    """Three causes at one robot, or that look alike, imitate another that the catalogue does not have."""
     robots = {found.candidate.robot for found in explanation.found} - {None}
-    return len(explanation.found) > 2 and len(robots) <= 1
+    families = {found.candidate.family for found in explanation.found}
+    return len(explanation.found) > 2 and (len(robots) <= 1 or len(families) <= 2)
 
 
 def _without_suspects(rig: Rig, explanation: Explanation) -> tuple[Explanation, str]:
@@ -175,9 +178,14 @@ def _confirm(
             chosen, best, after = hypothesis, value, result
     if chosen is not free:
         explanation = refitted(rig, replace(explanation, problem=problem), chosen)
-    if mean_chi2(after) > mean_chi2(before) * (1.0 + MARGIN):
+    none, ours = mean_chi2(before), mean_chi2(after)
+    idle = none > VISIBLE and ours > none * (1.0 - LEAST_SHARE)
+    if ours > none * (1.0 + MARGIN) or idle:
         dropped = ", ".join(found.candidate.label for found in explanation.found)
-        notes.append(f"{dropped}: makes the response to the commands worse, so it is not named.")
+        effect = "hardly improves the response" if ours < none else "makes the response worse"
+        notes.append(
+            f"{dropped}: {effect} to the commands (chi2/n {none:.3g} to {ours:.3g}), so it is not named."
+        )
         after, chosen = before, []
         explanation = refitted(rig, explanation, [])
     tried = {(p, c.key): mean_chi2(r) for (p, c, _), r in zip(trials, others, strict=True)}

@@ -144,6 +144,10 @@ class Rig(Protocol):
         """Whitened columns of what a cause leaves open in every trial, shape (n, C, k), possibly k = 0."""
         ...
 
+    def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
+        """Whether such values can be: no negative mass, stiffness or friction beyond the errors."""
+        ...
+
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Causes that act for a while in one trial only, where the whitened residuals (n, C) are worst."""
         ...

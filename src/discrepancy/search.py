@@ -343,7 +343,11 @@ def _leaders(
             best = _better(rig, problem, free, index, shape, best, inflation)
         for shape in rig.refinements(best.candidate, finer=True) if best is not None else []:
             best = _better(rig, problem, free, index, shape, best, inflation)
-        if best is not None and _log10_p(best.problem, best.evidence) <= SIGNIFICANT:
+        if best is None or _log10_p(best.problem, best.evidence) > SIGNIFICANT:
+            continue
+        values, covariance = best.problem.fit([*free, index]).part(index)
+        units = best.candidate.units
+        if rig.possible(best.candidate, values * units, covariance * np.outer(units, units)):
             leaders.append(best)
     return sorted(leaders, key=lambda leader: leader.misfit)
 

@@ -15,6 +15,7 @@ from discrepancy.report import format_diagnosis
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.estimates import errors, estimates
 from discrepancy.team.rig import TeamRig
+from discrepancy.team.signals import TRIM_S
 from discrepancy.team.team_traces import traces
 from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.words import TeamWords
@@ -32,6 +33,8 @@ if TYPE_CHECKING:
     from mocobot.cli import Diagnose
 
 JSON, REPORT, EXTENDED = "diagnosis.json", "report.txt", "extended"
+LEAST_S, GOOD_S = 5.0, 30.0
+"""Length of all recordings together below which nothing is diagnosed, and with which it starts to be of use."""
 MASS_TOLERANCE = 0.05
 """Trials whose masses differ by more than this share are not of one payload."""
 
@@ -106,6 +109,13 @@ def _check_recordings(recordings: Sequence[Recording]) -> None:
         raise InputError(
             f"{first.name} has one robot; without a second one nothing tells where the payload really is, so there is "
             "nothing to diagnose"
+        )
+    used = [max(0.0, recording.time[-1] - recording.time[0] - 2.0 * TRIM_S) for recording in recordings]
+    if sum(used) < LEAST_S:
+        names = ", ".join(recording.name for recording in recordings)
+        raise InputError(
+            f"{names}: {sum(used):.1f} s are left when {TRIM_S:g} s are dropped at both ends; a diagnosis needs at "
+            f"least {LEAST_S:g} s, and {GOOD_S:g} s of motion to be worth much"
         )
     for other in recordings[1:]:
         if other.metadata.robots != first.metadata.robots:

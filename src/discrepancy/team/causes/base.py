@@ -44,6 +44,7 @@ class Cause(ABC):
         scales: typical sizes, for causes that have no tolerance.
         per: ``joint``, ``robot`` or ``payload``: where it can sit.
         shapes: alternatives of what changes the columns themselves; the first is the catalogue's.
+        positive: parameters that cannot be negative.
         separate: what experiment would tell it from its look-alikes.
     """
 
@@ -53,6 +54,7 @@ class Cause(ABC):
     scales: ClassVar[tuple[float, ...]] = ()
     per: ClassVar[Literal["joint", "robot", "payload"]] = "joint"
     shapes: ClassVar[tuple[Shape, ...]] = ({},)
+    positive: ClassVar[tuple[str, ...]] = ()
     separate: ClassVar[str] = ""
 
     @abstractmethod

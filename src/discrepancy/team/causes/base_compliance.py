@@ -13,6 +13,7 @@ class BaseCompliance(Cause):
     family = "compliance"
     parameters = ("compliance_m_per_N",)
     per = "robot"
+    positive = ("compliance_m_per_N",)
     separate = (
         "Vertical forces (lifting against each other) separate a base, which yields sideways, from a grasp."
     )

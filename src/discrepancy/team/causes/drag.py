@@ -13,6 +13,7 @@ class Drag(Cause):
     family = "dissipation"
     parameters = ("coefficient_Ns_per_m",)
     per = "payload"
+    positive = ("coefficient_Ns_per_m",)
     separate = "Translation at constant attitude separates drag of the payload from friction of the gimbals."
 
     def columns(self, trial, robot, joint, shape):

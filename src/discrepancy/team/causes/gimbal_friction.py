@@ -17,6 +17,7 @@ class GimbalFriction(Cause):
     family = "dissipation"
     parameters = ("coulomb_Nm", "viscous_Nms_per_rad")
     shapes = ({"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3})
+    positive = ("coulomb_Nm",)
     separate = "Which robot's gimbal rubs shows only with one robot released at a time."
 
     def columns(self, trial, robot, joint, shape):

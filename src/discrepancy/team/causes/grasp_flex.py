@@ -12,6 +12,7 @@ class GraspFlex(Cause):
     family = "compliance"
     parameters = ("compliance_m_per_N",)
     per = "robot"
+    positive = ("compliance_m_per_N",)
     separate = (
         "Vertical forces (lifting against each other) separate a grasp from a base, which yields sideways."
     )

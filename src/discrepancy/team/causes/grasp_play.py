@@ -16,6 +16,7 @@ class GraspPlay(Cause):
     parameters = ("play_m",)
     per = "robot"
     shapes = ({"force_N": 0.1}, {"force_N": 0.02}, {"force_N": 0.5})
+    positive = ("play_m",)
     separate = "Internal forces of both signs at rest separate play from flexibility."
 
     def columns(self, trial, robot, joint, shape):

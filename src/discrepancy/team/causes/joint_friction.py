@@ -11,6 +11,7 @@ class JointFriction(Cause):
     family = "dissipation"
     parameters = ("coulomb_Nm", "viscous_Nms_per_rad")
     shapes = ({"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3})
+    positive = ("coulomb_Nm",)
     separate = "An arm-only run (payload released) shows friction of the joint alone."
 
     def columns(self, trial, robot, joint, shape):

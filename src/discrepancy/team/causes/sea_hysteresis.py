@@ -14,6 +14,7 @@ class SeaHysteresis(Cause):
     family = "dissipation"
     parameters = ("friction_Nm",)
     shapes = ({"slow_Nm_per_s": 0.2}, {"slow_Nm_per_s": 0.6})
+    positive = ("friction_Nm",)
     separate = (
         "Motion with load reversals at rest separates friction in the spring from friction in the joint."
     )

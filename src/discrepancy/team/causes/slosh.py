@@ -24,6 +24,7 @@ class Slosh(Cause):
         for length in (0.2, 0.05, 0.065, 0.085, 0.11, 0.145, 0.27, 0.37, 0.5, 0.7)
         for damping in (0.05, 0.15)
     )
+    positive = ("mass_kg",)
     separate = "Motion near the pendulum's own frequency."
 
     def columns(self, trial, robot, joint, shape):

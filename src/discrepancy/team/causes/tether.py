@@ -16,6 +16,7 @@ class Tether(Cause):
     parameters = ("force_x_N", "force_y_N", "force_z_N", "stiffness_N_per_m")
     scales = (0.1, 0.1, 0.1, 1.0)
     per = "robot"
+    positive = ("stiffness_N_per_m",)
     separate = "A run without payload, or a second payload at the same place, separates an outside force from a sensor."
 
     def columns(self, trial, robot, joint, shape):

@@ -11,6 +11,7 @@ class TorqueLag(Cause):
     family = "dissipation"
     parameters = ("time_constant_s",)
     per = "robot"
+    positive = ("time_constant_s",)
     separate = "The commands separate a lag inside the sensor from a late log."
 
     def columns(self, trial, robot, joint, shape):

@@ -1,0 +1,84 @@
+"""Run ``mocobot diagnose`` in a test, and spoil recordings for it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+import numpy as np
+import pyarrow as pa
+import pytest
+
+from mocobot.cli import main
+
+BIAS_NM = 0.08
+"""Torque zero that the recordings hide in robot 2, joint 1."""
+Edit = Callable[[pa.Table], pa.Table]
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
+    """Exit code, standard output and standard error of ``mocobot diagnose``."""
+    try:
+        main(["diagnose", *map(str, arguments)])
+        code = 0
+    except SystemExit as stop:
+        code = int(stop.code or 0)
+    out, err = capsys.readouterr()
+    return code, out, err.removesuffix("\n")
+
+
+def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """The one sentence of a command that must exit with 2."""
+    code, out, err = run(capsys, *arguments)
+    assert code == 2, (out, err)
+    assert out == ""
+    assert err.startswith("mocobot: ")
+    assert "\n" not in err
+    assert "Traceback" not in err
+    return err
+
+
+def with_metadata(**changes: object) -> Edit:
+    def edit(table: pa.Table) -> pa.Table:
+        values = json.loads(table.schema.metadata[b"mocobot"]) | changes
+        return table.replace_schema_metadata({b"mocobot": json.dumps(values).encode()})
+
+    return edit
+
+
+def without_robots(count: int) -> Edit:
+    """Only the first robots' columns."""
+
+    def edit(table: pa.Table) -> pa.Table:
+        first = tuple(f"omnid{i}." for i in range(1, count + 1))
+        names = [name for name in table.column_names if name == "time" or name.startswith(first)]
+        return with_metadata(robots=count)(table.select(names))
+
+    return edit
+
+
+def changed(part: str, change: Callable[[np.ndarray], np.ndarray]) -> Edit:
+    """Every column whose name contains a part."""
+
+    def edit(table: pa.Table) -> pa.Table:
+        for k, name in enumerate(table.column_names):
+            if part in name and name != "time":
+                values = pa.array(change(table.column(name).to_numpy().copy()))
+                table = table.set_column(k, name, values)
+        return table
+
+    return edit
+
+
+def with_nan(values: np.ndarray) -> np.ndarray:
+    values[500] = np.nan
+    return values
+
+
+def unlabelled_and_heavier(table: pa.Table) -> pa.Table:
+    return with_metadata(payload=None)(changed(".tau", lambda v: 1.2 * v)(table))
+
+
+def of_longer_links(table: pa.Table) -> pa.Table:
+    design = json.loads(table.schema.metadata[b"mocobot"])["design"]
+    return with_metadata(design=design | {"proximal_length_m": 1.01 * design["proximal_length_m"]})(table)

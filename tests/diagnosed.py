@@ -1,0 +1,143 @@
+"""A check of the diagnosis' JSON, key by key, and a small diagnosis to report on."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+VERDICTS = ("consistent", "explained", "partly_explained", "unexplained")
+PLACE = {"cause", "family", "robot", "joint", "place"}
+RESPONSE = {f"{c}_{kind}" for c in ("phi", "theta", "tau") for kind in ("nrmse", "rms")} | {"chi2_per_n"}
+
+
+def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
+    """Assert that values have exactly the documented keys and types, and no number that is not finite."""
+    assert set(values) == {
+        "format", "version", "recordings", "verdict", "causes", "rejected", "gain", "not_simulated", "undecidable",
+        "residual", "notes",
+    }  # fmt: skip
+    assert (values["format"], values["version"]) == ("mocobot-diagnosis", 1)
+    assert values["verdict"] in VERDICTS
+    assert bool(values["causes"]) == (values["verdict"] in ("explained", "partly_explained"))
+    for cause in values["causes"]:
+        assert set(cause) == PLACE | {
+            "sentence", "parameters", "explained", "log10_p", "folds", "shape", "separate", "alternatives"
+        }  # fmt: skip
+        _check_place(cause)
+        assert cause["parameters"]
+        for parameter in cause["parameters"].values():
+            assert set(parameter) == {"value", "se"}
+            assert isinstance(parameter["value"], float)
+            assert parameter["se"] is None or parameter["se"] > 0
+        assert set(cause["explained"]) == {"in_sample", "held_out"}
+        assert 0.0 <= cause["explained"]["in_sample"] <= 1.0
+        assert isinstance(cause["log10_p"], float)
+        for rival in cause["alternatives"]:
+            assert set(rival) == PLACE | {"evidence_gap", "chi2_per_n", "ambiguous", "separate"}
+            _check_place(rival)
+            assert isinstance(rival["ambiguous"], bool)
+    _check_gain(values["gain"], len(values["recordings"]), simulated=simulated)
+    for entry in values["undecidable"]:
+        assert set(entry) == {"what", "why", "remedy"}
+    residual = values["residual"]
+    assert set(residual) == {"chi2_per_n", "signature", "chi2_per_n_tolerated", "tolerances", "nominal"}
+    assert set(residual["tolerances"]) == {"chi2", "freedom", "log10_p"}
+    assert {"chi2_per_n", "sentence", "kind", "trial"} <= set(residual["signature"])
+    assert all(isinstance(note, str) for note in values["notes"])
+    check_finite(values)
+
+
+def _check_place(values: dict[str, Any]) -> None:
+    for key in ("robot", "joint"):
+        assert values[key] is None or (type(values[key]) is int and values[key] >= 1)
+    assert isinstance(values["cause"], str)
+    assert isinstance(values["family"], str)
+
+
+def _check_gain(gain: dict[str, Any], trials: int, *, simulated: bool) -> None:
+    assert set(gain) - {"errors"} == {
+        "held_out", "units", "noise", "removed", "validated", "trials", "estimates"
+    }  # fmt: skip
+    for name in ("before", "after"):
+        response = gain["held_out"][name]
+        assert (response is not None) == simulated
+        assert response is None or set(response) == RESPONSE
+        estimate = gain["estimates"][name]
+        assert set(estimate) == {"mass_kg", "p_1c_m", "principal_inertia_kgm2", "grasps"}
+        assert {len(estimate["p_1c_m"]), len(estimate["principal_inertia_kgm2"])} == {3}
+        assert set(estimate["grasps"][0]) == {"p_1i_m", "R_1i_rotvec_deg"}
+    assert len(gain["trials"]) == (trials if simulated else 0)
+
+
+def check_finite(values: Any) -> None:
+    """No NaN and no infinity anywhere."""
+    if isinstance(values, dict):
+        for item in values.values():
+            check_finite(item)
+    elif isinstance(values, list):
+        for item in values:
+            check_finite(item)
+    elif isinstance(values, float):
+        assert math.isfinite(values)
+
+
+def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
+    """A diagnosis as ``diagnosis_to_dict`` gives it, made up."""
+    place = {"cause": "sea_bias", "family": "sea_torque", "robot": 2, "joint": 1, "place": "robot 2, joint 1"}
+    rival = {
+        "cause": "sea_scale",
+        "family": "sea_torque",
+        "robot": 2,
+        "joint": 1,
+        "place": "robot 2, joint 1",
+    }
+    cause = {
+        **place,
+        "sentence": "Robot 2, joint 1: the torque sensor reads 0.0500 +- 0.0010 N m too much.",
+        "parameters": {"bias_Nm": {"value": 0.05, "se": 0.001}},
+        "explained": {"in_sample": 0.99, "held_out": 0.98},
+        "log10_p": -80.0,
+        "folds": [3.0, 4.0],
+        "shape": {},
+        "separate": "A known weight separates them.",
+        "alternatives": [
+            {**rival, "evidence_gap": 2.0, "chi2_per_n": 1.01, "ambiguous": True, "separate": ""}
+        ],
+    }
+    before = dict.fromkeys(sorted(RESPONSE), 0.01) | {"chi2_per_n": 90.0}
+    after = dict.fromkeys(sorted(RESPONSE), 0.001) | {"chi2_per_n": 1.01}
+    estimate = {
+        "mass_kg": 11.7, "p_1c_m": [0.1, 0.2, 0.3], "principal_inertia_kgm2": [1.0, 2.0, 3.0],
+        "grasps": [{"p_1i_m": [0.0, 0.0, 0.0], "R_1i_rotvec_deg": [0.0, 0.0, 0.0]}] * 2,
+    }  # fmt: skip
+    signature = {"chi2_per_n": 1.1, "sentence": "somewhere.", "kind": {}, "trial": {}}
+    trial = {"before": before, "after": after}
+    values = {
+        "format": "mocobot-diagnosis",
+        "version": 1,
+        "recordings": ["one", "two"],
+        "verdict": verdict,
+        "causes": [cause] if "explained" in verdict and verdict != "unexplained" else [],
+        "rejected": [],
+        "gain": {
+            "held_out": {"before": before, "after": after},
+            "units": {"phi": "rad", "theta": "rad", "tau": "N m"},
+            "noise": {"phi_rms": 1e-4, "theta_rms": 1e-4, "tau_rms": 1e-3},
+            "removed": {"share": 0.99, "interval": [0.9, 1.0]},
+            "validated": True,
+            "trials": [{"name": "one", **trial}, {"name": "two", **trial}],
+            "estimates": {"before": estimate, "after": estimate},
+        },
+        "not_simulated": None,
+        "undecidable": [{"what": "this", "why": "of that", "remedy": "a weight"}],
+        "residual": {
+            "chi2_per_n": 1.1,
+            "signature": signature,
+            "chi2_per_n_tolerated": 1.4,
+            "tolerances": {"chi2": 20.0, "freedom": 30.0, "log10_p": -0.1},
+            "nominal": {"chi2_per_n": 12.0, "signature": signature},
+        },
+        "notes": ["A note."],
+    }
+    check_schema(values)
+    return values
