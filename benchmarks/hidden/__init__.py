@@ -1,0 +1,1 @@
+"""Hidden effects: a blind generator, and how well the diagnosis finds what it hid."""

@@ -1,0 +1,122 @@
+"""The blind generator: recordings of a team in which something may be hidden, and the sealed truth."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from estimator.recording import Recording
+from hidden.background import draw_background
+from hidden.draw import Ground, draw_effect
+from hidden.schedule import Schedule
+from hidden.sealed import Sealed
+from mocobot_sim.effects import Effect, apply_effects, effect_to_dict
+from mocobot_sim.scene import TeamScene, build_team
+from mocobot_sim.sensors import measure, sensor_preset
+from mocobot_sim.trial import run_trial
+
+PAYLOADS = "abcd"
+TIMESTEP_S = 5e-4
+"""Half of what the diagnosis simulates with."""
+
+Kind = Literal["clean", "tolerance", "single", "pair"]
+
+
+@dataclass(frozen=True)
+class HiddenSet:
+    """One data set; equal requests give equal bits.
+
+    Attributes:
+        kind: ``clean``, ``tolerance`` (every parameter of every cause within its tolerance), ``single`` or ``pair``.
+        seed: of everything random.
+        causes: what is hidden.
+        factor: size over the detection limit.
+        payload: name of a shipped payload; None to draw one.
+        background: tolerances besides what is hidden.
+        preset: sensors.
+        schedule: what is recorded.
+        timestep_s: integration step [s].
+    """
+
+    kind: Kind
+    seed: int
+    causes: tuple[str, ...] = ()
+    factor: float = 4.0
+    payload: str | None = None
+    background: bool = False
+    preset: str = "nominal"
+    schedule: Schedule = field(default_factory=Schedule)
+    timestep_s: float = TIMESTEP_S
+
+    @property
+    def key(self) -> str:
+        """Name of the set."""
+        what = ["+".join(self.causes), f"x{self.factor:g}"] if self.causes else []
+        return "-".join([self.kind, *what, *(["tolerances"] if self.background else []), str(self.seed)])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+    def rng(self, purpose: str) -> np.random.Generator:
+        """Independent stream for one purpose."""
+        words = f"{purpose}|{self.kind}|{'+'.join(self.causes)}|{self.factor:g}".encode()
+        return np.random.default_rng(np.random.SeedSequence([self.seed, *words]))
+
+
+def generate(request: HiddenSet) -> tuple[list[Recording], Sealed]:
+    """Draw what is hidden, simulate the trials, read them through the sensors.
+
+    Raises:
+        TrialError: the physics of a trial cannot be trusted.
+    """
+    payload = request.payload or str(request.rng("payload").choice(list(PAYLOADS)))
+    team = build_team(payload)
+    trajectories = request.schedule.trajectories(team, request.rng("trajectories"))
+    hidden, background = _effects(request, Ground.of(team, trajectories))
+    recordings = []
+    for number, trajectory in enumerate(trajectories, start=1):
+        scene = apply_effects(build_team(payload, timestep_s=request.timestep_s), [*hidden, *background])
+        log = run_trial(scene, trajectory, trial_number=number)
+        noise = request.rng(f"sensors {number}")
+        recordings.append(measure(log, sensor_preset(request.preset), noise, name=f"trial {number}"))
+    truth = {
+        "payload": payload,
+        "effects": [effect_to_dict(effect) for effect in hidden],
+        "background": [effect_to_dict(effect) for effect in background],
+        "gimbal_axes_1": _gimbal_axes(team),
+    }
+    return recordings, Sealed(truth)
+
+
+def _effects(request: HiddenSet, ground: Ground) -> tuple[list[Effect], list[Effect]]:
+    hidden = [
+        draw_effect(cause, request.factor, ground, request.rng(f"effect {k}"))
+        for k, cause in enumerate(request.causes)
+    ]
+    if not (request.background or request.kind == "tolerance"):
+        return hidden, []
+    background = draw_background(ground.robots, request.rng("background"))
+    # One cause acts once at a place: what is hidden takes the place of what is tolerated there.
+    taken = [_place(effect) for effect in hidden]
+    return hidden, [effect for effect in background if _place(effect) not in taken]
+
+
+def _place(effect: Effect) -> Sequence[Any]:
+    return effect.cause, *(getattr(effect, name) for name in effect.place_names())
+
+
+def _gimbal_axes(team: TeamScene) -> list[list[list[float]]]:
+    """Axes of the gimbal joints 1, 2, 3 (z, y, x) at home in {1}, one per row, for every robot."""
+    out = []
+    for theta, X in zip(team.theta_home, team.X_1i, strict=True):
+        flange = X.rotation * Rotation.from_euler("ZYX", theta).inv()  # {b} turned into {1}
+        after_z = flange * Rotation.from_euler("Z", theta[0])
+        after_y = after_z * Rotation.from_euler("Y", theta[1])
+        axes = [flange.apply([0, 0, 1]), after_z.apply([0, 1, 0]), after_y.apply([1, 0, 0])]
+        out.append(np.array(axes).tolist())
+    return out

@@ -1,0 +1,65 @@
+"""Which sets each part of the campaign consists of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from discrepancy.team.causes import CAUSES
+from hidden.generator import PAYLOADS, HiddenSet
+
+Part = Literal["clean", "tolerance", "single", "pairs", "leave-one-out"]
+LEFT_OUT_FACTOR = 4.0
+
+
+@dataclass(frozen=True)
+class Task:
+    """One diagnosis to run.
+
+    Attributes:
+        part: of the campaign.
+        request: the set.
+        excluded: causes left out of the diagnosis' catalogue.
+    """
+
+    part: Part
+    request: HiddenSet
+    excluded: tuple[str, ...] = ()
+
+
+def tasks(
+    part: Part, draws: int, factors: Sequence[float], causes: Sequence[str], *, background: bool
+) -> list[Task]:
+    """All tasks of a part; payloads of clean and tolerance sets take turns, others are drawn."""
+    names = list(causes) or list(CAUSES)
+    if part in ("clean", "tolerance"):
+        return [
+            Task(part, HiddenSet(part, seed, payload=PAYLOADS[seed % len(PAYLOADS)])) for seed in range(draws)
+        ]
+    if part == "pairs":
+        return [
+            Task(part, HiddenSet("pair", seed, _pair(seed), background=background)) for seed in range(draws)
+        ]
+    if part == "leave-one-out":
+        factors = [LEFT_OUT_FACTOR]
+    return [
+        Task(
+            part,
+            HiddenSet("single", seed, (cause,), factor, background=background),
+            (cause,) if part == "leave-one-out" else (),
+        )
+        for seed in range(draws)
+        for factor in factors
+        for cause in names
+    ]
+
+
+def _pair(seed: int) -> tuple[str, str]:
+    """Two causes of different families."""
+    rng = np.random.default_rng([seed, *b"pair"])
+    first = str(rng.choice(list(CAUSES)))
+    others = [cause for cause in CAUSES if CAUSES[cause].family != CAUSES[first].family]
+    return first, str(rng.choice(others))

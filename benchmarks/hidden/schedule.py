@@ -1,0 +1,51 @@
+"""What is recorded of one team: two random trials, a periodic one, a static one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mocobot_sim.scene import TeamScene
+from mocobot_sim.trajectories import (
+    SETTLE_S,
+    Trajectory,
+    random_vias,
+    sphere_motion,
+    static_orientations,
+)
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Trials of one data set, random ones first; the default lasts 164 s or a little more.
+
+    Attributes:
+        randoms: number of random trials.
+        vias: vias of each.
+        periodic_s: length of the periodic trial's motion [s].
+        hold_s: time at each hold of the static trial [s]; None for no static trial.
+    """
+
+    randoms: int = 2
+    vias: int = 27
+    periodic_s: float = 35.0
+    hold_s: float | None = 4.5
+
+    def trajectories(self, scene: TeamScene, rng: np.random.Generator) -> list[Trajectory]:
+        """Commands of every trial."""
+        home = scene.wrist_home_b
+        out = [random_vias(home, rng, vias=self.vias) for _ in range(self.randoms)]
+        out.append(sphere_motion(home, scene.X_1i, duration_s=self.periodic_s, rng=rng))
+        if self.hold_s is not None:
+            out.append(static_orientations(home, scene.X_1i, hold_s=self.hold_s))
+        return out
+
+
+def moving_intervals(trajectories: list[Trajectory]) -> list[tuple[int, float, float]]:
+    """Trial number (from 1), begin and end of the motion [s] of every trial that moves all the time."""
+    return [
+        (number, SETTLE_S, trajectory.duration_s - SETTLE_S)
+        for number, trajectory in enumerate(trajectories, start=1)
+        if trajectory.trial != "static"
+    ]

@@ -1,0 +1,75 @@
+"""Run the diagnosis on recordings; the verdict as plain data."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from typing import Any
+
+from discrepancy.diagnose import Alternative, Diagnosis, diagnose
+from discrepancy.search import Found
+from discrepancy.team.rig import TeamRig
+from discrepancy.team.tolerances import read_tolerances
+from estimator.estimate import estimate_payload
+from estimator.recording import Recording
+
+
+def verdict_on(
+    recordings: Sequence[Recording], excluded: Sequence[str] = (), *, closed_loop: bool = True
+) -> dict[str, Any]:
+    """What the diagnosis finds.
+
+    Args:
+        recordings: the trials.
+        excluded: causes left out of its catalogue.
+        closed_loop: whether to simulate the closed loop where the rows leave two causes about equally likely;
+            elsewhere it is left out to save time.
+    """
+    start = time.perf_counter()
+    rig = TeamRig.of(recordings, estimate_payload(recordings), read_tolerances(None), excluded)
+    diagnosis = diagnose(rig, closed_loop=False)
+    if closed_loop and _undecided(diagnosis):
+        diagnosis = diagnose(rig)
+    explanation = diagnosis.explanation
+    return {
+        "verdict": diagnosis.verdict,
+        "found": [_found(rig, *pair) for pair in zip(explanation.found, diagnosis.alternatives, strict=True)],
+        "rejected": [candidate.label for candidate in explanation.rejected],
+        "before": explanation.before / explanation.samples,
+        "after": explanation.after / explanation.samples,
+        "explained": explanation.explained,
+        "closed_loop": diagnosis.gain is not None,
+        "notes": list(diagnosis.notes),
+        "seconds": time.perf_counter() - start,
+    }
+
+
+def _undecided(diagnosis: Diagnosis) -> bool:
+    return any(rival.ambiguous for rivals in diagnosis.alternatives for rival in rivals)
+
+
+def _found(rig: TeamRig, item: Found, rivals: Sequence[Alternative]) -> dict[str, Any]:
+    candidate = item.candidate
+    values, errors = rig.effect_parameters(candidate, item.values, item.covariance)
+    return {
+        "cause": candidate.cause,
+        "family": candidate.family,
+        "robot": candidate.robot,
+        "joint": candidate.joint,
+        "parameters": {name: float(value) for name, value in values.items()},
+        "standard_errors": {name: float(value) for name, value in errors.items()},
+        "columns": [float(value) for value in item.values],
+        "log10_p": item.evidence.log10_p,
+        "in_sample": item.in_sample,
+        "held_out": item.held_out,
+        "rivals": [
+            {
+                "cause": rival.candidate.cause,
+                "robot": rival.candidate.robot,
+                "joint": rival.candidate.joint,
+                "gap": float(rival.evidence_gap),
+                "ambiguous": bool(rival.ambiguous),
+            }
+            for rival in rivals
+        ],
+    }

@@ -1,0 +1,69 @@
+"""Hide effects in simulated recordings, diagnose blind, count what was found.
+
+Finished sets are kept in the output folder and skipped when the command is given again.
+"""
+
+from __future__ import annotations
+
+import pprint
+from dataclasses import dataclass
+from pathlib import Path
+
+import tyro
+
+from hidden.campaign import run_tasks
+from hidden.measure_limits import measure_limits
+from hidden.notes import failures
+from hidden.parts import Part, tasks
+from hidden.store import read_results
+from hidden.tables import tables
+
+
+@dataclass(frozen=True)
+class Options:
+    """Command line.
+
+    Attributes:
+        part: what to run.
+        draws: sets per cause and size, or in all where there is neither.
+        factors: sizes over the detection limit.
+        causes: what to hide; all if none is given.
+        background: tolerances besides.
+        jobs: processes.
+        out: where recordings and results go.
+        again: repeat sets that were not found right.
+        tables: print the tables of all results instead.
+        failures: print every set that was not found right instead.
+        limits: measure the detection limits instead.
+    """
+
+    part: Part = "single"
+    draws: int = 2
+    factors: tuple[float, ...] = (4.0,)
+    causes: tuple[str, ...] = ()
+    background: bool = False
+    jobs: int = 2
+    out: Path = Path("out/hidden")
+    again: bool = False
+    tables: bool = False
+    failures: bool = False
+    limits: bool = False
+
+
+def main(options: Options) -> None:
+    """Run, or print what was run."""
+    if options.limits:
+        pprint.pprint(measure_limits(options.jobs))
+    elif options.tables:
+        print(tables(read_results(options.out / "results.jsonl")))
+    elif options.failures:
+        print(failures(read_results(options.out / "results.jsonl")))
+    else:
+        chosen = tasks(
+            options.part, options.draws, options.factors, options.causes, background=options.background
+        )
+        run_tasks(chosen, options.out, options.jobs, again=options.again)
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Options))
