@@ -265,7 +265,7 @@ def team_of(case, robots):
 @pytest.mark.parametrize("robots", [1, 2, 5])
 def test_every_cause_has_finite_columns_and_an_effect(case, robots):
     rig = team_of(case, robots)
-    candidates = [*rig.candidates(), push(0, 5.0, 1.0)]
+    candidates = [*rig.candidates(), push(0, 5.0, 1.0, {})]
     per = {"joint": 3 * robots, "robot": robots, "payload": 1}
     assert len(candidates) == sum(per[CAUSES[name].per] for name in CAUSES)
     assert len({c.key for c in candidates}) == len(candidates)

@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 from discrepancy.problem import Problem
 from discrepancy.team.pushes import push
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.tolerances import read_tolerances
+from discrepancy.team.tolerances import DEFAULTS, read_tolerances
 from estimator.estimate import estimate_payload
 from hidden.generator import PAYLOADS, HiddenSet, generate
 from hidden.limits import GAIN, PUSH_S
@@ -36,7 +36,11 @@ def _limits(payload: str) -> list[tuple[str, tuple[str, ...], list[float]]]:
     recordings, _ = generate(HiddenSet("clean", 0, payload=payload))
     rig = TeamRig.of(recordings, estimate_payload(recordings), read_tolerances(None))
     candidates = rig.candidates()
-    candidates += [push(trial, start, PUSH_S) for trial in range(3) for start in np.arange(5.0, 35.0, 5.0)]
+    candidates += [
+        push(trial, start, PUSH_S, DEFAULTS["push"])
+        for trial in range(3)
+        for start in np.arange(5.0, 35.0, 5.0)
+    ]
     fit = Problem.of(rig.rows(candidates), candidates).fit()
     return [
         (candidate.cause, tuple(p.name for p in candidate.parameters), values.tolist())

@@ -302,9 +302,10 @@ def _with_transients(
         if any(c.detail and dict(c.detail) == dict(candidate.detail) for c in problem.candidates):
             continue
         wider = problem.extended(candidate, rig.columns(candidate))
-        gain = wider.fit(fit.free).evidence_of(len(wider.candidates) - 1, inflation)
-        if gain is not None and (best is None or gain.score > best[0]):
-            best = (gain.score, wider)
+        last = len(wider.candidates) - 1
+        misfit = wider.fit([*fit.free, last]).misfit
+        if best is None or misfit < best[0]:
+            best = (misfit, wider)
     if best is None:
         return problem, evidence
     return best[1], best[1].fit(fit.free).evidence(inflation)

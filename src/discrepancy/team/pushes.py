@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,10 +16,11 @@ DURATIONS_S = (0.4, 0.8, 1.6, 3.2, 6.4)
 WORST = 2
 
 
-def push(trial: int, start_s: float, duration_s: float) -> Candidate:
+def push(trial: int, start_s: float, duration_s: float, tolerances: Mapping[str, float]) -> Candidate:
     """A push in one trial (index from 0)."""
     cause = CAUSES["push"]
-    parameters = tuple(Parameter(n, 0.0, s) for n, s in zip(cause.parameters, cause.scales, strict=True))
+    sizes = zip(cause.parameters, cause.scales, strict=True)
+    parameters = tuple(Parameter(name, tolerances.get(name, 0.0), scale) for name, scale in sizes)
     interval = {"start_s": start_s, "duration_s": duration_s}
     return Candidate("push", cause.family, None, None, parameters, interval, {"trial": trial, **interval})
 

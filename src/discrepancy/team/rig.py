@@ -302,10 +302,9 @@ class TeamRig:
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a transient with its interval moved."""
         if candidate.detail:
-            if finer:
-                return []
+            given = self.tolerances.get("push", {})
             near = intervals_near(candidate.shape["start_s"], candidate.shape["duration_s"])
-            return [push(int(candidate.detail["trial"]), start, duration) for start, duration in near]
+            return [push(int(candidate.detail["trial"]), start, duration, given) for start, duration in near]
         cause = CAUSES[candidate.cause]
         shapes = cause.finer(candidate.shape) if finer else cause.shapes
         return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
@@ -322,7 +321,7 @@ class TeamRig:
         for t, z in enumerate(remaining):
             moving, time = self.linear[t].reduction.moving, self.linear[t].reduction.time
             found = worst_intervals(time[:moving], np.sum(z[:moving, -6:] ** 2, axis=1))
-            out += [push(t, start, duration) for start, duration in found]
+            out += [push(t, start, duration, self.tolerances.get("push", {})) for start, duration in found]
         return out
 
     def quantities(self, trial: int) -> dict[str, Array]:

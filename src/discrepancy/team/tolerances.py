@@ -29,6 +29,8 @@ DEFAULTS: dict[str, dict[str, float]] = {
     "grasp_flex": {"compliance_m_per_N": 1e-7},
     "grasp_play": {"play_m": 3e-6},
     "drag": {"coefficient_Ns_per_m": 0.05},
+    # Friction within tolerance takes another value at every rest, which is a small push while it lasts.
+    "push": {f"force_{axis}_N": 0.02 for axis in "xyz"} | {f"moment_{axis}_Nm": 0.02 for axis in "xyz"},
 }
 
 
