@@ -14,10 +14,12 @@ from mocobot_sim.effects import EFFECTS, Effect, make_effect
 def draw_background(robots: int, rng: np.random.Generator) -> list[Effect]:
     """Every cause with a tolerance at every place, normal, with its standard deviation.
 
-    Magnitudes where a parameter cannot be negative.
+    Magnitudes where a parameter cannot be negative. Pushes are left out: their tolerance stands for friction at rest.
     """
     out = []
     for cause, deviations in DEFAULTS.items():
+        if cause == "push":
+            continue
         names = EFFECTS[cause].place_names()
         places = product(
             range(1, robots + 1) if "robot" in names else [None], (1, 2, 3) if "joint" in names else [None]

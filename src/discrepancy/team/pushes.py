@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from discrepancy.rig import Candidate, Parameter
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.tolerances import DEFAULTS
 
 Array = NDArray[np.float64]
 
@@ -19,8 +20,8 @@ WORST = 2
 def push(trial: int, start_s: float, duration_s: float, tolerances: Mapping[str, float]) -> Candidate:
     """A push in one trial (index from 0)."""
     cause = CAUSES["push"]
-    sizes = zip(cause.parameters, cause.scales, strict=True)
-    parameters = tuple(Parameter(name, tolerances.get(name, 0.0), scale) for name, scale in sizes)
+    scales = DEFAULTS["push"]
+    parameters = tuple(Parameter(n, tolerances.get(n, 0.0), scales[n]) for n in cause.parameters)
     interval = {"start_s": start_s, "duration_s": duration_s}
     return Candidate("push", cause.family, None, None, parameters, interval, {"trial": trial, **interval})
 

@@ -11,7 +11,6 @@ class Push(Cause):
     name = "push"
     family = "push"
     parameters = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nm", "moment_y_Nm", "moment_z_Nm")
-    scales = (0.1, 0.1, 0.1, 0.1, 0.1, 0.1)
     per = "payload"
     separate = "Another trial: a push does not repeat."
 
