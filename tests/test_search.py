@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from discrepancy.diagnose import _verdict, diagnose
+from discrepancy.held_out import confirmed
 from discrepancy.problem import Problem
-from discrepancy.search import CLEAN, _confirmed, search
+from discrepancy.search import CLEAN, search
 from fake_rig import CATALOGUE, FakeRig, cause
 
 TWINS = {4: (2, 0.005)}  # cause 4 leaves the trace of cause 2, but for half a percent
@@ -63,7 +64,7 @@ def test_one_cause_is_found_with_its_value(seed):
     ],
 )
 def test_trials_that_confirm(folds, expected):
-    assert _confirmed(folds) is expected
+    assert confirmed(folds) is expected
 
 
 def test_two_causes_are_found_the_larger_first():

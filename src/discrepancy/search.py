@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.held_out import confirmed, held_out_gains, shares
 from discrepancy.problem import COMPLEXITY, Evidence, Fit, Problem
 from discrepancy.rig import Candidate, Rig
 
@@ -26,12 +27,8 @@ ENOUGH = 0.8
 """Share of the misfit that causes must explain on held-out trials, or the verdict is not ``explained``."""
 RIVAL_SHARE = 0.5
 """A rival explains at least this share of what the best does."""
-SHORT_ROWS = 24
-"""A transient of fewer rows (2 s) cannot be split and tested on its own; its evidence has to do."""
 MOST_REJECTED = 4
 LEADERS = 8
-FOLDS = 0.75
-"""Share of the trials on which a cause must help when it was fitted to the others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +40,7 @@ class Found:
         values, covariance: its parameters and their covariance, in their own units.
         evidence: when it was chosen.
         rivals: other candidates then, best first, with the gap of their score [nats].
-        in_sample, held_out: share of the nominal model's misfit that it removes (see ``_shares``).
+        in_sample, held_out: share of the nominal model's misfit that it removes (see ``held_out.shares``).
         folds: gain of chi-square on every trial when fitted to the others.
     """
 
@@ -128,8 +125,8 @@ def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] 
         best = leaders[0]
         candidate = best.candidate
         say(f"refit {candidate.label}")
-        folds = _folds(best.problem, free, best.evidence.index, candidate)
-        if not _confirmed(folds):
+        folds = held_out_gains(best.problem, free, best.evidence.index, candidate)
+        if not confirmed(folds):
             rejected.append(candidate)
             if len(rejected) > MOST_REJECTED:
                 break
@@ -143,7 +140,7 @@ def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] 
         before_it = list(free)
         free.append(best.evidence.index)
         problem, fit = _refit(rig, problem, free)
-        in_sample, held_out = _shares(problem, before_it, best.evidence.index)
+        in_sample, held_out = shares(problem, before_it, best.evidence.index)
         found.append(
             Found(
                 candidate,
@@ -187,9 +184,9 @@ def refitted(rig: Rig, explanation: Explanation, free: Sequence[int]) -> Explana
             continue
         others = [i for i in free if i != index]
         evidence = problem.fit(others).evidence_of(index) or old.evidence
-        in_sample, held_out = _shares(problem, others, index)
+        in_sample, held_out = shares(problem, others, index)
         rivals = tuple((old.candidate, -gap) if c.key == candidate.key else (c, gap) for c, gap in old.rivals)
-        folds = tuple(_folds(problem, others, index, candidate))
+        folds = tuple(held_out_gains(problem, others, index, candidate))
         found.append(replace(old, candidate=candidate, evidence=evidence, rivals=rivals, in_sample=in_sample,
                              held_out=held_out, folds=folds))  # fmt: skip
     return _finished(
@@ -221,76 +218,6 @@ def _least(leader: _Leader, excess: float, *, first: bool) -> float:
 def _log10_p(problem: Problem, evidence: Evidence) -> float:
     transient = bool(problem.candidates[evidence.index].detail)
     return evidence.log10_p + (INTERVALS_LOG10 if transient else 0.0)
-
-
-def _confirmed(folds: Sequence[float]) -> bool:
-    if len(folds) < 2:
-        return True
-    return sum(gain > 0 for gain in folds) >= FOLDS * len(folds) and sum(folds) > 0
-
-
-def _folds(problem: Problem, free: Sequence[int], index: int, candidate: Candidate) -> list[float]:
-    """How much rather every trial has a cause as the other trials fitted it than all within its tolerance."""
-    if candidate.detail:
-        return _interleaved(problem, free, index, int(candidate.detail["trial"]))
-    trials = range(len(problem.rows))
-    if len(problem.rows) < 2:
-        return []
-    gains = []
-    for t in trials:
-        values, _ = problem.fit([*free, index], [k for k in trials if k != t]).part(index)
-        tolerated = problem.fit(free, [t])
-        gains.append(tolerated.misfit - problem.fit(free, [t], fixed=(index, values)).misfit)
-    return gains
-
-
-def _shares(problem: Problem, free: Sequence[int], index: int) -> tuple[float, float | None]:
-    """Share of the nominal model's misfit that a cause removes, in sample and on trials left out of the fit.
-
-    Nominal is the model with the causes before it and nothing else off; the room for improvement ends where the
-    cause and every tolerance together leave the data.
-    """
-    after = [*free, index]
-    full = problem.fit(after)
-    nominal, with_it = (problem.fit(chosen, background=False) for chosen in (free, after))
-    trials = range(len(problem.rows))
-    floor = sum(full.held_out(t) for t in trials)
-    in_sample = (nominal.misfit - with_it.misfit) / max(nominal.misfit - floor, 1e-9)
-    if len(trials) < 2 or problem.candidates[index].detail:
-        return float(np.clip(in_sample, 0.0, 1.0)), None
-    gained, room = 0.0, 0.0
-    for t in trials:
-        others = [k for k in trials if k != t]
-        before, after_it, best = (
-            problem.fit(free, others, background=False).held_out(t),
-            problem.fit(after, others, background=False).held_out(t),
-            problem.fit(after, others).held_out(t),
-        )
-        gained, room = gained + before - after_it, room + before - best
-    return float(np.clip(in_sample, 0.0, 1.0)), float(np.clip(gained / max(room, 1e-9), 0.0, 1.0))
-
-
-def _interleaved(
-    problem: Problem, free: Sequence[int], index: int, trial: int, blocks: int = 4
-) -> list[float]:
-    """The same within the trial of a transient: fitted to all but every fourth block of it."""
-    rows = problem.rows[trial]
-    inside = np.flatnonzero(np.abs(rows[..., problem.spans[index]]).sum(axis=(1, 2)) > 1e-6)
-    if len(inside) < SHORT_ROWS:
-        return []
-    width = max(1, len(inside) // (2 * blocks))
-    gains = []
-    for b in range(blocks):
-        out = np.zeros(len(rows), dtype=bool)
-        out[inside[(np.arange(len(inside)) // width) % blocks == b]] = True
-        apart = np.einsum("nck,ncl->kl", rows[out], rows[out], optimize=True)
-        gram = problem.grams.sum(axis=0) - apart
-        ends = []
-        for chosen in (tuple(free), (*free, index)):
-            x = np.append(-Fit.of(problem, gram, chosen).coefficients, 1.0)
-            ends.append(float(x @ apart @ x))
-        gains.append(ends[0] - ends[1])
-    return gains
 
 
 def _with_transients(
