@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -30,7 +31,7 @@ def check_recording(recording: Recording) -> None:
     rows = len(recording.time)
     if rows < MIN_SAMPLES:
         raise InputError(f"{recording.name}: {rows} rows are too few; at least {MIN_SAMPLES} are needed")
-    _check_finite(recording)
+    check_finite(recording.name, recording.columns())
     _check_time(recording)
     design = recording.metadata.design
     _check_range(recording, ("phi1", "phi2", "phi3"), design.phi_min_rad, design.phi_max_rad)
@@ -52,12 +53,17 @@ def check_duration(recording: Recording, trim_s: float) -> None:
         raise InputError(f"{recording.name}: {error}") from error
 
 
-def _check_finite(recording: Recording) -> None:
-    for name, values in recording.columns().items():
+def check_finite(name: str, columns: Mapping[str, Array]) -> None:
+    """Check that columns hold finite numbers only.
+
+    Raises:
+        InputError: names the recording, the column and the row (counted from 0).
+    """
+    for column, values in columns.items():
         bad = np.flatnonzero(~np.isfinite(values))
         if len(bad):
             raise InputError(
-                f"{recording.name}: column {name!r} is {values[bad[0]]} in {len(bad)} of {len(values)} rows, "
+                f"{name}: column {column!r} is {values[bad[0]]} in {len(bad)} of {len(values)} rows, "
                 f"first in row {bad[0]}; every value must be a finite number"
             )
 
@@ -113,10 +119,19 @@ def _check_range(recording: Recording, suffixes: tuple[str, ...], low: float, hi
         if len(bad):
             worst = values[bad[np.argmax(np.abs(values[bad]))]]
             raise InputError(
-                f"{recording.name}: column {name!r} reaches {worst:.6g} rad (outside in {len(bad)} of "
+                f"{recording.name}: {_called(recording, name)} reaches {worst:.6g} rad (outside in {len(bad)} of "
                 f"{len(values)} rows, first in row {bad[0]}); its range is {low:.6g} to {high:.6g} rad"
                 + (" - the values look like degrees" if in_degrees else "")
             )
+
+
+def _called(recording: Recording, name: str) -> str:
+    """A column in words that fit the file: at wrist level it holds neither driven angles nor torques."""
+    robot, _, channel = name.partition(".")
+    if recording.metadata.level == "joint" or channel.startswith("theta"):
+        return f"column {name!r}"
+    of = "h_x, h_y, h_z" if channel.startswith("phi") else "force_x, force_y, force_z and the wrist position"
+    return f"{channel} of {robot}, which follows from its {of},"
 
 
 def _check_torques(recording: Recording) -> None:
@@ -126,7 +141,7 @@ def _check_torques(recording: Recording) -> None:
         if len(bad):
             worst = values[bad[np.argmax(np.abs(values[bad]))]]
             raise InputError(
-                f"{recording.name}: column {name!r} reaches {worst:.6g} N m (in {len(bad)} of {len(values)} "
+                f"{recording.name}: {_called(recording, name)} reaches {worst:.6g} N m (in {len(bad)} of {len(values)} "
                 f"rows, first in row {bad[0]}), more than {TORQUE_FACTOR:g} times the design's "
                 f"torque_limit_Nm of {limit:g}"
             )

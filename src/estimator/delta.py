@@ -127,12 +127,7 @@ def inverse_kinematics(h: ArrayLike, design: OmnidDesign) -> Array:
         InputError: a leg is too long or too short for some position.
     """
     h = np.asarray(h, dtype=float)
-    # The wrist from the driven axis, once the platform joint is shifted onto it.
-    reach = h[..., None, :] - (design.base_radius_m - design.platform_radius_m) * LEG_DIRECTIONS
-    outward, up = np.sum(reach * LEG_DIRECTIONS, axis=-1), reach[..., 2]
-    distance = np.hypot(outward, up)
-    l1, l2 = design.proximal_length_m, design.rod_length_m
-    cosine = (l1**2 + np.sum(reach**2, axis=-1) - l2**2) / (2.0 * l1 * distance)
+    outward, up, cosine = _leg_triangles(h, design)
     outside = ~(np.abs(cosine) <= 1.0)
     if np.any(outside):
         *where, leg = np.unravel_index(np.argmax(outside), outside.shape)
@@ -140,6 +135,22 @@ def inverse_kinematics(h: ArrayLike, design: OmnidDesign) -> Array:
         raise InputError(f"leg {int(leg) + 1} cannot reach the wrist position ({position}) m")
     # The outward knee lies clockwise of the line to the wrist if that points up, else counter-clockwise.
     return np.arctan2(up, outward) - np.copysign(np.arccos(cosine), up)
+
+
+def is_in_reach(h: ArrayLike, design: OmnidDesign) -> NDArray[np.bool_]:
+    """Whether each leg reaches the wrist position ``h`` in {b} [m], shape (..., 3) -> (..., 3)."""
+    return np.abs(_leg_triangles(np.asarray(h, dtype=float), design)[2]) <= 1.0
+
+
+def _leg_triangles(h: Array, design: OmnidDesign) -> tuple[Array, Array, Array]:
+    """Wrist from each driven axis, outward and up [m], and the cosine of the angle there; each (..., 3)."""
+    # Once the platform joint is shifted onto the wrist.
+    reach = h[..., None, :] - (design.base_radius_m - design.platform_radius_m) * LEG_DIRECTIONS
+    outward, up = np.sum(reach * LEG_DIRECTIONS, axis=-1), reach[..., 2]
+    distance = np.hypot(outward, up)
+    l1, l2 = design.proximal_length_m, design.rod_length_m
+    with np.errstate(all="ignore"):  # on the driven axis itself, or absurdly far: no cosine, so out of reach
+        return outward, up, (l1**2 + np.sum(reach**2, axis=-1) - l2**2) / (2.0 * l1 * distance)
 
 
 def _solve(matrix: Array, right: Array) -> Array:

@@ -14,19 +14,29 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from estimator.checks import check_recording
+from estimator.checks import check_finite, check_recording
 from estimator.errors import InputError
-from estimator.recording_metadata import RecordingMetadata
+from estimator.recording_metadata import Level, RecordingMetadata
+from estimator.wrist_level import joints_of, wrist_fault, wrist_of
 
 Array = NDArray[np.float64]
 
 METADATA_KEY = b"mocobot"
 # Column suffixes in array order: one (Q, N, 3) array per field.
-CHANNELS = {
-    "phi": ("phi1", "phi2", "phi3"),
-    "theta": ("theta_z", "theta_y", "theta_x"),
-    "tau": ("tau1", "tau2", "tau3"),
-    "ref": ("ref_x", "ref_y", "ref_z"),
+_THETA, _REF = ("theta_z", "theta_y", "theta_x"), ("ref_x", "ref_y", "ref_z")
+CHANNELS: dict[Level, dict[str, tuple[str, ...]]] = {
+    "joint": {
+        "phi": ("phi1", "phi2", "phi3"),
+        "theta": _THETA,
+        "tau": ("tau1", "tau2", "tau3"),
+        "ref": _REF,
+    },
+    "wrist": {
+        "h": ("h_x", "h_y", "h_z"),
+        "theta": _THETA,
+        "force": ("force_x", "force_y", "force_z"),
+        "ref": _REF,
+    },
 }
 
 
@@ -58,7 +68,7 @@ class Recording:
     def __post_init__(self) -> None:
         """Bring the arrays to float64 and check their shapes."""
         shape = (np.size(self.time), self.metadata.robots, 3)
-        for field in ("time", *CHANNELS):
+        for field in ("time", *CHANNELS["joint"]):
             value = getattr(self, field)
             if value is None and field == "ref":
                 continue
@@ -69,11 +79,28 @@ class Recording:
             object.__setattr__(self, field, array)
 
     def columns(self) -> dict[str, Array]:
-        """Every column of the file by its name, in file order, each of shape (Q,)."""
+        """Driven angles, gimbal angles, torques and commands by their column's name, each of shape (Q,)."""
+        return self._named("joint", {"phi": self.phi, "theta": self.theta, "tau": self.tau, "ref": self.ref})
+
+    def file_columns(self) -> dict[str, Array]:
+        """Every column of the file by its name, in file order, each of shape (Q,).
+
+        Raises:
+            InputError: the level is "wrist" and some driven angles have no wrist position (see ``wrist_of``).
+        """
+        if self.metadata.level == "joint":
+            return self.columns()
+        try:
+            h, force = wrist_of(self.phi, self.tau, self.metadata.design)
+        except InputError as error:
+            raise InputError(f"{self.name}: {error}") from error
+        return self._named("wrist", {"h": h, "theta": self.theta, "force": force, "ref": self.ref})
+
+    def _named(self, level: Level, fields: dict[str, Array | None]) -> dict[str, Array]:
         columns = {"time": self.time}
         for robot in range(self.metadata.robots):
-            for field, suffixes in CHANNELS.items():
-                if (array := getattr(self, field)) is not None:
+            for field, suffixes in CHANNELS[level].items():
+                if (array := fields[field]) is not None:
                     columns |= {f"omnid{robot + 1}.{s}": array[:, robot, k] for k, s in enumerate(suffixes)}
         return columns
 
@@ -82,11 +109,14 @@ def write_recording(recording: Recording, path: Path | str) -> None:
     """Write a recording as Parquet; an existing file is replaced only once the new one is complete.
 
     Raises:
-        InputError: the target cannot be written, or the metadata is not valid.
+        InputError: the target cannot be written, the metadata is not valid, or the level is "wrist" and some
+            driven angles have no wrist position.
     """
     path = Path(path)
     metadata = {METADATA_KEY: recording.metadata.to_json().encode()}
-    table = pa.table({name: np.ascontiguousarray(values) for name, values in recording.columns().items()})
+    table = pa.table(
+        {name: np.ascontiguousarray(values) for name, values in recording.file_columns().items()}
+    )
     temporary = path.parent / f".{uuid.uuid4().hex}.tmp"
     try:
         # Measured samples hardly repeat, so dictionaries only cost space; checksums catch damaged pages.
@@ -116,7 +146,7 @@ def read_recording(path: Path | str) -> Recording:
     if text is None:
         raise InputError(f"{path}: not a recording, the schema metadata has no key {METADATA_KEY.decode()!r}")
     metadata = RecordingMetadata.from_json(text, where=f"{path}: metadata")
-    _check_column_names(table.column_names, metadata.robots, path)
+    _check_column_names(table.column_names, metadata, path)
     if table.num_rows == 0:
         raise InputError(f"{path}: the file has no rows")
     values = {name: _column(table, name, path) for name in table.column_names}
@@ -125,11 +155,25 @@ def read_recording(path: Path | str) -> Recording:
         names = [f"omnid{i}.{s}" for i in range(1, metadata.robots + 1) for s in suffixes]
         return np.stack([values[name] for name in names], axis=-1).reshape(-1, metadata.robots, 3)
 
-    arrays = {field: stack(suffixes) for field, suffixes in CHANNELS.items() if field != "ref"}
-    ref = stack(CHANNELS["ref"]) if any(".ref_" in name for name in values) else None
+    channels = CHANNELS[metadata.level]
+    arrays = {field: stack(suffixes) for field, suffixes in channels.items() if field != "ref"}
+    ref = stack(channels["ref"]) if any(".ref_" in name for name in values) else None
+    if metadata.level == "wrist":
+        check_finite(str(path), values)
+        phi, tau = _joints(arrays.pop("h"), arrays.pop("force"), metadata, path)
+        arrays |= {"phi": phi, "tau": tau}
     recording = Recording(time=values["time"], ref=ref, metadata=metadata, name=str(path), **arrays)
     check_recording(recording)
     return recording
+
+
+def _joints(h: Array, force: Array, metadata: RecordingMetadata, path: Path) -> tuple[Array, Array]:
+    if (fault := wrist_fault(h, metadata.design)) is None:
+        return joints_of(h, force, metadata.design)
+    (row, robot), sentence = fault
+    in_mm = np.abs(h).max() > 2.0 and wrist_fault(1e-3 * h, metadata.design) is None
+    hint = "the values look like millimetres" if in_mm else "are zero, signs and order of its axes right?"
+    raise InputError(f"{path}: omnid{robot + 1}.h_x, .h_y, .h_z in row {row}: {sentence} - {hint}")
 
 
 def _read_table(path: Path) -> pa.Table:
@@ -153,18 +197,22 @@ def _read_table(path: Path) -> pa.Table:
         raise InputError(f"{path}: not a readable Parquet file, or a damaged one ({detail})") from error
 
 
-def _check_column_names(names: list[str], robots: int, path: Path) -> None:
+def _check_column_names(names: list[str], metadata: RecordingMetadata, path: Path) -> None:
+    robots, channels = metadata.robots, CHANNELS[metadata.level]
+
     def of_robots(*fields: str) -> list[str]:
         # No need to spell out an absurd number of robots: each has more columns than one.
         spelled = range(1, min(robots, len(names)) + 1)
-        return [f"omnid{i}.{s}" for i in spelled for field in fields for s in CHANNELS[field]]
+        return [f"omnid{i}.{s}" for i in spelled for field in fields for s in channels[field]]
 
-    required, optional = ["time", *of_robots("phi", "theta", "tau")], of_robots("ref")
+    required = ["time", *of_robots(*(field for field in channels if field != "ref"))]
+    optional = of_robots("ref")
     valid = {*required, *optional}
     if any(name in optional for name in names):
         required += optional
-    suffixes = ", ".join(s for group in CHANNELS.values() for s in group)
-    rule = f"the columns are time and, for i = 1..{robots}, omnid{{i}}. followed by {suffixes}"
+    suffixes = ", ".join(s for group in channels.values() for s in group)
+    of_level = f" at {metadata.level} level" if metadata.level != "joint" else ""
+    rule = f"the columns{of_level} are time and, for i = 1..{robots}, omnid{{i}}. followed by {suffixes}"
     for name in names:
         if name not in valid:
             close = difflib.get_close_matches(name, sorted(valid), n=1)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 from estimator.design import OmnidDesign
 from estimator.errors import InputError
 
 FORMAT = "mocobot-recording"
-VERSION = 1
+VERSIONS = (1, 2)
+"""Version 2 has the key ``level``; files of version 1 are joint level, and joint level is still written as such."""
 TRIALS = ("random", "periodic", "static")
+Level = Literal["joint", "wrist"]
+LEVELS: tuple[Level, ...] = ("joint", "wrist")
 _REQUIRED = ("format", "version", "robots", "rate_hz", "trial", "source", "payload", "seed", "design")
 _OPTIONAL = ("control",)
 
@@ -29,6 +32,7 @@ class RecordingMetadata:
         seed: seed of a simulated trial, or None.
         design: numbers of the robots (all alike).
         control: gains, feed-forward and inner loop as plain JSON values, or None.
+        level: how the file tells the samples: "joint" (phi, theta, tau) or "wrist" (h, theta, force).
     """
 
     robots: int
@@ -39,6 +43,7 @@ class RecordingMetadata:
     seed: int | None
     design: OmnidDesign
     control: dict[str, Any] | None = None
+    level: Level = "joint"
 
     def to_json(self) -> str:
         """The metadata as JSON text.
@@ -48,7 +53,7 @@ class RecordingMetadata:
         """
         values: dict[str, Any] = {
             "format": FORMAT,
-            "version": VERSION,
+            "version": 1 if self.level == "joint" else 2,
             "robots": self.robots,
             "rate_hz": self.rate_hz,
             "trial": self.trial,
@@ -57,6 +62,8 @@ class RecordingMetadata:
             "seed": self.seed,
             "design": self.design.to_dict(),
         }
+        if self.level != "joint":
+            values["level"] = self.level
         if self.control is not None:
             values["control"] = self.control
         try:
@@ -85,11 +92,12 @@ class RecordingMetadata:
         if not isinstance(values, dict):
             raise InputError(f"{where}: must be a JSON object, not {values!r:.60}")
         _check_format(values, where)
-        for key in sorted(set(values) - {*_REQUIRED, *_OPTIONAL}):
-            raise InputError(f"{where}: unknown key {key!r}; the keys are {', '.join(_REQUIRED + _OPTIONAL)}")
-        for key in _REQUIRED:
+        required = _REQUIRED + (("level",) if values.get("version") == 2 else ())
+        for key in sorted(set(values) - {*required, *_OPTIONAL}):
+            raise InputError(f"{where}: unknown key {key!r}; the keys are {', '.join(required + _OPTIONAL)}")
+        for key in required:
             if key not in values:
-                raise InputError(f"{where}: missing key {key!r}; required are {', '.join(_REQUIRED)}")
+                raise InputError(f"{where}: missing key {key!r}; required are {', '.join(required)}")
         _check_values(values, where)
         return cls(
             robots=values["robots"],
@@ -100,6 +108,7 @@ class RecordingMetadata:
             seed=values["seed"],
             design=OmnidDesign.from_dict(values["design"], where=f"{where}: design"),
             control=values.get("control"),
+            level=values.get("level", "joint"),
         )
 
 
@@ -107,9 +116,10 @@ def _check_format(values: dict[str, Any], where: str) -> None:
     """Before anything else: another version may well have other keys."""
     if values.get("format", FORMAT) != FORMAT:
         raise InputError(f"{where}: format is {values['format']!r}; it must be {FORMAT!r}")
-    version = values.get("version", VERSION)
-    if type(version) is not int or version != VERSION:
-        raise InputError(f"{where}: version is {version!r}; this program reads version {VERSION}")
+    version = values.get("version", VERSIONS[0])
+    if type(version) is not int or version not in VERSIONS:
+        known = " and ".join(str(known) for known in VERSIONS)
+        raise InputError(f"{where}: version is {version!r:.60}; this program reads versions {known}")
 
 
 def _check_values(values: dict[str, Any], where: str) -> None:
@@ -129,6 +139,8 @@ def _check_values(values: dict[str, Any], where: str) -> None:
     require("payload", "text or null, all of it printable", good=is_label)
     require("seed", "a whole number or null", good=seed is None or type(seed) is int)
     require("design", "an object", good=isinstance(values["design"], dict))
+    if "level" in values:
+        require("level", f"one of {', '.join(LEVELS)}", good=values["level"] in LEVELS)
     if "control" in values:
         require("control", "an object (leave it out if unknown)", good=isinstance(values["control"], dict))
 
