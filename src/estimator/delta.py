@@ -144,12 +144,14 @@ def is_in_reach(h: ArrayLike, design: OmnidDesign) -> NDArray[np.bool_]:
 
 def _leg_triangles(h: Array, design: OmnidDesign) -> tuple[Array, Array, Array]:
     """Wrist from each driven axis, outward and up [m], and the cosine of the angle there; each (..., 3)."""
-    # Once the platform joint is shifted onto the wrist.
-    reach = h[..., None, :] - (design.base_radius_m - design.platform_radius_m) * LEG_DIRECTIONS
-    outward, up = np.sum(reach * LEG_DIRECTIONS, axis=-1), reach[..., 2]
-    distance = np.hypot(outward, up)
     l1, l2 = design.proximal_length_m, design.rod_length_m
-    with np.errstate(all="ignore"):  # on the driven axis itself, or absurdly far: no cosine, so out of reach
+    with np.errstate(
+        all="ignore"
+    ):  # on the driven axis itself, or infinitely far: no cosine, so out of reach
+        # Once the platform joint is shifted onto the wrist.
+        reach = h[..., None, :] - (design.base_radius_m - design.platform_radius_m) * LEG_DIRECTIONS
+        outward, up = np.sum(reach * LEG_DIRECTIONS, axis=-1), reach[..., 2]
+        distance = np.hypot(outward, up)
         return outward, up, (l1**2 + np.sum(reach**2, axis=-1) - l2**2) / (2.0 * l1 * distance)
 
 

@@ -34,18 +34,20 @@ def wrist_of(phi: ArrayLike, tau: ArrayLike, design: OmnidDesign) -> tuple[Array
         h in {b} [m] and force in {b} [N], arm weight and inertia not removed, each of shape (..., 3).
 
     Raises:
-        InputError: the rods cannot meet, a knee points inward, or the arm is singular at some configuration.
+        InputError: at some configuration the rods cannot meet, a leg is past its stretched position, the wrist is not
+            above the driven axes, or the arm is singular.
     """
     phi, tau = np.asarray(phi, dtype=float), np.asarray(tau, dtype=float)
     apart = ~is_reachable(phi, design)
     if np.any(apart):
         raise InputError(f"no wrist position reaches all three rods at phi = ({_at(phi, apart)}) rad")
     legs = leg_geometry(phi, design)
-    inward = np.any(legs.leverage <= 0.0, axis=-1)
-    if np.any(inward):
-        raise InputError(
-            f"a knee points inward at phi = ({_at(phi, inward)}) rad, which no wrist position tells"
-        )
+    folded = np.any(legs.leverage <= 0.0, axis=-1)
+    if np.any(folded):
+        raise InputError(f"a leg is folded past its stretched position at phi = ({_at(phi, folded)}) rad")
+    below = legs.h[..., 2] <= 0.0
+    if np.any(below):
+        raise InputError(f"the wrist lies below the driven axes at phi = ({_at(phi, below)}) rad")
     singular = _is_singular(legs)
     if np.any(singular):
         raise InputError(f"the arm is singular at phi = ({_at(phi, singular)}) rad")
@@ -96,8 +98,9 @@ def wrist_fault(h: ArrayLike, design: OmnidDesign) -> tuple[tuple[int, ...], str
     if (index := _first(~is_reachable(phi, design))) is not None:
         return index, f"the arm is singular at the wrist position ({_numbers(h[index])}) m"
     legs = leg_geometry(phi, design)
-    if (index := _first(np.any(np.abs(legs.h - h) > _SAME_M, axis=-1))) is not None:
-        return index, f"the wrist position ({_numbers(h[index])}) m lies below the plane of the knees"
+    below = (h[..., 2] <= 0.0) | np.any(np.abs(legs.h - h) > _SAME_M, axis=-1)
+    if (index := _first(below)) is not None:
+        return index, f"the wrist position ({_numbers(h[index])}) m lies below the arm"
     if (index := _first(_is_singular(legs))) is not None:
         return index, f"the arm is singular at the wrist position ({_numbers(h[index])}) m"
     return None

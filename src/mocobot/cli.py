@@ -121,6 +121,8 @@ class Simulate:
     """Sensors: ideal, nominal or uncalibrated."""
     seed: int = 0
     """Seed of trajectory, noise and calibration errors."""
+    level: Literal["joint", "wrist"] = "joint"
+    """What the file holds: driven angles and spring torques, or wrist positions and forces."""
 
     def run(self) -> None:
         """Run the command."""
@@ -151,7 +153,9 @@ class Simulate:
         request = replace(request, **{name: value for name, value in given.items() if value is not None})
         with bar(None, "simulating", "sample") as advance:
             done = simulate(request, [sensor_preset(self.preset)], progress=advance, scene=scene)
-        write_recording(done.recordings[self.preset], self.out)
+        recording = done.recordings[self.preset]
+        metadata = replace(recording.metadata, level=self.level)
+        write_recording(replace(recording, metadata=metadata), self.out)
         write_truth(done.truth, self.out)
         print(f"{self.out}: {done.log.time[-1]:.1f} s of {self.trajectory} motion, {self.preset} sensors")
 
