@@ -1,0 +1,98 @@
+"""Time of a table in whole nanoseconds: exact for whole numbers and decimal text, rounded for floats."""
+
+from __future__ import annotations
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from numpy.typing import NDArray
+
+from estimator.errors import InputError
+from mocobot_logs.log import Stamps
+
+LARGEST_NS = (1 << 63) - 1
+_DIGITS = {10**exponent: exponent for exponent in range(10)}
+
+Given = NDArray[np.bool_]
+
+
+def from_numbers(values: NDArray, unit_ns: int, where: str, row: int = 0) -> tuple[Stamps, Given]:
+    """Stamps from numbers.
+
+    Args:
+        values: times in any unit, whole numbers or floats, NaN where there is none, shape (q,).
+        unit_ns: nanoseconds in one unit.
+        where: file and column, for messages.
+        row: row of the first one, for messages.
+
+    Returns:
+        Stamps [ns], 0 where there is none, and where there is one; each of shape (q,).
+
+    Raises:
+        InputError: a time is infinite or beyond 292 years.
+    """
+    if values.dtype.kind in "iu":
+        limit = LARGEST_NS // unit_ns
+        beyond = (values > limit) | (values < -limit)
+        _refuse(values, beyond, where, row)
+        return values.astype(np.int64) * unit_ns, np.ones(len(values), bool)
+    given = ~np.isnan(values)
+    with np.errstate(over="ignore"):
+        scaled = np.where(given, values, 0.0).astype(np.float64) * unit_ns
+    # One below 2**63: the next float down from it is whole and fits.
+    _refuse(values, np.abs(scaled) >= float(LARGEST_NS), where, row)
+    return np.rint(scaled).astype(np.int64), given
+
+
+def from_text(values: pa.Array, unit_ns: int, where: str, row: int = 0) -> tuple[Stamps, Given]:
+    """Stamps from decimal text, to the nanosecond: a float of the Unix time resolves 0.24 us only.
+
+    Args:
+        values: decimal numbers, null where there is none, shape (q,).
+        unit_ns: nanoseconds in one unit, a power of ten.
+        where: file and column, for messages.
+        row: row of the first one, for messages.
+
+    Returns:
+        As ``from_numbers``.
+
+    Raises:
+        InputError: a time is not a number, or is beyond 292 years.
+    """
+    exact = pa.decimal128(38, _DIGITS[unit_ns])
+    try:
+        decimals = pc.cast(values, exact, safe=False)
+    except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
+        raise InputError(_first_bad(values, exact, where, row)) from None
+    given = decimals.is_valid().to_numpy(zero_copy_only=False)
+    if not len(values):
+        return np.empty(0, np.int64), given
+    # A decimal is 128 bits, low word first; its digits without the point are the nanoseconds.
+    buffer = decimals.buffers()[1]
+    words = np.frombuffer(buffer, np.int64).reshape(-1, 2)[decimals.offset : decimals.offset + len(values)]
+    low, high = np.where(given[:, None], words, 0).T
+    beyond = high != (low >> 63)
+    if beyond.any():
+        text = values[int(np.flatnonzero(beyond)[0])].as_py()
+        raise InputError(_range(where, row + int(np.flatnonzero(beyond)[0]), text))
+    return low.copy(), given
+
+
+def _refuse(values: NDArray, beyond: Given, where: str, row: int) -> None:
+    if beyond.any():
+        first = int(np.flatnonzero(beyond)[0])
+        raise InputError(_range(where, row + first, values[first]))
+
+
+def _range(where: str, row: int, value: object) -> str:
+    return f"{where} is {value!s:.40} in row {row}; a time must be finite and within 292 years (is its unit right?)"
+
+
+def _first_bad(values: pa.Array, exact: pa.DataType, where: str, row: int) -> str:
+    for index, value in enumerate(values):
+        try:
+            pc.cast(pa.array([value.as_py()], values.type), exact, safe=False)
+        except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
+            text = value.as_py()
+            return f"{where} is {text!r:.60} in row {row + index}; a time must be a number"
+    return f"{where} holds what is not a number"
