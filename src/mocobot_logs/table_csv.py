@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -51,6 +52,7 @@ class CsvTable:
             raise InputError(
                 f"{name}: the first line holds numbers ({header.strip()!r:.60}); it must name the columns"
             )
+        self._empty = not first_row
         self.size = path.stat().st_size
         self.shapes: Mapping[str, tuple[int, ...]] = dict.fromkeys(self._names, ())
 
@@ -72,10 +74,12 @@ class CsvTable:
         clash = set(columns) & set(clocks)
         if clash:
             raise InputError(f"{self.name}: column {clash.pop()!r} is both time and a channel")
+        if self._empty:
+            return
         row = before = 0
         with self._readable() as source:
             reader = self._reader(source, types)
-            while reader is not None and (batch := self._next(reader)) is not None:
+            while (batch := self._next(reader)) is not None:
                 yield Block(
                     {
                         # A cell without a value is NaN.
@@ -104,7 +108,7 @@ class CsvTable:
         except OSError as error:
             raise InputError(f"{self.name}: cannot be read ({error.strerror or error})") from error
 
-    def _reader(self, source: pa.NativeFile, types: dict[str, pa.DataType]) -> pcsv.CSVStreamingReader | None:
+    def _reader(self, source: pa.NativeFile, types: dict[str, pa.DataType]) -> pcsv.CSVStreamingReader:
         try:
             return pcsv.open_csv(
                 source,
@@ -124,10 +128,6 @@ class CsvTable:
                     decimal_point=self._decimal,
                 ),
             )
-        except pa.ArrowInvalid as error:
-            if "Empty CSV file" in str(error):
-                return None
-            raise self._complaint(error) from error
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             raise self._complaint(error) from error
 
@@ -142,7 +142,7 @@ class CsvTable:
     def _complaint(self, error: Exception) -> InputError:
         text = str(error)
         row = re.search(r"Row #(\d+)", text)
-        line = f" in line {int(row[1]) + self._lines_before}" if row else ""
+        line = f" in line {self._line_of(int(row[1]))}" if row else ""
         if found := re.search(r"In CSV column #(\d+).*invalid value '(.*)", text, re.DOTALL):
             column, cell = self._names[int(found[1])], found[2].removesuffix("'")
             return InputError(
@@ -157,6 +157,15 @@ class CsvTable:
                 f"{self.name}: a row is longer than {BLOCK_BYTES >> 20} MiB; this is no table of samples"
             )
         return InputError(f"{self.name}: cannot be read as CSV ({' '.join(text.split())!r:.200})")
+
+    def _line_of(self, row: int) -> int:
+        """Line of the file, given the row as pyarrow counts it: without the blank lines after the header."""
+        with contextlib.suppress(OSError), self._path.open("rb") as file:
+            for number, line in enumerate(file, 1):
+                row += number > self._lines_before and not line.strip(b"\r\n")
+                if number >= row:
+                    break
+        return row
 
     def _index(self, name: str) -> int:
         if (count := self._names.count(name)) > 1:

@@ -202,7 +202,8 @@ class TableSource:
         return Place(found[1], index) if inside else None
 
     def _missing(self, address: str, what: str) -> str:
-        names = sorted({*self._table.shapes, *self._table.aliases})
+        mapped = {c.column for robot in range(1, self.robots + 1) for c in self._map.channels(robot).values()}
+        names = sorted({*self._table.shapes, *self._table.aliases} - mapped)
         close = difflib.get_close_matches(address, names[:1000], n=1, cutoff=0.75)
         hint = f" (did you mean {close[0]!r:.60}?)" if close else ""
         listed = ", ".join(f"{name!s:.60}" for name in list(self._table.shapes)[:SHOWN_COLUMNS])
