@@ -1,0 +1,174 @@
+"""What a bag's storage hands over: its topics, and serialised messages by the block."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.errors import InputError
+from mocobot_logs.log import Stamps
+
+BLOCK_BYTES = 4 << 20
+"""About so many bytes of messages are handed over at a time, unless a chunk of the file is larger."""
+MESSAGE_BYTES = 16 << 20
+"""Largest message that is read [bytes]; one robot's joint states take some hundred."""
+SHOWN_TOPICS = 20
+"""So many topics are listed in a message."""
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A topic of a bag.
+
+    Attributes:
+        name: such as ``/omnid1/joint/joint_states``.
+        type: such as ``sensor_msgs/msg/JointState``.
+        encoding: how messages are serialised, ``cdr`` in all that is read.
+        definition_format: ``ros2msg``, ``ros2idl``, or "" where the bag has no definition of the type.
+        definition: text of the definition.
+        count: number of messages as far as it is known, else None.
+    """
+
+    name: str
+    type: str
+    encoding: str
+    definition_format: str = ""
+    definition: str = ""
+    count: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Messages:
+    """Serialised messages of one topic inside a block of memory, in the order of the bag.
+
+    Attributes:
+        block: the memory.
+        start: first byte of each message, shape (q,).
+        size: its number of bytes, shape (q,).
+        log_ns: when the recorder wrote it [ns], shape (q,).
+        order: place of each message among those of all topics of the block, shape (q,).
+    """
+
+    block: bytes
+    start: NDArray[np.int64]
+    size: NDArray[np.int64]
+    log_ns: Stamps
+    order: NDArray[np.int64]
+
+    def __len__(self) -> int:
+        """Number of messages q."""
+        return len(self.start)
+
+    def __getitem__(self, index: int) -> bytes:
+        """One message."""
+        start = int(self.start[index])
+        return self.block[start : start + int(self.size[index])]
+
+
+class Storage(Protocol):
+    """One file of a bag.
+
+    Attributes:
+        name: what messages call it.
+        size: bytes to read.
+        topics: by name.
+    """
+
+    name: str
+    size: int
+    topics: dict[str, Topic]
+
+    def blocks(
+        self, topics: Collection[str], advance: Callable[[int], object]
+    ) -> Iterator[dict[str, Messages]]:
+        """Messages of some topics in the order of the file; topics without messages in a block are left out.
+
+        Args:
+            topics: names of the topics.
+            advance: takes the bytes read since the last call.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        ...
+
+    def has_messages(self, topic: str) -> bool:
+        """Whether there is any message of a topic, as far as the file says.
+
+        Raises:
+            InputError: the file is damaged.
+        """
+        ...
+
+
+def joined(payloads: list[bytes], log_ns: Stamps, order: NDArray[np.int64], where: str) -> Messages:
+    """Messages that come one by one, in one block of memory.
+
+    Raises:
+        InputError: one is larger than ``MESSAGE_BYTES``.
+    """
+    size = np.fromiter(map(len, payloads), np.int64, len(payloads))
+    check_sizes(size, where)
+    return Messages(b"".join(payloads), np.cumsum(size) - size, size, log_ns, order)
+
+
+def check_sizes(size: NDArray[np.int64], where: str) -> None:
+    """Refuse messages that are larger than ``MESSAGE_BYTES``.
+
+    Raises:
+        InputError: one is.
+    """
+    if len(size) and (largest := int(size.max())) > MESSAGE_BYTES:
+        raise InputError(
+            f"{where}: a message of {largest / 2**20:.1f} MiB; joint data are read from messages of at most "
+            f"{MESSAGE_BYTES >> 20} MiB"
+        )
+
+
+def merged_topics(storages: Collection[Storage]) -> dict[str, Topic]:
+    """Topics of all files of a bag.
+
+    Raises:
+        InputError: a topic has one type in one file and another one in another.
+    """
+    found: dict[str, Topic] = {}
+    for storage in storages:
+        for name, topic in storage.topics.items():
+            known = found.setdefault(name, topic)
+            if known is topic:
+                continue
+            if (known.type, known.encoding) != (topic.type, topic.encoding):
+                raise InputError(
+                    f"{storage.name}: topic {name!r:.80} holds {topic.type!r:.80} ({topic.encoding!r:.20}), but "
+                    f"{known.type!r:.80} ({known.encoding!r:.20}) in another file of the bag"
+                )
+            count = None if known.count is None or topic.count is None else known.count + topic.count
+            described = known if known.definition_format else topic
+            found[name] = Topic(
+                name,
+                topic.type,
+                topic.encoding,
+                described.definition_format,
+                described.definition,
+                count,
+            )
+    return found
+
+
+def listed(topics: Mapping[str, Topic]) -> str:
+    """The topics of a bag and their types, for messages."""
+    if not topics:
+        return "the bag has no topics"
+    first = list(topics.values())[:SHOWN_TOPICS]
+    names = ", ".join(f"{printable(topic.name)} ({printable(topic.type)})" for topic in first)
+    more = f", ... ({len(topics)} in all)" if len(topics) > SHOWN_TOPICS else ""
+    return f"the bag's topics are {names}{more}"
+
+
+def printable(text: str) -> str:
+    """Text of a file as a terminal may show it."""
+    return f"{text:.80}" if text.isprintable() else f"{text!r:.80}"
