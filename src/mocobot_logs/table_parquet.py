@@ -78,7 +78,9 @@ class ParquetTable:
         row = 0
         for path in self._files:
             with opened(path, self.name) as file:
-                check_claim(8 * cells * file.metadata.num_rows, path.stat().st_size, str(self.name))
+                check_claim(
+                    8 * cells * file.metadata.num_rows, path.stat().st_size, f"{self.name}: the table"
+                )
                 for batch in file.iter_batches(rows_at_a_time(cells), columns=names, use_threads=False):
                     yield self._block(batch, columns, clocks, unit_ns, row)
                     row += batch.num_rows
