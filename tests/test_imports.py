@@ -1,4 +1,5 @@
-"""Imports run one way: estimator <- mocobot_sim <- discrepancy <- mocobot (the command line)."""
+"""Imports run one way: estimator <- mocobot_sim <- discrepancy <- mocobot (the command line), and estimator <-
+mocobot_logs <- mocobot."""
 
 from __future__ import annotations
 
@@ -36,6 +37,29 @@ def test_no_layer_imports_a_later_one(package: str) -> None:
     later = set(LAYERS[LAYERS.index(package) + 1 :])
     for path in files:
         assert not imported_roots(path) & later, path
+
+
+def test_logs_need_the_estimator_only() -> None:
+    """Measured logs can be read where there is no simulator, and the simulator knows nothing of them."""
+    files = source_files("mocobot_logs")
+    assert len(files) > 10
+    for path in files:
+        assert not imported_roots(path) & {"mocobot_sim", "discrepancy", "mocobot", "mujoco", "dm_control"}, (
+            path
+        )
+    for package in ("estimator", "mocobot_sim", "discrepancy"):
+        for path in source_files(package):
+            assert "mocobot_logs" not in imported_roots(path), path
+
+
+def test_logs_are_read_without_the_simulator() -> None:
+    code = (
+        "import sys; import pkgutil, importlib, mocobot_logs\n"
+        "for m in pkgutil.walk_packages(mocobot_logs.__path__, 'mocobot_logs.'): importlib.import_module(m.name)\n"
+        "assert 'mocobot_logs.open_log' in sys.modules\n"
+        "assert not {'mujoco', 'dm_control', 'numba', 'mocobot_sim', 'discrepancy', 'mocobot'} & set(sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_estimator_needs_numpy_and_scipy_only() -> None:
