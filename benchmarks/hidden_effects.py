@@ -26,6 +26,7 @@ class Options:
     Attributes:
         part: what to run.
         draws: sets per cause and size, or in all where there is neither.
+        first: seed of the first draw.
         factors: sizes over the detection limit.
         causes: what to hide; all if none is given.
         background: tolerances besides.
@@ -39,6 +40,7 @@ class Options:
 
     part: Part = "single"
     draws: int = 2
+    first: int = 0
     factors: tuple[float, ...] = (4.0,)
     causes: tuple[str, ...] = ()
     background: bool = False
@@ -60,7 +62,11 @@ def main(options: Options) -> None:
         print(failures(read_results(options.out / "results.jsonl")))
     else:
         chosen = tasks(
-            options.part, options.draws, options.factors, options.causes, background=options.background
+            options.part,
+            range(options.first, options.first + options.draws),
+            options.factors,
+            options.causes,
+            background=options.background,
         )
         run_tasks(chosen, options.out, options.jobs, again=options.again)
 

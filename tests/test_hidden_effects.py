@@ -7,7 +7,7 @@ import pytest
 
 import discrepancy.team.causes
 import mocobot_sim.effects
-from discrepancy.search import CLEAN
+from discrepancy.explanation import CLEAN
 from discrepancy.team.causes import CAUSES
 from hidden.generator import generate
 from hidden.limits import LIMITS

@@ -122,6 +122,22 @@ def test_evidence_is_the_distance_over_uncertainty_and_tolerance(rows):
     assert problem.fit([1]).evidence_of(1) is None
 
 
+@pytest.mark.parametrize("free", [(), (0,), (4,)])
+@pytest.mark.parametrize("index", [1, 2, 3])
+def test_evidence_with_other_columns_is_that_of_the_changed_problem(rng, rows, free, index):
+    problem = Problem.of(rows, CANDIDATES)
+    columns = [rng.standard_normal((*r.residual.shape, len(CANDIDATES[index].parameters))) for r in rows]
+    columns[1][:] = 0.0  # as of a transient that another trial has
+    without = problem.fit(free, fixed=(index, np.zeros(len(CANDIDATES[index].parameters))))
+    changed = problem.with_columns(index, CANDIDATES[index], columns)
+    expected, found = changed.fit(free).evidence_of(index), without.evidence_with(index, columns)
+    for name in ("gain", "fall", "log10_p", "score", "parameters"):
+        assert getattr(found, name) == pytest.approx(getattr(expected, name)), name
+    np.testing.assert_allclose(found.values, expected.values)
+    np.testing.assert_allclose(found.covariance, expected.covariance, atol=1e-12)
+    assert found.fall == pytest.approx(without.misfit - changed.fit([*free, index]).misfit)
+
+
 def test_inflated_noise_divides_the_gain(rows):
     fit = Problem.of(rows, CANDIDATES).fit()
     plain, inflated = fit.evidence_of(1), fit.evidence_of(1, 4.0)

@@ -31,18 +31,14 @@ class Task:
 
 
 def tasks(
-    part: Part, draws: int, factors: Sequence[float], causes: Sequence[str], *, background: bool
+    part: Part, seeds: Sequence[int], factors: Sequence[float], causes: Sequence[str], *, background: bool
 ) -> list[Task]:
     """All tasks of a part; payloads of clean and tolerance sets take turns, others are drawn."""
     names = list(causes) or list(CAUSES)
     if part in ("clean", "tolerance"):
-        return [
-            Task(part, HiddenSet(part, seed, payload=PAYLOADS[seed % len(PAYLOADS)])) for seed in range(draws)
-        ]
+        return [Task(part, HiddenSet(part, seed, payload=PAYLOADS[seed % len(PAYLOADS)])) for seed in seeds]
     if part == "pairs":
-        return [
-            Task(part, HiddenSet("pair", seed, _pair(seed), background=background)) for seed in range(draws)
-        ]
+        return [Task(part, HiddenSet("pair", seed, _pair(seed), background=background)) for seed in seeds]
     if part == "leave-one-out":
         factors = [LEFT_OUT_FACTOR]
     return [
@@ -51,7 +47,7 @@ def tasks(
             HiddenSet("single", seed, (cause,), factor, background=background),
             (cause,) if part == "leave-one-out" else (),
         )
-        for seed in range(draws)
+        for seed in seeds
         for factor in factors
         for cause in names
     ]

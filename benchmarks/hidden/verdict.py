@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from discrepancy.diagnose import Alternative, Diagnosis, diagnose
-from discrepancy.search import Found
+from discrepancy.explanation import Found
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from estimator.estimate import estimate_payload

@@ -8,9 +8,10 @@ from typing import Literal
 
 import numpy as np
 
+from discrepancy.explanation import Explanation, Found
 from discrepancy.gain import Gain, Response, mean_chi2, responses
 from discrepancy.rig import Candidate, Rig
-from discrepancy.search import ENOUGH, Explanation, Found, refitted, search
+from discrepancy.search import ENOUGH, MOST_CAUSES, refitted, search
 
 Verdict = Literal["consistent", "explained", "partly_explained", "unexplained"]
 
@@ -71,6 +72,7 @@ def diagnose(
     rig: Rig,
     *,
     closed_loop: bool = True,
+    most: int = MOST_CAUSES,
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
     simulated: Callable[[int], object] | None = None,
@@ -80,11 +82,12 @@ def diagnose(
     Args:
         rig: recordings and causes.
         closed_loop: whether to run the recorded commands again.
+        most: largest number of causes; more than the default where the nominal model leaves out much on purpose.
         jobs: parallel processes of the simulations.
         say: called with what is being done.
         simulated: called with 1 for every simulated trial.
     """
-    explanation = search(rig, progress=say)
+    explanation = search(rig, most, progress=say)
     why_not = rig.can_run_again() if closed_loop else "the closed loop was left out on request"
     alternatives: list[tuple[Alternative, ...]] = [_unsimulated(found) for found in explanation.found]
     gain: Gain | None = None
@@ -130,7 +133,9 @@ def _add_up(explanation: Explanation) -> bool:
     """Three causes at one robot, or that look alike, imitate another that the catalogue does not have."""
     robots = {found.candidate.robot for found in explanation.found} - {None}
     families = {found.candidate.family for found in explanation.found}
-    return len(explanation.found) > 2 and (len(robots) <= 1 or len(families) <= 2)
+    # Where no cause has a robot, all are at one place anyway, and only their families tell.
+    placed = any(candidate.robot for candidate in explanation.problem.candidates)
+    return len(explanation.found) > 2 and ((placed and len(robots) <= 1) or len(families) <= 2)
 
 
 def _without_suspects(rig: Rig, explanation: Explanation) -> tuple[Explanation, str]:

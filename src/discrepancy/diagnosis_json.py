@@ -42,9 +42,9 @@ from typing import Any
 import numpy as np
 
 from discrepancy.diagnose import Alternative, Diagnosis
+from discrepancy.explanation import Explanation, Found
 from discrepancy.gain import Gain, Response
 from discrepancy.rig import Candidate, Rig
-from discrepancy.search import Explanation, Found
 from discrepancy.signature import signature
 from discrepancy.words import Words
 

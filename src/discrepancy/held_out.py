@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discrepancy.problem import Fit, Problem
+from discrepancy.fit import Fit
+from discrepancy.problem import Problem
 from discrepancy.rig import Candidate
 
 SHORT_ROWS = 24

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
+from discrepancy.explanation import Explanation
 from discrepancy.plots_against import against_figure
 from discrepancy.plots_evidence import closed_loop_figure, evidence_figure
-from discrepancy.search import Explanation
 from discrepancy.traces import Group, Trace, groups
 from discrepancy.words import Words
 

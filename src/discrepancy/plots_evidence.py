@@ -10,11 +10,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
+from discrepancy.explanation import CLEAN, Explanation
+from discrepancy.fit import Evidence
 from discrepancy.plots_against import AFTER, BEFORE
-from discrepancy.problem import Evidence
 from discrepancy.report_gain import SMALL_UNITS
 from discrepancy.rig import Candidate
-from discrepancy.search import CLEAN, Explanation
 
 NAMED, FAMILY, OTHER = "#2f6fd0", "#8fb3e8", "#b9bfc9"
 TOP = 14

@@ -6,8 +6,8 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from discrepancy.explanation import CLEAN
 from discrepancy.report_gain import gain_lines
-from discrepancy.search import CLEAN
 
 WIDTH = 100
 STRAINED = -6.0

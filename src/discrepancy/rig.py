@@ -44,6 +44,7 @@ class Candidate:
         parameters: its numbers, in the order of its columns.
         shape: further numbers that change the columns themselves, by name.
         detail: for a transient, when and in which trial.
+        where: the place in words, of what sits at no robot and no joint.
     """
 
     cause: str
@@ -53,6 +54,7 @@ class Candidate:
     parameters: tuple[Parameter, ...]
     shape: Mapping[str, float] = field(default_factory=dict)
     detail: Mapping[str, float] = field(default_factory=dict)
+    where: str = "payload"
 
     @property
     def units(self) -> Array:
@@ -64,7 +66,7 @@ class Candidate:
         """The place in words."""
         words = [f"robot {self.robot}"] if self.robot else []
         words += [f"joint {self.joint}"] if self.joint else []
-        return ", ".join(words) or "payload"
+        return ", ".join(words) or self.where
 
     @property
     def label(self) -> str:

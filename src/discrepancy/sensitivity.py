@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.search import Explanation
+from discrepancy.explanation import Explanation
 
 NOTICED = 38.0
 """Expected gain of chi-square at which a cause is found in about nine of ten data sets."""

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.explanation import Explanation
 from discrepancy.rig import Rig
-from discrepancy.search import Explanation
 
 Array = NDArray[np.float64]
 

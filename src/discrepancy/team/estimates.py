@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.search import Explanation
+from discrepancy.explanation import Explanation
 from discrepancy.team.residual import Shared
 from discrepancy.team.rig import TeamRig
 from estimator import so3

@@ -12,8 +12,8 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
+from discrepancy.explanation import Explanation
 from discrepancy.rig import Candidate, Channel, Parameter, Rows
-from discrepancy.search import Explanation
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.linear import TrialLinear, start_bases

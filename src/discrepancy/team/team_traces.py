@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from discrepancy.search import Explanation
+from discrepancy.explanation import Explanation
 from discrepancy.team.rig import TeamRig
 from discrepancy.traces import Trace
 from discrepancy.whitening import Whitening

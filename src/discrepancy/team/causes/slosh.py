@@ -1,7 +1,9 @@
 """A mass that swings in the payload."""
 
+from typing import cast
+
 import numpy as np
-from scipy.signal import StateSpace, lsim
+from scipy.signal import cont2discrete, lfilter
 
 from discrepancy.team.causes.base import Array, Cause, stack
 from estimator.fusion import fuse
@@ -51,10 +53,11 @@ class Slosh(Cause):
         return stack(columns)
 
     def finer(self, shape):
-        lengths = shape["length_m"] * np.array([0.85, 0.9, 0.95, 0.975, 1.025, 1.05, 1.1, 1.15])
-        return [{**shape, "length_m": float(x)} for x in lengths] + [
-            {**shape, "length_m": float(x), "damping_ratio": 0.5 * shape["damping_ratio"]}
-            for x in lengths[2:6]
+        longer = (0.85, 0.9, 0.95, 0.975, 0.9875, 1.0125, 1.025, 1.05, 1.1, 1.15)
+        more = (0.5, 0.7, 0.85, 0.95, 1.05, 1.2, 1.4)  # swings less: the mass comes out larger
+        length, damping = shape["length_m"], shape["damping_ratio"]
+        return [{**shape, "length_m": length * x} for x in longer] + [
+            {"length_m": length * x, "damping_ratio": damping * y} for x in (0.98, 1.0, 1.02) for y in more
         ]
 
     def physical(self, values, context):
@@ -70,13 +73,8 @@ def _moment(r: Array, force: Array) -> Array:
 
 
 def _swing(a, rate_hz, gravity, shape):
-    """Relative acceleration of the swinging mass [m/s^2], shape (Q, 3)."""
+    """Relative acceleration of the swinging mass [m/s^2] from rest, a linear between samples, shape (Q, 3)."""
     w = np.sqrt(gravity / shape["length_m"])
-    pendulum = StateSpace(
-        [[0.0, 1.0], [-(w**2), -2.0 * shape["damping_ratio"] * w]],
-        [[0.0], [-1.0]],
-        [[-(w**2), -2.0 * shape["damping_ratio"] * w]],
-        [[-1.0]],
-    )
-    time = np.arange(len(a)) / rate_hz
-    return np.stack([np.asarray(lsim(pendulum, axis, time)[1]) for axis in a.T], axis=1)
+    pendulum = [-1.0, 0.0, 0.0], [1.0, 2.0 * shape["damping_ratio"] * w, w**2]
+    discrete = cast("tuple[Array, Array, float]", cont2discrete(pendulum, 1.0 / rate_hz, method="foh"))
+    return np.asarray(lfilter(np.ravel(discrete[0]), discrete[1], a, axis=0), dtype=np.float64)
