@@ -14,7 +14,7 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     """Assert that values have exactly the documented keys and types, and no number that is not finite."""
     assert set(values) == {
         "format", "version", "recordings", "verdict", "causes", "rejected", "gain", "not_simulated", "undecidable",
-        "residual", "notes",
+        "detection_limits", "residual", "notes",
     }  # fmt: skip
     assert (values["format"], values["version"]) == ("mocobot-diagnosis", 1)
     assert values["verdict"] in VERDICTS
@@ -39,6 +39,9 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     _check_gain(values["gain"], len(values["recordings"]), simulated=simulated)
     for entry in values["undecidable"]:
         assert set(entry) == {"what", "why", "remedy"}
+    for entry in values["detection_limits"]:
+        assert set(entry) == {"cause", "robot", "joint", "parameters"}
+        assert all(size is None or size > 0 for size in entry["parameters"].values())
     residual = values["residual"]
     assert set(residual) == {"chi2_per_n", "signature", "chi2_per_n_tolerated", "tolerances", "nominal"}
     assert set(residual["tolerances"]) == {"chi2", "freedom", "log10_p"}
@@ -130,6 +133,13 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
         },
         "not_simulated": None,
         "undecidable": [{"what": "this", "why": "of that", "remedy": "a weight"}],
+        "detection_limits": [
+            {"cause": "sea_bias", "robot": 1, "joint": 1, "parameters": {"bias_Nm": 0.0213}},
+            {"cause": "sea_bias", "robot": 1, "joint": 2, "parameters": {"bias_Nm": 0.0189}},
+            {"cause": "theta_zero", "robot": 1, "joint": 1, "parameters": {"zero_rad": 6e-4}},
+            {"cause": "theta_zero", "robot": 1, "joint": 3, "parameters": {"zero_rad": None}},
+            {"cause": "slosh", "robot": None, "joint": None, "parameters": {"mass_kg": None}},
+        ],
         "residual": {
             "chi2_per_n": 1.1,
             "signature": signature,

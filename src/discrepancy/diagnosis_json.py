@@ -25,7 +25,9 @@ gain                null where the closed loop was not simulated and there is no
     estimates       {before, after}, as the rig has them
     errors          {before, after} against the truth, only where it is known
 not_simulated       why there is no closed-loop comparison, or null
-undecidable         list of {what, why, remedy}
+undecidable         list of {what, why, remedy}: what no recordings of this rig decide, then what these do not
+detection_limits    list of {cause, robot, joint, parameters: {name: size}}: what would have been noticed nine times in
+                    ten; null where these recordings say nothing
 residual            {chi2_per_n, signature} of what the causes (with tolerances) leave, and
     chi2_per_n_tolerated           with tolerances and no cause
     tolerances                     {chi2, freedom, log10_p}: how hard they are used
@@ -45,6 +47,7 @@ from discrepancy.diagnose import Alternative, Diagnosis
 from discrepancy.explanation import Explanation, Found
 from discrepancy.gain import Gain, Response
 from discrepancy.rig import Candidate, Rig
+from discrepancy.sensitivity import blind_spots, detection_limits
 from discrepancy.signature import signature
 from discrepancy.words import Words
 
@@ -90,7 +93,8 @@ def diagnosis_to_dict(
         "rejected": [_where(candidate) for candidate in explanation.rejected],
         "gain": gain,
         "not_simulated": diagnosis.not_simulated,
-        "undecidable": rig.undecidable(),
+        "undecidable": [*rig.undecidable(), *blind_spots(explanation)],
+        "detection_limits": detection_limits(explanation),
         "residual": {
             "chi2_per_n": explanation.after / explanation.samples,
             "signature": plain(signature(rig, explanation)),

@@ -39,6 +39,12 @@ def format_diagnosis(values: Values) -> str:
         for note in notes:
             lines += _wrapped(note)
     lines += ["", "[[Residual]]", *(line for text in _residual(values) for line in _wrapped(text))]
+    if values["verdict"] == "consistent":
+        lines += [
+            "",
+            "[[What would have been noticed, nine times in ten]]",
+            *_limits(values["detection_limits"]),
+        ]
     if values["verdict"] != "consistent":
         lines += ["", "[[What such recordings cannot decide]]"]
         for entry in values["undecidable"]:
@@ -97,7 +103,7 @@ def _residual(values: Values) -> Iterable[str]:
     )
     if values["causes"]:
         text += f", {residual['chi2_per_n']:.3g} with what is named"
-    yield f"{text} (clean recordings: 1.05 to 1.15)."
+    yield f"{text} (up to {CLEAN:g} counts as clean)."
     tolerances = residual["tolerances"]
     if values["verdict"] != "consistent" and tolerances["log10_p"] < STRAINED:
         yield (
@@ -108,6 +114,25 @@ def _residual(values: Values) -> Iterable[str]:
         yield f"As simulated: {residual['nominal']['signature']['sentence']}"
     if residual["chi2_per_n"] > CLEAN:
         yield f"What is left: {residual['signature']['sentence']}"
+
+
+def _limits(limits: Sequence[Values]) -> Iterable[str]:
+    """One line per cause: each parameter's smallest and largest limit over the places."""
+    sizes: dict[str, dict[str, list[float | None]]] = {}
+    for entry in limits:
+        for name, size in entry["parameters"].items():
+            sizes.setdefault(entry["cause"], {}).setdefault(name, []).append(size)
+    for cause, parameters in sizes.items():
+        each = ", ".join(f"{name} {_range(values)}" for name, values in parameters.items())
+        yield from _wrapped(f"{cause}: {each}")
+
+
+def _range(sizes: Sequence[float | None]) -> str:
+    seen = sorted(size for size in sizes if size is not None)
+    if not seen:
+        return "never"
+    low, high = f"{seen[0]:.2g}", f"{seen[-1]:.2g}"
+    return (low if low == high else f"{low}-{high}") + (", not everywhere" if len(seen) < len(sizes) else "")
 
 
 def _label(candidate: Values) -> str:
