@@ -8,6 +8,7 @@ from importlib import resources
 from pathlib import Path
 
 from estimator.errors import InputError
+from mocobot_logs.faults import detail_of
 from mocobot_logs.log_map import ChannelMap, CsvMap, LogMap, TimeMap
 from mocobot_logs.map_parse import parse_map
 
@@ -75,11 +76,11 @@ def _read(path: Path) -> str:
     except (OSError, ValueError) as error:
         if isinstance(error, InputError):
             raise
-        raise InputError(f"map {str(path)!r:.80}: cannot be read ({error})") from error
+        raise InputError(f"map {str(path)!r:.80}: cannot be read ({detail_of(error)})") from error
 
 
 def _values(text: str, where: str) -> dict[str, object]:
     try:
         return tomllib.loads(text)
     except (tomllib.TOMLDecodeError, RecursionError, ValueError) as error:
-        raise InputError(f"{where}: is not TOML ({error})") from error
+        raise InputError(f"{where}: is not TOML ({detail_of(error)})") from error

@@ -8,6 +8,7 @@ from pathlib import Path
 from estimator.errors import InputError
 from estimator.recording import METADATA_KEY
 from estimator.recording_metadata import RecordingMetadata
+from mocobot_logs.faults import detail_of
 from mocobot_logs.log import LogSource
 from mocobot_logs.map_parse import MAX_ROBOTS
 from mocobot_logs.maps import LogMap, builtin_map
@@ -67,7 +68,7 @@ def _kind(path: Path) -> str:
     except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL in it
         if isinstance(error, InputError):
             raise
-        raise InputError(f"{str(path)!r:.80}: not a usable file name ({error})") from error
+        raise InputError(f"{str(path)!r:.80}: not a usable file name ({detail_of(error)})") from error
     if head == b"PAR1":
         return "lerobot" if _is_of_a_dataset(path) else "parquet"
     if head == b"PK\x03\x04" or head == b"PK\x05\x06":

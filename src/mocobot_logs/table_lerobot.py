@@ -18,6 +18,7 @@ import pyarrow as pa
 
 from estimator.errors import InputError
 from estimator.recording_metadata import RecordingMetadata
+from mocobot_logs.faults import detail_of
 from mocobot_logs.stamps import LARGEST_NS
 from mocobot_logs.table_parquet import ParquetTable, opened
 from mocobot_logs.tables import Block
@@ -118,7 +119,7 @@ def _read_info(root: Path, name: str) -> dict[str, Any]:
     except InputError:
         raise
     except (OSError, ValueError, RecursionError) as error:
-        raise InputError(f"{where} cannot be read ({error})") from error
+        raise InputError(f"{where} cannot be read ({detail_of(error)})") from error
     if not isinstance(info, dict):
         raise InputError(f"{where} must be a JSON object, not {info!r:.60}")
     version = info.get("codebase_version")

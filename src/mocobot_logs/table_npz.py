@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from estimator.errors import InputError
 from estimator.recording_metadata import RecordingMetadata
 from mocobot_logs.claims import check_claim
+from mocobot_logs.faults import detail_of
 from mocobot_logs.stamps import from_numbers
 from mocobot_logs.tables import Block, rows_at_a_time
 
@@ -191,9 +192,8 @@ class NpzTable:
         except PermissionError as error:
             raise InputError(f"{self.name}: cannot be read (permission denied)") from error
         except Exception as error:  # on damaged bytes zipfile and zlib raise many types
-            detail = (str(error).splitlines() or [type(error).__name__])[0]
             raise InputError(
-                f"{self.name}: not a readable NPZ archive, or a damaged one ({detail:.200})"
+                f"{self.name}: not a readable NPZ archive, or a damaged one ({detail_of(error)})"
             ) from error
 
 

@@ -15,6 +15,7 @@ from estimator.errors import InputError
 from estimator.recording import METADATA_KEY
 from estimator.recording_metadata import RecordingMetadata
 from mocobot_logs.claims import check_claim
+from mocobot_logs.faults import detail_of
 from mocobot_logs.log import Stamps
 from mocobot_logs.stamps import from_numbers
 from mocobot_logs.tables import Block, rows_at_a_time
@@ -137,8 +138,9 @@ def opened(path: Path, name: str) -> Iterator[pq.ParquetFile]:
     except PermissionError as error:
         raise InputError(f"{name}: cannot be read (permission denied)") from error
     except Exception as error:  # on damaged bytes pyarrow raises many types, not all of them its own
-        detail = (str(error).splitlines() or [type(error).__name__])[0]
-        raise InputError(f"{name}: not a readable Parquet file, or a damaged one ({detail:.200})") from error
+        raise InputError(
+            f"{name}: not a readable Parquet file, or a damaged one ({detail_of(error)})"
+        ) from error
 
 
 def numbers(column: pa.Array, shape: tuple[int, ...], where: str) -> NDArray:

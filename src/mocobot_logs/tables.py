@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from estimator.errors import InputError
 from estimator.recording_metadata import RecordingMetadata
+from mocobot_logs.faults import shown
 from mocobot_logs.log import CHANNELS, REF, Level, Samples, Stamps
 from mocobot_logs.log_map import ChannelMap, LogMap
 
@@ -121,7 +122,8 @@ class TableSource:
                 stamps, given = block.clocks[self._clocks[robot]]
                 values = np.empty((len(stamps), len(self.channels)))
                 for k, (name, place) in enumerate(zip(self.channels, places, strict=True)):
-                    raw = np.asarray(block.columns[place.column][(slice(None), *place.index)], float)
+                    with np.errstate(invalid="ignore"):  # NaN of a damaged file may be a signalling one
+                        raw = np.asarray(block.columns[place.column][(slice(None), *place.index)], float)
                     values[:, k] = channels[name].apply(raw)
                 if self._table.sparse and (blank := np.isnan(values).all(axis=1)).any():
                     stamps, given, values = stamps[~blank], given[~blank], values[~blank]
@@ -206,7 +208,7 @@ class TableSource:
         names = sorted({*self._table.shapes, *self._table.aliases} - mapped)
         close = difflib.get_close_matches(address, names[:1000], n=1, cutoff=0.75)
         hint = f" (did you mean {close[0]!r:.60}?)" if close else ""
-        listed = ", ".join(f"{name!s:.60}" for name in list(self._table.shapes)[:SHOWN_COLUMNS])
+        listed = ", ".join(shown(name) for name in list(self._table.shapes)[:SHOWN_COLUMNS])
         more = f", ... ({len(self._table.shapes)} in all)" if len(self._table.shapes) > SHOWN_COLUMNS else ""
         return (
             f"{self.name}: missing column {address!r:.80} for {what} by map {self._map.name}{hint}; "

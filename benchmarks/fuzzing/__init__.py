@@ -1,0 +1,1 @@
+"""Damage to real logs, and what the readers make of it."""
