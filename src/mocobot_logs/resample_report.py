@@ -1,0 +1,51 @@
+"""What resampling found in a robot's stream, and what it did to it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+Method = Literal["untouched", "filtered", "interpolated"]
+"""Samples as they came; low-passed and thinned; interpolated, then low-passed and thinned."""
+
+
+@dataclass(frozen=True)
+class StreamReport:
+    """One robot's stream.
+
+    Attributes:
+        robot: number of the robot, from 1.
+        samples: rows of the log, duplicates included.
+        first_ns, last_ns: its first and its last stamp [ns].
+        native_hz: rate of its samples [Hz], dropped ones counted in.
+        jitter_rms_s, jitter_max_s: how far intervals between stamps are from whole periods [s].
+        gaps: intervals in which samples are missing.
+        longest_gap_s: the longest time without samples beyond one period [s].
+        filled: samples that are missing and were interpolated, at the native rate.
+        duplicates: rows that repeat the row before, stamp and values; dropped.
+        merged: rows closer than a quarter of a period to the row before; averaged with it.
+        method: what was done.
+    """
+
+    robot: int
+    samples: int
+    first_ns: int
+    last_ns: int
+    native_hz: float
+    jitter_rms_s: float
+    jitter_max_s: float
+    gaps: int
+    longest_gap_s: float
+    filled: int
+    duplicates: int
+    merged: int
+    method: Method
+
+    @property
+    def filled_share(self) -> float:
+        """Missing samples over all that there should be."""
+        return self.filled / max(1, self.filled + self.samples - self.duplicates)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain values by name."""
+        return asdict(self) | {"filled_share": self.filled_share}

@@ -1,0 +1,100 @@
+"""A robot's rows in order: each a finite sample at a later time than the one before."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.errors import InputError
+from mocobot_logs.log import NS, Array, Samples, Stamps
+
+LONGEST_S = 1e8
+"""Three years [s]: whatever lasts longer is two clocks, and nanoseconds of it would overflow."""
+
+
+class Screen:
+    """Drops repeated rows and refuses what no resampling can mend.
+
+    Attributes:
+        rows: rows seen.
+        duplicates: rows dropped.
+        first_ns, last_ns: first and last stamp [ns], None before the first row.
+        log_ns: first and last time of the recorder [ns], None where the log has none.
+    """
+
+    def __init__(self, name: str, robot: int, channels: tuple[str, ...]) -> None:
+        """Take the names that messages need; ``robot`` counts from 1."""
+        self.rows = self.duplicates = 0
+        self.first_ns: int | None = None
+        self.last_ns: int | None = None
+        self.log_ns: tuple[int, int] | None = None
+        self._where = f"{name}: robot {robot}"
+        self._channels = channels
+        self._last: Array | None = None
+
+    def keep(self, samples: Samples) -> tuple[Stamps, Array]:
+        """Rows of a chunk that say something new: time since the first row [ns], shape (q,), and values (q, C).
+
+        Raises:
+            InputError: a value is not finite, time goes back or leaps, or one stamp has two values.
+        """
+        stamp, values = samples.stamp_ns, samples.values
+        if not len(stamp):
+            return stamp, values
+        self._note(samples)
+        before = np.concatenate([[stamp[0] if self.last_ns is None else self.last_ns], stamp[:-1]])
+        above = np.concatenate([(values[0] if self._last is None else self._last)[None], values[:-1]])
+        same = stamp == before
+        same[0] &= self._last is not None
+        repeats = same & np.all(values == above, axis=1)
+        finite = np.isfinite(values).all(axis=1)
+        bad = ~finite | (stamp < before) | (same & ~repeats) | self._leaps(stamp, before)
+        if bad.any():
+            self._refuse(int(np.argmax(bad)), stamp, before, values, above)
+        self.rows += len(stamp)
+        self.duplicates += int(repeats.sum())
+        self.last_ns, self._last = int(stamp[-1]), values[-1]
+        assert self.first_ns is not None
+        return stamp[~repeats] - self.first_ns, values[~repeats]
+
+    def _note(self, samples: Samples) -> None:
+        if self.first_ns is None:
+            self.first_ns = int(samples.stamp_ns[0])
+        if samples.log_ns is not None:
+            first = int(samples.log_ns[0]) if self.log_ns is None else self.log_ns[0]
+            self.log_ns = first, int(samples.log_ns[-1])
+
+    def _leaps(self, stamp: Stamps, before: Stamps) -> NDArray[np.bool_]:
+        """Whether time moves on by more than any log lasts; as floats, which do not overflow."""
+        assert self.first_ns is not None
+        return np.abs(stamp.astype(float) - before.astype(float)) > LONGEST_S / NS
+
+    def _refuse(self, k: int, stamp: Stamps, before: Stamps, values: Array, above: Array) -> None:
+        row = self.rows + k
+        assert self.first_ns is not None
+        here = f"row {row}, {_seconds(int(stamp[k]) - self.first_ns)} s after its first sample"
+        faulty = np.flatnonzero(~np.isfinite(values[k]))
+        if len(faulty):
+            raise InputError(
+                f"{self._where}: {self._channels[faulty[0]]} is {values[k, faulty[0]]} in {here}; "
+                "every value must be a finite number"
+            )
+        if stamp[k] < before[k]:
+            raise InputError(
+                f"{self._where}: time runs back by {_seconds(int(before[k]) - int(stamp[k]))} s in {here}; "
+                "stamps must increase"
+            )
+        if stamp[k] == before[k]:
+            c = int(np.flatnonzero(values[k] != above[k])[0])
+            raise InputError(
+                f"{self._where}: {self._channels[c]} is {above[k, c]:.9g} and {values[k, c]:.9g} at one time, "
+                f"in {here}; a repeated stamp must repeat all values (are the stamps too coarse?)"
+            )
+        raise InputError(
+            f"{self._where}: time leaps by {_seconds(int(stamp[k]) - int(before[k]))} s in {here}; "
+            "all stamps of a robot must come from one clock"
+        )
+
+
+def _seconds(ns: int) -> str:
+    return f"{ns * NS:.9g}"

@@ -1,0 +1,77 @@
+"""Gaps and jitter of a robot's stamps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from estimator.errors import InputError
+from mocobot_logs.log import NS, Stamps
+
+MOST_MISSING = 0.1
+"""Largest share of samples that may be missing; the same for samples that crowd."""
+_STAMP_S = 1e-6  # gaps are measured no finer
+
+
+class Tally:
+    """Counts what the intervals between stamps say.
+
+    Attributes:
+        gaps, filled, longest_gap_s, jitter_max_s: as in ``StreamReport``.
+    """
+
+    def __init__(self, where: str, period_ns: float, max_gap_s: float) -> None:
+        """``where`` names file and robot in messages; periods and gaps as in ``resample``."""
+        self.gaps = self.filled = 0
+        self.longest_gap_s = self.jitter_max_s = 0.0
+        self._where, self._period_ns, self._max_gap_s = where, period_ns, max_gap_s
+        self._intervals, self._squares = 0, 0.0
+
+    @property
+    def jitter_rms_s(self) -> float:
+        """As in ``StreamReport`` [s]."""
+        return float(np.sqrt(self._squares / max(1, self._intervals)))
+
+    def add(self, time_ns: Stamps) -> None:
+        """Count the intervals between consecutive times after the first stamp [ns].
+
+        Raises:
+            InputError: one is too long.
+        """
+        interval = np.diff(time_ns)
+        if not len(interval):
+            return
+        periods = np.maximum(np.rint(interval / self._period_ns), 1.0)
+        beyond_s = np.where(periods > 1, (interval - self._period_ns) * NS, 0.0)
+        bad = np.flatnonzero(beyond_s > self._max_gap_s + _STAMP_S)
+        if len(bad):
+            raise InputError(
+                f"{self._where}: no samples for {interval[bad[0]] * NS:.6g} s, from "
+                f"{time_ns[bad[0]] * NS:.9g} s after its first sample on; they usually come "
+                f"{self._period_ns * NS:.6g} s apart, and at most {self._max_gap_s:g} s more may pass"
+            )
+        jitter_s = (interval - periods * self._period_ns) * NS
+        self._intervals += len(interval)
+        self.filled += int(np.sum(periods - 1))
+        self.gaps += int(np.sum(periods > 1))
+        self.longest_gap_s = max(self.longest_gap_s, float(np.max(beyond_s)))
+        self._squares += float(np.sum(jitter_s**2))
+        self.jitter_max_s = max(self.jitter_max_s, float(np.max(np.abs(jitter_s))))
+
+    def check(self, rows: int, merged: int) -> None:
+        """Judge a stream's ``rows``, of which ``merged`` crowd.
+
+        Raises:
+            InputError: too many are missing, or crowd.
+        """
+        expected = rows + self.filled
+        if self.filled > MOST_MISSING * expected:
+            raise InputError(
+                f"{self._where}: {self.filled} of {expected} samples are missing "
+                f"({100 * self.filled / expected:.3g} %); at most {100 * MOST_MISSING:g} % may be"
+            )
+        if merged > MOST_MISSING * rows:
+            raise InputError(
+                f"{self._where}: {merged} of {rows} samples come within a quarter of the usual "
+                f"{self._period_ns * NS:.6g} s of the one before; at most {100 * MOST_MISSING:g} % may "
+                "(does the rate change, or do stamps tell when messages arrived?)"
+            )
