@@ -30,6 +30,7 @@ class Options:
         factors: sizes over the detection limit.
         causes: what to hide; all if none is given.
         background: tolerances besides.
+        preset: sensors.
         jobs: processes.
         out: where recordings and results go.
         again: repeat sets that were not found right.
@@ -44,6 +45,7 @@ class Options:
     factors: tuple[float, ...] = (4.0,)
     causes: tuple[str, ...] = ()
     background: bool = False
+    preset: str = "nominal"
     jobs: int = 2
     out: Path = Path("out/hidden")
     again: bool = False
@@ -67,6 +69,7 @@ def main(options: Options) -> None:
             options.factors,
             options.causes,
             background=options.background,
+            preset=options.preset,
         )
         run_tasks(chosen, options.out, options.jobs, again=options.again)
 

@@ -56,7 +56,10 @@ class HiddenSet:
     def key(self) -> str:
         """Name of the set."""
         what = ["+".join(self.causes), f"x{self.factor:g}"] if self.causes else []
-        return "-".join([self.kind, *what, *(["tolerances"] if self.background else []), str(self.seed)])
+        preset = [self.preset] if self.preset != "nominal" else []
+        return "-".join(
+            [self.kind, *what, *(["tolerances"] if self.background else []), *preset, str(self.seed)]
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""

@@ -31,20 +31,32 @@ class Task:
 
 
 def tasks(
-    part: Part, seeds: Sequence[int], factors: Sequence[float], causes: Sequence[str], *, background: bool
+    part: Part,
+    seeds: Sequence[int],
+    factors: Sequence[float],
+    causes: Sequence[str],
+    *,
+    background: bool,
+    preset: str = "nominal",
 ) -> list[Task]:
     """All tasks of a part; payloads of clean and tolerance sets take turns, others are drawn."""
     names = list(causes) or list(CAUSES)
     if part in ("clean", "tolerance"):
-        return [Task(part, HiddenSet(part, seed, payload=PAYLOADS[seed % len(PAYLOADS)])) for seed in seeds]
+        return [
+            Task(part, HiddenSet(part, seed, payload=PAYLOADS[seed % len(PAYLOADS)], preset=preset))
+            for seed in seeds
+        ]
     if part == "pairs":
-        return [Task(part, HiddenSet("pair", seed, _pair(seed), background=background)) for seed in seeds]
+        return [
+            Task(part, HiddenSet("pair", seed, _pair(seed), background=background, preset=preset))
+            for seed in seeds
+        ]
     if part == "leave-one-out":
         factors = [LEFT_OUT_FACTOR]
     return [
         Task(
             part,
-            HiddenSet("single", seed, (cause,), factor, background=background),
+            HiddenSet("single", seed, (cause,), factor, background=background, preset=preset),
             (cause,) if part == "leave-one-out" else (),
         )
         for seed in seeds
