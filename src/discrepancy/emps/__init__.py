@@ -1,0 +1,1 @@
+"""The EMPS rig: one electro-mechanical positioning axis, its drive and its position loop."""

@@ -1,0 +1,68 @@
+"""Where a time series is cut into the trials that validate each other."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import fftconvolve
+
+from discrepancy.emps.signals import Signals
+
+Array = NDArray[np.float64]
+
+EDGE_S = 0.15
+"""Left out at both ends of a recording, where smoothing has one side only."""
+LENGTH_S = 6.0
+"""About what a block lasts where the reference does not repeat."""
+SEARCH = 0.06
+"""A cut may move by this share of a block to where the motion is steady."""
+SAME = 1e-6
+"""Cycles of the reference agree to this share of its range."""
+LEAST_PERIOD_S = 1.0
+
+
+def period_of(reference: Array, rate_hz: float) -> int | None:
+    """Samples after which the reference repeats itself at least once in full, or None."""
+    count = len(reference)
+    x = reference - reference.mean()
+    least, most = round(LEAST_PERIOD_S * rate_hz), count // 2
+    if most <= least or np.ptp(x) == 0:
+        return None
+    squares = np.concatenate([[0.0], np.cumsum(x**2)])
+    product = fftconvolve(x, x[::-1])[count - 1 :]
+    lags = np.arange(least, most + 1)
+    apart = (squares[count] - squares[lags]) + squares[count - lags] - 2.0 * product[lags]
+    for lag in lags[apart / (count - lags) < (1e-4 * np.ptp(x)) ** 2]:
+        if np.abs(reference[lag:] - reference[:-lag]).max() <= SAME * np.ptp(x):
+            return int(lag)
+    return None
+
+
+def blocks(signals: Signals, period: int | None) -> list[slice]:
+    """Samples of every block.
+
+    A block is one cycle of the reference where that repeats, else about six seconds. It begins where the axis moves
+    steadily: there its measured position and velocity say all about its state, so that a simulation can start.
+    """
+    rate, count = signals.log.rate_hz, len(signals.x)
+    first, last = round(EDGE_S * rate), count - round(EDGE_S * rate)
+    number = max(2, round((last - first) / (period or LENGTH_S * rate)))
+    length = period or (last - first) // number
+    starts = [_steady(signals, first, first + max(2, round(SEARCH * length)))]
+    for k in range(1, number):
+        near, reach = starts[0] + k * length, round(0.5 * SEARCH * length)
+        starts.append(_steady(signals, near - reach, near + reach))
+    return [slice(a, b) for a, b in zip(starts, [*starts[1:], last], strict=True)]
+
+
+def _steady(signals: Signals, first: int, last: int) -> int:
+    """The sample between two with the least acceleration, among those that move (if any does)."""
+    here = slice(max(first, 0), last)
+    fast = np.abs(signals.v[here]) > 0.3 * np.sqrt(np.mean(signals.v**2))
+    usable = signals.log.usable[here]
+    width = max(1, round(0.02 * signals.log.rate_hz))
+    restless = np.convolve(np.abs(signals.a[here]), np.ones(width) / width, mode="same")
+    restless[:width] += 1e3 * (len(restless) > 4 * width)  # the convolution sees one side only
+    restless[-width:] += 1e3 * (len(restless) > 4 * width)
+    cost = restless + np.where(fast, 0.0, 1e6) + np.where(usable, 0.0, 1e9)
+    return here.start + int(np.argmin(cost))

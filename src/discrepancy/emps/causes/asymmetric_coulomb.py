@@ -1,0 +1,31 @@
+"""Dry friction that differs between the directions."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.causes.sliding import SLOW, direction
+
+
+class AsymmetricCoulomb(Cause):
+    """Dry friction is larger forwards and smaller backwards, by ``asymmetry_N`` each; while it slides, a constant."""
+
+    name = "asymmetric_coulomb"
+    family = "constant_force"
+    parameters = ("asymmetry_N",)
+    scales = (1.0,)
+    separate = (
+        "Rest: raise the voltage slowly from zero in each direction and see where the axis breaks loose; a constant "
+        "force shifts both, friction that differs does not push."
+    )
+
+    def columns(self, signals, shape):
+        return force(np.abs(direction(signals, shape["slow_mps"])))
+
+    def apply(self, plant, values, shape):
+        forward, backward = plant.coulomb_N
+        return replace(plant, coulomb_N=(forward + values[0], backward - values[0]))
+
+    def shapes(self, hints):
+        return SLOW

@@ -1,0 +1,26 @@
+"""Viscous friction that differs between the directions."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from discrepancy.emps.causes.base import Cause, force
+
+
+class AsymmetricViscous(Cause):
+    """Viscous friction is larger forwards and smaller backwards, by ``asymmetry_Ns_per_m`` each."""
+
+    name = "asymmetric_viscous"
+    family = "asymmetric_viscous"
+    parameters = ("asymmetry_Ns_per_m",)
+    scales = (10.0,)
+    separate = (
+        "Steady motions at several speeds in both directions: a constant force does not grow with the speed."
+    )
+
+    def columns(self, signals, shape):
+        return force(np.abs(signals.v))
+
+    def apply(self, plant, values, shape):
+        forward, backward = plant.viscous_Ns_per_m
+        return replace(plant, viscous_Ns_per_m=(forward + values[0], backward - values[0]))

@@ -1,0 +1,36 @@
+"""Play between the motor, where the encoder is, and the carriage."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.plant import FIRST_GUESS_KG
+from estimator.filtering import differentiate, low_pass
+
+CARRIAGE = 0.5
+"""Share of the moving mass behind the play: assumed."""
+SOFT_N = 2.0
+SMOOTH_HZ = 60.0
+
+
+class Backlash(Cause):
+    """The carriage, half of the mass and all of the friction, follows the motor with a play of ``play_m`` in all."""
+
+    name = "backlash"
+    family = "backlash"
+    parameters = ("play_m",)
+    scales = (1e-5,)
+    positive = ("play_m",)
+    separate = "A scale or a dial gauge on the carriage while the motor reverses."
+
+    def columns(self, signals, shape):
+        # The side on which motor and carriage touch is that of the force passed on.
+        passed = signals.force - (1.0 - CARRIAGE) * FIRST_GUESS_KG * signals.a
+        rate = signals.log.rate_hz
+        side = low_pass(np.tanh(passed / SOFT_N), rate, min(SMOOTH_HZ, 0.2 * rate))
+        second = differentiate(differentiate(side, rate), rate)
+        return force(-0.5 * CARRIAGE * FIRST_GUESS_KG * second)
+
+    def apply(self, plant, values, shape):
+        return replace(plant, play_m=max(plant.play_m + values[0], 0.0))

@@ -1,0 +1,86 @@
+"""What every cause of the axis' catalogue offers the diagnosis."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.emps.plant import Plant
+from discrepancy.emps.signals import Signals
+
+Array = NDArray[np.float64]
+Shape = Mapping[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Hints:
+    """Where to begin with shapes that are found, not assumed.
+
+    Attributes:
+        wavelength_m: of the strongest ripple along the way.
+        train: ``start_s``, ``period_s`` and ``width_s`` of what looks most like rectangular pulses.
+    """
+
+    wavelength_m: float
+    train: Shape
+
+
+class Cause(ABC):
+    """One physical cause: what it adds to the nominal residual per unit of each parameter, and to the simulated axis.
+
+    Attributes:
+        name: as in the verdict.
+        family: causes of one family look alike.
+        where: part of the machine.
+        parameters: units as suffix.
+        scales: typical sizes.
+        positive: parameters that cannot be negative.
+        separate: what experiment would tell it from its look-alikes.
+    """
+
+    name: ClassVar[str]
+    family: ClassVar[str]
+    where: ClassVar[str] = "axis"
+    parameters: ClassVar[tuple[str, ...]]
+    scales: ClassVar[tuple[float, ...]]
+    positive: ClassVar[tuple[str, ...]] = ()
+    separate: ClassVar[str] = ""
+
+    @abstractmethod
+    def columns(self, signals: Signals, shape: Shape) -> Array:
+        """What one unit of each parameter adds to force [N] and voltage [V], shape (Q, 2, k)."""
+
+    @abstractmethod
+    def apply(self, plant: Plant, values: Array, shape: Shape) -> Plant:
+        """The simulated axis with the cause in it."""
+
+    def exact(self, signals: Signals, values: Array, shape: Shape) -> Array:
+        """What the given values add, shape (Q, 2), where that is not linear in them."""
+        return self.columns(signals, shape) @ values
+
+    def shapes(self, hints: Hints) -> Sequence[Shape]:
+        """Alternatives of what changes the columns themselves; the first is the catalogue's."""
+        return [{}]
+
+    def finer(self, shape: Shape) -> Sequence[Shape]:
+        """Shapes near a chosen one, for a second look."""
+        return []
+
+    def rests(self, signals: Signals, shape: Shape) -> list[Array]:
+        """Forces (Q,) that the cause leaves open, such as dry friction at rest, one unit each."""
+        return []
+
+
+def force(*columns: Array) -> Array:
+    """Columns that act on the force alone, shape (Q, 2, k)."""
+    return np.stack([np.column_stack([c, np.zeros_like(c)]) for c in columns], axis=2)
+
+
+def voltage(*columns: Array) -> Array:
+    """Columns that act on the voltage alone, shape (Q, 2, k)."""
+    return np.stack([np.column_stack([np.zeros_like(c), c]) for c in columns], axis=2)

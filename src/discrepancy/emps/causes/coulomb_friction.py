@@ -1,0 +1,30 @@
+"""Dry friction, the same in both directions."""
+
+from dataclasses import replace
+
+from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.causes.sliding import SLOW, direction, rests
+
+
+class CoulombFriction(Cause):
+    """A force against the motion that does not depend on the speed; below ``slow_mps`` it fades."""
+
+    name = "coulomb_friction"
+    family = "dry_friction"
+    parameters = ("coulomb_N",)
+    scales = (1.0,)
+    positive = ("coulomb_N",)
+    separate = "A steady motion at several speeds in one direction."
+
+    def columns(self, signals, shape):
+        return force(direction(signals, shape["slow_mps"]))
+
+    def apply(self, plant, values, shape):
+        forward, backward = plant.coulomb_N
+        return replace(plant, coulomb_N=(forward + values[0], backward + values[0]))
+
+    def shapes(self, hints):
+        return SLOW
+
+    def rests(self, signals, shape):
+        return rests(signals, shape["slow_mps"])

@@ -1,0 +1,28 @@
+"""The drive acts late."""
+
+from dataclasses import replace
+
+from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.signals import at_delay
+from estimator.filtering import differentiate
+
+
+class Delay(Cause):
+    """The force follows the voltage late, beyond the half period that its hold takes anyway."""
+
+    name = "delay"
+    family = "delay"
+    where = "drive"
+    parameters = ("delay_s",)
+    scales = (1e-4,)
+    separate = "A step of the voltage with the loop open."
+
+    def columns(self, signals, shape):
+        return force(differentiate(signals.force, signals.log.rate_hz))
+
+    def exact(self, signals, values, shape):
+        late = at_delay(signals.force, signals.log.rate_hz, values[0])
+        return force(signals.force - late)[..., 0]
+
+    def apply(self, plant, values, shape):
+        return replace(plant, delay_s=max(plant.delay_s + values[0], 0.0))

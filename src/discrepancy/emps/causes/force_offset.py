@@ -1,0 +1,26 @@
+"""A constant force on the axis, or an offset of the drive's current."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from discrepancy.emps.causes.base import Cause, force
+
+
+class ForceOffset(Cause):
+    """A constant force resists the motion forwards and helps it backwards."""
+
+    name = "force_offset"
+    family = "constant_force"
+    parameters = ("resisting_N",)
+    scales = (1.0,)
+    separate = (
+        "Rest: raise the voltage slowly from zero in each direction and see where the axis breaks loose; a constant "
+        "force shifts both, friction that differs does not push."
+    )
+
+    def columns(self, signals, shape):
+        return force(np.ones(len(signals.x)))
+
+    def apply(self, plant, values, shape):
+        return replace(plant, resisting_N=plant.resisting_N + values[0])

@@ -1,0 +1,28 @@
+"""Rectangular pulses of force on the carriage, past the drive."""
+
+from dataclasses import replace
+
+from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.plant import PulseTrain
+from discrepancy.emps.pulse_search import rectangle
+
+
+class InjectedForce(Cause):
+    """Rectangular pulses of force on the carriage: the drive's voltage shows only what the loop does about them."""
+
+    name = "injected_force"
+    family = "injection"
+    parameters = ("resisting_N",)
+    scales = (1.0,)
+    separate = "The law's inputs and its output, logged separately."
+
+    def columns(self, signals, shape):
+        train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], 1.0)
+        return force(rectangle(signals.log.time, train))
+
+    def apply(self, plant, values, shape):
+        train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], float(values[0]))
+        return replace(plant, force_pulses=(*plant.force_pulses, train))
+
+    def shapes(self, hints):
+        return [dict(hints.train)]

@@ -1,0 +1,29 @@
+"""Rectangular pulses that someone adds to the loop's voltage."""
+
+from dataclasses import replace
+
+from discrepancy.emps.causes.base import Cause, voltage
+from discrepancy.emps.plant import PulseTrain
+from discrepancy.emps.pulse_search import rectangle
+
+
+class InjectedVoltage(Cause):
+    """Rectangular pulses between the loop's law and the drive: the drive gets, and the log has, law plus pulse."""
+
+    name = "injected_voltage"
+    family = "injection"
+    where = "loop"
+    parameters = ("size_V",)
+    scales = (0.1,)
+    separate = "The law's inputs and its output, logged separately."
+
+    def columns(self, signals, shape):
+        train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], 1.0)
+        return voltage(rectangle(signals.log.time, train))
+
+    def apply(self, plant, values, shape):
+        train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], float(values[0]))
+        return replace(plant, voltage_pulses=(*plant.voltage_pulses, train))
+
+    def shapes(self, hints):
+        return [dict(hints.train)]

@@ -1,0 +1,36 @@
+"""A force that repeats along the way, as the screw or the motor turns."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.plant import Ripple
+
+
+class PositionForce(Cause):
+    """A force that resists or helps with the position, periodic over ``wavelength_m``."""
+
+    name = "position_force"
+    family = "position_force"
+    parameters = ("cosine_N", "sine_N")
+    scales = (1.0, 1.0)
+    separate = "The same way at several speeds: what depends on the place stays there."
+
+    def columns(self, signals, shape):
+        angle = 2.0 * np.pi * signals.x / shape["wavelength_m"]
+        return force(np.cos(angle), np.sin(angle))
+
+    def apply(self, plant, values, shape):
+        ripple = Ripple(shape["wavelength_m"], float(values[0]), float(values[1]))
+        return replace(plant, ripples=(*plant.ripples, ripple))
+
+    def shapes(self, hints):
+        return [{"wavelength_m": factor * hints.wavelength_m} for factor in (1.0, 0.5, 2.0)]
+
+    def finer(self, shape):
+        return [
+            {"wavelength_m": (1.0 + off) * shape["wavelength_m"]}
+            for off in np.linspace(-2e-3, 2e-3, 9)
+            if off
+        ]

@@ -1,0 +1,22 @@
+"""The position loop's gain is not its nominal value."""
+
+from dataclasses import replace
+
+from discrepancy.emps.causes.base import Cause, voltage
+
+
+class PositionGain(Cause):
+    """The position loop is stronger than its nominal gain says."""
+
+    name = "position_gain"
+    family = "position_gain"
+    where = "loop"
+    parameters = ("excess_per_s",)
+    scales = (1.0,)
+    separate = "A motion at constant speed, where the tracking error is the speed over this gain."
+
+    def columns(self, signals, shape):
+        return voltage(signals.linear * signals.log.kv_Vs_per_m * signals.error)
+
+    def apply(self, plant, values, shape):
+        return replace(plant, kp_per_s=plant.kp_per_s + values[0])

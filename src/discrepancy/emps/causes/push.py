@@ -1,0 +1,25 @@
+"""Something pushed the carriage for a while."""
+
+from dataclasses import replace
+
+from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.plant import ForcePush
+
+
+class Push(Cause):
+    """A constant outside force on the carriage during an interval of one block."""
+
+    name = "push"
+    family = "push"
+    parameters = ("force_N",)
+    scales = (1.0,)
+    separate = "The same motion again: a push does not repeat."
+
+    def columns(self, signals, shape):
+        time = signals.log.time
+        inside = (time >= shape["start_s"]) & (time < shape["start_s"] + shape["duration_s"])
+        return force(-inside.astype(float))
+
+    def apply(self, plant, values, shape):
+        push = ForcePush(shape["start_s"], shape["duration_s"], float(values[0]))
+        return replace(plant, pushes=(*plant.pushes, push))

@@ -1,0 +1,32 @@
+"""Dry friction while it slides, and when it does not."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.emps.signals import Signals
+
+Array = NDArray[np.float64]
+
+SLOW = tuple({"slow_mps": s} for s in (1e-3, 1e-4, 3e-4, 3e-3))
+"""Speeds below which the direction of friction fades; the first is the catalogue's."""
+SHORTEST_REST_S = 0.1
+
+
+def direction(signals: Signals, slow: float) -> Array:
+    """Direction of motion in [-1, 1], shape (Q,); it fades below the speed ``slow`` [m/s]."""
+    return np.clip(signals.v / slow, -1.0, 1.0)
+
+
+def rests(signals: Signals, slow: float) -> list[Array]:
+    """One indicator (Q,) per interval of rest: there friction has an unknown value of its own."""
+    still = np.abs(signals.v) < slow
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int))).reshape(-1, 2)
+    out = []
+    for start, stop in edges:
+        if stop - start >= SHORTEST_REST_S * signals.log.rate_hz:
+            indicator = np.zeros(len(signals.v))
+            indicator[start:stop] = 1.0
+            out.append(indicator)
+    return out

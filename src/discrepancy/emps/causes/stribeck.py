@@ -1,0 +1,34 @@
+"""Dry friction at low speed is another than in fast motion."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.causes.sliding import direction
+
+SPEEDS_MPS = (0.01, 0.003, 0.005, 0.02, 0.04)
+SLOW_MPS = 1e-3
+
+
+class Stribeck(Cause):
+    """Dry friction differs near standstill, by ``excess_N`` that fades with exp(-|v| / ``speed_mps``)."""
+
+    name = "stribeck"
+    family = "dry_friction"
+    parameters = ("excess_N",)
+    scales = (1.0,)
+    separate = "Steady motions at low speeds."
+
+    def columns(self, signals, shape):
+        fade = np.exp(-np.abs(signals.v) / shape["speed_mps"])
+        return force(direction(signals, SLOW_MPS) * fade)
+
+    def apply(self, plant, values, shape):
+        return replace(plant, stribeck_N=plant.stribeck_N + values[0], stribeck_mps=shape["speed_mps"])
+
+    def shapes(self, hints):
+        return [{"speed_mps": speed} for speed in SPEEDS_MPS]
+
+    def finer(self, shape):
+        return [{"speed_mps": factor * shape["speed_mps"]} for factor in (0.7, 0.85, 1.2, 1.4)]

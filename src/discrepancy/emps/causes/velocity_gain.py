@@ -1,0 +1,22 @@
+"""The velocity loop's gain is not its nominal value."""
+
+from dataclasses import replace
+
+from discrepancy.emps.causes.base import Cause, voltage
+
+
+class VelocityGain(Cause):
+    """The velocity loop is stronger than its nominal gain says."""
+
+    name = "velocity_gain"
+    family = "velocity_gain"
+    where = "loop"
+    parameters = ("excess_Vs_per_m",)
+    scales = (1.0,)
+    separate = "The drive's voltage against the loop's own velocity error."
+
+    def columns(self, signals, shape):
+        return voltage(signals.linear * (signals.log.kp_per_s * signals.error - signals.v))
+
+    def apply(self, plant, values, shape):
+        return replace(plant, kv_Vs_per_m=plant.kv_Vs_per_m + values[0])

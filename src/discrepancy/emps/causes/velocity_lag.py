@@ -1,0 +1,28 @@
+"""The loop's velocity is old: it is a difference of past positions, or filtered."""
+
+from dataclasses import replace
+
+from discrepancy.emps.causes.base import Cause, voltage
+from discrepancy.emps.signals import at_delay
+
+
+class VelocityLag(Cause):
+    """The loop uses a velocity that is ``lag_s`` old."""
+
+    name = "velocity_lag"
+    family = "velocity_lag"
+    where = "loop"
+    parameters = ("lag_s",)
+    scales = (1e-4,)
+    separate = "The loop's own velocity signal in the log."
+
+    def columns(self, signals, shape):
+        return voltage(signals.linear * signals.log.kv_Vs_per_m * signals.a)
+
+    def exact(self, signals, values, shape):
+        log = signals.log
+        change = signals.v - at_delay(signals.v, log.rate_hz, values[0])
+        return voltage(signals.linear * log.kv_Vs_per_m * change)[..., 0]
+
+    def apply(self, plant, values, shape):
+        return replace(plant, velocity_lag_s=max(plant.velocity_lag_s + values[0], 0.0))

@@ -1,0 +1,108 @@
+"""What of a residual is noise: what does not repeat when the motion does, and the rounding of the position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.emps.plant import FIRST_GUESS_KG
+from discrepancy.emps.preflight import resolution
+from discrepancy.emps.reduction import Reduction
+from discrepancy.emps.signals import SMOOTH_HZ, Signals
+from estimator.filtering import differentiate, low_pass
+
+Array = NDArray[np.float64]
+
+REPEATED = 0.02
+"""Motion repeats if its tracking error differs between cycles by less than this share of itself."""
+DITHER_SEED = 0
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Draws of the noise, and how large it is in the measured signals.
+
+    Attributes:
+        draws: rows of noise alone, shape (D, n, 2).
+        repeats: cycles of the same motion that they come from; 0 where the motion does not repeat, and the draws are
+            what all causes of the catalogue together leave.
+        position_m, voltage_V: standard deviations.
+    """
+
+    draws: Array
+    repeats: int
+    position_m: float
+    voltage_V: float
+
+
+def repeated(signals: Signals, period: int | None) -> bool:
+    """Whether cycles of the reference are answered by the same motion."""
+    if period is None:
+        return False
+    error = signals.log.reference - signals.log.position
+    usable = signals.log.usable
+    both = usable[period:] & usable[:-period]
+    change = (error[period:] - error[:-period])[both]
+    # A quantised position repeats but for where its steps fall.
+    rounding = resolution(signals.log.position).step_m ** 2 / 6.0
+    rms = np.sqrt(max(np.mean(change**2) - rounding, 0.0))
+    return bool(rms < REPEATED * np.sqrt(np.mean(error[usable] ** 2)))
+
+
+def from_repeats(signals: Signals, reduction: Reduction, period: int) -> Noise:
+    """Noise as what differs between cycles, plus the position's rounding (which may repeat with the motion)."""
+    usable = signals.log.usable
+    deviation, cycles = _deviations(signals.residual, period, usable)
+    measured = np.column_stack([signals.log.position, signals.log.voltage])
+    apart, _ = _deviations(measured, period, usable)
+    rows = reduction(deviation + _rounding(signals))
+    position, voltage = np.sqrt(np.mean(apart[usable] ** 2, axis=0))
+    step = resolution(signals.log.position).step_m
+    return Noise(draws_of(rows), cycles, float(np.hypot(position, step / np.sqrt(12.0))), float(voltage))
+
+
+def from_remainder(rows: list[Array], signals: Signals) -> Noise:
+    """Noise as what the whole catalogue leaves, rows (n, 2) per block."""
+    step = resolution(signals.log.position).step_m
+    high = signals.log.position - signals.x
+    return Noise(
+        draws_of(rows),
+        0,
+        float(np.hypot(np.std(high), step / np.sqrt(12.0))),
+        float(np.sqrt(np.mean(np.concatenate(rows)[:, 1] ** 2))),
+    )
+
+
+def draws_of(rows: list[Array]) -> Array:
+    """Rows of blocks cut to one length, shape (D, n, 2)."""
+    shortest = min(len(block) for block in rows)
+    return np.stack([block[:shortest] for block in rows])
+
+
+def _deviations(x: Array, period: int, usable: NDArray[np.bool_]) -> tuple[Array, int]:
+    """What differs from the mean over cycles, scaled to the variance of one cycle, and the number of cycles."""
+    phase = np.arange(len(x)) % period
+    counts = np.bincount(phase, usable, minlength=period)
+    out = np.empty_like(x)
+    for k in range(x.shape[1]):
+        mean = np.bincount(phase, x[:, k] * usable, minlength=period) / np.maximum(counts, 1)
+        out[:, k] = x[:, k] - mean[phase]
+    m = counts[phase]
+    scale = np.where(m > 1, np.sqrt(m / np.maximum(m - 1, 1)), 0.0) * usable
+    return out * scale[:, None], int(np.ceil(len(x) / period))
+
+
+def _rounding(signals: Signals) -> Array:
+    """What a fresh draw of rounding errors of the position does to the nominal residual, shape (Q, 2)."""
+    log = signals.log
+    step = resolution(log.position).step_m
+    if step == 0:
+        return np.zeros((len(log.time), 2))
+    error = np.random.default_rng(DITHER_SEED).uniform(-0.5 * step, 0.5 * step, len(log.time))
+    x = low_pass(error, log.rate_hz, min(SMOOTH_HZ, 0.2 * log.rate_hz))
+    v = differentiate(x, log.rate_hz)
+    return np.column_stack(
+        [-FIRST_GUESS_KG * differentiate(v, log.rate_hz), log.kv_Vs_per_m * (log.kp_per_s * x + v)]
+    )

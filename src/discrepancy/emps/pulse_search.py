@@ -1,0 +1,107 @@
+"""Find rectangular pulses in a residual: when they start, how often they come, how long and how large they are.
+
+A box is fitted to the residual folded at every period (box least squares: Kovacs, Zucker, Mazeh, "A box-fitting
+algorithm in the search for periodic transits", A&A 391, 2002), then its edges are read off the samples.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.emps.plant import PulseTrain
+
+Array = NDArray[np.float64]
+
+SHORTEST_S, LONGEST_S = 0.2, 6.0
+BINS = 50
+FOLD_HZ = 100.0
+
+
+def pulse_train(residual: Array, rate_hz: float) -> PulseTrain:
+    """The rectangular train that explains most of a residual, shape (Q,); there always is one, meaningful or not."""
+    step = max(1, round(rate_hz / FOLD_HZ))
+    count = len(residual) // step
+    coarse = residual[: count * step].reshape(count, step).mean(axis=1)
+    time = (np.arange(count) + 0.5) * step / rate_hz
+    level = coarse - np.median(coarse)
+    duration = count * step / rate_hz
+    frequencies = np.arange(1.0 / min(LONGEST_S, duration / 2.0), 1.0 / SHORTEST_S, 0.05 / duration)
+    best = (-np.inf, 1.0, 0.0, 0.5)
+    for frequency in frequencies:
+        power, phase, width = _box(level, time * frequency % 1.0)
+        if power > best[0]:
+            best = (power, 1.0 / frequency, phase / frequency, width / frequency)
+    _, period, start, width = best
+    start %= period
+    if start + width > period:  # on already when the recording begins
+        start -= period
+    return _sharpened(residual, rate_hz, PulseTrain(start, period, width, 0.0))
+
+
+def rectangle(time: Array, train: PulseTrain) -> Array:
+    """1 while a pulse is on, else 0, shape (Q,); nothing before the start."""
+    since = time - train.start_s
+    # Stamps are on a grid, and so are edges: what is a rounding error before an edge is on it.
+    slack = 1e-6
+    return ((since > -slack) & ((since + slack) % train.period_s < train.width_s)).astype(float)
+
+
+def _box(level: Array, phase: Array) -> tuple[float, float, float]:
+    """The best box in a folded series: power, start and width in shares of the period."""
+    bins = np.minimum((phase * BINS).astype(int), BINS - 1)
+    sums = np.bincount(bins, level, BINS)
+    counts = np.bincount(bins, minlength=BINS)
+    total, number = sums.sum(), counts.sum()
+    doubled = np.concatenate([[0.0], np.cumsum(np.tile(sums, 2))])
+    many = np.concatenate([[0.0], np.cumsum(np.tile(counts, 2))])
+    best = (-np.inf, 0.0, 0.5)
+    for width in range(2, BINS - 1):
+        inside = doubled[width : width + BINS] - doubled[:BINS]
+        n = many[width : width + BINS] - many[:BINS]
+        spread = np.maximum(n * (number - n) / number, 1e-9)
+        power = (inside - total * n / number) ** 2 / spread
+        k = int(np.argmax(power))
+        if power[k] > best[0]:
+            best = (float(power[k]), k / BINS, width / BINS)
+    return best
+
+
+def _sharpened(residual: Array, rate_hz: float, train: PulseTrain) -> PulseTrain:
+    """Edges to the sample, from where the residual crosses half of the pulses' size; unchanged where they are none."""
+    time = np.arange(len(residual)) / rate_hz
+    on = rectangle(time + train.period_s, train) > 0.5
+    low, high = np.median(residual[~on]), np.median(residual[on])
+    train = PulseTrain(train.start_s, train.period_s, train.width_s, float(high - low))
+    above = (residual - low) / (high - low) > 0.5 if high != low else on
+    rising, falling = _edges(above, True), _edges(above, False)
+    ups, ranks = _matched(time, rising, train.start_s, train.period_s)
+    downs, _ = _matched(time, falling, train.start_s + train.width_s, train.period_s)
+    expected = int((time[-1] - train.start_s) / train.period_s) + 1
+    if len(ups) < max(2, 0.8 * expected) or len(downs) < max(2, 0.8 * expected - 1):
+        return train
+    period, start = np.polyfit(ranks, ups, 1)
+    _, ends = np.polyfit(_matched(time, falling, train.start_s + train.width_s, train.period_s)[1], downs, 1)
+    grid = 1.0 / rate_hz
+    start, width = np.round(start / grid) * grid, np.round((ends - start) / grid) * grid
+    if abs(period / grid - np.round(period / grid)) * len(ups) < 1.0:
+        period = np.round(period / grid) * grid
+    return PulseTrain(float(start), float(period), float(width), train.size)
+
+
+def _edges(above: NDArray[np.bool_], rising: bool) -> NDArray[np.intp]:
+    change = np.diff(above.astype(int))
+    return np.flatnonzero(change == (1 if rising else -1)) + 1
+
+
+def _matched(time: Array, edges: NDArray[np.intp], start: float, period: float) -> tuple[Array, Array]:
+    """Times of edges near where they are expected, one each, and their numbers from 0."""
+    found, ranks = [], []
+    for k in range(int((time[-1] - start) / period) + 1):
+        if not len(edges):
+            break
+        near = edges[np.argmin(np.abs(time[edges] - start - k * period))]
+        if abs(time[near] - start - k * period) < 0.1 * period:
+            found.append(time[near])
+            ranks.append(k)
+    return np.array(found), np.array(ranks, dtype=float)

@@ -1,0 +1,280 @@
+"""One axis as a rig: rows from blocks of a recording, candidates from the catalogue."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.emps.axis_log import AxisLog
+from discrepancy.emps.blocks import blocks, period_of
+from discrepancy.emps.catalogue import DEFAULTS, Tolerances, candidate_of, remainder
+from discrepancy.emps.causes import CAUSES
+from discrepancy.emps.causes.base import Hints
+from discrepancy.emps.extended import write_extended
+from discrepancy.emps.hints import hints_of
+from discrepancy.emps.noise import Noise, from_remainder, from_repeats, repeated
+from discrepancy.emps.plant import Plant
+from discrepancy.emps.preflight import checked
+from discrepancy.emps.pushes import intervals_near, push, worst_intervals
+from discrepancy.emps.reduction import Reduction
+from discrepancy.emps.resimulate import errors_of_rerun, plant_of, start_of
+from discrepancy.emps.signals import Signals
+from discrepancy.emps.undecidable import statements
+from discrepancy.explanation import Explanation
+from discrepancy.rig import Candidate, Channel, Rows
+from discrepancy.whitening import Whitening
+from estimator.errors import InputError
+
+Array = NDArray[np.float64]
+
+LEAST_ROWS = 100
+"""Rows that a block must have to be one."""
+
+
+@dataclass(frozen=True, eq=False)
+class EmpsRig:
+    """One recording of the axis, cut into blocks that validate each other.
+
+    Attributes:
+        log: the recording, checked.
+        signals: its smoothed signals.
+        blocks: samples of every block.
+        reduction: from samples to rows.
+        hints: where shapes begin.
+        noise: what is not to be explained.
+        whitening: of every block.
+        tolerances: standard deviations by cause and parameter.
+        excluded: causes left out of the catalogue.
+    """
+
+    log: AxisLog
+    signals: Signals
+    blocks: tuple[slice, ...]
+    reduction: Reduction
+    hints: Hints
+    noise: Noise
+    whitening: tuple[Whitening, ...]
+    tolerances: Tolerances
+    excluded: frozenset[str]
+
+    @classmethod
+    def of(cls, log: AxisLog, tolerances: Tolerances | None = None, excluded: Sequence[str] = ()) -> EmpsRig:
+        """Check a recording, cut it and find its noise.
+
+        Raises:
+            InputError: the recording cannot be used, or a cause to be excluded does not exist.
+        """
+        unknown = sorted(set(excluded) - set(CAUSES))
+        if unknown:
+            raise InputError(f"cause {unknown[0]!r} does not exist; the causes are {', '.join(CAUSES)}")
+        log = checked(log)
+        signals = Signals.of(log)
+        period = period_of(log.reference, log.rate_hz)
+        cut = blocks(signals, period)
+        reduction = Reduction.of(log.rate_hz, cut, log.usable)
+        cut, reduction = _long_enough(log, cut, reduction)
+        hints = hints_of(signals, reduction)
+        if period is not None and repeated(signals, period):
+            noise = from_repeats(signals, reduction, period)
+        else:
+            noise = from_remainder(remainder(signals, reduction, hints), signals)
+        shared = Whitening.of(noise.draws, noise.draws.shape[1])
+        whitening = tuple(replace(shared, moving=len(rows)) for rows in reduction.samples)
+        known = DEFAULTS if tolerances is None else tolerances
+        return cls(log, signals, tuple(cut), reduction, hints, noise, whitening, known, frozenset(excluded))
+
+    @property
+    def trials(self) -> Sequence[str]:
+        """Names of the blocks."""
+        time = self.log.time
+        return [f"{self.log.name} {time[b.start]:.2f}-{time[b.stop - 1]:.2f} s" for b in self.blocks]
+
+    @property
+    def local_unknowns(self) -> int:
+        """Blocks have no unknowns of their own."""
+        return 0
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """Force that the drive is told minus what the motion needs, and voltage minus the loop's law."""
+        return [Channel("force", "axis", None, "N"), Channel("voltage", "loop", None, "V")]
+
+    @property
+    def nominal(self) -> Plant:
+        """The axis as assumed."""
+        return Plant.nominal(self.log)
+
+    def candidates(self) -> list[Candidate]:
+        """Every cause of the catalogue; pushes come from ``transients``."""
+        return [
+            candidate_of(name, self.hints, self.tolerances)
+            for name in CAUSES
+            if name not in self.excluded and name != "push"
+        ]
+
+    def physical(self, candidate: Candidate) -> list[Array]:
+        """Columns of one candidate in N and V, rows (n, 2, k) of every block."""
+        columns = self.reduction(CAUSES[candidate.cause].columns(self.signals, candidate.shape))
+        return [c * self._present(candidate, t) for t, c in enumerate(columns)]
+
+    def columns(self, candidate: Candidate) -> list[Array]:
+        """Whitened columns of one candidate, shape (n, 2, k) per block."""
+        return [white(c) for white, c in zip(self.whitening, self.physical(candidate), strict=True)]
+
+    def _present(self, candidate: Candidate, trial: int) -> float:
+        return float(not candidate.detail or candidate.detail["trial"] == trial)
+
+    def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
+        """Whitened rows of every block; there are no unknowns but the causes."""
+        columns = [self.columns(candidate) for candidate in candidates]
+        out = []
+        for t, (white, residual) in enumerate(
+            zip(self.whitening, self.reduction(self.signals.residual), strict=True)
+        ):
+            none = np.zeros((*residual.shape, 0))
+            time = self.log.time[self.reduction.samples[t]]
+            out.append(Rows(self.trials[t], white(residual), none, none, [c[t] for c in columns], time))
+        return out
+
+    def residual(
+        self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
+    ) -> list[Array]:
+        """Exact whitened residual of every block with causes taken out."""
+        return [white(r) for white, r in zip(self.whitening, self.physical_residual(active), strict=True)]
+
+    def physical_residual(self, active: Sequence[tuple[Candidate, Array]]) -> list[Array]:
+        """The same in N and V, rows (n, 2) of every block."""
+        out = self.reduction(self.signals.residual)
+        for candidate, values in active:
+            taken = self.reduction(CAUSES[candidate.cause].exact(self.signals, values, candidate.shape))
+            out = [
+                r - x * self._present(candidate, t) for t, (r, x) in enumerate(zip(out, taken, strict=True))
+            ]
+        return out
+
+    def unknowns(self, candidate: Candidate) -> list[Array]:
+        """Dry friction at rest, whitened columns (n, 2, k) of every block."""
+        rests = CAUSES[candidate.cause].rests(self.signals, candidate.shape)
+        reduced = [self.reduction(np.column_stack([rest, np.zeros_like(rest)])) for rest in rests]
+        out = []
+        for t, (white, samples) in enumerate(zip(self.whitening, self.reduction.samples, strict=True)):
+            seen = [r[t] for r in reduced if np.abs(r[t]).max(initial=0.0) > 1e-6]
+            out.append(white(np.stack(seen, axis=2)) if seen else np.zeros((len(samples), 2, 0)))
+        return out
+
+    def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
+        """Whether such values can be: no friction or play that is negative beyond two standard errors."""
+        cause = CAUSES[candidate.cause]
+        se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        return all(values[k] > -2.0 * se[k] for k, n in enumerate(cause.parameters) if n in cause.positive)
+
+    def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
+        """Pushes at the intervals where the force is worst."""
+        if "push" in self.excluded:
+            return []
+        out = []
+        for t, z in enumerate(remaining):
+            time = self.log.time[self.reduction.samples[t]]
+            tolerance = self.tolerances["push"]["force_N"]
+            out += [push(t, start, duration, tolerance) for start, duration in worst_intervals(time, z[:, 0])]
+        return out
+
+    def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
+        """The candidate with every other shape of its cause; a push with its interval moved."""
+        if candidate.detail:
+            near = intervals_near(candidate.shape["start_s"], candidate.shape["duration_s"])
+            tolerance = candidate.parameters[0].tolerance
+            return [
+                push(int(candidate.detail["trial"]), start, duration, tolerance) for start, duration in near
+            ]
+        cause = CAUSES[candidate.cause]
+        shapes = cause.finer(candidate.shape) if finer else cause.shapes(self.hints)
+        return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
+
+    def can_run_again(self) -> str | None:
+        """Nothing stands against it: every recording has its reference and the loop's gains."""
+        return None
+
+    def simulation(
+        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
+    ) -> Callable[[], dict[str, Array] | None]:
+        """What runs one block's reference again, with causes in the axis.
+
+        It returns recorded minus simulated ``position`` [m] and ``voltage`` [V], shape (Q,) each.
+        """
+        here, log = self.blocks[trial], self.log
+        acting = [(c, v) for c, v in active if self._present(c, trial)]
+        return partial(
+            errors_of_rerun,
+            plant_of(self.nominal, acting),
+            log.time[here],
+            log.reference[here],
+            start_of(self.signals, here.start),
+            log.position[here],
+            log.voltage[here],
+            log.usable[here],
+        )
+
+    def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
+        """Standard deviation of the noise and of the motion, by channel."""
+        here = self.blocks[trial]
+        position, voltage = float(np.std(self.log.position[here])), float(np.std(self.log.voltage[here]))
+        return {
+            "position": (np.array([self.noise.position_m]), np.array([position])),
+            "voltage": (np.array([self.noise.voltage_V]), np.array([voltage])),
+        }
+
+    def effect_parameters(
+        self, candidate: Candidate, values: Array, covariance: Array
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """Values with standard errors, and the shape, which has none."""
+        names = [p.name for p in candidate.parameters]
+        se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        found = dict(zip(names, map(float, values), strict=True)) | dict(candidate.shape)
+        return found, dict(zip(names, map(float, se), strict=True)) | {
+            n: float("nan") for n in candidate.shape
+        }
+
+    def quantities(self, trial: int) -> dict[str, Array]:
+        """Speed [m/s], position [m], acceleration [m/s^2] and force [N] per row, shape (n,) each."""
+        at, s = self.reduction.samples[trial], self.signals
+        return {"speed": np.abs(s.v[at]), "velocity": s.v[at], "position": s.x[at], "acceleration": s.a[at]}
+
+    def row_rate_hz(self, trial: int) -> float:
+        """Rate of the rows [Hz]."""
+        return self.log.rate_hz / self.reduction.step
+
+    def directions(self, trial: int) -> dict[str, Array]:
+        """The two channels themselves: what the axis does, and what its loop does."""
+        n = len(self.reduction.samples[trial])
+        return {
+            "the axis' force": np.tile(np.array([[1.0], [0.0]]), (n, 1, 1)),
+            "the loop's voltage": np.tile(np.array([[0.0], [1.0]]), (n, 1, 1)),
+        }
+
+    def write_extended(self, explanation: Explanation, folder: Path) -> None:
+        """Write the axis with the named causes in it.
+
+        Raises:
+            InputError: the folder cannot be written.
+        """
+        active = [(found.candidate, found.values) for found in explanation.found]
+        write_extended(plant_of(self.nominal, active), active, folder, list(self.trials))
+
+    def undecidable(self) -> list[dict[str, Any]]:
+        """What recordings of one axis cannot decide."""
+        return statements()
+
+
+def _long_enough(log: AxisLog, cut: list[slice], reduction: Reduction) -> tuple[list[slice], Reduction]:
+    """Only blocks with rows enough."""
+    keep = [k for k, rows in enumerate(reduction.samples) if len(rows) >= LEAST_ROWS]
+    if not keep:
+        raise InputError(f"{log.name}: no part of it is long enough to diagnose")
+    return [cut[k] for k in keep], replace(reduction, samples=tuple(reduction.samples[k] for k in keep))

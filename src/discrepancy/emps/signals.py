@@ -1,0 +1,66 @@
+"""Smooth signals of a recording: position and its derivatives, the force that the drive is told, the loop's error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from discrepancy.emps.axis_log import LIMIT_V, AxisLog
+from discrepancy.emps.plant import FIRST_GUESS_KG
+from estimator.filtering import differentiate, low_pass
+
+Array = NDArray[np.float64]
+
+SMOOTH_HZ = 100.0
+"""Cut-off before differentiating, well above the rows' own."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """Of all samples of one recording, shape (Q,) each.
+
+    Attributes:
+        log: the recording.
+        x, v, a: smoothed position [m], velocity [m/s], acceleration [m/s^2].
+        force: gain times voltage [N]. The drive holds a sample's voltage until the next, so what acts at a sample is
+            the mean of the hold before and after it: half a period old on average.
+        error: reference minus position [m].
+        command: what the nominal loop asks for before it saturates [V].
+        linear: 1 where that is within the limits, else 0.
+    """
+
+    log: AxisLog
+    x: Array
+    v: Array
+    a: Array
+    force: Array
+    error: Array
+    command: Array
+    linear: Array
+
+    @classmethod
+    def of(cls, log: AxisLog) -> Signals:
+        """Smooth and differentiate."""
+        rate = log.rate_hz
+        x = low_pass(log.position, rate, min(SMOOTH_HZ, 0.2 * rate))
+        v = differentiate(x, rate)
+        a = differentiate(v, rate)
+        error = log.reference - x
+        command = log.kv_Vs_per_m * (log.kp_per_s * error - v)
+        force = log.gain_N_per_V * at_delay(log.voltage, rate, 0.5 / rate)
+        return cls(log, x, v, a, force, error, command, (np.abs(command) < LIMIT_V).astype(float))
+
+    @property
+    def residual(self) -> Array:
+        """Nominal residual, shape (Q, 2): force told minus that of a frictionless mass [N], voltage minus law [V]."""
+        law = np.clip(self.command, -LIMIT_V, LIMIT_V)
+        return np.column_stack([self.force - FIRST_GUESS_KG * self.a, self.log.voltage - law])
+
+
+def at_delay(x: Array, rate_hz: float, delay_s: float) -> Array:
+    """x(t - delay) of even samples, shape (Q,); held at the ends."""
+    time = np.arange(len(x)) / rate_hz
+    return np.asarray(CubicSpline(time, x)(np.clip(time - delay_s, 0.0, time[-1])), dtype=np.float64)
