@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -43,14 +44,14 @@ def _factor(result: Result) -> float:
 
 def _alarms(parts: Mapping[str, Sequence[Result]]) -> str:
     rows = []
-    for part in ("clean", "tolerance"):
-        if runs := parts.get(part):
+    for part, preset in product(("clean", "tolerance"), ("nominal", "ideal")):
+        if runs := [r for r in parts.get(part, []) if r["key"].endswith("-ideal") is (preset == "ideal")]:
             named = [r["verdict"]["found"] for r in runs]
             alarms = sum(bool(found) for found in named)
             low, high = interval(alarms, len(runs))
             causes = Counter(item["cause"] for found in named for item in found)
             what = ", ".join(f"{cause} {n}" for cause, n in causes.items()) or "-"
-            rows.append([part, len(runs), alarms, f"{100 * low:.0f} .. {100 * high:.0f} %", what])
+            rows.append([f"{part}, {preset} sensors", len(runs), alarms, f"{100 * low:.0f} .. {100 * high:.0f} %", what])
     return _markdown("False alarms", ["sets", "number", "something named", "95 % interval", "what"], rows)
 
 
