@@ -51,7 +51,8 @@ def _alarms(parts: Mapping[str, Sequence[Result]]) -> str:
             low, high = interval(alarms, len(runs))
             causes = Counter(item["cause"] for found in named for item in found)
             what = ", ".join(f"{cause} {n}" for cause, n in causes.items()) or "-"
-            rows.append([f"{part}, {preset} sensors", len(runs), alarms, f"{100 * low:.0f} .. {100 * high:.0f} %", what])
+            share = f"{100 * low:.0f} .. {100 * high:.0f} %"
+            rows.append([f"{part}, {preset} sensors", len(runs), alarms, share, what])
     return _markdown("False alarms", ["sets", "number", "something named", "95 % interval", "what"], rows)
 
 
