@@ -110,9 +110,10 @@ class Layout:
         stamps = np.zeros(len(rows), np.int64)
         if "header.stamp.sec" in (self._record.names or ()):
             nanoseconds = table["header.stamp.nanosec"].astype(np.int64)
-            if nanoseconds.max() >= 1_000_000_000:
+            if (bad := nanoseconds >= 1_000_000_000).any():
+                row = int(np.argmax(bad))
                 raise CdrError(
-                    f"the nanoseconds of its stamp are {nanoseconds.max()}; they must be below 1e9"
+                    f"the nanoseconds of its stamp are {nanoseconds[row]}; they must be below 1e9", row
                 )
             stamps = table["header.stamp.sec"].astype(np.int64) * 1_000_000_000 + nanoseconds
         values = np.full((len(rows), len(self.lacking)), np.nan)
@@ -186,7 +187,7 @@ class CdrReader:
             try:
                 stamps[at], values[at] = layout.read(here)
             except CdrError as error:
-                raise self._error(int(at[0]), error) from error
+                raise self._error(int(at[error.row]), error) from error
             for number, lacking in enumerate(layout.lacking):
                 if self.lacking[number] is not None:
                     self.lacking[number] = lacking

@@ -69,7 +69,7 @@ class McapRuns:
         Raises:
             InputError: the file is damaged.
         """
-        at = told = len(MAGIC)
+        at, told = len(MAGIC), 0
         end, window = self.size - len(MAGIC), _WINDOW
         with self._open() as file:
             while True:

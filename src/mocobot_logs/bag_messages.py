@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -105,7 +105,7 @@ class Storage(Protocol):
         ...
 
 
-def joined(payloads: list[bytes], log_ns: Stamps, order: NDArray[np.int64], where: str) -> Messages:
+def joined(payloads: Sequence[bytes], log_ns: Stamps, order: NDArray[np.int64], where: str) -> Messages:
     """Messages that come one by one, in one block of memory.
 
     Raises:

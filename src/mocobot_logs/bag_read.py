@@ -86,7 +86,7 @@ class BagSource:
                 if parts[robot] and (samples := _rows(parts[robot], joiner)) is not None:
                     yield robot, samples
         for robot, joiner in enumerate(joiners):
-            if joiner is not None and (samples := joiner.push({})) is not None:
+            if joiner is not None and (samples := joiner.finish()) is not None:
                 yield robot, samples
         for reader in readers.values():
             reader.check_end()
@@ -160,8 +160,11 @@ class _Reader:
             self._check(f"none of the first {self._cdr.count} messages")
         for use in self._topic.uses:
             values = np.empty((len(stamps), len(use.columns)))
-            for k, channel in enumerate(use.maps):
-                values[:, k] = channel.apply(numbers[:, use.numbers[k]])
+            with np.errstate(
+                over="ignore", invalid="ignore"
+            ):  # what is wrong with a value is not for the reader
+                for k, channel in enumerate(use.maps):
+                    values[:, k] = channel.apply(numbers[:, use.numbers[k]])
             parts[use.robot][use.part] = Part(stamps, messages.log_ns, messages.order, use.columns, values)
 
     def check_end(self) -> None:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import sqlite3
-from array import array
 from collections.abc import Callable, Collection, Iterator
 from pathlib import Path
 
@@ -25,6 +24,8 @@ _REQUIRED = {
     "topics": ("id", "name", "type", "serialization_format"),
     "messages": ("topic_id", "timestamp", "data"),
 }
+
+_Row = tuple[int, bytes, int, int]  # topic, message, when it was logged [ns], number of the row
 
 
 class SqliteBag:
@@ -53,46 +54,55 @@ class SqliteBag:
             InputError: the file is damaged.
         """
         ids = [key for key, name in self._ids.items() if name in topics]
+        last = dict.fromkeys(topics, -(1 << 63))
         told = 0
         with self._connected() as connection:
             marks = ",".join("?" * len(ids))
             # By rowid: no index is trusted, nothing sorted, and the file is read from front to back.
             rows = connection.execute(
-                f"SELECT rowid, topic_id, timestamp, data FROM messages NOT INDEXED WHERE topic_id IN ({marks}) "
+                f"SELECT topic_id, data, timestamp, rowid FROM messages NOT INDEXED WHERE topic_id IN ({marks}) "
                 "ORDER BY rowid",
                 ids,
             )
-            previous = -(1 << 63)
-            while found := self._next(rows, previous):
-                previous, parts = found
-                yield {
-                    topic: part.joined(f"{self.name}: topic {topic!r:.80}") for topic, part in parts.items()
-                }
-                now = int(self.size * min(max(previous / self._last, 0.0), 1.0)) if self._last > 0 else 0
+            while found := self._next(rows):
+                block = {topic: self._messages(part, topic, last) for topic, part in found.items()}
+                yield block
+                done = max(last.values()) / self._last if self._last > 0 else 0.0
+                now = int(self.size * min(max(done, 0.0), 1.0))
                 advance(now - told)
                 told = now
         advance(self.size - told)
 
-    def _next(
-        self, rows: Iterator[tuple[int, int, int, bytes]], previous: int
-    ) -> tuple[int, dict[str, _Rows]] | None:
-        """Rows of about one block by topic, and the last one's number."""
-        found: dict[str, _Rows] = {}
+    def _next(self, rows: Iterator[_Row]) -> dict[str, list[_Row]]:
+        """Rows of about one block, by topic."""
+        parts: dict[int, list[_Row]] = {key: [] for key in self._ids}
         held = 0
-        for order, (row, topic, stamp, data) in enumerate(rows):
-            if row <= previous or type(data) is not bytes or type(stamp) is not int:
-                raise InputError(f"{self.name}: damaged in row {row} of its messages")
-            previous = row
-            part = found.get(name := self._ids[topic])
-            if part is None:
-                part = found[name] = _Rows()
-            part.log_ns.append(stamp)
-            part.order.append(order)
-            part.data.append(data)
-            held += len(data) + 64
-            if held > BLOCK_BYTES:
-                break
-        return (previous, found) if found else None
+        try:
+            for row in rows:
+                parts[row[0]].append(row)
+                held += len(row[1]) + 64
+                if held > BLOCK_BYTES:
+                    break
+        except TypeError as error:
+            raise InputError(f"{self.name}: damaged, its table 'messages' has a row without data") from error
+        found: dict[str, list[_Row]] = {}
+        for key, part in parts.items():
+            if part:
+                found.setdefault(self._ids[key], []).extend(part)
+        return found
+
+    def _messages(self, part: list[_Row], topic: str, last: dict[str, int]) -> Messages:
+        """Rows of one topic as messages; ``last`` has the number of each topic's last row so far."""
+        keys, payloads, stamps, numbers = zip(*part, strict=True)
+        if len(set(keys)) > 1:  # one topic may be listed several times
+            _, payloads, stamps, numbers = zip(*sorted(part, key=lambda row: row[3]), strict=True)
+        if {*map(type, payloads)} != {bytes} or {*map(type, stamps)} != {int}:
+            raise InputError(f"{self.name}: damaged, its table 'messages' has a row that holds no message")
+        order = np.array(numbers, np.int64)
+        if order[0] <= last[topic] or (order[1:] <= order[:-1]).any():
+            raise InputError(f"{self.name}: damaged, its table 'messages' holds the same row twice")
+        last[topic] = int(order[-1])
+        return joined(payloads, np.array(stamps, np.int64), order, f"{self.name}: topic {topic!r:.80}")
 
     def has_messages(self, topic: str) -> bool:
         """Whether there is any message of a topic.
@@ -145,6 +155,11 @@ class SqliteBag:
                     connection.execute(f"PRAGMA {setting}")
                 connection.set_progress_handler(stop, _OPERATIONS)
                 yield connection
+        except sqlite3.DataError as error:
+            limit = f"a message of more than {MESSAGE_BYTES >> 20} MiB"
+            raise InputError(
+                f"{self.name}: {limit} ({error}); joint data are read from smaller ones"
+            ) from error
         except (sqlite3.Error, OverflowError, UnicodeDecodeError) as error:
             what = "its pages run in circles" if left < 0 else (str(error).splitlines() or ["unreadable"])[0]
             raise InputError(f"{self.name}: damaged, or not a bag ({what})") from error
@@ -183,14 +198,3 @@ class SqliteBag:
                 )
             self._ids[key] = name
         return topics
-
-
-class _Rows:
-    """Messages of one topic, row by row."""
-
-    def __init__(self) -> None:
-        self.log_ns, self.order, self.data = array("q"), array("q"), []
-
-    def joined(self, where: str) -> Messages:
-        log_ns, order = (np.frombuffer(values, np.int64) for values in (self.log_ns, self.order))
-        return joined(self.data, log_ns, order, where)

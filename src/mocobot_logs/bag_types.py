@@ -21,6 +21,7 @@ SIZES = {
     "int64": 8, "uint64": 8, "float32": 4, "float64": 8,
 }  # fmt: skip
 """Numbers of a message and their sizes [bytes]."""
+_TIME = "builtin_interfaces/msg/Time"
 _DEEPEST = 32
 _IDL = "=" * 80 + "\n"
 _EMPTY: list[tuple[str, FieldDesc]] = [("structure_needs_at_least_one_member", (Nodetype.BASE, ("uint8", 0)))]
@@ -99,8 +100,11 @@ class MessageType:
                 f"{self.where}: {printable(self.name)} has no header and so no stamp of its own; "
                 "with clock = 'log' in the map's [time], the recorder's clock is taken"
             )
-        for part in ("sec", "nanosec"):
-            self.require(f"header.stamp.{part}")
+        stamp = dict(self.fields("std_msgs/msg/Header")).get("stamp")
+        if stamp != (Nodetype.NAME, _TIME) or dict(self.fields(_TIME)) != dict(_known()[_TIME][1]):
+            raise InputError(
+                f"{self.where}: the bag defines a header without the stamp that headers of ROS 2 have"
+            )
 
     def require_joints(self, field: str) -> None:
         """Check that messages have named joints with such numbers.

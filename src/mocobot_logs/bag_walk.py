@@ -24,7 +24,16 @@ _TRAILING = 3  # bytes that bring a message to a multiple of four
 
 
 class CdrError(ValueError):
-    """A message is not what its type says; tells what is wrong, not where."""
+    """A message is not what its type says; tells what is wrong, not where.
+
+    Attributes:
+        row: which of the messages that are read together.
+    """
+
+    def __init__(self, what: str, row: int = 0) -> None:
+        """What is wrong with which message."""
+        super().__init__(what)
+        self.row = row
 
 
 @dataclass(frozen=True)
