@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import tomllib
-from collections.abc import Mapping
 from pathlib import Path
 
-from estimator.errors import InputError
+from discrepancy import tolerances_file
 
 # Standard deviation, and a typical size where the tolerance is zero. Assumed, like the robot's masses: a calibrated
 # unit with 16-bit encoders; a lab replaces them by its own (--tolerances).
@@ -35,34 +33,9 @@ DEFAULTS: dict[str, dict[str, float]] = {
 
 
 def read_tolerances(path: Path | None) -> dict[str, dict[str, float]]:
-    """The defaults, with what a TOML file of tables ``[cause]`` and keys ``parameter = value`` changes.
+    """The defaults, with what a TOML file changes; see ``discrepancy.tolerances_file``.
 
     Raises:
         InputError: the file cannot be read, or names something unknown, or a value is not a number of at least 0.
     """
-    tolerances = {cause: dict(values) for cause, values in DEFAULTS.items()}
-    if path is None:
-        return tolerances
-    try:
-        given = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: not a readable file of tolerances ({error})") from error
-    for cause, values in given.items():
-        if cause not in tolerances or not isinstance(values, Mapping):
-            raise InputError(f"{path}: unknown table {cause!r}; the causes are {', '.join(tolerances)}")
-        for name, value in values.items():
-            if name not in tolerances[cause]:
-                raise InputError(
-                    f"{path}: {cause} has no {name!r}; its parameters are {', '.join(tolerances[cause])}"
-                )
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not number or not 0 <= value < 1e6:
-                raise InputError(f"{path}: {cause}.{name} is {value!r}; it must be a number of at least 0")
-            tolerances[cause][name] = float(value)
-        zeros = [name for name, value in tolerances[cause].items() if value == 0]
-        if zeros and len(zeros) < len(tolerances[cause]):
-            raise InputError(
-                f"{path}: {cause}.{zeros[0]} is 0; either all parameters of a cause have a tolerance or none "
-                f"({', '.join(tolerances[cause])})"
-            )
-    return tolerances
+    return tolerances_file.read_tolerances(path, DEFAULTS)
