@@ -16,8 +16,8 @@ LENGTH_S = 6.0
 """About what a block lasts where the reference does not repeat."""
 SEARCH = 0.06
 """A cut may move by this share of a block to where the motion is steady."""
-SAME = 1e-6
-"""Cycles of the reference agree to this share of its range."""
+SAME = 3e-4
+"""Cycles of the reference agree to this share of its range; filled gaps leave that much."""
 LEAST_PERIOD_S = 1.0
 
 
@@ -32,10 +32,14 @@ def period_of(reference: Array, rate_hz: float) -> int | None:
     product = fftconvolve(x, x[::-1])[count - 1 :]
     lags = np.arange(least, most + 1)
     apart = (squares[count] - squares[lags]) + squares[count - lags] - 2.0 * product[lags]
-    for lag in lags[apart / (count - lags) < (1e-4 * np.ptp(x)) ** 2]:
-        if np.abs(reference[lag:] - reference[:-lag]).max() <= SAME * np.ptp(x):
-            return int(lag)
-    return None
+    close = apart / (count - lags) < (SAME * np.ptp(x)) ** 2
+    if not close.any():
+        return None
+    # The first run of lags that will do, and the best of it: neighbours of the period nearly do, too.
+    first = int(np.argmax(close))
+    run = first + int(np.argmin(np.append(close[first:], False)))
+    lag = int(lags[first:run][np.argmin((apart / (count - lags))[first:run])])
+    return lag if np.abs(reference[lag:] - reference[:-lag]).max() <= SAME * np.ptp(x) else None
 
 
 def blocks(signals: Signals, period: int | None) -> list[slice]:

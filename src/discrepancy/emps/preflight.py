@@ -42,9 +42,10 @@ def checked(log: AxisLog) -> AxisLog:
             f"{log.name}: qm moves by {1e3 * np.ptp(log.position):.3g} mm in all; at least "
             f"{1e3 * LEAST_MOTION_M:g} mm are needed to tell anything"
         )
-    usable = log.usable.copy()
+    usable, position = log.usable.copy(), log.position.copy()
     for start, stop in stuck(log):
         usable[start:stop] = False
+        _bridge(position, log.reference, start, stop)
         moved = 1e3 * np.ptp(log.reference[start:stop])
         notes.append(
             f"qm is stuck at {log.position[start]:.6g} m from {log.time[start]:.3f} to {log.time[stop - 1]:.3f} s "
@@ -54,6 +55,7 @@ def checked(log: AxisLog) -> AxisLog:
         raise InputError(
             f"{log.name}: qm is stuck for {100 * (~usable).mean():.0f} % of the time; nothing can be made of the rest"
         )
+    log = replace(log, position=position)
     _check_sign(log, usable)
     step = resolution(log.position).step_m
     if step > COARSE_M:
@@ -86,6 +88,13 @@ def resolution(position: Array) -> Resolution:
     multiples = steps / max(least, 1e-300)
     common = len(steps) > 10 and np.all(np.abs(multiples - np.round(multiples)) < 0.02)
     return Resolution(least if common else 0.0)
+
+
+def _bridge(position: Array, reference: Array, start: int, stop: int) -> None:
+    """Replace a stuck reading by one that follows the reference, so that no jump rings in the filters beside it."""
+    ends = [max(start - 1, 0), min(stop, len(position) - 1)]
+    at = np.arange(start, stop)
+    position[at] = reference[at] - np.interp(at, ends, reference[ends] - position[ends])
 
 
 def _check_sign(log: AxisLog, usable: NDArray[np.bool_]) -> None:

@@ -56,7 +56,7 @@ def read_emps(path: Path) -> AxisLog:
     numbers = {name: _number(path, name, found[name]) for name in NUMBERS}
     time, others, usable, notes = on_grid(str(path), series.pop("t"), series)
     return AxisLog(
-        path.stem,
+        path.name,
         time,
         others["qm"],
         others["qg"],

@@ -92,8 +92,8 @@ class EmpsRig:
     @property
     def trials(self) -> Sequence[str]:
         """Names of the blocks."""
-        time = self.log.time
-        return [f"{self.log.name} {time[b.start]:.2f}-{time[b.stop - 1]:.2f} s" for b in self.blocks]
+        time, name = self.log.time, Path(self.log.name).stem
+        return [f"{name} {time[b.start]:.2f}-{time[b.stop - 1]:.2f} s" for b in self.blocks]
 
     @property
     def local_unknowns(self) -> int:
@@ -169,10 +169,12 @@ class EmpsRig:
         return out
 
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
-        """Whether such values can be: no friction or play that is negative beyond two standard errors."""
+        """Whether such values can be: no friction or play that is negative beyond two standard errors, or rounding."""
         cause = CAUSES[candidate.cause]
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        return all(values[k] > -2.0 * se[k] for k, n in enumerate(cause.parameters) if n in cause.positive)
+        return cause.visible(self.signals, values) and all(
+            values[k] > -2.0 * se[k] for k, n in enumerate(cause.parameters) if n in cause.positive
+        )
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the force is worst."""

@@ -6,12 +6,15 @@ import numpy as np
 
 from discrepancy.emps.causes.base import Cause, force
 from discrepancy.emps.plant import FIRST_GUESS_KG
+from discrepancy.emps.preflight import resolution
 from estimator.filtering import differentiate, low_pass
 
 CARRIAGE = 0.5
 """Share of the moving mass behind the play: assumed."""
 SOFT_N = 2.0
 SMOOTH_HZ = 60.0
+STEPS = 3.0
+"""A play of fewer steps of the encoder is rounding."""
 
 
 class Backlash(Cause):
@@ -31,6 +34,10 @@ class Backlash(Cause):
         side = low_pass(np.tanh(passed / SOFT_N), rate, min(SMOOTH_HZ, 0.2 * rate))
         second = differentiate(differentiate(side, rate), rate)
         return force(-0.5 * CARRIAGE * FIRST_GUESS_KG * second)
+
+    def visible(self, signals, values):
+        # Rounding by whole steps has a hysteresis of its own.
+        return abs(values[0]) > STEPS * resolution(signals.log.position).step_m
 
     def apply(self, plant, values, shape):
         return replace(plant, play_m=max(plant.play_m + values[0], 0.0))

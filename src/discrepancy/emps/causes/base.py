@@ -71,6 +71,10 @@ class Cause(ABC):
         """Shapes near a chosen one, for a second look."""
         return []
 
+    def visible(self, signals: Signals, values: Array) -> bool:
+        """Whether a cause of that size can be told from the position's rounding."""
+        return True
+
     def rests(self, signals: Signals, shape: Shape) -> list[Array]:
         """Forces (Q,) that the cause leaves open, such as dry friction at rest, one unit each."""
         return []

@@ -31,4 +31,6 @@ class Stribeck(Cause):
         return [{"speed_mps": speed} for speed in SPEEDS_MPS]
 
     def finer(self, shape):
-        return [{"speed_mps": factor * shape["speed_mps"]} for factor in (0.7, 0.85, 1.2, 1.4)]
+        near = (factor * shape["speed_mps"] for factor in (0.7, 0.85, 1.2, 1.4))
+        # Beyond that it is viscous friction by another name.
+        return [{"speed_mps": speed} for speed in near if min(SPEEDS_MPS) / 2 <= speed <= max(SPEEDS_MPS)]
