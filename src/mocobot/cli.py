@@ -81,7 +81,10 @@ class Diagnose:
     """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth."""
 
     rec: tyro.conf.Positional[tuple[Path, ...]]
-    """Recordings (Parquet), all of one payload; several, so that what is named can be validated."""
+    """Recordings (Parquet), all of one payload; several, so that what is named can be validated. One MAT file with
+    --rig emps."""
+    rig: Literal["team", "emps"] = "team"
+    """What was recorded: a team of mocobots, or the EMPS benchmark's axis (docs/emps.md)."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder for diagnosis.json, report.txt, the extended model and plots; an earlier diagnosis is replaced."""
     jobs: int = 2
@@ -95,7 +98,10 @@ class Diagnose:
 
     def run(self) -> None:
         """Run the command."""
-        from mocobot.diagnose_command import run
+        if self.rig == "emps":
+            from mocobot.diagnose_emps import run
+        else:
+            from mocobot.diagnose_command import run
 
         run(self)
 

@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from discrepancy.diagnose import Diagnosis, diagnose
-from discrepancy.diagnosis_json import FORMAT, diagnosis_to_dict
-from discrepancy.plots import PLOTS, save_plots
+from discrepancy.diagnosis_json import diagnosis_to_dict
 from discrepancy.report import format_diagnosis
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.estimates import errors, estimates
@@ -24,15 +23,14 @@ from estimator.estimate import estimate_payload
 from estimator.payload_estimate import PayloadEstimate
 from estimator.recording import Recording, read_recording
 from estimator.statics import CONTRADICTION
-from mocobot.files import write_json, write_text
-from mocobot.folders import check_folder, whole_folder
+from mocobot.diagnose_folder import check_options, write_diagnosis
+from mocobot.folders import whole_folder
 from mocobot.progress import bar, stages
 from mocobot_sim.truth import truth_path
 
 if TYPE_CHECKING:
     from mocobot.cli import Diagnose
 
-JSON, REPORT, EXTENDED = "diagnosis.json", "report.txt", "extended"
 LEAST_S, GOOD_S = 5.0, 30.0
 """Length of all recordings together below which nothing is diagnosed, and with which it starts to be of use."""
 MASS_TOLERANCE = 0.05
@@ -45,7 +43,7 @@ def run(options: Diagnose) -> None:
     Raises:
         InputError: recordings, tolerances or options that cannot be used, or an output that cannot be written.
     """
-    _check(options)
+    check_options(options, CAUSES)
     tolerances = read_tolerances(options.tolerances)
     with whole_folder(options.out) if options.out else nullcontext() as folder:
         with bar(len(options.rec), "reading", "file") as advance:
@@ -67,40 +65,11 @@ def run(options: Diagnose) -> None:
             values = _values(diagnosis, rig, options.rec)
             if folder is not None:
                 say("write")
-                _write(folder, values, diagnosis, rig)
+                shown = (rig, diagnosis.explanation)
+                write_diagnosis(folder, values, diagnosis, rig, TeamWords(), lambda: traces(*shown))
         print(format_diagnosis(values))
     if options.out:
         print(f"\nWritten to {options.out}.")
-
-
-def _check(options: Diagnose) -> None:
-    """Everything that can be refused before a recording is read."""
-    from mocobot.cli import check_recordings
-
-    if not options.rec:
-        hint = "; name them before --exclude" if options.exclude else "; name at least one file"
-        raise InputError(f"no recording given{hint}")
-    if options.jobs < 1:
-        raise InputError(f"jobs is {options.jobs}; it must be at least 1")
-    check_recordings(options.rec)
-    for name in options.exclude:
-        if name not in CAUSES:
-            raise InputError(f"cause {name!r} does not exist; the causes are {', '.join(CAUSES)}")
-    if set(CAUSES) <= set(options.exclude):
-        raise InputError("every cause is excluded; nothing is left to look for")
-    if options.out:
-        inputs = [*options.rec, *([options.tolerances] if options.tolerances else [])]
-        check_folder(options.out, inputs, _is_diagnosis, "an earlier diagnosis")
-
-
-def _is_diagnosis(folder: Path) -> bool:
-    """Whether a folder holds a diagnosis and nothing that someone else put there."""
-    try:
-        ours = json.loads((folder / JSON).read_text(encoding="utf-8"))["format"] == FORMAT
-    except (OSError, ValueError, TypeError, KeyError):
-        return False
-    known = [JSON, REPORT, EXTENDED, *PLOTS]
-    return ours and all(any(path.match(pattern) for pattern in known) for path in folder.iterdir())
 
 
 def _check_recordings(recordings: Sequence[Recording]) -> None:
@@ -180,15 +149,3 @@ def _truth(paths: Sequence[Path]) -> dict[str, Any] | None:
         except (OSError, ValueError, KeyError, TypeError):
             return None
     return found[0] if all(values == found[0] for values in found) else None
-
-
-def _write(folder: Path, values: dict[str, Any], diagnosis: Diagnosis, rig: TeamRig) -> None:
-    if diagnosis.causes:
-        try:
-            rig.write_extended(diagnosis.explanation, folder / EXTENDED)
-        except InputError as error:  # values that no effect can have, such as a negative friction
-            values["notes"].append(f"There is no extended model: {error}.")
-    shown = traces(rig, diagnosis.explanation)
-    save_plots(values, diagnosis.explanation, shown, rig.channels, TeamWords(), folder)
-    write_json(folder / JSON, values)
-    write_text(folder / REPORT, format_diagnosis(values) + "\n")

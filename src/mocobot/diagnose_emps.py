@@ -1,0 +1,55 @@
+"""``mocobot diagnose --rig emps``: read one recording of the axis, find out what its model gets wrong, write it."""
+
+from __future__ import annotations
+
+from contextlib import nullcontext
+from typing import TYPE_CHECKING
+
+from discrepancy.diagnosis_json import diagnosis_to_dict
+from discrepancy.emps.catalogue import DEFAULTS
+from discrepancy.emps.causes import CAUSES
+from discrepancy.emps.diagnosis import diagnose_axis
+from discrepancy.emps.emps_traces import traces
+from discrepancy.emps.reader import read_emps
+from discrepancy.emps.rig import EmpsRig
+from discrepancy.emps.words import EmpsWords
+from discrepancy.report import format_diagnosis
+from discrepancy.tolerances_file import read_tolerances
+from estimator.errors import InputError
+from mocobot.diagnose_folder import check_options, write_diagnosis
+from mocobot.folders import whole_folder
+from mocobot.progress import stages
+
+if TYPE_CHECKING:
+    from mocobot.cli import Diagnose
+
+
+def run(options: Diagnose) -> None:
+    """Run the command.
+
+    Raises:
+        InputError: the recording, tolerances or options cannot be used, or an output cannot be written.
+    """
+    check_options(options, CAUSES)
+    if len(options.rec) > 1:
+        raise InputError(
+            f"{len(options.rec)} recordings are given; the emps rig takes one and cuts it into blocks that validate "
+            "each other"
+        )
+    tolerances = read_tolerances(options.tolerances, DEFAULTS)
+    with whole_folder(options.out) if options.out else nullcontext() as folder:
+        with stages() as (say, advance):
+            say("read")
+            log = read_emps(next(iter(options.rec)))
+            rig = EmpsRig.of(log, tolerances, options.exclude)
+            diagnosis = diagnose_axis(
+                rig, closed_loop=options.closed_loop, jobs=options.jobs, say=say, simulated=advance
+            )
+            values = diagnosis_to_dict(diagnosis, rig, EmpsWords())
+            if folder is not None:
+                say("write")
+                shown = (rig, diagnosis.explanation)
+                write_diagnosis(folder, values, diagnosis, rig, EmpsWords(), lambda: traces(*shown))
+        print(format_diagnosis(values))
+    if options.out:
+        print(f"\nWritten to {options.out}.")
