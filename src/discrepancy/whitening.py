@@ -32,21 +32,27 @@ class Whitening:
     innovation: Array
 
     @classmethod
-    def of(cls, draws: Array, moving: int) -> Whitening:
-        """Whitening from noise draws, shape (D, n, C), of which the first ``moving`` rows are a series."""
+    def of(cls, draws: Array, moving: int, order: int = AR_ORDER) -> Whitening:
+        """Whitening from noise draws, shape (D, n, C), of which the first ``moving`` rows are a series.
+
+        Args:
+            draws: of the noise alone.
+            moving: number of leading rows that follow each other.
+            order: of the autoregression.
+        """
         channels = draws.shape[2]
         chol_moving = _cholesky(draws[:, :moving])
         chol_alone = _cholesky(draws[:, moving:])
-        ar, innovation = np.zeros((channels, AR_ORDER)), np.ones(channels)
-        if moving > 10 * AR_ORDER:
+        ar, innovation = np.zeros((channels, order)), np.ones(channels)
+        if moving > 10 * order:
             flat = _per_row(chol_moving, draws[:, :moving].reshape(-1, channels))
             white = flat.reshape(len(draws), moving, channels)
-            lag = [np.mean(white[:, k:] * white[:, : moving - k], axis=(0, 1)) for k in range(AR_ORDER + 1)]
+            lag = [np.mean(white[:, k:] * white[:, : moving - k], axis=(0, 1)) for k in range(order + 1)]
             for c in range(channels):
                 if lag[0][c] < 1e-12:  # a channel without noise
                     continue
-                toeplitz = np.array([[lag[abs(i - j)][c] for j in range(AR_ORDER)] for i in range(AR_ORDER)])
-                right = np.array([lag[i + 1][c] for i in range(AR_ORDER)])
+                toeplitz = np.array([[lag[abs(i - j)][c] for j in range(order)] for i in range(order)])
+                right = np.array([lag[i + 1][c] for i in range(order)])
                 ar[c] = np.linalg.solve(toeplitz, right)
                 innovation[c] = np.sqrt(max(lag[0][c] - ar[c] @ right, 1e-6))
         return cls(moving, chol_moving, chol_alone, ar, innovation)
@@ -57,13 +63,13 @@ class Whitening:
         y[self.moving :] = _per_row(self.chol_alone, x[self.moving :])
         z = _per_row(self.chol_moving, x[: self.moving])
         shape = (1, -1) + (1,) * (x.ndim - 2)
-        series = z.copy()
-        for k in range(AR_ORDER):
+        series, order = z.copy(), self.ar.shape[1]
+        for k in range(order):
             series[k + 1 :] -= self.ar[:, k].reshape(shape) * z[: len(z) - k - 1]
         scale = self.innovation.reshape(shape)
         # The first rows have no past to predict them from; they keep their own variance of one.
-        series[AR_ORDER:] /= scale
-        series[:AR_ORDER] = z[:AR_ORDER]
+        series[order:] /= scale
+        series[:order] = z[:order]
         y[: self.moving] = series
         return y
 
