@@ -9,12 +9,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.explanation import Explanation
+from discrepancy.fit import Fit
 
 Array = NDArray[np.float64]
 
 
 def with_block_errors(explanation: Explanation, rows_per_block: int) -> Explanation:
-    """The explanation with covariances from how the causes' scores vary between blocks of rows.
+    """The explanation with the causes' covariances from ``block_covariance``."""
+    if not explanation.found:
+        return explanation
+    covariance = block_covariance(explanation.fit, rows_per_block)
+    found = []
+    for index, item in zip(explanation.fit.free, explanation.found, strict=True):
+        units = explanation.problem.candidates[index].units
+        part = part_of(explanation.fit, covariance, index)
+        found.append(replace(item, covariance=part * np.outer(units, units)))
+    return replace(explanation, found=tuple(found))
+
+
+def block_covariance(fit: Fit, rows_per_block: int) -> Array:
+    """Covariance of a fit's solution from how its scores vary between blocks of rows, shape (used, used), in units.
 
     The fit's own covariance takes whitened rows to be independent and of unit variance. What the named causes leave is
     neither where the model is not perfect. With H the normal matrix and g_b the score of block b,
@@ -22,28 +36,26 @@ def with_block_errors(explanation: Explanation, rows_per_block: int) -> Explanat
     analysis using generalized linear models", Biometrika 73, 1986), right for any correlation that ends within a block.
 
     Args:
-        explanation: what the search found.
+        fit: a solution.
         rows_per_block: length of a block; longer than the correlation, short enough to leave a dozen blocks.
     """
-    fit, problem = explanation.fit, explanation.problem
-    scores = np.array(list(block_scores(explanation, rows_per_block)))
-    if len(scores) < 2 or not explanation.found:
-        return explanation
+    scores = np.array(list(block_scores(fit, rows_per_block)))
+    if len(scores) < 2:
+        return fit.covariance
     spread = scores @ fit.covariance
-    covariance = len(scores) / (len(scores) - 1) * spread.T @ spread
-    found = []
-    for index, item in zip(fit.free, explanation.found, strict=True):
-        at = np.searchsorted(fit.used, np.arange(*problem.spans[index].indices(1 << 30)))
-        units = problem.candidates[index].units
-        found.append(replace(item, covariance=covariance[np.ix_(at, at)] * np.outer(units, units)))
-    return replace(explanation, found=tuple(found))
+    return np.asarray(len(scores) / (len(scores) - 1) * spread.T @ spread, dtype=np.float64)
 
 
-def block_scores(explanation: Explanation, rows_per_block: int) -> Iterator[Array]:
+def block_scores(fit: Fit, rows_per_block: int) -> Iterator[Array]:
     """Score of every block: its columns times what the fit leaves in it, one number per column in the fit."""
-    fit, problem = explanation.fit, explanation.problem
-    for t, rows in enumerate(problem.rows):
+    for t, rows in enumerate(fit.problem.rows):
         left = fit.remaining(t)
         count = max(1, round(len(rows) / rows_per_block))
         for part in np.array_split(np.arange(len(rows)), count):
             yield np.einsum("ncl,nc->l", rows[part][..., fit.used], left[part])
+
+
+def part_of(fit: Fit, covariance: Array, index: int) -> Array:
+    """One candidate's part of a covariance of a fit's solution, shape (k, k)."""
+    at = np.searchsorted(fit.used, np.arange(*fit.problem.spans[index].indices(1 << 30)))
+    return np.asarray(covariance[np.ix_(at, at)], dtype=np.float64)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from discrepancy.block_errors import with_block_errors
+import numpy as np
+
+from discrepancy.block_errors import block_covariance, part_of, with_block_errors
 from discrepancy.diagnose import Diagnosis, diagnose
 from discrepancy.emps.rig import EmpsRig
+from discrepancy.explanation import Explanation
+from discrepancy.words import number
 
-MOST_CAUSES = 8
+MOST_CAUSES = 10
 """The nominal axis is a bare mass: mass, friction of several kinds and the loop's details are all left out of it."""
 BLOCK_S = 1.0
 """Blocks of the standard errors: what is left is correlated over a few tenths of a second."""
@@ -30,15 +34,63 @@ def diagnose_axis(
         closed_loop, jobs, say, simulated: as of ``diagnose``.
     """
     found = diagnose(rig, closed_loop=closed_loop, most=MOST_CAUSES, jobs=jobs, say=say, simulated=simulated)
-    explanation = with_block_errors(found.explanation, round(BLOCK_S * rig.row_rate_hz(0)))
+    explanation = with_block_errors(found.explanation, block_rows(rig))
+    notes = (*rig.log.notes, *found.notes, _noise(rig), *_loop(rig, found.explanation))
+    return replace(found, explanation=explanation, notes=notes)
+
+
+def block_rows(rig: EmpsRig) -> int:
+    """Rows in a block of the standard errors."""
+    return round(BLOCK_S * rig.row_rate_hz(0))
+
+
+def also_fitted(
+    rig: EmpsRig, explanation: Explanation, causes: tuple[str, ...]
+) -> dict[str, tuple[float, float]]:
+    """Value and standard error of the first parameter of further causes, fitted together with the named ones.
+
+    Args:
+        rig: the recording.
+        explanation: what was found.
+        causes: names; those of the catalogue's that are left out are missing in the answer.
+    """
+    problem = explanation.problem
+    by_name = {c.cause: k for k, c in enumerate(problem.candidates) if not c.detail}
+    wanted = {name: by_name[name] for name in causes if name in by_name}
+    fit = problem.fit(tuple(dict.fromkeys([*explanation.fit.free, *wanted.values()])))
+    covariance = block_covariance(fit, block_rows(rig))
+    out = {}
+    for name, index in wanted.items():
+        unit = float(problem.candidates[index].units[0])
+        se = np.sqrt(part_of(fit, covariance, index)[0, 0])
+        out[name] = float(fit.part(index)[0][0]) * unit, float(se) * unit
+    return out
+
+
+def _noise(rig: EmpsRig) -> str:
     if rig.noise.repeats:
-        noise = (
+        return (
             f"Noise (what counts as 1 in chi2/n) is what differs between {rig.noise.repeats} cycles of the same "
             "motion, so chi2/n above 1 is something that repeats."
         )
-    else:
-        noise = (
-            "The motion does not repeat, so noise (what counts as 1 in chi2/n) is what the whole catalogue leaves; "
-            "something that no cause of it describes would not show in chi2/n."
+    return (
+        "The motion does not repeat, so noise (what counts as 1 in chi2/n) is what the whole catalogue leaves; "
+        "something that no cause of it describes would not show in chi2/n."
+    )
+
+
+def _loop(rig: EmpsRig, explanation: Explanation) -> Iterator[str]:
+    """What the data say of the loop's gains, and of pulses where none are named."""
+    also = also_fitted(rig, explanation, ("position_gain", "velocity_gain"))
+    if len(also) == 2:
+        nominal = (rig.log.kp_per_s, rig.log.kv_Vs_per_m)
+        kp, kv = (number(n + also[k][0], also[k][1], "") for n, k in zip(nominal, also, strict=True))
+        yield (
+            f"The loop's gains, fitted with the rest: kp = {kp} 1/s and kv = {kv} V s/m (nominal {nominal[0]:g} and "
+            f"{nominal[1]:g})."
         )
-    return replace(found, explanation=explanation, notes=(*rig.log.notes, *found.notes, noise))
+    named = {found.candidate.cause for found in explanation.found}
+    pulses = also_fitted(rig, explanation, ("injected_voltage",))
+    if "injected_voltage" not in named and pulses:
+        size = number(*pulses["injected_voltage"], "mV", 1e3)
+        yield f"No pulses: the train of rectangles that fits the voltage best has {size}."

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from discrepancy.emps.plant import FIRST_GUESS_KG
 from discrepancy.emps.preflight import resolution
 from discrepancy.emps.reduction import Reduction
-from discrepancy.emps.signals import SMOOTH_HZ, Signals
-from estimator.filtering import differentiate, low_pass
+from discrepancy.emps.signals import Signals, smooth
+from estimator.filtering import differentiate
 
 Array = NDArray[np.float64]
 
@@ -101,7 +101,7 @@ def _rounding(signals: Signals) -> Array:
     if step == 0:
         return np.zeros((len(log.time), 2))
     error = np.random.default_rng(DITHER_SEED).uniform(-0.5 * step, 0.5 * step, len(log.time))
-    x = low_pass(error, log.rate_hz, min(SMOOTH_HZ, 0.2 * log.rate_hz))
+    x = smooth(error, log.rate_hz)
     v = differentiate(x, log.rate_hz)
     return np.column_stack(
         [-FIRST_GUESS_KG * differentiate(v, log.rate_hz), log.kv_Vs_per_m * (log.kp_per_s * x + v)]

@@ -33,6 +33,8 @@ from estimator.errors import InputError
 
 Array = NDArray[np.float64]
 
+AR_ORDER = 8
+"""More does not whiten the benchmark's noise better (by Akaike's criterion)."""
 LEAST_ROWS = 100
 """Rows that a block must have to be one."""
 
@@ -84,7 +86,7 @@ class EmpsRig:
             noise = from_repeats(signals, reduction, period)
         else:
             noise = from_remainder(remainder(signals, reduction, hints), signals)
-        shared = Whitening.of(noise.draws, noise.draws.shape[1])
+        shared = Whitening.of(noise.draws, noise.draws.shape[1], AR_ORDER)
         whitening = tuple(replace(shared, moving=len(rows)) for rows in reduction.samples)
         known = DEFAULTS if tolerances is None else tolerances
         return cls(log, signals, tuple(cut), reduction, hints, noise, whitening, known, frozenset(excluded))

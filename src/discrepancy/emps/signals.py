@@ -15,7 +15,7 @@ from estimator.filtering import differentiate, low_pass
 Array = NDArray[np.float64]
 
 SMOOTH_HZ = 100.0
-"""Cut-off before differentiating, well above the rows' own."""
+"""Cut-off before differentiating, well above the rows' own; a signal that skips it would not fit the others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,17 +25,19 @@ class Signals:
     Attributes:
         log: the recording.
         x, v, a: smoothed position [m], velocity [m/s], acceleration [m/s^2].
+        u: voltage through the same filter [V].
         force: gain times voltage [N]. The drive holds a sample's voltage until the next, so what acts at a sample is
             the mean of the hold before and after it: half a period old on average.
         error: reference minus position [m].
-        command: what the nominal loop asks for before it saturates [V].
-        linear: 1 where that is within the limits, else 0.
+        command: what the nominal loop asks for [V].
+        linear: 1 where the drive was within its limits, else 0: a saturated voltage says nothing about the law.
     """
 
     log: AxisLog
     x: Array
     v: Array
     a: Array
+    u: Array
     force: Array
     error: Array
     command: Array
@@ -45,19 +47,24 @@ class Signals:
     def of(cls, log: AxisLog) -> Signals:
         """Smooth and differentiate."""
         rate = log.rate_hz
-        x = low_pass(log.position, rate, min(SMOOTH_HZ, 0.2 * rate))
+        x, reference, u = (smooth(series, rate) for series in (log.position, log.reference, log.voltage))
         v = differentiate(x, rate)
         a = differentiate(v, rate)
-        error = log.reference - x
+        error = reference - x
         command = log.kv_Vs_per_m * (log.kp_per_s * error - v)
-        force = log.gain_N_per_V * at_delay(log.voltage, rate, 0.5 / rate)
-        return cls(log, x, v, a, force, error, command, (np.abs(command) < LIMIT_V).astype(float))
+        within = np.abs(log.voltage) < LIMIT_V * (1.0 - 1e-6)
+        force = log.gain_N_per_V * at_delay(u, rate, 0.5 / rate)
+        return cls(log, x, v, a, u, force, error, command, within.astype(float))
 
     @property
     def residual(self) -> Array:
         """Nominal residual, shape (Q, 2): force told minus that of a frictionless mass [N], voltage minus law [V]."""
-        law = np.clip(self.command, -LIMIT_V, LIMIT_V)
-        return np.column_stack([self.force - FIRST_GUESS_KG * self.a, self.log.voltage - law])
+        return np.column_stack([self.force - FIRST_GUESS_KG * self.a, self.linear * (self.u - self.command)])
+
+
+def smooth(x: Array, rate_hz: float) -> Array:
+    """The filter that comes before differentiating, for everything alike, shape (Q, ...)."""
+    return low_pass(x, rate_hz, min(SMOOTH_HZ, 0.2 * rate_hz))
 
 
 def at_delay(x: Array, rate_hz: float, delay_s: float) -> Array:
