@@ -126,7 +126,8 @@ def _static_forces(
     mujoco.mj_fwdPosition(model, data)
     mujoco.mj_fwdVelocity(model, data)
     spring = index.spring_dof.ravel()
-    apart = np.concatenate([index.motor_dof.ravel(), index.yielding_dof, index.slosh_dof])
+    # The floor carries released bases: their wheels settle in a trial's first milliseconds.
+    apart = np.concatenate([index.motor_dof.ravel(), index.yielding_dof, index.slosh_dof, index.base_dof])
     rows = np.setdiff1d(np.arange(model.nv), apart)
     jacobian = loop_jacobian(model, data)[0].T  # (nv, loops)
     constraint = jacobian[rows]

@@ -1,4 +1,4 @@
-"""Compose a team scene: one parked Omnid under every grasp of a payload (PyMJCF)."""
+"""Compose a team scene: one Omnid, parked or on its wheels, under every grasp of a payload (PyMJCF)."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.errors import InputError
 from mocobot_sim.as_built import AsBuilt, units_of
+from mocobot_sim.base.design import base_design
+from mocobot_sim.base.rollers import release, rough_floor
 from mocobot_sim.models import base_height_m, models_dir, omnid_design
 from mocobot_sim.payload import grasp_frames, load_payload
 from mocobot_sim.pymjcf import mjcf
@@ -100,6 +102,7 @@ def build_team(
     timestep_s: float = TIMESTEP_S,
     mounts: RigidTransform | None = None,
     initial: tuple[Array, Array] | None = None,
+    released: bool = False,
 ) -> TeamScene:
     """Park one Omnid under each grasp of a payload and weld the payload to their gimbals.
 
@@ -116,6 +119,7 @@ def build_team(
         mounts: where the robots stand, floor mounts in the world, N transforms; None to place them under the grasps.
         initial: true (phi, theta) near which trials start, two arrays (N, 3) [rad]; None for home. With ``mounts`` of
             one's own, home may not close the loops; a measured posture does nearly.
+        released: robots stand on their wheels and can drive (see docs/base.md), instead of being part of the floor.
 
     Raises:
         InputError: the payload cannot be read, has no grasps or one that is tilted beyond the gimbal's range, or
@@ -141,12 +145,17 @@ def build_team(
         omnid = mjcf.from_path(str(models_dir() / "omnid" / "omnid.xml"))
         omnid.model = f"omnid{i + 1}"
         deviate(omnid, units[i])
-        _park(omnid)
+        if released:
+            release(omnid, base_design())
+        else:
+            _park(omnid)
         mount = root.worldbody.add(
             "site", name=f"mount{i + 1}", group=4, pos=mounts[i].translation,
             quat=mount_quats[i],
         )  # fmt: skip
-        mount.attach(omnid)
+        frame = mount.attach(omnid)
+        if released:
+            frame.add("freejoint")
         if i == 0:
             try:
                 omnid.find("site", "grasp").attach(payload_root)
@@ -159,6 +168,8 @@ def build_team(
                 "weld", name=f"grasp{i + 1}", **STIFF,
                 site1=omnid.find("site", "grasp"), site2=payload_root.find("site", f"grasp{i + 1}"),
             )  # fmt: skip
+    if released:
+        rough_floor(root, base_design())
     return TeamScene(root, robots, wrist_home_b, theta_home, X_1i, units, mounts, initial)
 
 

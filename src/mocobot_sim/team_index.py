@@ -29,6 +29,7 @@ class TeamIndex:
         payload_body: body id of the payload.
         yielding_dof: slides of bases and grasps that yield, are loose or creep; none in a team as designed.
         slosh_dof: hinges of a pendulum in the payload.
+        base_dof: free chassis, wheels and rollers; none in a team that is parked.
     """
 
     motor_qpos: Index
@@ -46,6 +47,7 @@ class TeamIndex:
     payload_body: int
     yielding_dof: Index
     slosh_dof: Index
+    base_dof: Index
 
     @property
     def robots(self) -> int:
@@ -100,6 +102,7 @@ class TeamIndex:
             payload_body=model.body(f"{PAYLOAD_PREFIX}payload").id,
             yielding_dof=_named(model, YIELDING),
             slosh_dof=_named(model, ("slosh",)),
+            base_dof=_base(model),
         )
 
 
@@ -108,3 +111,10 @@ def _named(model: mujoco.MjModel, kinds: tuple[str, ...]) -> Index:
     names = {f"{kind}_{axis}" for kind in kinds for axis in "xyz"}
     found = [j for j in range(model.njnt) if model.joint(j).name.rsplit("/", 1)[-1] in names]
     return model.jnt_dofadr[np.array(found, dtype=int)].astype(np.intp)
+
+
+def _base(model: mujoco.MjModel) -> Index:
+    """Positions in ``qvel`` of free joints, and of joints called ``.../wheel_*``."""
+    wheel = [model.joint(j).name.rsplit("/", 1)[-1].startswith("wheel_") for j in range(model.njnt)]
+    joints = np.flatnonzero(np.array(wheel) | (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE))
+    return np.flatnonzero(np.isin(model.dof_jntid, joints)).astype(np.intp)

@@ -1,0 +1,115 @@
+"""Planned planar motion of a frame, and of bases that stay where they are under it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimator.errors import InputError
+from mocobot_sim.base.planar import compose, relative
+from mocobot_sim.trajectories import LONGEST_S, minimum_jerk
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One straight piece of a plan; the frame starts and ends it at rest, with minimum jerk.
+
+    Attributes:
+        to: pose at its end in the world: x, y [m], yaw [rad].
+        duration_s: time to get there, greater than 0 [s].
+        rest_s: time at rest there [s].
+    """
+
+    to: tuple[float, float, float]
+    duration_s: float
+    rest_s: float = 0.0
+
+
+@dataclass(frozen=True)
+class PlanarMotion:
+    """Where frames are meant to be at every tick; N frames.
+
+    Attributes:
+        rate_hz: ticks per second [Hz].
+        pose: x, y [m], yaw [rad] in the world, shape (T, N, 3).
+        twist: w_z [rad/s], v_x, v_y [m/s] in each frame, shape (T, N, 3).
+    """
+
+    rate_hz: float
+    pose: Array
+    twist: Array
+
+    @property
+    def duration_s(self) -> float:
+        """From the first tick to the last [s]."""
+        return (len(self.pose) - 1) / self.rate_hz
+
+
+def plan(start: ArrayLike, legs: Sequence[Leg], rest_s: float, rate_hz: float = 1000.0) -> PlanarMotion:
+    """Motion of one frame along straight legs.
+
+    Args:
+        start: pose at the beginning: x, y [m], yaw [rad].
+        legs: what to do, one after the other; yaw is not wrapped, so 2 pi is a full turn.
+        rest_s: time at rest before the first leg [s].
+        rate_hz: ticks per second [Hz].
+
+    Raises:
+        InputError: there is no leg, a number is not finite, a duration is not positive or the whole lasts over an hour.
+    """
+    stations = np.array([start, *(leg.to for leg in legs)], dtype=float)
+    if not legs:
+        raise InputError("a plan has no legs; it needs at least one")
+    if stations.shape[1:] != (3,) or not np.isfinite(stations).all():
+        raise InputError("a plan's poses are not x, y and yaw, all finite; they must be")
+    times = np.array([[leg.duration_s, leg.rest_s] for leg in legs], dtype=float)
+    if not (times[:, 0] > 0).all() or not (times[:, 1] >= 0).all() or not rest_s >= 0:
+        raise InputError("a leg must last longer than 0 s and a rest 0 s or more")
+    duration = rest_s + times.sum()
+    if not duration <= LONGEST_S:
+        raise InputError(f"the plan lasts {duration:g} s; it may last {LONGEST_S:g} s at most")
+    time = np.arange(round(duration * rate_hz) + 1) / rate_hz
+    pose, rate = np.tile(stations[0], (len(time), 1)), np.zeros((len(time), 3))
+    begin = rest_s
+    for k, leg in enumerate(legs):
+        s = (time - begin) / leg.duration_s
+        on = s > 0
+        step = stations[k + 1] - stations[k]
+        pose[on] = stations[k] + minimum_jerk(s[on])[:, None] * step
+        within = np.clip(s[on], 0.0, 1.0)
+        rate[on] = (30.0 * within**2 * (1.0 - within) ** 2 / leg.duration_s)[:, None] * step
+        begin += leg.duration_s + leg.rest_s
+    return PlanarMotion(rate_hz, pose[:, None], _body_twist(pose, rate)[:, None])
+
+
+def carried(motion: PlanarMotion, places: ArrayLike) -> PlanarMotion:
+    """Motion of N frames that are fixed to a moving one: what bases do that stay put under a moving payload.
+
+    Args:
+        motion: of one frame.
+        places: where the N frames are in the world at the beginning: x, y [m], yaw [rad], shape (N, 3).
+    """
+    lead, twist = motion.pose[:, 0], motion.twist[:, 0]
+    held = relative(lead[0], np.asarray(places, dtype=float))  # poses in the moving frame, (N, 3)
+    pose = compose(lead[:, None], held[None])
+    # Velocity of the held origins in the moving frame, turned into their own axes.
+    x, y, yaw = held.T
+    v_x, v_y = twist[:, 1, None] - twist[:, 0, None] * y, twist[:, 2, None] + twist[:, 0, None] * x
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    turn = np.broadcast_to(twist[:, 0, None], v_x.shape)
+    return PlanarMotion(
+        motion.rate_hz, pose, np.stack([turn, cos * v_x + sin * v_y, cos * v_y - sin * v_x], axis=-1)
+    )
+
+
+def _body_twist(pose: Array, rate: Array) -> Array:
+    """Body twists (T, 3) from poses and their rates (T, 3)."""
+    cos, sin = np.cos(pose[:, 2]), np.sin(pose[:, 2])
+    return np.stack(
+        [rate[:, 2], cos * rate[:, 0] + sin * rate[:, 1], cos * rate[:, 1] - sin * rate[:, 0]], axis=1
+    )
