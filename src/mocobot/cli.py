@@ -107,6 +107,40 @@ class Diagnose:
 
 
 @dataclass(frozen=True)
+class Convert:
+    """Convert a measured log (ROS 2 bag, CSV, NPZ, Parquet, LeRobot) to a recording, or a recording to one of these."""
+
+    log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="IN")]
+    """Log: a rosbag2 folder, .mcap, .db3, .csv, .npz or .parquet file, or a LeRobot dataset."""
+    out: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="OUT")]
+    """Recording to write: .parquet; .csv, .npz, .mcap or .db3; or a rosbag2 folder if it has no suffix."""
+    map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
+    """Where the log has which channel, by file or built-in name (docs/measured-data.md); found out if not given."""
+    trial: Literal["random", "periodic", "static"] | None = None
+    """Kind of trial, if neither log nor map says; "random" else."""
+    payload: str | None = None
+    """Name of the payload."""
+    design: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """Numbers of the robots, if not the log's own or those of the Omnid."""
+    level: Literal["joint", "wrist"] | None = None
+    """What to write: driven angles and torques, or wrist positions and forces; that of the log if not given."""
+    clock: Literal["keep", "correct"] = "keep"
+    """Believe the robots' stamps, or take out what their clocks differ by. It is estimated and reported either way."""
+    rate: Annotated[float, tyro.conf.arg(metavar="HZ")] = 100.0
+    """Rate of the recording [Hz]."""
+    max_gap: Annotated[float, tyro.conf.arg(metavar="S")] = 0.05
+    """Longest time without samples that is filled in [s]."""
+    episode: int | None = None
+    """Episode of a LeRobot dataset that holds several."""
+
+    def run(self) -> None:
+        """Run the command."""
+        from mocobot.convert_command import run
+
+        run(self)
+
+
+@dataclass(frozen=True)
 class Simulate:
     """Simulate one trial and write its recording, with the ground truth in a sidecar."""
 
@@ -206,6 +240,7 @@ def _run(arguments: Sequence[str] | None) -> None:
         Annotated[Paper, tyro.conf.subcommand("paper")]
         | Annotated[Estimate, tyro.conf.subcommand("estimate")]
         | Annotated[Diagnose, tyro.conf.subcommand("diagnose")]
+        | Annotated[Convert, tyro.conf.subcommand("convert")]
         | Annotated[Simulate, tyro.conf.subcommand("simulate")],
         prog="mocobot",
         description="Simulate mobile cobots that carry an unknown payload together, estimate it, and find out what "

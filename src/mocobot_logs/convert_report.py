@@ -1,0 +1,128 @@
+"""What happened to a log on its way to a recording, as text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from estimator.clocks import ClockEstimate
+from mocobot_logs.convert import Converted
+from mocobot_logs.resample_report import StreamReport
+
+SURE = 4.0
+"""Standard errors beyond which a difference of clocks is pointed out ..."""
+SMALL_S, SMALL_DRIFT = 1e-4, 5e-6
+"""... if it is more than this [s, s/s]; 0.1 ms changes estimates by less than the sensors' noise."""
+_COLUMNS = (
+    ("samples", ""),
+    ("rate", "Hz"),
+    ("jitter", "rms, max ms"),
+    ("gaps", "longest ms"),
+    ("filled", ""),
+    ("doubles", ""),
+)
+_WIDTHS = (9, 9, 15, 13, 7, 8)
+_DONE = {
+    "untouched": "taken as they are",
+    "filtered": "low-passed and thinned",
+    "interpolated": "interpolated, low-passed and thinned",
+}
+
+
+def format_conversion(converted: Converted, name: str, out: Path) -> str:
+    """Readable report: what was found in each stream, the clocks, and where the recording is.
+
+    Args:
+        converted: the result.
+        name: the log, as the user named it.
+        out: where the recording was written.
+    """
+    recording, streams = converted.recording, converted.streams
+    metadata = recording.metadata
+    robots = f"{metadata.robots} robot{'s' * (metadata.robots > 1)}"
+    lines = [f"[[Log {name}]]  {robots}, {converted.level} level"]
+    titles, units = zip(*_COLUMNS, strict=True)
+    lines += [_row("robot", titles), _row("", units)]
+    lines += [_stream(stream) for stream in streams]
+    lines += _methods(streams)
+    lines += ["[[Clocks against that of robot 1]]", *_clocks(converted)]
+    duration_s = (len(recording.time) - 1) / metadata.rate_hz
+    payload = "" if metadata.payload is None else f", payload {metadata.payload}"
+    lines += [
+        f"[[Recording {out}]]  {robots}, {metadata.level} level, {metadata.trial} trial{payload}",
+        f"    {len(recording.time)} samples at {metadata.rate_hz:g} Hz, {duration_s:.2f} s, "
+        f"commands: {'no' if recording.ref is None else 'yes'}",
+    ]
+    lost_s = float(np.max(converted.clocks.lost_s))
+    if lost_s > 1.0 / metadata.rate_hz:
+        lines.append(
+            f"    up to {lost_s:.3g} s of a robot's samples lie outside what all robots have in common"
+        )
+    return "\n".join(lines)
+
+
+def _stream(stream: StreamReport) -> str:
+    cells = (
+        f"{stream.samples}",
+        f"{stream.native_hz:.6g}",
+        f"{1e3 * stream.jitter_rms_s:.3g}, {1e3 * stream.jitter_max_s:.3g}",
+        f"{stream.gaps}, {1e3 * stream.longest_gap_s:.4g}" if stream.gaps else "0",
+        f"{stream.filled}",
+        f"{stream.duplicates + stream.merged}",
+    )
+    return _row(f"{stream.robot}", cells)
+
+
+def _row(first: str, cells: Sequence[str]) -> str:
+    row = "".join(f" {cell:>{width}}" for cell, width in zip(cells, _WIDTHS, strict=True))
+    return f"    {first:<5}{row}".rstrip()
+
+
+def _methods(streams: tuple[StreamReport, ...]) -> list[str]:
+    lines = []
+    for method, words in _DONE.items():
+        robots = [str(stream.robot) for stream in streams if stream.method == method]
+        if robots:
+            whose = (
+                "all robots"
+                if len(robots) == len(streams)
+                else f"robot{'s' * (len(robots) > 1)} {', '.join(robots)}"
+            )
+            lines.append(f"    samples of {whose}: {words}")
+    return lines
+
+
+def _clocks(converted: Converted) -> list[str]:
+    estimate = converted.clocks.estimate
+    if len(estimate.offset_s) == 1:
+        return ["    one robot"]
+    lines = [_clock(estimate, robot) for robot in range(1, len(estimate.offset_s))]
+    if converted.clocks.corrected:
+        return [*lines, "    corrected"]
+    hint = " (--clock correct takes them out)" if _differ(estimate) else ""
+    return [*lines, f"    kept as logged{hint}"]
+
+
+def _differ(estimate: ClockEstimate) -> bool:
+    """Whether clocks differ beyond doubt, and by what matters."""
+    if not estimate.determined:
+        return False
+    offset, drift = np.abs(estimate.offset_s), np.abs(estimate.drift)
+    apart = (offset > SURE * estimate.offset_se_s) & (offset > SMALL_S)
+    return bool(np.any(apart | (drift > SURE * estimate.drift_se) & (drift > SMALL_DRIFT)))
+
+
+def _clock(estimate: ClockEstimate, robot: int) -> str:
+    if (why := estimate.why_not[robot]) is not None:
+        return f"    robot {robot + 1}: not determined, {why}"
+    offset, offset_se = 1e3 * estimate.offset_s[robot], 1e3 * estimate.offset_se_s[robot]
+    text = f"    robot {robot + 1}: offset {offset:+.4f} +- {offset_se:.4f} ms"
+    if np.isfinite(estimate.drift_se[robot]):
+        text += f", drift {1e6 * estimate.drift[robot]:+.3f} +- {1e6 * estimate.drift_se[robot]:.3f} ppm"
+    else:
+        text += ", drift not determined"
+    if np.isfinite(estimate.repeats_s[robot]):
+        text += f"; the motion repeats itself, so {estimate.repeats_s[robot]:.3g} s more or less fit as well"
+    return text
