@@ -1,0 +1,206 @@
+"""From uniform grids of several clocks to one recording on one clock.
+
+Time is that of robot 1; the recording begins at the first instant of robot 1's grid at which every robot has samples,
+and counts from there. A robot whose grid has instants within 1 us of all these keeps its samples bit for bit. The
+others are read between their samples by a quintic spline: of a sine of 5 Hz sampled at 100 Hz it misses less than
+1e-7, of 1 Hz less than 1e-11.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from estimator.clocks import ClockEstimate, estimate_clocks
+from estimator.design import OmnidDesign
+from estimator.errors import InputError
+from estimator.filtering import MIN_SAMPLES
+from estimator.recording import Recording
+from estimator.recording_metadata import RecordingMetadata
+from estimator.wrist_level import joints_of, wrist_fault
+from mocobot_logs.log import CHANNELS, REF, THETA, Array
+from mocobot_logs.resample import Resampled
+
+EARLY_S = 1.0
+"""A robot's log that ends so much before another's is broken off."""
+_SAME_S = 1e-6
+_SUSPECT_S = 0.5  # clocks that differ by more explain logs that end apart
+
+
+@dataclass(frozen=True, eq=False)
+class ClockReport:
+    """What is known about the robots' clocks, and what was done.
+
+    Attributes:
+        estimate: offsets and drifts, in seconds after the log's ``origin_ns``; it stands for the log as it came.
+        corrected: whether the samples were moved accordingly.
+        start_s: first instant of the recording by the clock of robot 1 after the log's origin [s].
+        lost_s: what each robot has before the first and after the last instant, shape (N, 2) [s].
+        untouched: per robot whether it kept its samples as they were on its own grid.
+    """
+
+    estimate: ClockEstimate
+    corrected: bool
+    start_s: float
+    lost_s: Array
+    untouched: tuple[bool, ...]
+
+
+def to_recording(
+    resampled: Resampled,
+    *,
+    design: OmnidDesign | None = None,
+    trial: str | None = None,
+    payload: str | None = None,
+    source: str | None = None,
+    correct: bool = False,
+) -> tuple[Recording, ClockReport]:
+    """Put all robots on one clock.
+
+    What the log says about itself is kept; what it does not say must be given, and what is given takes its place.
+
+    Args:
+        resampled: the log.
+        design: numbers of the robots.
+        trial: kind of trial.
+        payload: name of the payload.
+        source: what produced the samples; by default the log's name.
+        correct: whether to take out the offset and the drift of every clock against that of robot 1. Otherwise
+            stamps are believed.
+
+    Returns:
+        The recording, joint level in memory whatever the log's level, and what was found.
+
+    Raises:
+        InputError: clocks shall be corrected and the motion does not tell how, one robot's log ends more than a
+            second before another's, they have less than 16 samples in common, a wrist position cannot be
+            reached, or design or trial is missing.
+    """
+    metadata = _metadata(resampled, design, trial, payload, source)
+    estimate = log_clocks(resampled)
+    if correct:
+        _check_determined(resampled.name, estimate)
+    N, rate_hz = resampled.robots, resampled.rate_hz
+    offset_s, drift = (estimate.offset_s, estimate.drift) if correct else (np.zeros(N), np.zeros(N))
+    ends_s = resampled.start_s + (np.array([len(x) for x in resampled.values]) - 1) / rate_hz
+    # The robots' first and last instants in the time of robot 1.
+    from_s, to_s = (
+        estimate.middle_s + (stamp - estimate.middle_s - offset_s) / (1.0 + drift)
+        for stamp in (resampled.start_s, ends_s)
+    )
+    _check_ends(resampled.name, to_s, estimate, correct=correct)
+    first = math.ceil((from_s.max() - resampled.start_s[0] - _SAME_S) * rate_hz)
+    last = math.floor((to_s.min() - resampled.start_s[0] + _SAME_S) * rate_hz)
+    if last - first + 1 < MIN_SAMPLES:
+        raise InputError(
+            f"{resampled.name}: the robots have {max(0, last - first + 1)} samples in common; "
+            f"at least {MIN_SAMPLES} are needed"
+        )
+    time_s = resampled.start_s[0] + np.arange(first, last + 1) / rate_hz
+    arrays = {field: np.empty((len(time_s), N, 3)) for field in ("position", "theta", "effort")}
+    ref = np.empty((len(time_s), N, 3)) if REF[0] in resampled.channels else None
+    untouched = []
+    for i in range(N):
+        stamps = time_s + offset_s[i] + drift[i] * (time_s - estimate.middle_s)
+        at = (stamps - resampled.start_s[i]) * rate_hz
+        values, same = _values_at(resampled.values[i], at, _SAME_S * rate_hz)
+        untouched.append(same)
+        arrays["position"][:, i], arrays["theta"][:, i], arrays["effort"][:, i] = np.split(
+            values[:, :9], 3, axis=1
+        )
+        if ref is not None:
+            ref[:, i] = values[:, 9:]
+    if resampled.level == "wrist":
+        _to_joints(arrays["position"], arrays["effort"], metadata.design, resampled.name, rate_hz)
+    recording = Recording(
+        time=np.arange(len(time_s)) / rate_hz,
+        phi=arrays["position"],
+        theta=arrays["theta"],
+        tau=arrays["effort"],
+        ref=ref,
+        metadata=metadata,
+        name=resampled.name,
+    )
+    lost_s = np.maximum(np.stack([time_s[0] - from_s, to_s - time_s[-1]], axis=1), 0.0)
+    return recording, ClockReport(estimate, correct, float(time_s[0]), lost_s, tuple(untouched))
+
+
+def log_clocks(resampled: Resampled) -> ClockEstimate:
+    """Offsets and drifts of the robots' clocks in a log; see ``estimate_clocks``."""
+    start = CHANNELS[resampled.level].index(THETA[0])
+    theta = [values[:, start : start + 3] for values in resampled.values]
+    return estimate_clocks(theta, resampled.start_s, resampled.rate_hz)
+
+
+def _metadata(
+    resampled: Resampled,
+    design: OmnidDesign | None,
+    trial: str | None,
+    payload: str | None,
+    source: str | None,
+) -> RecordingMetadata:
+    known = resampled.metadata
+    given = {"design": design, "trial": trial, "payload": payload, "source": source}
+    given = {key: value for key, value in given.items() if value is not None}
+    fixed = {"robots": resampled.robots, "rate_hz": resampled.rate_hz, "level": resampled.level}
+    if known is not None:
+        return replace(known, **fixed, **given)
+    for key in ("design", "trial"):
+        if key not in given:
+            raise InputError(f"{resampled.name}: says nothing about its {key}, which must be given")
+    rest = {"source": f"log {resampled.name}", "payload": None, "seed": None}
+    return RecordingMetadata(**(rest | given | fixed))
+
+
+def _check_determined(name: str, estimate: ClockEstimate) -> None:
+    for i, why in enumerate(estimate.why_not):
+        if why is not None:
+            raise InputError(
+                f"{name}: the clock of robot {i + 1} cannot be told from the motion and so not be corrected: {why}"
+            )
+
+
+def _check_ends(name: str, ends_s: Array, estimate: ClockEstimate, *, correct: bool) -> None:
+    """Whether a robot's log breaks off before the others'."""
+    early, late = int(np.argmin(ends_s)), int(np.argmax(ends_s))
+    short_s = ends_s[late] - ends_s[early]
+    if short_s <= EARLY_S:
+        return
+    apart_s = estimate.offset_s[early] - estimate.offset_s[late]
+    hint = ""
+    if not correct and abs(apart_s) > _SUSPECT_S:
+        hint = (
+            f" (by the motion, the clock of robot {early + 1} differs from that of robot {late + 1} by "
+            f"{apart_s:+.3g} s: correct the clocks)"
+        )
+    raise InputError(
+        f"{name}: the log of robot {early + 1} ends {short_s:.4g} s before that of robot {late + 1}; "
+        f"at most {EARLY_S:g} s is allowed{hint}"
+    )
+
+
+def _values_at(values: Array, at: Array, tolerance: float) -> tuple[Array, bool]:
+    """Samples (Q, C) at places between them, and whether all these are samples to within ``tolerance``."""
+    nearest = np.rint(at).astype(np.int64)
+    if np.all(np.abs(at - nearest) <= tolerance):
+        return values[nearest], True
+    # Only what is asked for, and enough around it that its ends do not show.
+    low, high = max(0, int(at[0]) - 64), min(len(values), int(at[-1]) + 66)
+    spline = make_interp_spline(np.arange(low, high), values[low:high], k=5)
+    return spline(np.clip(at, low, high - 1)), False
+
+
+def _to_joints(h: Array, force: Array, design: OmnidDesign, name: str, rate_hz: float) -> None:
+    """Turn wrist positions and forces, shape (Q, N, 3), into driven angles and torques in place."""
+    for i in range(h.shape[1]):
+        fault = wrist_fault(h[:, i], design)
+        if fault is not None:
+            (row,), what = fault
+            raise InputError(
+                f"{name}: robot {i + 1}, {row / rate_hz:.6g} s after the recording's beginning: {what}; "
+                "are unit, sign and offset of the wrist's channels right?"
+            )
+        h[:, i], force[:, i] = joints_of(h[:, i], force[:, i], design)
