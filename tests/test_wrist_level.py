@@ -10,11 +10,11 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from estimator.delta import forward_kinematics, inverse_kinematics, is_in_reach
+from estimator.delta import forward_kinematics, inverse_kinematics, is_in_reach, leg_geometry
 from estimator.errors import InputError
 from estimator.estimate import estimate_payload
 from estimator.recording import Recording, read_recording, write_recording
-from estimator.wrist_level import joints_of, wrist_fault, wrist_of
+from estimator.wrist_level import driven_motion, joints_of, wrist_fault, wrist_of
 from mujoco_arm import Arm, random_motion
 from omnid_design import DESIGN
 from recorded_team import MASS, Sines, carry
@@ -95,6 +95,23 @@ def test_round_trip() -> None:
     assert np.abs(back_tau - tau).max() < 1e-12 * np.abs(force).max()
     assert wrist_of(np.zeros((0, 3)), np.zeros((0, 3)), DESIGN)[0].shape == (0, 3)
     assert joints_of(np.zeros((0, 3)), np.zeros((0, 3)), DESIGN)[1].shape == (0, 3)
+
+
+def test_driven_motion_of_a_wrist_along_a_path() -> None:
+    """By fourth-order differences of inverse kinematics alone."""
+    rng = np.random.default_rng(6)
+    h = np.array([0.0, 0.0, HOME_Z]) + rng.uniform(-0.07, 0.07, (50, 3))
+    velocity, acceleration = rng.normal(0.0, 0.3, h.shape), rng.normal(0.0, 2.0, h.shape)
+    step = 1e-3
+    phi = [
+        inverse_kinematics(h + t * velocity + t**2 / 2 * acceleration, DESIGN)
+        for t in step * np.arange(-2, 3)
+    ]
+    rate, rate_dot = driven_motion(leg_geometry(phi[2], DESIGN), velocity, acceleration)
+    assert rate == pytest.approx((phi[0] - 8 * phi[1] + 8 * phi[3] - phi[4]) / (12 * step), abs=1e-8)
+    second = (-phi[0] + 16 * phi[1] - 30 * phi[2] + 16 * phi[3] - phi[4]) / (12 * step**2)
+    assert rate_dot == pytest.approx(second, abs=1e-6)
+    assert np.abs(second).max() > 10.0
 
 
 # What has no driven angles

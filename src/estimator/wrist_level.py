@@ -78,6 +78,21 @@ def joints_of(h: ArrayLike, force: ArrayLike, design: OmnidDesign) -> tuple[Arra
     return phi, legs.leverage * np.linalg.solve(np.swapaxes(legs.rod, -1, -2), force[..., None])[..., 0]
 
 
+def driven_motion(legs: LegGeometry, h_dot: ArrayLike, h_ddot: ArrayLike) -> tuple[Array, Array]:
+    """Driven rates [rad/s] and accelerations [rad/s^2], each of shape (..., 3): the inverse of ``wrist_motion``.
+
+    Args:
+        legs: geometry at the driven angles, no leg stretched.
+        h_dot: velocity of the wrist in {b} [m/s], shape (..., 3).
+        h_ddot: its acceleration [m/s^2], shape (..., 3).
+    """
+    h_dot, h_ddot = np.asarray(h_dot, dtype=float), np.asarray(h_ddot, dtype=float)
+    phi_dot = np.einsum("...kj,...j->...k", legs.rod, h_dot) / legs.leverage
+    rod_dot = h_dot[..., None, :] - legs.knee_d1 * phi_dot[..., None]
+    curvature = np.sum(legs.rod * legs.knee_d2, axis=-1) * phi_dot**2 - np.sum(rod_dot**2, axis=-1)
+    return phi_dot, (np.einsum("...kj,...j->...k", legs.rod, h_ddot) - curvature) / legs.leverage
+
+
 def wrist_fault(h: ArrayLike, design: OmnidDesign) -> tuple[tuple[int, ...], str] | None:
     """The first wrist position that has no driven angles, or None where all have.
 

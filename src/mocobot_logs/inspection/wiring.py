@@ -1,0 +1,199 @@
+"""Is the log wired as it says? Suspected mistakes are undone one by one, and what fits far better is reported.
+
+A misfit (``misfit``) beyond what poorly calibrated robots show is *suspicious*; a mistake is found when undoing it
+makes it ``DECISIVE`` times smaller. A smaller misfit may still be a mistake in the log of well calibrated robots: then
+undoing has to make it ``OVERWHELMING`` times smaller. Several mistakes are found one after the other, the one that
+helps most first; in the end each is put back alone, and dropped if it hardly matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from estimator.design import OmnidDesign
+from mocobot_logs.inspection.misfit import Misfit, team_misfit
+from mocobot_logs.inspection.mistakes import Mistake, suspects
+from mocobot_logs.inspection.mistakes.wrong_zero import WrongZero
+from mocobot_logs.inspection.motion import Fault, Grasp, grasp_motion
+from mocobot_logs.inspection.signals import Signals
+
+SUSPICIOUS = 2.0
+"""Misfit beyond which something is wrong; poorly calibrated robots stay below 1."""
+DECISIVE = 4.0
+"""How many times smaller the misfit must become."""
+WORTH_TRYING = 0.3
+"""Misfit below which there is nothing to be explained."""
+OVERWHELMING = 30.0
+"""How many times smaller a misfit that is not suspicious must become."""
+HELPS = 1.5
+"""How many times smaller one of several mistakes must make it."""
+ALIKE = 1.3
+"""Mistakes whose misfits differ by less than this factor cannot be told apart."""
+MOST = 6
+_REFINED = 6
+
+
+@dataclass(frozen=True)
+class Found:
+    """A mistake that explains the misfit.
+
+    Attributes:
+        mistake: what is wrong.
+        alternatives: others that explain it as well.
+        before, after: misfit of all other mistakes undone, without and with this one undone.
+    """
+
+    mistake: Mistake
+    alternatives: tuple[Mistake, ...]
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class Wiring:
+    """What the search found.
+
+    Attributes:
+        as_is: misfit of the log as it is.
+        found: mistakes, the one that matters most first; empty when none is found.
+        undone: misfit with all of them undone.
+        hidden: mistakes that would not show in these data.
+        tried: number of mistakes looked for.
+    """
+
+    as_is: Misfit
+    found: tuple[Found, ...]
+    undone: Misfit
+    hidden: tuple[Mistake, ...]
+    tried: int
+
+    @property
+    def suspicious(self) -> bool:
+        """Whether the log as it is does not fit robots that carry one rigid payload."""
+        return self.as_is.total > SUSPICIOUS
+
+    @property
+    def explained(self) -> bool:
+        """Whether what is left is no longer suspicious."""
+        return self.undone.total <= SUSPICIOUS
+
+
+class Team:
+    """Misfits of one log with mistakes undone; robots that a mistake does not touch are not computed again."""
+
+    def __init__(self, signals: Signals, design: OmnidDesign) -> None:
+        """Compute every robot's motion."""
+        self.signals, self._design = signals, design
+        self._told = [grasp_motion(signals, robot, design) for robot in range(signals.robots)]
+        self.misfit = self._judge(self._told)
+
+    def without(self, mistake: Mistake) -> Misfit:
+        """The misfit with a mistake undone."""
+        signals = mistake.undo(self.signals)
+        told = list(self._told)
+        for robot in mistake.robots:
+            told[robot] = grasp_motion(signals, robot, self._design)
+        return self._judge(told)
+
+    def undone(self, mistake: Mistake) -> Team:
+        """The team with a mistake undone."""
+        return Team(mistake.undo(self.signals), self._design)
+
+    def _judge(self, told: Sequence[tuple[Grasp | None, tuple[Fault, ...]]]) -> Misfit:
+        return team_misfit([t[0] for t in told], [t[1] for t in told], self._design.gravity_mps2)
+
+
+def check_wiring(
+    signals: Signals, design: OmnidDesign, advance: Callable[[int], object] = lambda _: None
+) -> tuple[Wiring, Signals]:
+    """Look for mistakes.
+
+    Args:
+        signals: the team's channels.
+        design: the robots' numbers.
+        advance: takes the number of mistakes tried since the last call.
+
+    Returns:
+        What was found, and the signals with all of it undone.
+    """
+    first = team = Team(signals, design)
+    chain: list[tuple[Mistake, tuple[Mistake, ...]]] = []
+    while team.misfit.total > WORTH_TRYING and len(chain) < MOST:
+        best, alike, after = _best(team, design, advance)
+        suspicious = team.misfit.total > SUSPICIOUS
+        if after > team.misfit.total / (HELPS if suspicious else OVERWHELMING):
+            break
+        chain.append((best, alike))
+        team = team.undone(best)
+    if not shows(first.misfit.total, team.misfit.total):
+        chain, team = [], first
+    found, team = _needed(first, team, chain)
+    hidden, tried = _hidden(team, design, advance)
+    return Wiring(first.misfit, found, team.misfit, hidden, tried), team.signals
+
+
+def shows(wrong: float, right: float) -> bool:
+    """Whether a mistake is found that makes a misfit out of another."""
+    return wrong > max(SUSPICIOUS, DECISIVE * right) or wrong > max(WORTH_TRYING, OVERWHELMING * right)
+
+
+def _best(
+    team: Team, design: OmnidDesign, advance: Callable[[int], object]
+) -> tuple[Mistake, tuple[Mistake, ...], float]:
+    """The mistake that explains most, and those that explain as much."""
+    tried = []
+    for mistake in suspects(team.signals, design):
+        tried.append((team.without(mistake).total, len(tried), mistake))
+        advance(1)
+    tried.sort(key=lambda entry: entry[:2])
+    top = []
+    for total, rank, mistake in tried[:_REFINED]:
+        refined = mistake.refined(lambda m: team.without(m).total)
+        top.append((total if refined is mistake else team.without(refined).total, rank, refined))
+    limit = ALIKE * min(entry[0] for entry in top) + 1e-9
+    # Among those that cannot be told apart, the earliest suspicion comes first.
+    alike = sorted((entry for entry in (*top, *tried[_REFINED:]) if entry[0] <= limit), key=lambda e: e[1])
+    return alike[0][2], tuple(_distinct([entry[2] for entry in alike[1:]])), alike[0][0]
+
+
+def _distinct(mistakes: Sequence[Mistake]) -> list[Mistake]:
+    """Each encoder's zero once, however many offsets were tried."""
+    seen: set[object] = set()
+    kept = []
+    for mistake in mistakes:
+        key = (mistake.robots, mistake.channels) if isinstance(mistake, WrongZero) else mistake
+        if key not in seen:
+            seen.add(key)
+            kept.append(mistake)
+    return kept
+
+
+def _needed(
+    first: Team, team: Team, chain: list[tuple[Mistake, tuple[Mistake, ...]]]
+) -> tuple[tuple[Found, ...], Team]:
+    """Each mistake of the chain with what it is worth, without those that hardly matter once all others are undone."""
+    found = []
+    for k in reversed(range(len(chain))):
+        others = first
+        for mistake, _ in (*chain[:k], *chain[k + 1 :]):
+            others = others.undone(mistake)
+        if others.misfit.total <= HELPS * team.misfit.total:
+            chain, team = [*chain[:k], *chain[k + 1 :]], others
+        else:
+            found.append(Found(chain[k][0], chain[k][1], others.misfit.total, team.misfit.total))
+    return tuple(reversed(found)), team
+
+
+def _hidden(
+    team: Team, design: OmnidDesign, advance: Callable[[int], object]
+) -> tuple[tuple[Mistake, ...], int]:
+    """Mistakes that would not have been found, had they been made."""
+    hidden, tried = [], 0
+    for mistake in suspects(team.signals, design):
+        if not isinstance(mistake, WrongZero):
+            tried += 1
+            if not shows(team.without(mistake).total, team.misfit.total):
+                hidden.append(mistake)
+            advance(1)
+    return tuple(hidden), tried
