@@ -22,6 +22,7 @@ from mocobot_logs.bag_mcap_runs import MAGIC
 from mocobot_logs.bag_messages import Storage
 from mocobot_logs.bag_sqlite import HEAD, SqliteBag
 from mocobot_logs.bag_unpack import unpack_file
+from mocobot_logs.faults import detail_of
 
 VERSIONS = range(1, 10)
 """Of ``metadata.yaml`` that are read; all that rosbag2 has written so far."""
@@ -191,8 +192,7 @@ def _load(content: bytes, path: Path) -> dict[str, Any]:
     try:
         values = YAML(typ="safe", pure=True).load(text)
     except Exception as error:  # on damaged text the parser raises many types, not all of them its own
-        line = " ".join(str(error).split())
-        raise InputError(f"{path}: not readable YAML ({line:.120})") from error
+        raise InputError(f"{path}: not readable YAML ({detail_of(error)})") from error
     if not isinstance(values, dict):
         raise InputError(f"{path}: has no table {_KEY!r}, so it is not the metadata of a bag")
     return values

@@ -196,4 +196,4 @@ class McapBag:
             raise InputError(
                 f"{self.name}: damaged, a message of topic {topic!r:.80} was logged after the year 2262"
             )
-        return Messages(block, start + _MESSAGE.itemsize, size, heads["log"].astype(np.int64), start)
+        return Messages(block, start + _MESSAGE.itemsize, size, heads["log"].astype(np.int64))

@@ -10,14 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.errors import InputError
+from mocobot_logs.faults import shown
 from mocobot_logs.log import Stamps
 
 BLOCK_BYTES = 4 << 20
 """About so many bytes of messages are handed over at a time, unless a chunk of the file is larger."""
 MESSAGE_BYTES = 16 << 20
 """Largest message that is read [bytes]; one robot's joint states take some hundred."""
-SHOWN_TOPICS = 20
-"""So many topics are listed in a message."""
+SHOWN = 20
+"""So many topics or joints are listed in a message."""
 
 
 @dataclass(frozen=True)
@@ -50,14 +51,12 @@ class Messages:
         start: first byte of each message, shape (q,).
         size: its number of bytes, shape (q,).
         log_ns: when the recorder wrote it [ns], shape (q,).
-        order: place of each message among those of all topics of the block, shape (q,).
     """
 
     block: bytes
     start: NDArray[np.int64]
     size: NDArray[np.int64]
     log_ns: Stamps
-    order: NDArray[np.int64]
 
     def __len__(self) -> int:
         """Number of messages q."""
@@ -105,7 +104,7 @@ class Storage(Protocol):
         ...
 
 
-def joined(payloads: Sequence[bytes], log_ns: Stamps, order: NDArray[np.int64], where: str) -> Messages:
+def joined(payloads: Sequence[bytes], log_ns: Stamps, where: str) -> Messages:
     """Messages that come one by one, in one block of memory.
 
     Raises:
@@ -113,7 +112,7 @@ def joined(payloads: Sequence[bytes], log_ns: Stamps, order: NDArray[np.int64], 
     """
     size = np.fromiter(map(len, payloads), np.int64, len(payloads))
     check_sizes(size, where)
-    return Messages(b"".join(payloads), np.cumsum(size) - size, size, log_ns, order)
+    return Messages(b"".join(payloads), np.cumsum(size) - size, size, log_ns)
 
 
 def check_sizes(size: NDArray[np.int64], where: str) -> None:
@@ -163,12 +162,17 @@ def listed(topics: Mapping[str, Topic]) -> str:
     """The topics of a bag and their types, for messages."""
     if not topics:
         return "the bag has no topics"
-    first = list(topics.values())[:SHOWN_TOPICS]
+    first = list(topics.values())[:SHOWN]
     names = ", ".join(f"{printable(topic.name)} ({printable(topic.type)})" for topic in first)
-    more = f", ... ({len(topics)} in all)" if len(topics) > SHOWN_TOPICS else ""
+    more = f", ... ({len(topics)} in all)" if len(topics) > SHOWN else ""
     return f"the bag's topics are {names}{more}"
+
+
+def listed_names(names: Sequence[str]) -> str:
+    """Names of a file, for messages."""
+    return ", ".join(map(printable, names[:SHOWN])) + (", ..." if len(names) > SHOWN else "") or "none"
 
 
 def printable(text: str) -> str:
     """Text of a file as a terminal may show it."""
-    return f"{text:.80}" if text.isprintable() else f"{text!r:.80}"
+    return shown(text, 80)

@@ -66,16 +66,16 @@ class Plan:
         robots: number of robots.
         channels: columns of ``Samples.values``.
         topics: by name.
-        parts: number of topics of each robot.
+        parts: topics of each robot.
     """
 
     robots: int
     channels: tuple[str, ...]
     topics: Mapping[str, TopicPlan]
-    parts: tuple[int, ...]
+    parts: tuple[tuple[str, ...], ...]
 
 
-def plan(
+def make_plan(
     bag: str, topics: Mapping[str, Topic], log_map: LogMap, names: Names, spoken: Callable[[str], bool]
 ) -> Plan:
     """Find every channel of every robot.
@@ -113,7 +113,7 @@ def plan(
                 )
             known[selector] = meaning
     plans = {}
-    own = [list(dict.fromkeys(m[name].topic for name in channels)) for m in maps]
+    own = [tuple(dict.fromkeys(m[name].topic or "" for name in channels)) for m in maps]
     for topic, meanings in selected.items():
         kind, selectors = message_type(topics[topic], bag), tuple(meanings)
         _check(kind, selectors, log_map)
@@ -133,7 +133,7 @@ def plan(
                     )
                 )
         plans[topic] = TopicPlan(kind, selectors, tuple(meanings.values()), tuple(uses))
-    return Plan(robots, channels, plans, tuple(len(found) for found in own))
+    return Plan(robots, channels, plans, tuple(own))
 
 
 def _check(kind: MessageType, selectors: tuple[Selector, ...], log_map: LogMap) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 
 from estimator.errors import InputError
 from mocobot_logs.bag_messages import BLOCK_BYTES, MESSAGE_BYTES, Messages, Topic, joined
+from mocobot_logs.faults import detail_of
 
 HEAD = b"SQLite format 3\0"
 _OPERATIONS = 1_000_000
@@ -102,7 +103,7 @@ class SqliteBag:
         if order[0] <= last[topic] or (order[1:] <= order[:-1]).any():
             raise InputError(f"{self.name}: damaged, its table 'messages' holds the same row twice")
         last[topic] = int(order[-1])
-        return joined(payloads, np.array(stamps, np.int64), order, f"{self.name}: topic {topic!r:.80}")
+        return joined(payloads, np.array(stamps, np.int64), f"{self.name}: topic {topic!r:.80}")
 
     def has_messages(self, topic: str) -> bool:
         """Whether there is any message of a topic.
@@ -133,9 +134,9 @@ class SqliteBag:
         if not head.startswith(HEAD):
             raise InputError(f"{self.name}: not an SQLite file, it begins with other bytes")
         page = int.from_bytes(head[16:18], "big")
-        pages = int.from_bytes(head[28:32], "big")
-        whole = pages * (65536 if page == 1 else page)
-        if len(head) < 100 or self.size < whole:
+        pages = int.from_bytes(head[28:32], "big") if head[24:28] == head[92:96] else 0  # else out of date
+        whole = max(pages * (65536 if page == 1 else page), 100)
+        if self.size < whole:
             raise InputError(f"{self.name}: cut off, the SQLite file has {self.size} of {whole} bytes")
 
     @contextlib.contextmanager
@@ -161,7 +162,7 @@ class SqliteBag:
                 f"{self.name}: {limit} ({error}); joint data are read from smaller ones"
             ) from error
         except (sqlite3.Error, OverflowError, UnicodeDecodeError) as error:
-            what = "its pages run in circles" if left < 0 else (str(error).splitlines() or ["unreadable"])[0]
+            what = "its pages run in circles" if left < 0 else detail_of(error)
             raise InputError(f"{self.name}: damaged, or not a bag ({what})") from error
 
     def _check_tables(self, connection: sqlite3.Connection) -> None:

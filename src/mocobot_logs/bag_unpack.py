@@ -9,6 +9,7 @@ import zstandard
 
 from estimator.errors import InputError
 from mocobot_logs.claims import FREE_BYTES, LARGEST_RATIO
+from mocobot_logs.faults import detail_of
 
 CHUNK_BYTES = 256 << 20
 """Largest chunk of a file that is unpacked in memory; recorders write chunks of about 1 MiB."""
@@ -42,7 +43,7 @@ def unpack(data: bytes, compression: str, size: int) -> bytes:
         else:
             raise UnpackError(f"is compressed by {compression!r:.40}; it must be zstd, lz4 or not compressed")
     except (zstandard.ZstdError, RuntimeError) as error:  # lz4 raises RuntimeError
-        raise UnpackError(f"does not unpack ({_first_line(error)})") from error
+        raise UnpackError(f"does not unpack ({detail_of(error)})") from error
     if len(unpacked) != size:
         more = "more" if len(unpacked) > size else f"{len(unpacked)}"
         raise UnpackError(f"claims {size} bytes unpacked, but holds {more}")
@@ -59,7 +60,7 @@ def unpack_message(data: bytes, limit: int) -> bytes:
         size = zstandard.frame_content_size(data)
         unpacked = _zstd(data, limit if size < 0 else min(size, limit))
     except zstandard.ZstdError as error:
-        raise UnpackError(f"does not unpack ({_first_line(error)})") from error
+        raise UnpackError(f"does not unpack ({detail_of(error)})") from error
     if size > limit or len(unpacked) > limit:
         raise UnpackError(f"unpacks to more than {limit >> 20} MiB")
     return unpacked
@@ -95,7 +96,7 @@ def unpack_file(source: Path, target: Path, heads: tuple[bytes, ...], name: str)
                     )
                 out.write(block)
     except zstandard.ZstdError as error:
-        raise InputError(f"{name}: damaged, does not unpack ({_first_line(error)})") from error
+        raise InputError(f"{name}: damaged, does not unpack ({detail_of(error)})") from error
     except OSError as error:
         raise InputError(
             f"{name}: cannot be unpacked into {target.parent} ({error.strerror or error})"
@@ -123,7 +124,3 @@ def _lz4(data: bytes, size: int) -> bytes:
     if not stream.eof and len(unpacked) <= size:
         raise UnpackError("is cut off")
     return unpacked
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0]
