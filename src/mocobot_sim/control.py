@@ -160,6 +160,12 @@ class TeamController:
         """F_ff of every robot in its {b} [N], shape (N, 3)."""
         return self._state[:, 4].copy()
 
+    @feed_forward.setter
+    def feed_forward(self, force: Array) -> None:
+        """Set F_ff, and take up no load from now on."""
+        self._state[:, 4] = force
+        self._given = True
+
     def update(self, ref: Array, ref_dot: Array) -> None:
         """One control tick: read ``qpos``, write ``ctrl``.
 

@@ -2,88 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
-from scipy.spatial.transform import Rotation
 
 from estimator.design import OmnidDesign
 from estimator.errors import InputError
-from mocobot_sim.as_built import AsBuilt
+from mocobot_sim.actors import Actor, Stage
 from mocobot_sim.assemble import assemble_at_home
 from mocobot_sim.control import ControlGains, TeamController, home_phi
 from mocobot_sim.models import omnid_design
 from mocobot_sim.scene import TeamScene
 from mocobot_sim.sensed import SensedLog
-from mocobot_sim.sensor_effects import SensorEffects
 from mocobot_sim.team_index import TeamIndex
 from mocobot_sim.trajectories import RATE_HZ, Trajectory
+from mocobot_sim.trial_log import TrialError as TrialError
+from mocobot_sim.trial_log import TrialLog as TrialLog
 
 Array = NDArray[np.float64]
 
 ROD_LIMIT_M = 0.02e-3
 WELD_LIMIT_M = 0.01e-3
 WELD_LIMIT_RAD = np.deg2rad(0.001)
-
-
-class TrialError(RuntimeError):
-    """The physics of a trial cannot be trusted; the sentence says what broke, where and when."""
-
-
-@dataclass(frozen=True)
-class TrialLog:
-    """What truly happened, at ``RATE_HZ``; nothing here has passed a sensor.
-
-    All quantities of one row belong to one instant.
-
-    Attributes:
-        trial: kind of trajectory.
-        time: [s], shape (Q,).
-        phi: driven angles [rad], shape (Q, N, 3).
-        theta: gimbal angles (z, y, x) [rad], shape (Q, N, 3).
-        tau: true torque of the springs on the proximal links, positive raising them [N m], shape (Q, N, 3).
-        ref_b: commanded wrist positions in {b} [m], shape (Q, N, 3).
-        p_W1: origin of {1} in the world [m], shape (Q, 3).
-        R_W1: orientation of {1} (the payload) in the world, shape (Q, 3, 3).
-        feed_forward: the controller's frozen load force in {b} [N], shape (N, 3).
-        gains: control gains.
-        units: how each robot deviates from the design, N entries.
-        sensors: timing faults of the sensors.
-        sensed: what the joint sensors see, at the control rate.
-        rod_error_m: largest distance between a rod's tip and its platform joint [m].
-        weld_error_m: largest distance between a flange and its grasp [m].
-        weld_error_rad: largest angle between a flange and its grasp [rad].
-    """
-
-    trial: str
-    time: Array
-    phi: Array
-    theta: Array
-    tau: Array
-    ref_b: Array
-    p_W1: Array
-    R_W1: Array
-    feed_forward: Array
-    gains: ControlGains
-    units: tuple[AsBuilt, ...]
-    sensors: SensorEffects
-    sensed: SensedLog
-    rod_error_m: float
-    weld_error_m: float
-    weld_error_rad: float
-
-    @property
-    def robots(self) -> int:
-        """Number of robots N."""
-        return self.phi.shape[1]
-
-    def payload_rotation(self) -> Array:
-        """Rotation vector of the payload from its pose at the first sample, in {1} then [rad], shape (Q, 3)."""
-        return (Rotation.from_matrix(self.R_W1[0]).inv() * Rotation.from_matrix(self.R_W1)).as_rotvec()
 
 
 def run_trial(
@@ -95,6 +38,7 @@ def run_trial(
     trial_number: int | None = None,
     feed_forward: Array | None = None,
     timestep_s: float | None = None,
+    actors: Sequence[Actor] = (),
 ) -> TrialLog:
     """Simulate one trial in closed loop.
 
@@ -106,6 +50,7 @@ def run_trial(
         trial_number: which trial this is, from 1: the scene's pushes for other trials do not act; None lets all act.
         feed_forward: F_ff of every robot in its {b} [N], shape (N, 3), held from the start; None to take it up.
         timestep_s: integration step [s]; None for the scene's.
+        actors: what else acts: bases that drive, a person's hand.
 
     Raises:
         TrialError: a constraint opens too far, a value is not finite, MuJoCo warns, or a joint or spring
@@ -129,15 +74,19 @@ def run_trial(
     controller = TeamController(index, design, gains, data, scene.units, scene.sensors, feed_forward, sensed)
     log = _Buffers(model, data, index, len(trajectory.ref_b), scene.grasp_slack_m)
     pushes = [push for push in scene.pushes if trial_number in (None, push.trial)]
+    for actor in actors:
+        actor.start(Stage(model, data, index, controller, gains.rate_hz, ticks, len(ref)))
     R_Wb1 = scene.mounts.rotation[0].as_matrix()
     reported, last = 0, len(trajectory.ref_b) - 1
     for sample in range(last + 1):
         for tick in range(sample * ticks, (sample + 1) * ticks):
-            controller.update(ref[tick], ref_dot[tick])
-            if pushes:
+            if pushes or actors:
                 data.xfrc_applied[index.payload_body] = 0.0
-                for push in pushes:
-                    push.act(model, data, index.payload_body, R_Wb1)
+            for actor in actors:
+                actor.act(tick)
+            controller.update(ref[tick], ref_dot[tick])
+            for push in pushes:
+                push.act(model, data, index.payload_body, R_Wb1)
             if tick == sample * ticks:
                 # A step first evaluates forces and frames at the state it starts from: one instant for all.
                 log.before_step(sample)

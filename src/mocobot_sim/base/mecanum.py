@@ -11,7 +11,7 @@ with a the angle between the axles of roller and wheel and s = +-1 the wheel's h
 (13.10) of K. M. Lynch and F. C. Park, "Modern Robotics", Cambridge University Press, 2017.
 
 The textbook's roller always touches with its middle. One of n straight axles is turned about the wheel's axle by up to
-pi / n while it carries the wheel; at an angle t only sin a cos t of its axle lies along the wheel's motion. A wheel that
+pi / n while it carries the wheel; at angle t only sin a cos t of its axle lies along the wheel's motion. A wheel that
 turns evenly passes all t alike, so the mean of cos t, sin(pi / n) / (pi / n), belongs into cot a: 12 rollers go 1.1 %
 less far sideways than the textbook says. ``with_rollers`` has this mean in it.
 """
