@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -11,11 +12,13 @@ import numpy as np
 import pytest
 
 from estimator.errors import InputError
+from mocobot_logs import map_parse
 from mocobot_logs.log import CHANNELS, REF
 from mocobot_logs.map_parse import parse_map
 from mocobot_logs.map_units import units_of
 from mocobot_logs.maps import MAPS, builtin_map, builtin_map_text, read_map
 
+ROOT = Path(__file__).resolve().parents[1]
 UNITS = {"phi": "rad", "theta": "rad", "tau": "Nm", "h": "m", "force": "N", "ref": "m"}
 
 
@@ -291,6 +294,30 @@ def test_paths_that_are_no_maps(tmp_path: Path) -> None:
             read_map(path)
     with pytest.raises(InputError, match=r"'omnid' does not exist; the built-in maps are omnid-ros2"):
         builtin_map("omnid")
+
+
+DOCUMENTED = re.findall(r"```toml\n(.*?)```", (ROOT / "docs" / "measured-data.md").read_text(), re.DOTALL)
+
+
+@pytest.mark.parametrize("block", DOCUMENTED, ids=range(len(DOCUMENTED)))
+def test_documented_maps_are_allowed(block: str) -> None:
+    """Those that leave channels out are completed first."""
+    values = tomllib.loads(block)
+    channels = values.setdefault("channels", {})
+    level = values.setdefault("level", "wrist" if {"h_x", "force_x"} & set(channels) else "joint")
+    for name in CHANNELS[level]:
+        channels.setdefault(name, {"column": name, "unit": unit(name)})
+    parse_map({"version": 1} | values, "documented").channels(2)
+
+
+def test_the_docs_name_every_key_unit_and_map() -> None:
+    text = (ROOT / "docs" / "measured-data.md").read_text()
+    for word in [
+        *map_parse.KEYS,
+        *MAPS,
+        *(u for name in CHANNELS["joint"] for u in units_of(name) if " " not in u),
+    ]:
+        assert re.search(rf"[`\s.\[,]{re.escape(word)}[`\s.\]=,\"]", text), word
 
 
 def test_a_map_may_start_from_a_builtin_one(tmp_path: Path) -> None:

@@ -20,6 +20,8 @@ _TOP = ("version", "level", "robots", "trial", "time", "csv", "defaults", "chann
 _TIME = ("column", "unit", "clock")
 _CSV = ("delimiter", "decimal")
 _CHANNEL = ("topic", "joint", "field", "column", "unit", "sign", "offset", "counts_per_turn", "optional")
+KEYS = (*_TOP, *_TIME, *_CSV, *_CHANNEL)
+"""Every key of a map but the channels' names."""
 _JOINT_FIELDS = ("position", "velocity", "effort")
 _LARGEST = sys.float_info.max
 
