@@ -58,6 +58,11 @@ def write_text(path: Path, columns: dict[str, np.ndarray], delimiter: str = ",",
     return path
 
 
+def column(table: pa.Table, name: str, values: object) -> pa.Table:
+    """A table with one column replaced."""
+    return table.set_column(table.column_names.index(name), name, pa.array(values))
+
+
 def write_lerobot(
     folder: Path, episodes: list[Recording], *, listing: bool = True, fps: float = 100.0
 ) -> Path:

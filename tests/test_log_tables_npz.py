@@ -251,6 +251,15 @@ def test_objects_are_never_unpickled(path: Path) -> None:
     assert "array 'extra' holds Python objects, which are never loaded" in refused(path)
 
 
+def test_numbers_beyond_floats_are_infinite(path: Path) -> None:
+    """As what came out of a log; no warning on the terminal."""
+    np.savez(path, **(ARRAYS | {"phi": np.full((60, 3, 3), 1e308, np.longdouble) * 1e5}))
+    common = {**builtin_map("mocobot-arrays").common}
+    common["tau1"] = replace(common["tau1"], scale=1e300, offset=1e308)
+    log = read_log(path, replace(builtin_map("mocobot-arrays"), common=common))
+    assert np.isposinf(log.streams[0].values[:, [0, 1, 2, 6]]).all()
+
+
 def test_no_rows_is_an_empty_log(path: Path) -> None:
     np.savez(path, **{name: array[:0] for name, array in ARRAYS.items()})
     assert [len(stream.stamp_ns) for stream in read_log(path).streams] == [0, 0, 0]

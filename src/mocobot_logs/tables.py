@@ -121,10 +121,11 @@ class TableSource:
             for robot, (places, channels) in enumerate(zip(self._places, maps, strict=True)):
                 stamps, given = block.clocks[self._clocks[robot]]
                 values = np.empty((len(stamps), len(self.channels)))
-                for k, (name, place) in enumerate(zip(self.channels, places, strict=True)):
-                    with np.errstate(invalid="ignore"):  # NaN of a damaged file may be a signalling one
+                # What is beyond floats, and signalling NaN of damaged files, are for the reader of the log to judge.
+                with np.errstate(invalid="ignore", over="ignore"):
+                    for k, (name, place) in enumerate(zip(self.channels, places, strict=True)):
                         raw = np.asarray(block.columns[place.column][(slice(None), *place.index)], float)
-                    values[:, k] = channels[name].apply(raw)
+                        values[:, k] = channels[name].apply(raw)
                 if self._table.sparse and (blank := np.isnan(values).all(axis=1)).any():
                     stamps, given, values = stamps[~blank], given[~blank], values[~blank]
                 if not given.all():
