@@ -247,7 +247,7 @@ def test_a_sequence_of_ten_gigabytes():
 def test_names_that_appear_twice():
     reader = joint_reader("a")
     reader.read(messages(bags.cdr(bags.joint_state([1, 2], [], names=["a", "a"]))))
-    assert reader.lacking == ["is there more than once"]
+    assert reader.lacking == ["is named more than once"]
 
 
 @pytest.mark.parametrize(

@@ -89,11 +89,11 @@ class Layout:
         path, index = (found[1], int(found[2])) if found else (selector.field, 0)
         if selector.joint is not None:
             if (times := walk.joints.count(selector.joint)) != 1:
-                return "is not there" if not times else "is there more than once"
+                return "is missing" if not times else "is named more than once"
             index = walk.joints.index(selector.joint)
         leaf = walk.leaves.get(path)
         if leaf is None or index >= leaf.count:
-            return f"has no {selector.field}" if selector.joint is not None else "is not there"
+            return f"has no {selector.field}" if selector.joint is not None else "is missing"
         return walk.order + leaf.kind, leaf.offset + index * np.dtype(leaf.kind).itemsize
 
     def fits(self, rows: NDArray[np.uint8]) -> NDArray[np.bool_]:
@@ -144,7 +144,7 @@ class CdrReader:
         self._layouts: dict[int, list[Layout]] = {}
         self._kept = 0
         self.joints: dict[str, None] = {}
-        self.lacking: list[str | None] = ["is not there"] * len(self._selectors)
+        self.lacking: list[str | None] = ["is missing"] * len(self._selectors)
         self.count = 0
 
     def read(self, messages: Messages) -> tuple[Stamps, Array]:

@@ -134,7 +134,7 @@ class _Reader:
             stamps = messages.log_ns
         self._stamped = self._stamped or bool(stamps.any())
         if self._cdr.count >= ENOUGH:
-            self._check(f"none of the first {self._cdr.count} messages")
+            self._check(f"all of the first {self._cdr.count} messages")
         for use in self._topic.uses:
             values = np.empty((len(stamps), len(use.columns)))
             with np.errstate(
@@ -148,24 +148,24 @@ class _Reader:
         """Raise ``InputError`` if there was no message, or something was in none of them."""
         if not self._cdr.count:
             raise InputError(f"{self._topic.kind.where} has no messages")
-        self._check("no message")
+        self._check("every message")
 
-    def _check(self, none: str) -> None:
+    def _check(self, every: str) -> None:
         where = self._topic.kind.where
         for selector, meaning, lacking in zip(
             self._topic.selectors, self._topic.meaning, self._cdr.lacking, strict=True
         ):
             if lacking is not None and selector.joint is not None:
                 raise InputError(
-                    f"{where}: joint {selector.joint!r:.60}, wanted for {meaning}, {lacking} in {none}; the joints "
+                    f"{where}: joint {selector.joint!r:.60}, wanted for {meaning}, {lacking} in {every}; the joints "
                     f"there are {listed_names(tuple(self._cdr.joints))}"
                 )
             if lacking is not None:
                 raise InputError(
-                    f"{where}: {selector.field!r:.60}, wanted for {meaning}, {lacking} in {none}"
+                    f"{where}: field {selector.field!r:.60}, wanted for {meaning}, {lacking} in {every}"
                 )
         if not self._stamped:
             raise InputError(
-                f"{where}: {none} has a header stamp other than zero; with clock = 'log' in the map's [time], the "
-                "recorder's clock is taken"
+                f"{where}: the header stamp is zero in {every}; with clock = 'log' in the map's [time], the recorder's "
+                "clock is taken"
             )

@@ -115,7 +115,9 @@ def write_bag(
             os.replace(temporary / name / f"{name}{SUFFIXES[storage]}", path)
         else:
             os.replace(temporary / name, path)  # takes the place of an empty folder
-    except (OSError, sqlite3.Error, WriterError) as error:
+    except InputError:
+        raise
+    except (OSError, ValueError, sqlite3.Error, WriterError) as error:
         detail = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be written ({detail})") from error
     finally:
@@ -191,7 +193,10 @@ def _values(recording: Recording, part: slice, level: Level) -> Iterator[tuple[A
     for robot in range(recording.metadata.robots):
         position, effort = recording.phi[part, robot], recording.tau[part, robot]
         if level == "wrist":
-            position, effort = wrist_of(position, effort, recording.metadata.design)
+            try:
+                position, effort = wrist_of(position, effort, recording.metadata.design)
+            except InputError as error:
+                raise InputError(f"{recording.name}: robot {robot + 1}: {error}") from error
         theta = recording.theta[part, robot]
         yield np.hstack([position, theta]), np.hstack([effort, np.zeros_like(theta)])
         if recording.ref is not None:
