@@ -30,8 +30,8 @@ def test_a_log_that_is_late_has_a_positive_offset(delay_s):
     """stamp = true time + offset: what is logged as of t was sampled at t - offset."""
     time = np.arange(3000) / RATE_HZ
     estimate = estimate_clocks([theta_at(time, 0), theta_at(time - delay_s, 1)], [0.0, 0.0], RATE_HZ)
-    assert estimate.offset_s[1] == pytest.approx(delay_s, abs=5e-9)
-    assert estimate.drift[1] == pytest.approx(0.0, abs=1e-9)
+    assert estimate.offset_s[1] == pytest.approx(delay_s, abs=1e-7)
+    assert estimate.drift[1] == pytest.approx(0.0, abs=1e-8)
     assert (estimate.offset_s[0], estimate.drift[0]) == (0.0, 0.0)
 
 
@@ -52,12 +52,12 @@ def test_drift_and_offset_at_the_middle_whatever_the_stamps_begin_with():
     )
     estimate = estimate_clocks(theta, starts, RATE_HZ)
     assert estimate.middle_s == pytest.approx(100.0 + 59.99 / 2)
-    np.testing.assert_allclose(estimate.offset_s, [0, 0.02, -3.1], rtol=0, atol=1e-8)
-    np.testing.assert_allclose(estimate.drift, [0, 5e-5, -4e-4], rtol=0, atol=5e-9)
+    np.testing.assert_allclose(estimate.offset_s, [0, 0.02, -3.1], rtol=0, atol=2e-7)
+    np.testing.assert_allclose(estimate.drift, [0, 5e-5, -4e-4], rtol=0, atol=1e-8)
     np.testing.assert_allclose(
         estimate.stamps(2, [100.0, estimate.middle_s]),
         [100 - 3.1 + 4e-4 * 29.995, estimate.middle_s - 3.1],
-        atol=1e-7,
+        atol=3e-7,
     )
 
 
@@ -85,7 +85,7 @@ def test_one_axis_is_enough():
         )
 
     theta, starts = clocked([0, 0.031], [0, 2e-5], motion=rocking)
-    for angles, tolerance in ((theta, 3e-8), (noisy(theta, np.random.default_rng(4)), 1e-4)):
+    for angles, tolerance in ((theta, 1e-7), (noisy(theta, np.random.default_rng(4)), 1e-4)):
         estimate = estimate_clocks(angles, starts, RATE_HZ)
         assert estimate.offset_s[1] == pytest.approx(0.031, abs=tolerance)
         assert estimate.drift[1] == pytest.approx(2e-5, abs=tolerance / 10)
