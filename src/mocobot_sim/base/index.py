@@ -22,6 +22,7 @@ class BaseIndex:
         wheel_qpos, wheel_dof: positions in ``qpos`` and ``qvel``, shape (N, 4).
         drive: positions of the wheels' motors in ``ctrl``, shape (N, 4).
         chassis: body ids, shape (N,).
+        free_qpos: where the position and quaternion of every chassis begin in ``qpos``, shape (N,).
         geom_wheel: number of the wheel, 4 robot + wheel from 0, that each geom is a roller of, or -1; shape (ngeom,).
     """
 
@@ -29,6 +30,7 @@ class BaseIndex:
     wheel_dof: Index
     drive: Index
     chassis: Index
+    free_qpos: Index
     geom_wheel: Index
 
     @property
@@ -63,5 +65,15 @@ class BaseIndex:
             wheel_dof=model.jnt_dofadr[joints].astype(np.intp),
             drive=np.array([[model.actuator(name).id for name in row] for row in drives], dtype=np.intp),
             chassis=np.array([model.body(f"omnid{i + 1}/chassis").id for i in range(robots)], dtype=np.intp),
+            free_qpos=np.array(
+                [model.jnt_qposadr[model.joint(f"omnid{i + 1}/").id] for i in range(robots)], dtype=np.intp
+            ),
             geom_wheel=geom_wheel,
         )
+
+    def poses(self, data: mujoco.MjData) -> NDArray[np.float64]:
+        """Where every chassis is: x, y [m], yaw [rad] within +-pi in the world, shape (N, 3)."""
+        w, x, y, z = data.qpos[self.free_qpos[:, None] + np.arange(3, 7)].T
+        at = data.qpos[self.free_qpos[:, None] + np.arange(2)]
+        yaw = np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
+        return np.column_stack([at, yaw])

@@ -23,6 +23,9 @@ Array = NDArray[np.float64]
 
 BASE_JOINTS = ("base_x", "base_y", "base_yaw")
 HUB_HALF_WIDTH_M = 0.018
+# MuJoCo's friction yields a little under any load; this many times stiffer than the contact, it creeps by
+# micrometres per second (docs/base.md).
+FRICTION_RATIO = 100.0
 CONTACT_SOLIMP = [0.9, 0.95, 0.001, 0.5, 2.0]  # MuJoCo's default
 # Only rollers and floor touch each other: a payload's own geoms, whatever they are, have no part in it.
 FLOOR_BIT = 1 << 10
@@ -81,7 +84,7 @@ def release(omnid: mjcf.RootElement, design: BaseDesign) -> None:
 def rough_floor(root: mjcf.RootElement, design: BaseDesign) -> None:
     """Let rollers stand on the floor of a scene: contact with elliptic friction cones, as stiff as the other loops."""
     root.option.flag.contact = "enable"
-    root.option.cone = "elliptic"
+    root.option.cone, root.option.impratio = "elliptic", FRICTION_RATIO
     floor = root.find("geom", "floor")
     floor.contype, floor.conaffinity = FLOOR_BIT, 0
     floor.priority, floor.condim = 1, 3

@@ -1,0 +1,164 @@
+"""Bases that drive: from planned motion to wheel torques, each base on its own odometry.
+
+Per base, at the control rate:
+
+    V = (planned twist) + k (planned pose - pose by odometry)
+    u = H V                                                       wheel speeds, ``mecanum``
+    torque = k_u (u - wheel speed) + k_i (integral of the same)    within the drive's limit
+
+Odometry integrates the twist that fits the wheels' angles best. It is all that a base knows: where wheels slip, it is
+off, and the base with it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.errors import InputError
+from mocobot_sim.actors import Stage
+from mocobot_sim.base.contact import WheelContacts
+from mocobot_sim.base.design import BaseDesign, base_design
+from mocobot_sim.base.drive_kernel import update_drives
+from mocobot_sim.base.index import BaseIndex
+from mocobot_sim.base.mecanum import MecanumKinematics
+from mocobot_sim.base.motion import PlanarMotion
+
+Array = NDArray[np.float64]
+
+POSITION_GAIN_PER_S = 2.0
+
+
+@dataclass(frozen=True)
+class DriveLog:
+    """What the bases did, one row per sample; N robots, wheels in the order of ``WHEELS``.
+
+    Attributes:
+        time: [s], shape (Q,).
+        planned: poses x, y [m], yaw [rad] in the world, shape (Q, N, 3).
+        odometry: poses that the bases believe, shape (Q, N, 3).
+        true: poses of the chassis, yaw not wrapped, shape (Q, N, 3).
+        commanded_speed: of the wheels [rad/s], shape (Q, N, 4).
+        speed: of the wheels [rad/s], shape (Q, N, 4).
+        torque: of the drives [N m], shape (Q, N, 4).
+        slip: velocity at which every wheel's contact slides along its roller's axle [m/s], shape (Q, N, 4).
+        load: normal force of every wheel [N], shape (Q, N, 4).
+        grip: friction force of every wheel [N], shape (Q, N, 4).
+    """
+
+    time: Array
+    planned: Array
+    odometry: Array
+    true: Array
+    commanded_speed: Array
+    speed: Array
+    torque: Array
+    slip: Array
+    load: Array
+    grip: Array
+
+
+class BaseDrive:
+    """Drives of all bases; an actor of a trial, or on its own by ``begin``, ``act`` and ``log``.
+
+    Args:
+        motion: plan of every base at the control rate; the last pose is held.
+        kinematics: what the bases believe about their wheels; None for the one with rollers.
+        design: of the bases; None for the shipped one.
+        position_gain_per_s: k [1/s].
+    """
+
+    def __init__(
+        self,
+        motion: PlanarMotion,
+        kinematics: MecanumKinematics | None = None,
+        design: BaseDesign | None = None,
+        position_gain_per_s: float = POSITION_GAIN_PER_S,
+    ) -> None:
+        self._design = design or base_design()
+        self._kinematics = kinematics or MecanumKinematics.with_rollers(self._design)
+        self._motion = motion
+        self._gain = position_gain_per_s
+
+    def start(self, stage: Stage) -> None:
+        """Begin as an actor of a trial.
+
+        Raises:
+            InputError: as ``begin``.
+        """
+        self.begin(stage.model, stage.data, stage.rate_hz, stage.ticks)
+
+    def begin(self, model: mujoco.MjModel, data: mujoco.MjData, rate_hz: float, ticks: int) -> None:
+        """Take hold of the wheels.
+
+        Args:
+            model, data: with released bases, standing at the plan's first poses.
+            rate_hz: control rate [Hz].
+            ticks: control ticks per row of the log.
+
+        Raises:
+            InputError: a base is parked, or the plan is for another number of bases or another rate.
+        """
+        index = BaseIndex.of(model)
+        if self._motion.pose.shape[1] != index.robots:
+            raise InputError(
+                f"the plan is for {self._motion.pose.shape[1]} bases; the scene has {index.robots} robots"
+            )
+        if abs(self._motion.rate_hz - rate_hz) > 1e-9 * rate_hz:
+            raise InputError(
+                f"the plan has {self._motion.rate_hz:g} ticks per second; control has {rate_hz:g}"
+            )
+        self._index, self._data, self._ticks, self._rate_hz = index, data, ticks, rate_hz
+        self._constants = (
+            self._gain,
+            self._design.drive_gain_Nms_per_rad,
+            self._design.drive_integral_Nm_per_rad,
+            self._design.drive_torque_limit_Nm,
+            1.0 / rate_hz,
+        )
+        self._pose, self._twist = (
+            np.ascontiguousarray(part) for part in (self._motion.pose, self._motion.twist)
+        )
+        self._odometry = self._pose[0].copy()
+        self._angle = data.qpos[index.wheel_qpos].copy()
+        self._lag, self._speed = np.zeros((index.robots, 4)), np.zeros((index.robots, 4))
+        self._contacts = WheelContacts(model, data, index, self._design)
+        self._rows: list[tuple[Array, ...]] = []
+
+    def act(self, tick: int) -> None:
+        """One control tick: read wheel angles and speeds, write torques."""
+        data, index = self._data, self._index
+        pose, twist = self._planned(tick)
+        update_drives(
+            data.qpos, data.qvel, data.ctrl, index.wheel_qpos, index.wheel_dof, index.drive,
+            self._kinematics.matrix, self._kinematics.inverse, self._constants,
+            pose, twist, self._odometry, self._angle, self._lag, self._speed,
+        )  # fmt: skip
+        if tick % self._ticks == 0:
+            self._rows.append(
+                (
+                    pose.copy(),
+                    self._odometry.copy(),
+                    index.poses(data),
+                    self._speed.copy(),
+                    data.qvel[index.wheel_dof],
+                    data.ctrl[index.drive],
+                    *self._contacts.measure(),
+                )
+            )
+
+    def _planned(self, tick: int) -> tuple[Array, Array]:
+        """Poses and twists of the plan, shapes (N, 3)."""
+        if tick < len(self._pose):
+            return self._pose[tick], self._twist[tick]
+        return self._pose[-1], np.zeros_like(self._twist[-1])
+
+    def log(self) -> DriveLog:
+        """What has happened since ``begin``."""
+        columns = [np.array(column) for column in zip(*self._rows, strict=True)]
+        columns[2][..., 2] = np.unwrap(columns[2][..., 2], axis=0)
+        time = np.arange(len(self._rows)) * self._ticks / self._rate_hz
+        return DriveLog(time, *columns)

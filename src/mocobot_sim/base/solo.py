@@ -1,0 +1,72 @@
+"""One Omnid alone on a floor, its arm locked at home: to see what its base does."""
+
+from __future__ import annotations
+
+import mujoco
+
+from mocobot_sim.base.design import WHEELS, BaseDesign, base_design
+from mocobot_sim.base.drive import BaseDrive, DriveLog
+from mocobot_sim.base.rollers import release, rough_floor
+from mocobot_sim.models import models_dir
+from mocobot_sim.pymjcf import mjcf
+from mocobot_sim.scene import TIMESTEP_S
+from mocobot_sim.trajectories import RATE_HZ
+
+
+def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S) -> mjcf.RootElement:
+    """One released Omnid at the world's origin, heading along x; its arm is rigid.
+
+    Args:
+        design: of its base; None for the shipped one.
+        timestep_s: integration step [s].
+
+    Raises:
+        InputError: the base cannot be built.
+    """
+    design = design or base_design()
+    root = mjcf.from_path(str(models_dir() / "team.xml"))
+    root.model = "solo"
+    root.option.timestep = timestep_s
+    omnid = mjcf.from_path(str(models_dir() / "omnid" / "omnid.xml"))
+    omnid.model = "omnid1"
+    release(omnid, design)
+    wheels = {f"wheel_{wheel}" for wheel in WHEELS}
+    for element in [*omnid.equality.all_children(), *omnid.actuator.all_children()]:
+        if element.name.startswith(("rod", "motor")):
+            element.remove()
+    for joint in omnid.find_all("joint"):
+        if not any(joint.name.startswith(wheel) for wheel in wheels):
+            joint.remove()
+    site = root.worldbody.add("site", name="mount1", group=4, pos=[0.0, 0.0, 0.0])
+    site.attach(omnid).add("freejoint")
+    rough_floor(root, design)
+    return root
+
+
+def compile_solo(root: mjcf.RootElement) -> mujoco.MjModel:
+    """Compile what ``build_solo`` returned."""
+    return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
+
+
+def drive_solo(
+    model: mujoco.MjModel, drive: BaseDrive, duration_s: float, rate_hz: float = 1000.0
+) -> DriveLog:
+    """Let the robot follow its plan.
+
+    Args:
+        model: of ``compile_solo``.
+        drive: its base's.
+        duration_s: how long [s].
+        rate_hz: control rate [Hz].
+
+    Raises:
+        InputError: the plan does not fit the model.
+    """
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    ticks, substeps = round(rate_hz / RATE_HZ), round(1.0 / (rate_hz * model.opt.timestep))
+    drive.begin(model, data, rate_hz, ticks)
+    for tick in range(round(duration_s * rate_hz) + 1):
+        drive.act(tick)
+        mujoco.mj_step(model, data, nstep=substeps)
+    return drive.log()

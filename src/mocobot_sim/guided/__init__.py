@@ -1,0 +1,1 @@
+"""A person guides the payload by hand, and the robots carry its weight."""
