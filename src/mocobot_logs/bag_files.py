@@ -10,6 +10,7 @@ import re
 import shutil
 import weakref
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path, PurePosixPath
 from tempfile import mkdtemp
 from typing import Any
@@ -32,6 +33,7 @@ SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
 _ROS1 = b"#ROSBAG"
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _METADATA_BYTES = 1 << 20
+_DEEPEST = 64
 _KEY = "rosbag2_bagfile_information"
 
 
@@ -186,8 +188,9 @@ def _read_metadata(folder: Path) -> tuple[list[str], bool]:
 
 def _load(content: bytes, path: Path) -> dict[str, Any]:
     text = content.decode("utf-8", errors="replace")
-    if re.search(r"<<\s*:|(?:^|\s)!\S|^\s*%", text, re.MULTILINE):
-        # Merged keys can grow without bound, and tags make objects: rosbag2 writes neither.
+    depth = accumulate((1 if mark in "[{" else -1 for mark in re.findall(r"[\[\]{}]", text)), initial=0)
+    if re.search(r"<<\s*:|(?:^|\s)!\S|^\s*%", text, re.MULTILINE) or max(depth) > _DEEPEST:
+        # Merged keys grow without bound, tags make objects, deep nesting takes minutes: no recorder writes them.
         raise InputError(f"{path}: holds YAML beyond plain values, which no bag's metadata does")
     try:
         values = YAML(typ="safe", pure=True).load(text)
