@@ -141,6 +141,32 @@ class Convert:
 
 
 @dataclass(frozen=True)
+class Replay:
+    """Watch recordings: the scene moving from the measured angles, estimate against truth, all signals (Rerun)."""
+
+    rec: tyro.conf.Positional[tuple[Path, ...]]
+    """Recordings (Parquet); several are shown side by side."""
+    estimate: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
+    """Estimate to show, as `mocobot estimate --out` writes it; made from each recording if not given."""
+    truth: bool = False
+    """Show the truth beside each recording, too (REC.truth.json)."""
+    diagnosis: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Mark what a diagnosis names, as `mocobot diagnose --out` writes it."""
+    payload: Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE.xml")] = None
+    """Geometry of the payload; that of the recording's label, or bars between the grasps, if not given."""
+    save: Annotated[Path | None, tyro.conf.arg(metavar="OUT.rrd")] = None
+    """Write a file for the Rerun viewer instead of opening it."""
+    web: bool = False
+    """Serve to a browser instead of opening the viewer."""
+
+    def run(self) -> None:
+        """Run the command."""
+        from mocobot.replay_command import run
+
+        run(self)
+
+
+@dataclass(frozen=True)
 class Simulate:
     """Simulate one trial and write its recording, with the ground truth in a sidecar."""
 
@@ -241,6 +267,7 @@ def _run(arguments: Sequence[str] | None) -> None:
         | Annotated[Estimate, tyro.conf.subcommand("estimate")]
         | Annotated[Diagnose, tyro.conf.subcommand("diagnose")]
         | Annotated[Convert, tyro.conf.subcommand("convert")]
+        | Annotated[Replay, tyro.conf.subcommand("replay")]
         | Annotated[Simulate, tyro.conf.subcommand("simulate")],
         prog="mocobot",
         description="Simulate mobile cobots that carry an unknown payload together, estimate it, and find out what "
