@@ -7,11 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.arm_dynamics import wrench_on_payload
+from estimator.arm_dynamics import arm_torque, gimbal_torque
 from estimator.checks import TORQUE_FACTOR
-from estimator.delta import inverse_kinematics, is_in_reach, is_reachable, leg_geometry, wrist_motion
+from estimator.delta import (
+    LegGeometry,
+    inverse_kinematics,
+    is_in_reach,
+    is_reachable,
+    leg_geometry,
+    wrist_motion,
+)
 from estimator.design import OmnidDesign
-from estimator.gimbal import angular_motion, rotation
+from estimator.gimbal import angular_motion, rate_matrix, rotation
 from estimator.wrist_level import driven_motion
 from mocobot_logs.inspection.signals import Signals, noise_gains
 
@@ -59,66 +66,115 @@ class Fault:
     reason: str
 
 
-def grasp_motion(signals: Signals, robot: int, design: OmnidDesign) -> tuple[Grasp | None, tuple[Fault, ...]]:
-    """Motion and wrench at one grasp, None where the arm cannot be in such a posture.
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """What follows from one robot's positions alone.
+
+    Attributes:
+        legs: geometry at the driven angles.
+        h_dot, h_ddot: velocity and acceleration of the wrist in {b} [m/s, m/s^2], shape (Q, 3).
+        own_torque: spring torques that move the arm itself [N m], shape (Q, 3).
+        faults: why the positions cannot be right.
+    """
+
+    legs: LegGeometry
+    h_dot: Array
+    h_ddot: Array
+    own_torque: Array
+    faults: tuple[Fault, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Gimbal:
+    """What follows from one robot's gimbal angles alone.
+
+    Attributes:
+        R_bi: orientation of {i} in {b}, shape (Q, 3, 3).
+        omega, alpha: its angular velocity [rad/s] and acceleration [rad/s^2] in {i}, shape (Q, 3).
+        moment: on the payload in {i} [N m], shape (Q, 3).
+        faults: why the angles cannot be right.
+    """
+
+    R_bi: Array
+    omega: Array
+    alpha: Array
+    moment: Array
+    faults: tuple[Fault, ...]
+
+
+def arm_motion(signals: Signals, robot: int, design: OmnidDesign) -> Arm | Fault:
+    """The arm of one robot (from 0), or why it cannot be in such postures."""
+    position, wrist = signals.position.values[:, :, robot], signals.level == "wrist"
+    faults: tuple[Fault, ...] = ()
+    if not wrist:
+        faults = _out_of_range("phi", position[0], design.phi_min_rad, design.phi_max_rad, "rad", robot)
+    posture = _posture(position, design, wrist=wrist)
+    if posture is None:
+        what = "no driven angles reach its wrist positions" if wrist else "its rods cannot meet"
+        return Fault(1.0 + sum(fault.share for fault in faults), f"omnid{robot + 1}: {what}")
+    phi, position, legs = posture
+    folded = float(np.mean(np.any(legs.leverage <= 0.0, axis=-1)))
+    if folded > WRONG_SHARE:
+        faults = (*faults, Fault(folded, f"omnid{robot + 1}: a leg is past its stretched position"))
+    h_dot, h_ddot = (position[1], position[2]) if wrist else wrist_motion(legs, phi[1], phi[2])
+    return Arm(legs, h_dot, h_ddot, arm_torque(phi[0], phi[1], phi[2], design), faults)
+
+
+def gimbal_motion(signals: Signals, robot: int, design: OmnidDesign) -> Gimbal:
+    """The gimbal of one robot (from 0)."""
+    theta = signals.theta.values[:, :, robot]
+    limit = design.gimbal_limit_rad
+    omega, alpha = angular_motion(theta[0], theta[1], theta[2])
+    axes_T = np.swapaxes(rate_matrix(theta[0]), -1, -2)
+    moment = -_solve(axes_T, gimbal_torque(theta[0], theta[1], theta[2], design))
+    faults = _out_of_range("theta", theta[0], -limit, limit, "rad", robot)
+    return Gimbal(rotation(theta[0]), omega, alpha, moment, faults)
+
+
+def grasp_motion(
+    signals: Signals, robot: int, arm: Arm | Fault, gimbal: Gimbal, design: OmnidDesign
+) -> tuple[Grasp | None, tuple[Fault, ...]]:
+    """Motion and wrench at one grasp, None where the arm cannot be in such postures.
 
     Args:
         signals: the team's channels.
         robot: which robot, from 0.
+        arm, gimbal: what follows from its positions and gimbal angles.
         design: the robots' numbers.
 
     Returns:
-        The motion, and the faults of its channels.
+        The motion, and the faults of all channels.
     """
-    position, theta, effort = (
-        signals.group(kind).values[:, :, robot] for kind in ("position", "theta", "effort")
-    )
-    noise = [signals.group(kind).noise[robot] for kind in ("position", "theta", "effort")]
-    wrist = signals.level == "wrist"
-    faults = _out_of_range("theta", theta[0], -design.gimbal_limit_rad, design.gimbal_limit_rad, "rad", robot)
-    if not wrist:
-        faults += _out_of_range("phi", position[0], design.phi_min_rad, design.phi_max_rad, "rad", robot)
-    posture = _posture(position, design, wrist=wrist)
-    if posture is None:
-        what = "no driven angles reach its wrist positions" if wrist else "its rods cannot meet"
-        return None, (*faults, Fault(1.0, f"omnid{robot + 1}: {what}"))
-    phi, position, folded = posture
-    if folded > WRONG_SHARE:
-        faults = (*faults, Fault(folded, f"omnid{robot + 1}: a leg is past its stretched position"))
-    legs = leg_geometry(phi[0], design)
-    # What the springs put on the wrist is effort itself at wrist level; taking it to the joints and back is exact.
-    tau = effort[0]
-    if wrist:
-        tau = legs.leverage * np.linalg.solve(np.swapaxes(legs.rod, -1, -2), tau[..., None])[..., 0]
+    if isinstance(arm, Fault):
+        return None, (*gimbal.faults, arm)
+    wrist, legs = signals.level == "wrist", arm.legs
+    effort = signals.effort.values[0, :, robot]
+    tau = legs.leverage * _solve(np.swapaxes(legs.rod, -1, -2), effort) if wrist else effort
     limit = TORQUE_FACTOR * design.torque_limit_Nm
-    faults += _out_of_range("force" if wrist else "tau", tau, -limit, limit, "N m", robot)
-    h_dot, h_ddot = (position[1], position[2]) if wrist else wrist_motion(legs, phi[1], phi[2])
-    R_bi = rotation(theta[0])
-    omega, alpha = angular_motion(theta[0], theta[1], theta[2])
-    wrench = wrench_on_payload((phi[0], phi[1], phi[2]), (theta[0], theta[1], theta[2]), tau, design)
+    faults = _out_of_range("force" if wrist else "tau", tau, -limit, limit, "N m", robot)
+    # Each leg pushes along its rod, see ``wrist_of``.
+    force = np.sum(legs.rod * ((tau - arm.own_torque) / legs.leverage)[..., None], axis=-2)
     value, rate, _ = noise_gains()
     lever = 1.0 if wrist else design.proximal_length_m  # of driven rates and torques, in order of magnitude
     scales = np.array([rate, rate * lever, value / lever, value])
-    levels = np.array([_rms(noise[1]), _rms(noise[0]), _rms(noise[2]), _rms(noise[1])])
-    return (
-        Grasp(
-            omega=omega,
-            alpha=alpha,
-            velocity=_into(R_bi, h_dot),
-            acceleration=_into(R_bi, h_ddot),
-            up=R_bi[:, 2, :],
-            wrench=wrench,
-            lift=np.einsum("qj,qj->q", R_bi[:, 2, :], wrench[:, 3:]),
-            rise=h_ddot[:, 2],
-            noise=scales * levels,
-        ),
-        faults,
+    noise = [_rms(signals.group(kind).noise[robot]) for kind in ("theta", "position", "effort", "theta")]
+    grasp = Grasp(
+        omega=gimbal.omega,
+        alpha=gimbal.alpha,
+        velocity=_into(gimbal.R_bi, arm.h_dot),
+        acceleration=_into(gimbal.R_bi, arm.h_ddot),
+        up=gimbal.R_bi[:, 2, :],
+        wrench=np.concatenate([gimbal.moment, _into(gimbal.R_bi, force)], axis=1),
+        lift=force[:, 2],
+        rise=arm.h_ddot[:, 2],
+        noise=scales * np.array(noise),
     )
+    return grasp, (*arm.faults, *gimbal.faults, *faults)
 
 
-def _posture(position: Array, design: OmnidDesign, *, wrist: bool) -> tuple[Array, Array, float] | None:
-    """Driven angles with rates and accelerations, the position itself, both without the few instants that no arm
-    can be in, shape (3, Q, 3); and the share of postures past the stretched leg."""
+def _posture(position: Array, design: OmnidDesign, *, wrist: bool) -> tuple[Array, Array, LegGeometry] | None:
+    """Driven angles with rates and accelerations, and the positions themselves, both (3, Q, 3) and without the few
+    instants that no arm can be in; and the geometry at the angles."""
     if wrist:
         possible = np.all(is_in_reach(position[0], design), axis=-1)
         possible[possible] = is_reachable(inverse_kinematics(position[0][possible], design), design)
@@ -126,16 +182,15 @@ def _posture(position: Array, design: OmnidDesign, *, wrist: bool) -> tuple[Arra
         possible = is_reachable(position[0], design)
     if np.mean(~possible) > WRONG_SHARE:
         return None
-    good = np.flatnonzero(possible)
-    nearest = good[np.clip(np.searchsorted(good, np.arange(len(possible))), 0, len(good) - 1)]
-    position = position[:, nearest]
-    if wrist:
-        angles = inverse_kinematics(position[0], design)
-        legs = leg_geometry(angles, design)
-        phi = np.stack([angles, *driven_motion(legs, position[1], position[2])])
-    else:
-        phi, legs = position, leg_geometry(position[0], design)
-    return phi, position, float(np.mean(np.any(legs.leverage <= 0.0, axis=-1)))
+    if not possible.all():
+        good = np.flatnonzero(possible)
+        nearest = good[np.clip(np.searchsorted(good, np.arange(len(possible))), 0, len(good) - 1)]
+        position = position[:, nearest]
+    if not wrist:
+        return position, position, leg_geometry(position[0], design)
+    angles = inverse_kinematics(position[0], design)
+    legs = leg_geometry(angles, design)
+    return np.stack([angles, *driven_motion(legs, position[1], position[2])]), position, legs
 
 
 def _out_of_range(
@@ -149,6 +204,10 @@ def _out_of_range(
     what = "torques that follow from force reach" if name == "force" else f"{name} reaches"
     reason = f"omnid{robot + 1}: {what} {worst:.4g} {unit}, outside {low:.4g} to {high:.4g}"
     return (Fault(share, f"{reason} in {100 * share:.0f} % of the time"),)
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    return np.asarray(np.linalg.solve(matrix, right[..., None])[..., 0], dtype=np.float64)
 
 
 def _into(R_bi: Array, vector: Array) -> Array:

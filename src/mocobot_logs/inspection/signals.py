@@ -25,7 +25,7 @@ RATE_HZ = 100.0
 CUTOFF_HZ = 5.0
 TRIM_S = 1.0
 """Transients of the filter die as exp(-pi 5 Hz t): 1e-7 of them is left."""
-INSTANTS = 400
+INSTANTS = 200
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,11 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from estimator.design import OmnidDesign
 from mocobot_logs.inspection.misfit import Misfit, team_misfit
-from mocobot_logs.inspection.mistakes import Mistake, suspects
+from mocobot_logs.inspection.mistakes import SUSPICIONS, Mistake, suspects, wrong_zero
 from mocobot_logs.inspection.mistakes.wrong_zero import WrongZero
-from mocobot_logs.inspection.motion import Fault, Grasp, grasp_motion
+from mocobot_logs.inspection.motion import Fault, Grasp, arm_motion, gimbal_motion, grasp_motion
 from mocobot_logs.inspection.signals import Signals
 
 SUSPICIOUS = 2.0
@@ -24,7 +26,7 @@ DECISIVE = 4.0
 """How many times smaller the misfit must become."""
 WORTH_TRYING = 0.3
 """Misfit below which there is nothing to be explained."""
-OVERWHELMING = 30.0
+OVERWHELMING = 15.0
 """How many times smaller a misfit that is not suspicious must become."""
 HELPS = 1.5
 """How many times smaller one of several mistakes must make it."""
@@ -80,20 +82,31 @@ class Wiring:
 
 
 class Team:
-    """Misfits of one log with mistakes undone; robots that a mistake does not touch are not computed again."""
+    """Misfits of one log with mistakes undone; what a mistake does not touch is not computed again."""
 
     def __init__(self, signals: Signals, design: OmnidDesign) -> None:
         """Compute every robot's motion."""
         self.signals, self._design = signals, design
-        self._told = [grasp_motion(signals, robot, design) for robot in range(signals.robots)]
+        robots = range(signals.robots)
+        with np.errstate(all="ignore"):
+            self._arms = [arm_motion(signals, robot, design) for robot in robots]
+            self._gimbals = [gimbal_motion(signals, robot, design) for robot in robots]
+            self._told = [
+                grasp_motion(signals, robot, self._arms[robot], self._gimbals[robot], design)
+                for robot in robots
+            ]
         self.misfit = self._judge(self._told)
 
     def without(self, mistake: Mistake) -> Misfit:
         """The misfit with a mistake undone."""
-        signals = mistake.undo(self.signals)
-        told = list(self._told)
-        for robot in mistake.robots:
-            told[robot] = grasp_motion(signals, robot, self._design)
+        signals, told = mistake.undo(self.signals), list(self._told)
+        same_arms = signals.position is self.signals.position
+        same_gimbals = signals.theta is self.signals.theta
+        with np.errstate(all="ignore"):  # wrong channels may divide by zero: an infinite misfit
+            for robot in mistake.robots:
+                arm = self._arms[robot] if same_arms else arm_motion(signals, robot, self._design)
+                gimbal = self._gimbals[robot] if same_gimbals else gimbal_motion(signals, robot, self._design)
+                told[robot] = grasp_motion(signals, robot, arm, gimbal, self._design)
         return self._judge(told)
 
     def undone(self, mistake: Mistake) -> Team:
@@ -142,10 +155,14 @@ def _best(
     team: Team, design: OmnidDesign, advance: Callable[[int], object]
 ) -> tuple[Mistake, tuple[Mistake, ...], float]:
     """The mistake that explains most, and those that explain as much."""
-    tried = []
-    for mistake in suspects(team.signals, design):
-        tried.append((team.without(mistake).total, len(tried), mistake))
-        advance(1)
+    tried: list[tuple[float, int, Mistake]] = []
+    for suspicion in SUSPICIONS:
+        # Single encoders with a wrong zero are many, and looked at only if nothing else will do.
+        if suspicion is wrong_zero and min(tried)[0] <= max(WORTH_TRYING, team.misfit.total / OVERWHELMING):
+            break
+        for mistake in suspicion.suspects(team.signals, design):
+            tried.append((team.without(mistake).total, len(tried), mistake))
+            advance(1)
     tried.sort(key=lambda entry: entry[:2])
     top = []
     for total, rank, mistake in tried[:_REFINED]:

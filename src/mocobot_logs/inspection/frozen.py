@@ -1,0 +1,108 @@
+"""Stretches in which a channel is stuck, or clipped at an extreme, while the robot's other channels move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+STUCK_S = 0.5
+"""Shortest time for which a channel must stand to be stuck."""
+CLIPPED_SAMPLES = 5
+"""Shortest run at an extreme to be clipped."""
+_MOVES = 0.05  # others move: by this share of their range
+_JUMP = 4.0  # times the usual large step from sample to sample
+_CORNER = 0.3  # of the same
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """One stretch.
+
+    Attributes:
+        kind: ``stuck`` or ``clipped``.
+        channel: which channel, from 0.
+        start, stop: rows, the last one not included.
+        value: where it stands [SI].
+    """
+
+    kind: Literal["stuck", "clipped"]
+    channel: int
+    start: int
+    stop: int
+    value: float
+
+
+def frozen(values: Array, rate_hz: float) -> list[Frozen]:
+    """Stuck and clipped stretches of one robot's channels.
+
+    A channel that stands still because nothing moves is not stuck; nor is one that is not moved while others are: a
+    stuck one jumps when it comes back, or never comes back from a standstill that noise and motion never leave it.
+
+    Args:
+        values: samples of the robot's channels, finite, shape (q, C).
+        rate_hz: their rate [Hz].
+    """
+    found = []
+    ranges = np.ptp(values, axis=0) if len(values) else np.zeros(values.shape[1])
+    for channel in range(values.shape[1]):
+        x = values[:, channel]
+        steps = np.abs(np.diff(x))
+        if not steps.any():
+            if len(x) and _others_move(values, ranges, channel, 0, len(x)):
+                found.append(Frozen("stuck", channel, 0, len(x), float(x[0])))
+            continue
+        usual = float(np.quantile(steps[steps > 0], 0.95))
+        # Without a resolution, no two samples of a live channel are equal.
+        continuous = np.mean(steps == 0) < 0.5 and len(np.unique(x)) > 0.4 * len(x)
+        for start, stop in _runs(x):
+            if stop - start < CLIPPED_SAMPLES or not _others_move(values, ranges, channel, start, stop):
+                continue
+            back = steps[stop - 1] if stop < len(x) else 0.0
+            into = steps[start - 1] if start else 0.0
+            if stop - start >= max(STUCK_S * rate_hz, CLIPPED_SAMPLES) and (
+                continuous or max(back, into) > _JUMP * usual
+            ):
+                found.append(Frozen("stuck", channel, start, stop, float(x[start])))
+    return found + _clipped(values)
+
+
+def _clipped(values: Array) -> list[Frozen]:
+    found = []
+    for channel in range(values.shape[1]):
+        x = values[:, channel]
+        steps = np.abs(np.diff(x))
+        if not steps.any():
+            continue
+        usual = float(np.quantile(steps[steps > 0], 0.95))
+        for extreme in (x.min(), x.max()):
+            runs = [(a, b) for a, b in _runs(x, x == extreme) if b - a >= CLIPPED_SAMPLES]
+            # A peak is round; a clipped one has corners: speed up to the limit, and none from there on.
+            corners = [
+                (a, b)
+                for a, b in runs
+                if (a >= 2 and steps[a - 2] > _CORNER * usual)
+                or (b + 1 < len(x) and steps[b] > _CORNER * usual)
+            ]
+            if len(corners) >= 2:
+                found += [Frozen("clipped", channel, a, b, float(extreme)) for a, b in corners]
+    return found
+
+
+def _runs(x: Array, where: NDArray[np.bool_] | None = None) -> list[tuple[int, int]]:
+    """Runs of equal values (start, stop), or those of rows ``where`` only."""
+    edges = np.flatnonzero(np.diff(x) != 0) + 1
+    bounds = np.concatenate([[0], edges, [len(x)]])
+    runs = zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True)
+    return [(a, b) for a, b in runs if where is None or where[a]]
+
+
+def _others_move(values: Array, ranges: Array, channel: int, start: int, stop: int) -> bool:
+    """Whether at least two other channels move in a stretch."""
+    moved = np.ptp(values[start:stop], axis=0) > _MOVES * ranges
+    moved[channel] = False
+    return int(np.sum(moved & (ranges > 0))) >= 2
