@@ -44,7 +44,7 @@ class Whitening:
         chol_moving = _cholesky(draws[:, :moving])
         chol_alone = _cholesky(draws[:, moving:])
         ar, innovation = np.zeros((channels, order)), np.ones(channels)
-        if moving > 10 * order:
+        if order and moving > 10 * order:
             flat = _per_row(chol_moving, draws[:, :moving].reshape(-1, channels))
             white = flat.reshape(len(draws), moving, channels)
             lag = [np.mean(white[:, k:] * white[:, : moving - k], axis=(0, 1)) for k in range(order + 1)]
