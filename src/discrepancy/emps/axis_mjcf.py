@@ -9,7 +9,6 @@ import mujoco
 from discrepancy.emps.plant import Plant
 from mocobot_sim.models import models_dir
 
-TIMESTEP_S = 5e-4
 JOINT, DRIVE, CARRIAGE, MOTOR = "axis", "drive", "carriage", "motor_side"
 LOAD_JOINT, PLAY = "load", "play"
 ONE_WAY_MPS = 3e-4
@@ -25,10 +24,10 @@ def axis_spec(plant: Plant) -> mujoco.MjSpec:
     """``models/emps/emps.xml`` with the plant's mass, friction, offset, play and loop gains in it.
 
     What acts in one direction only is an actuator whose force range ends at zero; its control is unused. The drive's
-    control is the reference position [m], its force the voltage [V].
+    control is the reference position [m], its force the voltage [V]; one step is one period of the loop.
     """
     spec = mujoco.MjSpec.from_file(str(models_dir() / "emps" / "emps.xml"))
-    spec.option.timestep = TIMESTEP_S
+    spec.option.timestep = plant.period_s
     joint = spec.joint(JOINT)
     spec.body(CARRIAGE).mass = plant.mass_kg
     drive = spec.actuator(DRIVE)

@@ -90,8 +90,8 @@ The EMPS axis in MuJoCo with these causes built in:
 {table}
 
 - `axis.xml`: loads in plain MuJoCo. The control of `drive` is the reference position [m], its force the voltage [V],
-  limited to +-10 V. The loop in it is continuous: without the hold of the digital one, and without what only
-  `plant.json` has.
+  limited to +-10 V; a step is one period of the loop, which holds its voltage that long. What only `plant.json` has
+  is not in it.
 - `plant.json`: all numbers, those included.
 
 With the digital loop and all causes:

@@ -10,12 +10,14 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.emps.axis_mjcf import DRIVE, JOINT, LOAD_JOINT, TIMESTEP_S, axis_spec
+from discrepancy.emps.axis_mjcf import DRIVE, JOINT, LOAD_JOINT, axis_spec
 from discrepancy.emps.plant import Plant
 from discrepancy.emps.pulse_search import rectangle
 
 Array = NDArray[np.float64]
 
+TIMESTEP_S = 5e-4
+"""Largest step of the integration, within which the voltage is held."""
 STRIBECK_MPS = 1e-3
 """Below this speed the direction of friction at low speed fades."""
 
@@ -52,6 +54,7 @@ def run(plant: Plant, time: Array, reference: Array, start: Start) -> tuple[Arra
     data = mujoco.MjData(model)
     steps = max(1, round(plant.period_s / TIMESTEP_S))
     model.opt.timestep = plant.period_s / steps
+    model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
     # The loop is digital: it gives the drive a voltage, in place of the servo that MJCF has.
     drive = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, DRIVE)
     model.actuator_gainprm[drive, 0] = 1.0

@@ -1,4 +1,9 @@
-"""What of a residual is noise: what does not repeat when the motion does, and the rounding of the position."""
+"""What of a residual is noise: as loud as what does not repeat when the motion does, as coloured as what causes leave.
+
+Weights must suit what will be left over. What no cause describes is larger than the sensors' noise and of another
+colour; weighting by the sensors' noise alone would put trust in frequencies where the model has least. So the colour
+is that of what the whole catalogue leaves, and the level that of the part of it that does not repeat.
+"""
 
 from __future__ import annotations
 
@@ -11,6 +16,7 @@ from discrepancy.emps.plant import FIRST_GUESS_KG
 from discrepancy.emps.preflight import resolution
 from discrepancy.emps.reduction import Reduction
 from discrepancy.emps.signals import Signals, smooth
+from discrepancy.whitening import Whitening
 from estimator.filtering import differentiate
 
 Array = NDArray[np.float64]
@@ -25,9 +31,9 @@ class Noise:
     """Draws of the noise, and how large it is in the measured signals.
 
     Attributes:
-        draws: rows of noise alone, shape (D, n, 2).
-        repeats: cycles of the same motion that they come from; 0 where the motion does not repeat, and the draws are
-            what all causes of the catalogue together leave.
+        draws: rows of what all causes of the catalogue together leave, scaled to the noise's level, shape (D, n, 2).
+        repeats: cycles of the same motion that the level comes from; 0 where the motion does not repeat and all of
+            what is left counts as noise.
         position_m, voltage_V: standard deviations.
     """
 
@@ -51,8 +57,15 @@ def repeated(signals: Signals, period: int | None) -> bool:
     return bool(rms < REPEATED * np.sqrt(np.mean(error[usable] ** 2)))
 
 
-def from_repeats(signals: Signals, reduction: Reduction, period: int) -> Noise:
-    """Noise as what differs between cycles, plus the position's rounding (which may repeat with the motion)."""
+def from_repeats(left: list[Array], signals: Signals, reduction: Reduction, period: int, order: int) -> Noise:
+    """Noise as loud as what differs between cycles, plus the position's rounding (which may repeat with the motion).
+
+    Args:
+        left: what the whole catalogue leaves, rows (n, 2) per block.
+        signals, reduction: of the recording.
+        period: of the cycles, samples.
+        order: of the autoregression that the level is measured behind.
+    """
     usable = signals.log.usable
     deviation, cycles = _deviations(signals.residual, period, usable)
     measured = np.column_stack([signals.log.position, signals.log.voltage])
@@ -60,18 +73,21 @@ def from_repeats(signals: Signals, reduction: Reduction, period: int) -> Noise:
     rows = reduction(deviation + _rounding(signals))
     position, voltage = np.sqrt(np.mean(apart[usable] ** 2, axis=0))
     step = resolution(signals.log.position).step_m
-    return Noise(draws_of(rows), cycles, float(np.hypot(position, step / np.sqrt(12.0))), float(voltage))
+    draws = draws_of(left)
+    white = Whitening.of(draws, draws.shape[1], order)
+    level = np.sqrt(np.mean([np.mean(white(r)[order:] ** 2, axis=0) for r in draws_of(rows)], axis=0))
+    return Noise(draws * level, cycles, float(np.hypot(position, step / np.sqrt(12.0))), float(voltage))
 
 
-def from_remainder(rows: list[Array], signals: Signals) -> Noise:
-    """Noise as what the whole catalogue leaves, rows (n, 2) per block."""
+def from_remainder(left: list[Array], signals: Signals) -> Noise:
+    """Noise as all of what the whole catalogue leaves, rows (n, 2) per block."""
     step = resolution(signals.log.position).step_m
     high = signals.log.position - signals.x
     return Noise(
-        draws_of(rows),
+        draws_of(left),
         0,
         float(np.hypot(np.std(high), step / np.sqrt(12.0))),
-        float(np.sqrt(np.mean(np.concatenate(rows)[:, 1] ** 2))),
+        float(np.sqrt(np.mean(np.concatenate(left)[:, 1] ** 2))),
     )
 
 

@@ -82,10 +82,11 @@ class EmpsRig:
         reduction = Reduction.of(log.rate_hz, cut, log.usable)
         cut, reduction = _long_enough(log, cut, reduction)
         hints = hints_of(signals, reduction)
+        left = remainder(signals, reduction, hints)
         if period is not None and repeated(signals, period):
-            noise = from_repeats(signals, reduction, period)
+            noise = from_repeats(left, signals, reduction, period, AR_ORDER)
         else:
-            noise = from_remainder(remainder(signals, reduction, hints), signals)
+            noise = from_remainder(left, signals)
         shared = Whitening.of(noise.draws, noise.draws.shape[1], AR_ORDER)
         whitening = tuple(replace(shared, moving=len(rows)) for rows in reduction.samples)
         known = DEFAULTS if tolerances is None else tolerances

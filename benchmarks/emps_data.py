@@ -1,0 +1,27 @@
+"""Where the EMPS benchmark's recordings are; they are not part of this repository."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+VARIABLE = "MOCOBOT_EMPS_DATA"
+DATA, PULSES = "DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"
+BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data" / "emps"
+
+
+def data_folder() -> Path | None:
+    """The folder with both recordings: from the environment, or ``../shared/data/emps`` beside the repository."""
+    folder = Path(os.environ.get(VARIABLE) or BESIDE)
+    return folder if all((folder / name).is_file() for name in (DATA, PULSES)) else None
+
+
+def needed_folder() -> Path:
+    """The folder, or a message and the end of the program."""
+    folder = data_folder()
+    if folder is None:
+        raise SystemExit(
+            f"{DATA} and {PULSES} of nonlinearbenchmark.org are needed: set {VARIABLE} to their folder ({BESIDE} has "
+            "none)"
+        )
+    return folder
