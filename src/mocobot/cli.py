@@ -167,6 +167,28 @@ class Replay:
 
 
 @dataclass(frozen=True)
+class Inspect:
+    """Look at a log before anyone trusts a number of it: stamps, channels, clocks, wiring, excitation."""
+
+    rec: tyro.conf.Positional[Path]
+    """Recording or log of any format that ``convert`` reads; broken ones are looked at, too."""
+    map: Annotated[str | None, tyro.conf.arg(metavar="MAP")] = None
+    """Map file or the name of a built-in one; see docs/measured-data.md."""
+    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
+    """Write the report as JSON, too."""
+    design: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """Numbers of the robots, where the log does not say; the Omnid's if not given."""
+    episode: int | None = None
+    """Episode of a LeRobot dataset."""
+
+    def run(self) -> None:
+        """Run the command."""
+        from mocobot.inspect_command import run
+
+        run(self)
+
+
+@dataclass(frozen=True)
 class Simulate:
     """Simulate one trial and write its recording, with the ground truth in a sidecar."""
 
@@ -268,6 +290,7 @@ def _run(arguments: Sequence[str] | None) -> None:
         | Annotated[Diagnose, tyro.conf.subcommand("diagnose")]
         | Annotated[Convert, tyro.conf.subcommand("convert")]
         | Annotated[Replay, tyro.conf.subcommand("replay")]
+        | Annotated[Inspect, tyro.conf.subcommand("inspect")]
         | Annotated[Simulate, tyro.conf.subcommand("simulate")],
         prog="mocobot",
         description="Simulate mobile cobots that carry an unknown payload together, estimate it, and find out what "

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 SLOWEST_HZ, FASTEST_HZ = 10.0, 20_000.0
 """Rates within which samples are taken for those of a robot."""
-OFFSET_S = 1e-3
+OFFSET_S = 2e-4
 """Clocks that differ by more than this, and by more than five standard errors, do differ."""
 SIGMAS = 5.0
 
@@ -109,7 +109,7 @@ def _motion(
 ) -> Inspection:
     parts = stretches(streams)
     clocks = _clocks(parts)
-    skewed = clocks is not None and any(_differs(clocks, robot) for robot in range(1, result.robots))
+    skewed = clocks is not None and any(differs(clocks, robot) for robot in range(1, result.robots))
     if skewed and clocks is not None:
         parts = stretches(streams, _moved(clocks, parts)) or parts
     if not parts:
@@ -145,7 +145,8 @@ def _clocks(parts: list[tuple[float, Array]]) -> ClockEstimate | None:
     return estimate_clocks(theta, np.full(len(theta), start), RATE_HZ)
 
 
-def _differs(clocks: ClockEstimate, robot: int) -> bool:
+def differs(clocks: ClockEstimate, robot: int) -> bool:
+    """Whether the clock of a robot (from 0) is known to differ from that of robot 1."""
     offset, error = clocks.offset_s[robot], clocks.offset_se_s[robot]
     return bool(np.isfinite(offset) and abs(offset) > max(OFFSET_S, SIGMAS * error))
 

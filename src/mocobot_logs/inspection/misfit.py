@@ -41,6 +41,8 @@ TOLERANCES = {
 }
 """Disagreement of robots with encoder zeros off by 1 deg, springs by 2 %, lengths by 1 mm (rad for the tilt, else over
 the signal): the largest of four payloads in random, periodic and static trials, rounded up."""
+SUSPICIOUS = 2.0
+"""Misfit beyond which something is wrong; poorly calibrated robots stay below 1."""
 FARTHEST_M = 5.0
 """Grasps farther apart than this are a wrong unit of lengths or angles."""
 FAULT = 1e3
@@ -76,6 +78,11 @@ class Misfit:
         squares = [value**2 for value in self.scaled.values()]
         total = (float(np.mean(squares)) if squares else 0.0) + FAULT * sum(f.share for f in self.faults)
         return total if np.isfinite(total) else np.inf
+
+    @property
+    def suspicious(self) -> bool:
+        """Whether robots that carry one rigid payload cannot look like this."""
+        return self.total > SUSPICIOUS
 
 
 def team_misfit(

@@ -14,14 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.design import OmnidDesign
-from mocobot_logs.inspection.misfit import Misfit, team_misfit
+from mocobot_logs.inspection.misfit import SUSPICIOUS, Misfit, team_misfit
 from mocobot_logs.inspection.mistakes import SUSPICIONS, Mistake, suspects, wrong_zero
 from mocobot_logs.inspection.mistakes.wrong_zero import WrongZero
 from mocobot_logs.inspection.motion import Fault, Grasp, arm_motion, gimbal_motion, grasp_motion
 from mocobot_logs.inspection.signals import Signals
 
-SUSPICIOUS = 2.0
-"""Misfit beyond which something is wrong; poorly calibrated robots stay below 1."""
 DECISIVE = 4.0
 """How many times smaller the misfit must become."""
 WORTH_TRYING = 0.3
@@ -43,13 +41,19 @@ class Found:
     Attributes:
         mistake: what is wrong.
         alternatives: others that explain it as well.
-        before, after: misfit of all other mistakes undone, without and with this one undone.
+        misfit: with all other mistakes undone and this one not.
+        after: total misfit with this one undone, too.
     """
 
     mistake: Mistake
     alternatives: tuple[Mistake, ...]
-    before: float
+    misfit: Misfit
     after: float
+
+    @property
+    def before(self) -> float:
+        """Total misfit with all other mistakes undone and this one not."""
+        return self.misfit.total
 
 
 @dataclass(frozen=True)
@@ -69,16 +73,6 @@ class Wiring:
     undone: Misfit
     hidden: tuple[Mistake, ...]
     tried: int
-
-    @property
-    def suspicious(self) -> bool:
-        """Whether the log as it is does not fit robots that carry one rigid payload."""
-        return self.as_is.total > SUSPICIOUS
-
-    @property
-    def explained(self) -> bool:
-        """Whether what is left is no longer suspicious."""
-        return self.undone.total <= SUSPICIOUS
 
 
 class Team:
@@ -198,7 +192,7 @@ def _needed(
         if others.misfit.total <= HELPS * team.misfit.total:
             chain, team = [*chain[:k], *chain[k + 1 :]], others
         else:
-            found.append(Found(chain[k][0], chain[k][1], others.misfit.total, team.misfit.total))
+            found.append(Found(chain[k][0], chain[k][1], others.misfit, team.misfit.total))
     return tuple(reversed(found)), team
 
 

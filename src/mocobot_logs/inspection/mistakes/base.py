@@ -55,6 +55,10 @@ class Mistake(ABC):
         """The mistake in words."""
         return f"{self.who()}: {self.what()}"
 
+    @abstractmethod
+    def subject(self) -> str:
+        """What the mistake is about, the same for its opposite."""
+
     def who(self) -> str:
         """The robots in words."""
         if len(self.robots) == self.team and self.team > 1:
@@ -111,6 +115,12 @@ class Rearranged(Mistake):
     def what(self) -> str:
         """See ``Mistake.what``."""
         return " and ".join(self._of(channel_names(self.level, kind), kind) for kind in self.kinds)
+
+    def subject(self) -> str:
+        """See ``Mistake.subject``."""
+        groups = " and ".join(NAMES[self.level][kind] for kind in self.kinds)
+        signs, order = min(self.signs) < 0, self.order != (0, 1, 2)
+        return ("order and signs" if signs and order else "signs" if signs else "order") + f" of {groups}"
 
     def _of(self, names: Sequence[str], kind: Kind) -> str:
         if self.order == (0, 1, 2):

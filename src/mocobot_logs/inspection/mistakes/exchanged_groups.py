@@ -44,6 +44,10 @@ class ExchangedGroups(Mistake):
         first, second = (NAMES[self.level][kind] for kind in self.pair)
         return f"the columns of {first} and {second} are exchanged"
 
+    def subject(self) -> str:
+        """See ``Mistake.subject``."""
+        return " and ".join(NAMES[self.level][kind] for kind in self.pair) + " exchanged"
+
 
 def suspects(signals: Signals, design: OmnidDesign) -> Iterator[ExchangedGroups]:
     """Every pair of groups, of all robots and of each."""

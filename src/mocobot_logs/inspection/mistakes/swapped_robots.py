@@ -49,6 +49,10 @@ class SwappedRobots(Mistake):
         parts = [f"robot {self.order[i] + 1} has those of robot {i + 1}" for i in self.robots]
         return f"their {name} columns are mixed up: {listed(parts)}"
 
+    def subject(self) -> str:
+        """See ``Mistake.subject``."""
+        return f"{NAMES[self.level][self.group]} of robots exchanged"
+
     def who(self) -> str:
         """See ``Mistake.who``."""
         return f"robots {listed([str(robot + 1) for robot in self.robots])}"

@@ -57,6 +57,10 @@ class WrongUnit(Mistake):
         """See ``Mistake.what``."""
         return f"{NAMES[self.level][self.group]} is {self.words}"
 
+    def subject(self) -> str:
+        """See ``Mistake.subject``."""
+        return f"unit of {NAMES[self.level][self.group]}"
+
     def to_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
         return super().to_dict() | {"factor": self.factor}

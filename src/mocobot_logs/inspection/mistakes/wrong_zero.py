@@ -11,7 +11,7 @@ from scipy.optimize import minimize_scalar
 
 from estimator.delta import inverse_kinematics
 from estimator.design import OmnidDesign
-from mocobot_logs.inspection.mistakes.base import Mistake, channel_names, teams
+from mocobot_logs.inspection.mistakes.base import NAMES, Mistake, channel_names, teams
 from mocobot_logs.inspection.signals import Kind, Signals
 
 STEP_RAD = float(np.deg2rad(15.0))
@@ -40,6 +40,10 @@ class CountsFromHome(Mistake):
         """See ``Mistake.channels``."""
         return channel_names(self.level, "position")
 
+    def subject(self) -> str:
+        """See ``Mistake.subject``."""
+        return f"zero of {NAMES[self.level]['position']}"
+
     def what(self) -> str:
         """See ``Mistake.what``."""
         at = ", ".join(f"{value:.4g}" for value in self.offset)
@@ -64,6 +68,10 @@ class CountsFromVertical(Mistake):
     def channels(self) -> tuple[str, ...]:
         """See ``Mistake.channels``."""
         return channel_names(self.level, "position")
+
+    def subject(self) -> str:
+        """See ``Mistake.subject``."""
+        return f"zero of {NAMES[self.level]['position']}"
 
     def what(self) -> str:
         """See ``Mistake.what``."""
@@ -97,6 +105,10 @@ class WrongZero(Mistake):
     def channels(self) -> tuple[str, ...]:
         """See ``Mistake.channels``."""
         return (channel_names(self.level, self.group)[self.joint],)
+
+    def subject(self) -> str:
+        """See ``Mistake.subject``."""
+        return f"zero of {self.channels[0]}"
 
     def what(self) -> str:
         """See ``Mistake.what``."""
