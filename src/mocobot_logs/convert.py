@@ -102,8 +102,10 @@ def convert(
         correct=correct,
     )
     recording = replace(recording, metadata=replace(recording.metadata, level=labels.level or source.level))
+    streams = resampled.reports
+    del resampled  # as large as the recording
     check_recording(recording)
-    return Converted(recording, source.level, resampled.reports, clocks)
+    return Converted(recording, source.level, streams, clocks)
 
 
 def output_kind(path: Path) -> Kind:

@@ -86,6 +86,7 @@ class ParquetTable:
                     yield self._block(batch, columns, clocks, unit_ns, row)
                     row += batch.num_rows
                     advance(batch.num_rows)
+        pa.default_memory_pool().release_unused()
 
     def _block(
         self, batch: pa.RecordBatch, columns: tuple[str, ...], clocks: tuple[str, ...], unit_ns: int, row: int
