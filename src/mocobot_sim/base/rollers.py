@@ -113,7 +113,7 @@ def _add_roller(hub: Any, name: str, angle: float, hand: float, design: BaseDesi
     roller.add("inertial", pos=[0.0, 0.0, 0.0], mass=mass, diaginertia=[across, across, along])
     roller.add(
         "geom", name=name, type="ellipsoid", size=[r, r, half], contype=0, conaffinity=FLOOR_BIT,
-        rgba=[0.13, 0.13, 0.14, 1.0],
+        rgba=[0.24, 0.25, 0.28, 1.0],
     )  # fmt: skip
     own = across * (1.0 - axle**2) + along * axle**2
     return own + mass * (at @ at - at**2)

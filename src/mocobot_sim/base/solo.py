@@ -7,6 +7,7 @@ import mujoco
 from mocobot_sim.base.design import WHEELS, BaseDesign, base_design
 from mocobot_sim.base.drive import BaseDrive, DriveLog
 from mocobot_sim.base.rollers import release, rough_floor
+from mocobot_sim.base.snapshots import Snapshots
 from mocobot_sim.models import models_dir
 from mocobot_sim.pymjcf import mjcf
 from mocobot_sim.scene import TIMESTEP_S
@@ -49,7 +50,11 @@ def compile_solo(root: mjcf.RootElement) -> mujoco.MjModel:
 
 
 def drive_solo(
-    model: mujoco.MjModel, drive: BaseDrive, duration_s: float, rate_hz: float = 1000.0
+    model: mujoco.MjModel,
+    drive: BaseDrive,
+    duration_s: float,
+    rate_hz: float = 1000.0,
+    snapshots: Snapshots | None = None,
 ) -> DriveLog:
     """Let the robot follow its plan.
 
@@ -58,6 +63,7 @@ def drive_solo(
         drive: its base's.
         duration_s: how long [s].
         rate_hz: control rate [Hz].
+        snapshots: to take on the way.
 
     Raises:
         InputError: the plan does not fit the model.
@@ -66,7 +72,10 @@ def drive_solo(
     mujoco.mj_forward(model, data)
     ticks, substeps = round(rate_hz / RATE_HZ), round(1.0 / (rate_hz * model.opt.timestep))
     drive.begin(model, data, rate_hz, ticks)
+    snapshots = snapshots or Snapshots(())
+    snapshots.begin(data, rate_hz)
     for tick in range(round(duration_s * rate_hz) + 1):
         drive.act(tick)
+        snapshots.act(tick)
         mujoco.mj_step(model, data, nstep=substeps)
     return drive.log()
