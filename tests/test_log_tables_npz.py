@@ -293,10 +293,15 @@ def test_the_same_array_twice(path: Path) -> None:
     assert "array 'phi' is in the archive twice" in refused(path)
 
 
-def test_a_flipped_bit_in_a_sample_is_found(path: Path) -> None:
-    archive(path, members(), zipfile.ZIP_STORED)
+@pytest.mark.parametrize("compression", [zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED])
+@pytest.mark.parametrize("fortran", [False, True])
+def test_a_flipped_bit_in_a_sample_is_found(path: Path, compression: int, fortran: bool) -> None:
+    """By the sum over the entry, even where it does not disturb the unpacking."""
+    tau = np.asfortranarray(RECORDING.tau) if fortran else RECORDING.tau
+    archive(path, members(tau=npy(tau)), compression)
     content = bytearray(path.read_bytes())
-    content[content.index(RECORDING.tau.tobytes()) + 100] ^= 1
+    entry = content.rindex(b"PK\x01\x02", 0, content.rindex(b"tau.npy"))
+    content[entry + 16] ^= 1  # of the sum: packed data would not unpack
     path.write_bytes(content)
     assert "damaged one (Bad CRC-32" in refused(path)
 

@@ -108,8 +108,6 @@ class NpzTable:
                     },
                 )
                 advance(count)
-            for name in names:  # past the last byte, which checks the sum of all
-                readers[name](0)
 
     def _rows(self, names: list[str]) -> int:
         rows = self._arrays[names[0]].shape[0]
@@ -150,8 +148,6 @@ class NpzTable:
             return next_loaded
 
         def next_read(count: int) -> NDArray:
-            if not count:
-                file.read(1)
             raw = _read_exactly(file, count * array.dtype.itemsize * prod(array.row_shape))
             return np.frombuffer(raw, array.dtype).reshape(count, *array.row_shape)
 
