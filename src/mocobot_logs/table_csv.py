@@ -207,20 +207,14 @@ def _first_lines(path: Path, name: str) -> tuple[str, str, int]:
 
 
 def _find_delimiter(header: str, row: str, decimal: str) -> str:
-    """The delimiter that cuts most numbers out of the first row, as many as the header has names.
+    """The delimiter that cuts most numbers out of the first row.
 
     Where none does, because a row is no row of numbers, the one that cuts the header at all, for what is said then.
     """
     best, most = "", 1
     for delimiter in DELIMITERS:
-        if delimiter == decimal:
-            continue
-        cells = _cut(row, delimiter)
-        if (
-            len(cells) > most
-            and len(cells) == len(_cut(header, delimiter))
-            and all(cell.strip() in EMPTY or _is_number(cell, decimal) for cell in cells)
-        ):
+        cells = _cut(row, delimiter) if delimiter != decimal else []
+        if len(cells) > most and all(cell in EMPTY or _is_number(cell, decimal) for cell in cells):
             best, most = delimiter, len(cells)
     return best or next((d for d in DELIMITERS if d != decimal and len(_cut(header, d)) > 1), ",")
 
