@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 SENSORS = 9
 """Channels of a robot before its commands."""
-LISTED = 20
+LISTED = 100
 """So many stuck and clipped stretches of a channel are kept; all are counted."""
 
 

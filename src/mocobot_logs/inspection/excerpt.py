@@ -23,11 +23,24 @@ SHORTEST_S = 2 * TRIM_S + 2.0
 _PERIODS = 3.5  # a gap in a slow log
 
 
-def clean_stream(samples: Samples, origin_ns: int) -> tuple[Array, Array]:
-    """Times [s] after the origin, increasing, and the nine channels, all finite; averaged where they come faster."""
+def clean_stream(
+    samples: Samples, origin_ns: int, faulty: Sequence[tuple[int, int]] = ()
+) -> tuple[Array, Array]:
+    """One robot's samples, without those that cannot be used; averaged where they come faster than 100 Hz.
+
+    Args:
+        samples: the samples.
+        origin_ns: the stamp from which time counts [ns].
+        faulty: stamps between which samples are not to be used [ns].
+
+    Returns:
+        Increasing times [s], shape (q,), and the nine channels, all finite, shape (q, 9).
+    """
     time_s = np.asarray((samples.stamp_ns - origin_ns) * NS, dtype=np.float64)
     values = samples.values[:, :9]
     good = np.isfinite(values).all(axis=1)
+    for start_ns, stop_ns in faulty:
+        good &= (samples.stamp_ns < start_ns) | (samples.stamp_ns >= stop_ns)
     time_s, values = time_s[good], values[good]
     if not len(time_s):
         return time_s, values

@@ -8,6 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from mocobot_logs.inspection.resolution import quantisation_step
+
 Array = NDArray[np.float64]
 
 STUCK_S = 0.5
@@ -58,7 +60,7 @@ def frozen(values: Array, rate_hz: float) -> list[Frozen]:
             continue
         usual = float(np.quantile(steps[steps > 0], 0.95))
         # Without a resolution, no two samples of a live channel are equal.
-        continuous = np.mean(steps == 0) < 0.5 and len(np.unique(x)) > 0.4 * len(x)
+        continuous = np.mean(steps == 0) < 0.5 and quantisation_step(x) is None
         for start, stop in _runs(x):
             if stop - start < CLIPPED_SAMPLES or not _others_move(values, ranges, channel, start, stop):
                 continue
@@ -102,7 +104,9 @@ def _runs(x: Array, where: NDArray[np.bool_] | None = None) -> list[tuple[int, i
 
 
 def _others_move(values: Array, ranges: Array, channel: int, start: int, stop: int) -> bool:
-    """Whether at least two other channels move in a stretch."""
-    moved = np.ptp(values[start:stop], axis=0) > _MOVES * ranges
+    """Whether at least two other channels move in both halves of a stretch."""
+    middle = (start + stop + 1) // 2
+    first, second = np.ptp(values[start:middle], axis=0), np.ptp(values[middle - 1 : stop], axis=0)
+    moved = np.minimum(first, second) > _MOVES / 2 * ranges
     moved[channel] = False
     return int(np.sum(moved & (ranges > 0))) >= 2

@@ -10,14 +10,16 @@ from numpy.typing import NDArray
 
 from estimator.clocks import ClockEstimate, estimate_clocks
 from estimator.design import OmnidDesign
+from mocobot_logs.inspection.channels import Channel
 from mocobot_logs.inspection.excerpt import SHORTEST_S, clean_stream, stretches
 from mocobot_logs.inspection.mistakes import Mistake
 from mocobot_logs.inspection.readiness import Readiness, readiness
 from mocobot_logs.inspection.segments import Segments, segments
 from mocobot_logs.inspection.signals import RATE_HZ, Group, Signals, signals_of
 from mocobot_logs.inspection.survey import Survey, survey
+from mocobot_logs.inspection.timing import Timing
 from mocobot_logs.inspection.wiring import Wiring, check_wiring
-from mocobot_logs.log import Level, LogSource
+from mocobot_logs.log import NS, Level, LogSource
 
 Array = NDArray[np.float64]
 
@@ -26,6 +28,8 @@ SLOWEST_HZ, FASTEST_HZ = 10.0, 20_000.0
 OFFSET_S = 2e-4
 """Clocks that differ by more than this, and by more than five standard errors, do differ."""
 SIGMAS = 5.0
+MOSTLY = 0.5
+"""A channel that stands for more than this share of its log is wrong as a whole."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,8 +104,23 @@ def inspect_log(
             return replace(result, unchecked=f"robot {robot + 1} has too few samples")
         if not SLOWEST_HZ <= rate <= FASTEST_HZ:
             return replace(result, unchecked=f"robot {robot + 1} is sampled at {rate:.3g} Hz")
-    streams = [clean_stream(samples, seen.origin_ns) for samples in seen.excerpt]
+    streams = [
+        clean_stream(samples, seen.origin_ns, _faulty(channels, timing))
+        for samples, channels, timing in zip(seen.excerpt, seen.channels, seen.timing, strict=True)
+    ]
     return _motion(result, streams, try_advance)
+
+
+def _faulty(channels: tuple[Channel, ...], timing: Timing) -> list[tuple[int, int]]:
+    """Stamps between which a channel is stuck or clipped [ns]; not those of one that nearly always is."""
+    assert timing.first_ns is not None
+    found = []
+    for c in channels:
+        for every in (c.stuck, c.clipped):
+            if sum(s.duration_s for s in every) < MOSTLY * timing.duration_s:
+                starts = [timing.first_ns + round(s.start_s / NS) for s in every]
+                found += [(a, a + round(s.duration_s / NS)) for a, s in zip(starts, every, strict=True)]
+    return found
 
 
 def _motion(
@@ -119,7 +138,7 @@ def _motion(
         )
     noise = np.array([[c.white_noise for c in of_robot[:9]] for of_robot in result.survey.channels])
     samples = [part for _, part in parts]
-    wiring, _ = check_wiring(signals_of(result.level, samples, noise), result.design, advance)
+    wiring = check_wiring(signals_of(result.level, samples, noise), result.design, advance)
     undone = None
     if wiring.found:
         right = [(start, _undone(part, wiring, result.level)) for start, part in parts]

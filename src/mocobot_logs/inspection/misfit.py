@@ -82,7 +82,12 @@ class Misfit:
     @property
     def suspicious(self) -> bool:
         """Whether robots that carry one rigid payload cannot look like this."""
-        return self.total > SUSPICIOUS
+        return self.total > SUSPICIOUS and self.tells
+
+    @property
+    def tells(self) -> bool:
+        """Whether a misfit means anything: next to no rotation leaves noise to be compared."""
+        return self.determined or bool(self.faults)
 
 
 def team_misfit(

@@ -26,6 +26,7 @@ Array = NDArray[np.float64]
 
 WRONG_SHARE = 0.01
 """A range that more than this share of the samples leaves is a fault of the wiring, not of some samples."""
+_POSTURE = 3.0  # relative change of forces per radian
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,8 +157,17 @@ def grasp_motion(
     force = np.sum(legs.rod * ((tau - arm.own_torque) / legs.leverage)[..., None], axis=-2)
     value, rate, _ = noise_gains()
     lever = 1.0 if wrist else design.proximal_length_m  # of driven rates and torques, in order of magnitude
-    scales = np.array([rate, rate * lever, value / lever, value])
-    noise = [_rms(signals.group(kind).noise[robot]) for kind in ("theta", "position", "effort", "theta")]
+    of_theta, of_position, of_effort = (
+        _rms(signals.group(kind).noise[robot]) for kind in ("theta", "position", "effort")
+    )
+    # A wrong posture turns and stretches forces, too: by as much as it is off, in order of magnitude.
+    off = value * (of_position / design.proximal_length_m if wrist else of_position)
+    noise = [
+        rate * of_theta,
+        rate * lever * of_position,
+        float(np.hypot(value * of_effort / lever, _POSTURE * off * _rms(force))),
+        value * of_theta,
+    ]
     grasp = Grasp(
         omega=gimbal.omega,
         alpha=gimbal.alpha,
@@ -167,7 +177,7 @@ def grasp_motion(
         wrench=np.concatenate([gimbal.moment, _into(gimbal.R_bi, force)], axis=1),
         lift=force[:, 2],
         rise=arm.h_ddot[:, 2],
-        noise=scales * np.array(noise),
+        noise=np.array(noise),
     )
     return grasp, (*arm.faults, *gimbal.faults, *faults)
 

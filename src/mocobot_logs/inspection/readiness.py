@@ -25,7 +25,8 @@ from mocobot_logs.log import Level
 Array = NDArray[np.float64]
 
 QUANTITIES = ("grasps", "mass", "centre of mass", "inertia")
-AXES = ("roll, about x of {1}", "pitch, about y of {1}", "yaw, about z of {1}")
+AXES = ("roll", "pitch", "yaw")
+"""Rotation about x, y and z of {1}."""
 _HARDLY = 0.1  # of the rotation about the liveliest axis
 _ALONG = np.cos(np.deg2rad(20.0))
 

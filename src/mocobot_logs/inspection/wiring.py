@@ -112,21 +112,23 @@ class Team:
 
 
 def check_wiring(
-    signals: Signals, design: OmnidDesign, advance: Callable[[int], object] = lambda _: None
-) -> tuple[Wiring, Signals]:
+    signals: Signals,
+    design: OmnidDesign,
+    advance: Callable[[int], object] = lambda _: None,
+    *,
+    look_for_hidden: bool = True,
+) -> Wiring:
     """Look for mistakes.
 
     Args:
         signals: the team's channels.
         design: the robots' numbers.
         advance: takes the number of mistakes tried since the last call.
-
-    Returns:
-        What was found, and the signals with all of it undone.
+        look_for_hidden: whether to find out which mistakes would not show.
     """
     first = team = Team(signals, design)
     chain: list[tuple[Mistake, tuple[Mistake, ...]]] = []
-    while team.misfit.total > WORTH_TRYING and len(chain) < MOST:
+    while team.misfit.total > WORTH_TRYING and team.misfit.tells and len(chain) < MOST:
         best, alike, after = _best(team, design, advance)
         suspicious = team.misfit.total > SUSPICIOUS
         if after > team.misfit.total / (HELPS if suspicious else OVERWHELMING):
@@ -136,8 +138,8 @@ def check_wiring(
     if not shows(first.misfit.total, team.misfit.total):
         chain, team = [], first
     found, team = _needed(first, team, chain)
-    hidden, tried = _hidden(team, design, advance)
-    return Wiring(first.misfit, found, team.misfit, hidden, tried), team.signals
+    hidden, tried = _hidden(team, design, advance) if look_for_hidden else ((), 0)
+    return Wiring(first.misfit, found, team.misfit, hidden, tried)
 
 
 def shows(wrong: float, right: float) -> bool:
@@ -168,6 +170,12 @@ def _best(
     return alike[0][2], tuple(_distinct([entry[2] for entry in alike[1:]])), alike[0][0]
 
 
+def _alike(others: Team, best: Mistake, alike: tuple[Mistake, ...]) -> tuple[Mistake, ...]:
+    """Those that still explain as much once all other mistakes are undone."""
+    limit = ALIKE * others.without(best).total + 1e-9
+    return tuple(mistake for mistake in alike if others.without(mistake).total <= limit)
+
+
 def _distinct(mistakes: Sequence[Mistake]) -> list[Mistake]:
     """Each encoder's zero once, however many offsets were tried."""
     seen: set[object] = set()
@@ -192,7 +200,7 @@ def _needed(
         if others.misfit.total <= HELPS * team.misfit.total:
             chain, team = [*chain[:k], *chain[k + 1 :]], others
         else:
-            found.append(Found(chain[k][0], chain[k][1], others.misfit, team.misfit.total))
+            found.append(Found(chain[k][0], _alike(others, *chain[k]), others.misfit, team.misfit.total))
     return tuple(reversed(found)), team
 
 

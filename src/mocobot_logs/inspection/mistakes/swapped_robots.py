@@ -45,7 +45,10 @@ class SwappedRobots(Mistake):
         """See ``Mistake.what``."""
         name = NAMES[self.level][self.group]
         if len(self.robots) == 2:
-            return f"their {name} columns are exchanged"
+            others = " and ".join(NAMES[self.level][kind] for kind in KINDS if kind != self.group)
+            return (
+                f"their {name} columns are exchanged (or those of {others}: the same but for their numbers)"
+            )
         parts = [f"robot {self.order[i] + 1} has those of robot {i + 1}" for i in self.robots]
         return f"their {name} columns are mixed up: {listed(parts)}"
 
