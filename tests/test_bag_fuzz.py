@@ -17,7 +17,7 @@ from fuzzing.damage import damaged
 from mocobot_logs.bag_read import open_bag
 from mocobot_logs.log import collect
 
-RUNS = 40
+RUNS = 60
 TEAM = Team.draw(robots=2, rows=40)
 MESSAGES = TEAM.said()
 
@@ -79,7 +79,7 @@ def assert_sound(path: Path, write, seed: int, runs: int = RUNS) -> None:
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 600_000  # kB
     refused = [text for text in said if text != "read"]
     assert len(refused) > runs / 10
-    assert len(set(refused)) > 2
+    assert len(set(refused)) > 1
 
 
 @pytest.mark.parametrize("options", [{"enable_crcs": False}, UNCHUNKED, NO_SUMMARY, {}], ids=range(4))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal, Protocol
 
 import numpy as np
@@ -44,13 +44,13 @@ class Single:
         return None
 
 
-def agree(look: Look, topics: Collection[str], clock: Clock) -> bool:
+def agree(look: Look, topics: Sequence[str], clock: Clock) -> bool:
     """Whether the first messages of a robot's topics are stamped together.
 
     Raises:
         InputError: the bag is damaged, or messages have no stamps.
     """
-    first, *others = (look.stamps(topic, clock) for topic in topics)
+    first, *others = look.stamps(topics, clock).values()
     return all(_share(stamps, first) >= MATCHING and _share(first, stamps) >= MATCHING for stamps in others)
 
 
@@ -81,8 +81,8 @@ def make_joiner(
     if len(topics) == 1:
         return Single()
     periods = []
-    for topic in topics:
-        steps = np.diff(look.stamps(topic, clock))
+    for topic, stamps in look.stamps(topics, clock).items():
+        steps = np.diff(stamps)
         if not (steps > 0).any():
             raise InputError(
                 f"{bag}: topic {printable(topic)} has too few stamps to be brought onto one time with the other topics "

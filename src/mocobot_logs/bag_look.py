@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
@@ -10,13 +10,14 @@ import numpy as np
 from estimator.errors import InputError
 from mocobot_logs.bag_cdr import CdrReader, Selector
 from mocobot_logs.bag_files import BagFiles
-from mocobot_logs.bag_messages import MESSAGE_BYTES, Messages, Topic, joined
+from mocobot_logs.bag_messages import BLOCK_BYTES, MESSAGE_BYTES, Messages, Topic, joined
 from mocobot_logs.bag_types import JOINT_STATE, message_type
 from mocobot_logs.bag_unpack import UnpackError, unpack_message
 from mocobot_logs.log import Stamps
 
 STAMPS = 1000
 """So many stamps of a topic are looked at."""
+_NAMES_BYTES = 64 << 10  # several publishers may have a part of the joints each
 
 
 class Look:
@@ -42,19 +43,16 @@ class Look:
         """
         return any(storage.has_messages(topic) for storage in self._files.storages)
 
-    def messages(self, topic: str, count: int = 1) -> list[Messages]:
-        """The first messages of a topic: about ``count``, or a block more, or as many as there are.
+    def first(self, topic: str, block_bytes: int) -> Messages | None:
+        """The first messages of a topic, of about so many bytes; None if there are none.
 
         Raises:
             InputError: the bag is damaged.
         """
-        found: list[Messages] = []
-        if self.has_messages(topic):
-            for block in blocks(self._files, (topic,), lambda _: None):
-                found.append(block[topic])
-                if sum(map(len, found)) >= count:
-                    break
-        return found
+        if not self.has_messages(topic):
+            return None
+        found = blocks(self._files, (topic,), lambda _: None, block_bytes)
+        return next((block[topic] for block in found), None)
 
     def joints(self, topic: str) -> tuple[str, ...]:
         """Joints in the first messages of a topic, none if they are no joint states.
@@ -67,28 +65,41 @@ class Look:
             reader = CdrReader(kind, [Selector("position", "")], stamp=False)
             if kind.name == JOINT_STATE:
                 kind.require_joints("position")
-                for messages in self.messages(topic):
+                if (messages := self.first(topic, _NAMES_BYTES)) is not None:
                     reader.read(messages)
             self._joints[topic] = tuple(reader.joints)
         return self._joints[topic]
 
-    def stamps(self, topic: str, clock: Literal["header", "log"]) -> Stamps:
-        """Stamps of the first messages of a topic [ns].
+    def stamps(self, topics: Sequence[str], clock: Literal["header", "log"]) -> dict[str, Stamps]:
+        """Stamps of the first messages of some topics [ns], with a single look at the bag.
 
         Raises:
             InputError: the bag is damaged, or messages have no stamps.
         """
-        if (topic, clock) not in self._stamps:
-            kind = message_type(self._topics[topic], self._bag)
-            reader = CdrReader(kind, (), stamp=clock == "header")
-            every = self.messages(topic, STAMPS)
-            found = [reader.read(messages)[0] if clock == "header" else messages.log_ns for messages in every]
-            self._stamps[topic, clock] = np.concatenate([np.empty(0, np.int64), *found])[:STAMPS]
-        return self._stamps[topic, clock]
+        missing = [topic for topic in topics if (topic, clock) not in self._stamps]
+        readers = {
+            t: CdrReader(message_type(self._topics[t], self._bag), (), clock == "header") for t in missing
+        }
+        found: dict[str, list[Stamps]] = {topic: [np.empty(0, np.int64)] for topic in missing}
+        wanted = {topic for topic in missing if self.has_messages(topic)}
+        for block in blocks(self._files, tuple(wanted), lambda _: None) if wanted else ():
+            for topic, messages in block.items():
+                stamps = readers[topic].read(messages)[0] if clock == "header" else messages.log_ns
+                found[topic].append(stamps)
+                if sum(map(len, found[topic])) >= STAMPS:
+                    wanted.discard(topic)
+            if not wanted:
+                break
+        for topic, parts in found.items():
+            self._stamps[topic, clock] = np.concatenate(parts)[:STAMPS]
+        return {topic: self._stamps[topic, clock] for topic in topics}
 
 
 def blocks(
-    files: BagFiles, topics: tuple[str, ...], advance: Callable[[int], object]
+    files: BagFiles,
+    topics: tuple[str, ...],
+    advance: Callable[[int], object],
+    block_bytes: int = BLOCK_BYTES,
 ) -> Iterator[dict[str, Messages]]:
     """Messages of some topics in all files of a bag, unpacked (see ``Storage.blocks``).
 
@@ -96,7 +107,7 @@ def blocks(
         InputError: a file is damaged.
     """
     for storage in files.storages:
-        for block in storage.blocks(topics, advance):
+        for block in storage.blocks(topics, advance, block_bytes):
             if files.packed:
                 yield {
                     topic: _unpacked(m, f"{storage.name}: topic {topic!r:.80}") for topic, m in block.items()

@@ -19,7 +19,7 @@ from mcap.records import Channel, Schema, Statistics
 
 from estimator.errors import InputError
 from mocobot_logs.bag_mcap_runs import HEAD, McapRuns, Run
-from mocobot_logs.bag_messages import Messages, Topic, check_sizes
+from mocobot_logs.bag_messages import BLOCK_BYTES, Messages, Topic, check_sizes
 
 DEFINITION_BYTES = 256 << 10
 """Longest definition of a message type that is read [bytes]."""
@@ -60,14 +60,14 @@ class McapBag:
         self.topics = self._topics(counts)
 
     def blocks(
-        self, topics: Collection[str], advance: Callable[[int], object]
+        self, topics: Collection[str], advance: Callable[[int], object], block_bytes: int = BLOCK_BYTES
     ) -> Iterator[dict[str, Messages]]:
         """Messages of some topics, see ``Storage.blocks``.
 
         Raises:
             InputError: the file is damaged.
         """
-        for run in self._runs.data(advance):
+        for run in self._runs.data(advance, block_bytes):
             by_topic: dict[str, list[int]] = {}
             for channel, starts in self._walk(run, topics).items():
                 by_topic.setdefault(self._channels[channel].name, []).extend(starts)

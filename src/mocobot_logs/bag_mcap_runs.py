@@ -60,11 +60,12 @@ class McapRuns:
         with self._open() as file:
             self.size, self._summary = self._check_ends(file)
 
-    def data(self, advance: Callable[[int], object]) -> Iterator[Run]:
+    def data(self, advance: Callable[[int], object], window_bytes: int = BLOCK_BYTES) -> Iterator[Run]:
         """All that may hold messages, from front to back.
 
         Args:
             advance: takes the bytes read since the last call.
+            window_bytes: largest window of loose records.
 
         Raises:
             InputError: the file is damaged.
@@ -94,7 +95,7 @@ class McapRuns:
                     yield Run(block, last, at)
                     after = at + last
                     # Small steps where chunks and loose records alternate: what is read twice stays in proportion.
-                    window = _WINDOW if stopped else min(2 * window, BLOCK_BYTES)
+                    window = _WINDOW if stopped else min(2 * window, max(window_bytes, _WINDOW))
                 elif not opcode:
                     raise self.damaged(at, "a record of no kind")
                 advance(after - told)

@@ -82,13 +82,14 @@ class Storage(Protocol):
     topics: dict[str, Topic]
 
     def blocks(
-        self, topics: Collection[str], advance: Callable[[int], object]
+        self, topics: Collection[str], advance: Callable[[int], object], block_bytes: int = BLOCK_BYTES
     ) -> Iterator[dict[str, Messages]]:
         """Messages of some topics in the order of the file; topics without messages in a block are left out.
 
         Args:
             topics: names of the topics.
             advance: takes the bytes read since the last call.
+            block_bytes: about so many bytes at a time, where the file leaves the choice.
 
         Raises:
             InputError: the file is damaged.

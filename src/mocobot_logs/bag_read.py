@@ -99,6 +99,8 @@ class BagSource:
         """The plan; without commands that a log may lack where they are not stamped together with the samples."""
         arguments = self.name, self._topics, self._map, self._look.joints
         found = make_plan(*arguments, self._look.has_messages)
+        if any(len(topics) > 1 for topics in found.parts):  # all at once: the bag need not be looked at again
+            self._look.stamps(tuple(found.topics), self._clock)
         may_lack = found.channels != CHANNELS[self._map.level] and self._map.common[REF[0]].optional
         if may_lack and not all(agree(self._look, topics, self._clock) for topics in found.parts):
             return make_plan(*arguments, lambda _: False)
@@ -106,14 +108,12 @@ class BagSource:
 
     def _read_metadata(self) -> RecordingMetadata | None:
         topic = self._topics.get(METADATA_TOPIC)
-        if (
-            topic is None
-            or type_name(topic) != STRING
-            or not (messages := self._look.messages(METADATA_TOPIC))
-        ):
+        if topic is None or type_name(topic) != STRING:
+            return None
+        if (messages := self._look.first(METADATA_TOPIC, 1)) is None:
             return None
         where = f"{self.name}: {METADATA_TOPIC}"
-        metadata = RecordingMetadata.from_json(string_of(messages[0][0], where), where)
+        metadata = RecordingMetadata.from_json(string_of(messages[0], where), where)
         if metadata.robots != self.robots:
             raise InputError(f"{where}: robots is {metadata.robots}, but the bag has topics of {self.robots}")
         return metadata

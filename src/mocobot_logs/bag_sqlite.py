@@ -47,7 +47,7 @@ class SqliteBag:
             self._last = connection.execute("SELECT max(rowid) FROM messages").fetchone()[0] or 0
 
     def blocks(
-        self, topics: Collection[str], advance: Callable[[int], object]
+        self, topics: Collection[str], advance: Callable[[int], object], block_bytes: int = BLOCK_BYTES
     ) -> Iterator[dict[str, Messages]]:
         """Messages of some topics, see ``Storage.blocks``.
 
@@ -65,7 +65,7 @@ class SqliteBag:
                 "ORDER BY rowid",
                 ids,
             )
-            while found := self._next(rows):
+            while found := self._next(rows, block_bytes):
                 block = {topic: self._messages(part, topic, last) for topic, part in found.items()}
                 yield block
                 done = max(last.values()) / self._last if self._last > 0 else 0.0
@@ -74,7 +74,7 @@ class SqliteBag:
                 told = now
         advance(self.size - told)
 
-    def _next(self, rows: Iterator[_Row]) -> dict[str, list[_Row]]:
+    def _next(self, rows: Iterator[_Row], block_bytes: int) -> dict[str, list[_Row]]:
         """Rows of about one block, by topic."""
         parts: dict[int, list[_Row]] = {key: [] for key in self._ids}
         held = 0
@@ -82,7 +82,7 @@ class SqliteBag:
             for row in rows:
                 parts[row[0]].append(row)
                 held += len(row[1]) + 64
-                if held > BLOCK_BYTES:
+                if held > block_bytes:
                     break
         except TypeError as error:
             raise InputError(f"{self.name}: damaged, its table 'messages' has a row without data") from error
