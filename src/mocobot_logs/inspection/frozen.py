@@ -19,6 +19,7 @@ CLIPPED_SAMPLES = 5
 _MOVES = 0.05  # others move: by this share of their range
 _JUMP = 4.0  # times the usual large step from sample to sample
 _CORNER = 0.3  # of the same
+_SPEED_S, _AT_SPEED = 0.1, 0.5  # time over which speed is taken; share of the usual high speed
 
 
 @dataclass(frozen=True)
@@ -42,8 +43,8 @@ class Frozen:
 def frozen(values: Array, rate_hz: float) -> list[Frozen]:
     """Stuck and clipped stretches of one robot's channels.
 
-    A channel that stands still because nothing moves is not stuck; nor is one that is not moved while others are: a
-    stuck one jumps when it comes back, or never comes back from a standstill that noise and motion never leave it.
+    A channel that stands because nothing moves is not stuck; nor is one that rests while others move. A stuck one jumps
+    when it comes back, stops dead before the log ends, or repeats a value that has no steps.
 
     Args:
         values: samples of the robot's channels, finite, shape (q, C).
@@ -67,10 +68,21 @@ def frozen(values: Array, rate_hz: float) -> list[Frozen]:
             back = steps[stop - 1] if stop < len(x) else 0.0
             into = steps[start - 1] if start else 0.0
             if stop - start >= max(STUCK_S * rate_hz, CLIPPED_SAMPLES) and (
-                continuous or max(back, into) > _JUMP * usual
+                continuous or max(back, into) > _JUMP * usual or _stops_dead(x, steps, start, stop, rate_hz)
             ):
                 found.append(Frozen("stuck", channel, start, stop, float(x[start])))
     return found + _clipped(values)
+
+
+def _stops_dead(x: Array, steps: Array, start: int, stop: int, rate_hz: float) -> bool:
+    """Whether a stretch that begins or ends with the log is left or entered at speed."""
+    window = max(2, round(_SPEED_S * rate_hz))
+    if len(x) <= 2 * window or (start > 0) == (stop < len(x)):
+        return False
+    usual = float(np.quantile(np.abs(x[window:] - x[:-window]), 0.95))
+    other = max(start - window, 0) if start else min(stop - 1 + window, len(x) - 1)
+    moved = abs(x[other] - x[start])
+    return moved > max(_AT_SPEED * usual, _JUMP * float(steps[steps > 0].min()))
 
 
 def _clipped(values: Array) -> list[Frozen]:
