@@ -18,7 +18,7 @@ from estimator.delta import forward_kinematics
 from estimator.errors import InputError
 from mocobot_sim.base.drive import BaseDrive, DriveLog
 from mocobot_sim.base.motion import Leg, PlanarMotion, carried, plan
-from mocobot_sim.base.pictures import Camera, Marks, render
+from mocobot_sim.base.pictures import Camera, Marks, make_folder, render
 from mocobot_sim.base.planar import compose, relative, yaw_of
 from mocobot_sim.base.snapshots import Snapshots
 from mocobot_sim.models import omnid_design
@@ -46,6 +46,7 @@ def main() -> None:
 
 def carry(payload: str, out: Path) -> None:
     """Run the trial, print what happened, and draw it."""
+    make_folder(out)
     scene = build_team(payload, released=True)
     middle = scene.X_1i.translation[:, :2].mean(
         axis=0
@@ -64,7 +65,6 @@ def carry(payload: str, out: Path) -> None:
     bases, led = drive.log(), reference(scene, log)
     report(motion, log, bases, led)
 
-    out.mkdir(parents=True, exist_ok=True)
     plot(motion, log, bases, led, out / "carry_sideways.png")
     print(out / "carry_sideways.png")
     marks = Marks()

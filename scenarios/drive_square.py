@@ -12,11 +12,12 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
+from estimator.errors import InputError
 from mocobot_sim.base.design import WHEELS, base_design
 from mocobot_sim.base.drive import BaseDrive, DriveLog
 from mocobot_sim.base.mecanum import MecanumKinematics
 from mocobot_sim.base.motion import Leg, PlanarMotion, plan
-from mocobot_sim.base.pictures import Camera, Marks, render
+from mocobot_sim.base.pictures import Camera, Marks, make_folder, render
 from mocobot_sim.base.snapshots import Snapshots
 from mocobot_sim.base.solo import build_solo, compile_solo, drive_solo
 
@@ -36,6 +37,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("out/drive_square"), help="folder for the pictures")
     out = parser.parse_args().out
+    try:
+        make_folder(out)
+    except InputError as error:
+        parser.error(str(error))
     design, model = base_design(), compile_solo(build_solo())
     calm, hasty = square(4.0, 8.0), square(0.9, 4.0)
     stops = np.array([0.5, *np.cumsum([4.5] * 4 + [8.5]) + 0.5])
@@ -53,7 +58,6 @@ def main() -> None:
         ends = stops if motion is calm else np.array([0.5, *np.cumsum([1.4] * 4 + [4.5]) + 0.5])
         print(f"{name}\n{table(log, ends)}\n")
 
-    out.mkdir(parents=True, exist_ok=True)
     plot(logs["textbook kinematics"], logs["kinematics with rollers"], out / "drive_square.png")
     print(out / "drive_square.png")
     log = logs["kinematics with rollers"]

@@ -1,7 +1,8 @@
 """A person guides the payload that three Omnids carry: the force it takes, with and without the estimate.
 
-The arms float: no stiffness, only the payload's weight fed forward. The person's two hands hold a handle over the middle
-of the frame and move it along one and the same path. Then the bases are released, and follow the person across the room.
+The arms float: no stiffness, only the payload's weight fed forward. The person's two hands hold a handle over the
+middle of the frame and move it along one and the same path. Then the bases are released, and follow the person across
+the room.
 
 python scenarios/guided_by_hand.py [--payload a] [--estimate est.json] [--out FOLDER]
 """
@@ -23,7 +24,7 @@ from estimator.estimate import estimate_payload
 from estimator.payload_estimate import PayloadEstimate
 from mocobot_sim.base.drive import DriveLog
 from mocobot_sim.base.follow import FollowingDrive
-from mocobot_sim.base.pictures import Camera, Marks, render
+from mocobot_sim.base.pictures import Camera, Marks, make_folder, render
 from mocobot_sim.base.snapshots import Snapshots
 from mocobot_sim.control import ControlGains
 from mocobot_sim.guided.float_arms import FLOAT_GAINS, FloatArms
@@ -85,6 +86,7 @@ def main() -> None:
 
 def compare(payload: str, estimate_path: Path | None, out: Path) -> None:
     """Estimate if need be, run all cases, print and draw."""
+    make_folder(out)
     team = build_team(payload)
     if team.robots < 3:
         raise InputError(f"{payload}: has {team.robots} grasps; floating needs three robots or more")
@@ -96,24 +98,28 @@ def compare(payload: str, estimate_path: Path | None, out: Path) -> None:
         Case("forces measured at the start", FloatArms(None), FLOAT_GAINS, team),
     ]
     if estimate_path is not None:
-        cases.append(
-            Case("estimate from the file", FloatArms(read_estimate(estimate_path)), FLOAT_GAINS, team)
-        )
+        known = read_estimate(estimate_path)
+        if len(known.p_1i) != team.robots:
+            raise InputError(
+                f"{estimate_path}: is for {len(known.p_1i)} grasps; the payload has {team.robots}"
+            )
+        cases.append(Case("estimate from the file", FloatArms(known), FLOAT_GAINS, team))
     else:
         for preset in ("nominal", "uncalibrated"):
             units = draw_units(payload, sensor_preset(preset), seed=0)
             estimate = make_estimate(payload, preset)
             print(_score(preset, estimate, truth))
-            arms = FloatArms(Payload.of_estimate(estimate), units)
             scene = build_team(payload, units)
+            if units:
+                cases.append(Case(f"forces measured, {preset} robots", FloatArms(None), FLOAT_GAINS, scene))
+            arms = FloatArms(Payload.of_estimate(estimate), units)
             cases.append(Case(f"estimate, {preset} robots", arms, FLOAT_GAINS, scene))
     grip_1 = _handle(truth)
     logs = [[guide(case, grip_1, grip) for grip in (FIRM, HANDS)] for case in cases]
     print(table(cases, logs, truth))
 
     following, bases, pictures = across_the_room(payload, cases[-1], grip_1)
-    print(journey(following, bases))
-    out.mkdir(parents=True, exist_ok=True)
+    print(journey(cases[-1].name, following, bases))
     plot(cases, [firm for firm, _ in logs], following, bases, out / "guided_by_hand.png")
     print(out / "guided_by_hand.png")
     if isinstance(pictures, str):
@@ -187,8 +193,8 @@ def across_the_room(
         k = min(round(t * RATE_HZ), len(log.time) - 1)
         mark = Marks()
         mark.path(log.position[: k + 1 : 10], 0.006, (0.16, 0.44, 0.82, 1.0))
-        # 1 N is 0.1 m.
-        mark.arrow(log.position[k], log.position[k] + 0.1 * log.force[k], 0.012, (0.85, 0.15, 0.15, 1.0))
+        # 1 N is 0.15 m.
+        mark.arrow(log.position[k], log.position[k] + 0.15 * log.force[k], 0.014, (0.85, 0.15, 0.15, 1.0))
         marks.append(mark)
     middle = log.position[0, :2]
     view = Camera((middle[0], middle[1] + 0.3, 0.45), 3.5, 200.0, -38.0)
@@ -202,33 +208,35 @@ def _rms(rows: np.ndarray) -> float:
 def table(cases: Sequence[Case], logs: Sequence[Sequence[HandLog]], truth: Payload) -> str:
     """Forces for the same motion, and what softer hands make of it."""
     lines = [
-        f"\nweight of the payload {9.81 * truth.mass_kg:.1f} N; handle moved by 60 mm aside, 40 mm up and 6 deg, and back",
-        "                                  the same motion: force [N]   moment [N m]   | hands of 1 kN/m:"
+        f"\nweight of the payload {9.81 * truth.mass_kg:.1f} N; handle moved 60 mm aside, 40 mm up, by 6 deg, and back",
+        "                                     the same motion: force [N]   moment [N m]   | hands of 1 kN/m:"
         "   at the hold, off by",
-        "robots                             peak    rms   at hold       peak   at hold  | force rms [N]"
+        "robots                                peak    rms   at hold       peak   at hold  | force rms [N]"
         "     height    angle",
     ]
     for case, (firm, soft) in zip(cases, logs, strict=True):
         move, hold = firm.time >= BEGIN_S, round((BEGIN_S + 3.4) * RATE_HZ)
         force, moment = np.linalg.norm(firm.force, axis=1), np.linalg.norm(firm.moment, axis=1)
         lines.append(
-            f"{case.name:34s} {force[move].max():5.1f}  {_rms(firm.force[move]):5.1f} {force[hold]:9.2f}"
+            f"{case.name:37s} {force[move].max():5.1f}  {_rms(firm.force[move]):5.1f} {force[hold]:9.2f}"
             f"    {moment[move].max():7.2f} {moment[hold]:9.2f}  | {_rms(soft.force[move]):13.1f}"
-            f" {1e3 * (soft.position - soft.intended)[hold, 2]:7.1f} mm {np.rad2deg(np.linalg.norm(soft.tilt[hold])):6.2f} deg"
+            f" {1e3 * (soft.position - soft.intended)[hold, 2]:7.1f} mm"
+            f" {np.rad2deg(np.linalg.norm(soft.tilt[hold])):6.2f} deg"
         )
     return "\n".join(lines)
 
 
-def journey(hand: HandLog, bases: DriveLog) -> str:
+def journey(name: str, hand: HandLog, bases: DriveLog) -> str:
     """What it takes to lead the team through the room."""
     on = hand.time >= 2.0
     travelled = np.linalg.norm(bases.true[-1, :, :2] - bases.true[0, :, :2], axis=-1)
+    way = 1e3 * np.linalg.norm(hand.intended[-1] - hand.intended[0])
+    force, moment = np.linalg.norm(hand.force[on], axis=1), np.linalg.norm(hand.moment[on], axis=1)
+    left = 1e3 * np.linalg.norm((hand.position - hand.intended)[-1])
     return (
-        f"\nbases released, {1e3 * np.linalg.norm(hand.intended[-1] - hand.intended[0]):.0f} mm across the room and 20 deg "
-        f"of yaw in 6 s: force peak {np.linalg.norm(hand.force[on], axis=1).max():.2f} N, rms {_rms(hand.force[on]):.2f} N; "
-        f"moment peak {np.linalg.norm(hand.moment[on], axis=1).max():.2f} N m; bases drove "
-        f"{', '.join(f'{d:.2f}' for d in travelled)} m; at the end the hands are off by "
-        f"{1e3 * np.linalg.norm((hand.position - hand.intended)[-1]):.1f} mm"
+        f"\nbases released ({name}), {way:.0f} mm across the room and 20 deg of yaw in 6 s:\n"
+        f"force peak {force.max():.2f} N, rms {_rms(hand.force[on]):.2f} N; moment peak {moment.max():.2f} N m; "
+        f"bases drove {', '.join(f'{d:.2f}' for d in travelled)} m; at the end the hands are off by {left:.1f} mm"
     )
 
 
@@ -236,23 +244,23 @@ def plot(cases: Sequence[Case], logs: Sequence[HandLog], hand: HandLog, bases: D
     """Force over time of every case, and the way through the room."""
     figure = Figure(figsize=(12, 7.5), layout="constrained")  # without pyplot: no display, no global state
     axes = figure.subplot_mosaic([["force", "force", "room"], ["moment", "moment", "lead"]])
-    colours = ("#6b7280", "#8b5cf6", "#e07b39", "#c2a100", "#2a9d8f", "#2f6fd0")
+    colours = ("#6b7280", "#8b5cf6", "#e07b39", "#c2a100", "#2a9d8f", "#111827", "#2f6fd0")
     for case, log, colour in zip(cases, logs, colours, strict=False):
         on = log.time >= BEGIN_S - 0.5
         axes["force"].plot(log.time[on], np.linalg.norm(log.force[on], axis=1), color=colour, label=case.name)
         axes["moment"].plot(log.time[on], np.linalg.norm(log.moment[on], axis=1), color=colour)
-    axes["force"].set(title="force that the same motion takes [N]", yscale="log", ylim=(0.02, 300))
+    axes["force"].set(title="force that the same motion takes [N]", yscale="log", ylim=(0.02, 3000))
     axes["moment"].set(
         title="moment that the same motion takes [N m]", yscale="log", ylim=(0.005, 100), xlabel="t [s]"
     )
     axes["force"].legend(frameon=False, fontsize=8, ncols=2, loc="upper right")
     for i in range(bases.true.shape[1]):
         axes["room"].plot(*bases.true[:, i, :2].T, color=colours[2], label="bases" if not i else None)
-    axes["room"].plot(*hand.position[:, :2].T, color=colours[5], label="handle")
+    axes["room"].plot(*hand.position[:, :2].T, color=colours[6], label="handle")
     axes["room"].set(title="the way through the room [m]", aspect="equal")
     axes["room"].legend(frameon=False, fontsize=8)
     for k, name in enumerate("xyz"):
-        axes["lead"].plot(hand.time, hand.force[:, k], color=colours[(5, 2, 4)[k]], label=name)
+        axes["lead"].plot(hand.time, hand.force[:, k], color=colours[(6, 2, 4)[k]], label=name)
     axes["lead"].set(title="guiding force, bases following [N]", xlabel="t [s]")
     axes["lead"].legend(frameon=False, fontsize=8)
     for axis in axes.values():

@@ -62,11 +62,12 @@ def plan(start: ArrayLike, legs: Sequence[Leg], rest_s: float, rate_hz: float = 
     Raises:
         InputError: there is no leg, a number is not finite, a duration is not positive or the whole lasts over an hour.
     """
-    stations = np.array([start, *(leg.to for leg in legs)], dtype=float)
     if not legs:
         raise InputError("a plan has no legs; it needs at least one")
-    if stations.shape[1:] != (3,) or not np.isfinite(stations).all():
+    poses = [np.asarray(pose, dtype=float) for pose in (start, *(leg.to for leg in legs))]
+    if not all(pose.shape == (3,) and np.isfinite(pose).all() for pose in poses):
         raise InputError("a plan's poses are not x, y and yaw, all finite; they must be")
+    stations = np.array(poses)
     times = np.array([[leg.duration_s, leg.rest_s] for leg in legs], dtype=float)
     if not (times[:, 0] > 0).all() or not (times[:, 1] >= 0).all() or not rest_s >= 0:
         raise InputError("a leg must last longer than 0 s and a rest 0 s or more")

@@ -19,6 +19,8 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimator.errors import InputError
+
 RENDERERS = ("egl", "osmesa")
 LONGEST_S = 120.0
 
@@ -118,3 +120,17 @@ def render(
             last = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
             failed.append(f"{renderer}: {last[0][:120]}")
     return f"pictures are skipped: MuJoCo cannot render without a screen here ({'; '.join(failed)})"
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder for pictures, before any work is done for them.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(
+            f"{folder}: cannot be made a folder for pictures ({error.strerror or error})"
+        ) from error
