@@ -126,6 +126,15 @@ def test_grids_between_each_other():
     assert error.max() < 2e-5
 
 
+@pytest.mark.parametrize(("late_s", "same"), [(0.9e-6, True), (-0.9e-6, True), (2e-6, False)])
+def test_stamps_within_a_microsecond_are_the_same(late_s, same):
+    log = moving(starts_s=(0.1, 0.1 + late_s))
+    result, report = made(log)
+    assert report.untouched == (True, same)
+    if same:
+        np.testing.assert_array_equal(result.tau[:, 1], log.streams[1].values[: len(result.time), 6:])
+
+
 def test_correction_undoes_offset_and_drift():
     """Against the tone of 5 Hz: at the instants that the estimate stands for to 1e-7, at the true ones to its error."""
     skew = (0.0, 0.0234, -1.71), (0.0, 5e-5, -2e-4)

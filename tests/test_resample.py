@@ -123,7 +123,9 @@ def low_band_amplitude(values: np.ndarray) -> float:
     return float(spectrum[: int(0.2 * len(values)) - 12].max())
 
 
-@pytest.mark.parametrize("rate_hz", [101.3, 110.0, 147.0, 250.0, 333.3, 499.0, 505.0, 640.0, 1000.0, 1003.7])
+@pytest.mark.parametrize(
+    "rate_hz", [101.3, 110.0, 147.0, 210.0, 250.0, 333.3, 499.0, 505.0, 640.0, 1000.0, 1003.7]
+)
 def test_nothing_folds_below_20_hz(rate_hz):
     """Tones from just above 25 Hz to half the native rate, one per channel, leave less than -80 dB there."""
     time = np.arange(round(8 * rate_hz)) / rate_hz
@@ -156,18 +158,26 @@ def test_dropped_samples_at_1_khz():
 # --- blocks and chunks
 
 
-def test_blocks_make_the_same_as_the_whole_signal():
+@pytest.mark.parametrize(("rate_hz", "k"), [(130.0, 4), (1000.0, 10)])
+def test_blocks_make_the_same_as_the_whole_signal(rate_hz, k):
     """Against one spline through all rows and one convolution."""
     rng = np.random.default_rng(2)
-    time = jittered(1000.0, 13.0, 0.2)
+    time = jittered(rate_hz, 13000 / rate_hz, 0.2)
     values = rng.normal(size=(len(time), 9))
     result = one_robot(time, values)
     stamps = np.rint(time * 1e9) * 1e-9
-    fine = make_interp_spline(stamps, values, k=5)(np.arange(int(stamps[-1] * 1000.0 + 1e-6) + 1) / 1000.0)
-    taps = firwin(241, 35.0, window=("kaiser", 0.1102 * (110 - 8.7)), fs=1000.0)
-    expected = np.stack([np.convolve(x, taps, "valid")[::10] for x in fine.T], axis=1)
+    fine = make_interp_spline(stamps, values, k=5)(np.arange(int(stamps[-1] * 100.0 * k) + 1) / (100.0 * k))
+    taps = firwin(24 * k + 1, 35.0, window=("kaiser", 0.1102 * (110 - 8.7)), fs=100.0 * k)
+    expected = np.stack([np.convolve(x, taps, "valid")[::k] for x in fine.T], axis=1)
     np.testing.assert_allclose(result.values[0], expected, rtol=0, atol=1e-11)
     assert result.start_s[0] == pytest.approx(0.12)
+
+
+def test_the_last_sample_is_the_last_instant():
+    time = np.arange(400) / 25.0
+    result = one_robot(time, tones(time, [1.0]))
+    assert grid_s(result)[-1] == pytest.approx(time[-1])
+    np.testing.assert_allclose(result.values[0][-1], tones(time[-1:], [1.0])[0], rtol=0, atol=1e-9)
 
 
 def made_stream(kind: str) -> Samples:
@@ -213,11 +223,13 @@ def test_rows_one_by_one():
 # --- faults that are mended
 
 
-def test_duplicates_are_dropped_and_counted():
+@pytest.mark.parametrize("piece", [1, 1000, 1024, 5000])
+def test_duplicates_are_dropped_and_counted(piece):
     time = np.arange(3000) / 100.0
     values = tones(time, BAND_HZ)
-    rows = np.sort(np.append(np.arange(3000), [5, 5, 999, 1000, 2999]))
-    result = one_robot(time[rows], values[rows], rows=1002)
+    rows = np.sort(np.append(np.arange(3000), [5, 5, 999, 1020, 2999]))
+    assert rows[1023] == rows[1024]  # in two pieces
+    result = one_robot(time[rows], values[rows], rows=piece)
     np.testing.assert_array_equal(result.values[0], values)
     assert (result.reports[0].duplicates, result.reports[0].samples) == (5, 3005)
 
@@ -236,8 +248,9 @@ def test_a_stream_that_leaves_the_grid_is_read_again():
     time = np.arange(9000) / 100.0
     time[5000:] += 3e-5 * np.arange(4000) / 100.0  # a clock that is adjusted
     log = ArrayLog([stream(np.arange(9000) / 100.0, tones(time, [1.0])), stream(time, tones(time, [1.0]))])
-    result = resample(log)
-    assert log.reads == 2
+    progress = []
+    result = resample(log, advance=progress.append)
+    assert (log.reads, sum(progress)) == (2, log.size)
     assert [report.method for report in result.reports] == ["untouched", "interpolated"]
     np.testing.assert_array_equal(result.values[0], log.streams[0].values)
     np.testing.assert_allclose(result.values[1], tones(grid_s(result, 1), [1.0]), rtol=0, atol=1e-5)
