@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -30,8 +31,15 @@ def run(options: Replay) -> None:
     _check_rerun()
     import rerun as rr
 
-    from mocobot_sim.replay.outputs import has_display, save_replay, serve_replay, show_replay
+    from mocobot_sim.replay.outputs import (
+        check_enabled,
+        has_display,
+        save_replay,
+        serve_replay,
+        show_replay,
+    )
 
+    check_enabled()
     if options.save is None and not options.web and not has_display():
         raise InputError(
             "there is no display to open the viewer on; write a file with --save replay.rrd, or serve it to a browser "
@@ -76,6 +84,7 @@ def _check(options: Replay) -> None:
 
 def _check_rerun() -> None:
     """Refuse in one sentence if Rerun is missing, or is not the version that this code speaks to."""
+    os.environ.setdefault("RUST_LOG", "off")  # or the SDK repeats in its own words what we say in one sentence
     try:
         import rerun
         from rerun.chunk import RrdReader  # noqa: F401

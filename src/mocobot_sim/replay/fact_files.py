@@ -57,6 +57,11 @@ def read_estimate(path: Path) -> PayloadEstimate:
         _check(estimate)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
+    except (
+        IndexError,
+        OverflowError,
+    ) as error:  # pairs of robots that are not there, numbers beyond all bounds
+        raise InputError(f"{path}: not a complete estimate ({type(error).__name__}: {error})") from error
     return estimate
 
 

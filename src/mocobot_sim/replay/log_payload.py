@@ -9,9 +9,10 @@ from scipy.spatial.transform import Rotation
 from mocobot_sim.replay import colours
 from mocobot_sim.replay.body_facts import BodyFacts
 from mocobot_sim.replay.colours import Colour
-from mocobot_sim.replay.log_robots import FRAME_M, log_label, log_shape
+from mocobot_sim.replay.log_robots import log_label, log_shape
 from mocobot_sim.replay.log_time import send_poses
 from mocobot_sim.replay.replay_trial import ReplayTrial
+from mocobot_sim.replay.sizes import FRAME_M
 
 
 def log_payload(stream: rr.RecordingStream, trial: ReplayTrial) -> None:

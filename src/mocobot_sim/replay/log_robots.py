@@ -14,13 +14,10 @@ from mocobot_sim.replay.diagnosis import Cause
 from mocobot_sim.replay.log_time import send, send_poses
 from mocobot_sim.replay.replay_trial import ReplayTrial
 from mocobot_sim.replay.robot import PATHS, fixed_frames, robot_shapes
+from mocobot_sim.replay.sizes import FORCE_M_PER_N, MARK_M
 
 Array = NDArray[np.float64]
 
-FORCE_M_PER_N = 0.006
-"""Length of a drawn force."""
-FRAME_M = 0.10
-"""Length of a drawn frame's axes."""
 TINTED = ("proximal1", "proximal2", "proximal3")
 """Bodies drawn in their robot's colour, which its series have, too."""
 TRAIL_HZ = 25.0
@@ -67,8 +64,8 @@ def log_causes(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
             position = trial.facts.p_1c
         path = f"{trial.name}/{place}/cause"
         label = ", ".join(f"! {cause.name}" for cause in causes)
-        stream.log(path, rr.Points3D([position], colors=[colours.FAULT], radii=0.06), static=True)
-        log_label(stream, f"{path}/name", position, label, colours.FAULT)
+        stream.log(path, rr.Points3D([position], colors=[colours.FAULT], radii=MARK_M), static=True)
+        log_label(stream, f"{path}/name", position + np.array([0.0, 0.0, 2.0 * MARK_M]), label, colours.FAULT)
 
 
 def log_label(

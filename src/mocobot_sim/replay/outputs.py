@@ -10,6 +10,7 @@ import uuid
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from urllib.parse import quote
 
 import rerun as rr
 from rerun.chunk import RrdReader
@@ -22,6 +23,8 @@ Progress = Callable[[int], object] | None
 
 WEB_PORT, DATA_PORT = 9090, 9876
 """Ports of the web viewer and of its data: Rerun's own."""
+FLUSH_S = 20.0
+"""How long a viewer may take to accept everything; a long recording takes it one."""
 
 
 def has_display() -> bool:
@@ -29,6 +32,18 @@ def has_display() -> bool:
     return not sys.platform.startswith("linux") or bool(
         os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
     )
+
+
+def check_enabled() -> None:
+    """Find out that Rerun is switched off, when it takes everything and keeps nothing.
+
+    Raises:
+        InputError: it is.
+    """
+    if not rr.is_enabled(new_stream()):
+        raise InputError(
+            f"RERUN is {os.environ.get('RERUN', '')!r} in the environment, which turns Rerun off; unset it"
+        )
 
 
 def save_replay(trials: Sequence[ReplayTrial], path: Path, progress: Progress = None) -> None:
@@ -41,7 +56,7 @@ def save_replay(trials: Sequence[ReplayTrial], path: Path, progress: Progress = 
     try:
         with open(temporary, "xb"):  # the SDK's message would name the temporary file
             pass
-        stream = _enabled_stream()
+        stream = new_stream()
         stream.save(temporary)
         log_replay(stream, trials, progress)
         stream.flush()
@@ -50,6 +65,8 @@ def save_replay(trials: Sequence[ReplayTrial], path: Path, progress: Progress = 
         os.replace(temporary, path)
     except OSError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+    except RuntimeError as error:  # the SDK's writer, which does not say what the system told it
+        raise InputError(f"{path}: cannot be written ({_line(error)}); is the disk full?") from error
     finally:
         with contextlib.suppress(OSError):
             temporary.unlink(missing_ok=True)
@@ -61,12 +78,12 @@ def show_replay(trials: Sequence[ReplayTrial], progress: Progress = None) -> Non
     Raises:
         InputError: the viewer does not start.
     """
-    stream = _enabled_stream()
+    stream = new_stream()
     beside = shutil.which("rerun", path=str(Path(sys.executable).parent))
     try:
-        stream.spawn(executable_path=beside, hide_welcome_screen=True)
+        rr.spawn(executable_path=beside, hide_welcome_screen=True, recording=stream)
         log_replay(stream, trials, progress)
-        stream.flush(timeout_sec=60.0)
+        stream.flush(timeout_sec=FLUSH_S)
     except (RuntimeError, ValueError, OSError) as error:
         raise InputError(
             f"the Rerun viewer does not open ({_line(error)}); write a file with --save, or use --web"
@@ -83,26 +100,17 @@ def serve_replay(trials: Sequence[ReplayTrial], progress: Progress = None) -> tu
     Raises:
         InputError: the servers do not start; another one may be using their ports.
     """
-    stream = _enabled_stream()
+    stream = new_stream()
     try:
         data = stream.serve_grpc()
         rr.serve_web_viewer(web_port=WEB_PORT, open_browser=has_display(), connect_to=data)
         log_replay(stream, trials, progress)
-        stream.flush(timeout_sec=60.0)
+        stream.flush(timeout_sec=FLUSH_S)
     except (RuntimeError, ValueError, OSError) as error:
         raise InputError(
             f"the replay cannot be served ({_line(error)}); is another one running on ports {WEB_PORT} and {DATA_PORT}?"
         ) from error
-    return stream, f"http://localhost:{WEB_PORT}?url={data.replace(':', '%3A').replace('/', '%2F')}"
-
-
-def _enabled_stream() -> rr.RecordingStream:
-    stream = new_stream()
-    if not rr.is_enabled(stream):
-        raise InputError(
-            f"RERUN is {os.environ.get('RERUN', '')!r} in the environment, which turns Rerun off; unset it"
-        )
-    return stream
+    return stream, f"http://localhost:{WEB_PORT}?url={quote(data, safe='')}"
 
 
 def _check_complete(path: Path) -> None:

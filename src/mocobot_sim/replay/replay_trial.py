@@ -34,8 +34,9 @@ from mocobot_sim.replay.signals import Balance, balance, filtered
 
 Array = NDArray[np.float64]
 
-MISFIT_M = 0.03
-"""Gap between flanges and grasps (rms) above which the grasps are not those of the recording."""
+MISFIT_M, MISFIT_RAD = 0.01, 0.03
+"""Gaps between flanges and grasps (rms) above which something is wrong; robots that were never calibrated show 6 mm
+and 10 mrad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,10 +124,11 @@ def replay_trial(
     else:
         bases = place_bases(R_bi, wrist, grasps, height)
         motion = payload_motion(R_bi, wrist, grasps, bases)
-        gap = float(np.sqrt(np.mean(motion.gap_position_m**2)))
-        if gap > MISFIT_M:
+        gap, turn = (float(np.sqrt(np.mean(g**2))) for g in (motion.gap_position_m, motion.gap_rotation_rad))
+        if gap > MISFIT_M or turn > MISFIT_RAD:
             notes.append(
-                f"The grasps do not fit this recording: flanges and grasps are {1e3 * gap:.0f} mm apart (rms)."
+                f"The grasps do not fit this recording: flanges and grasps are {1e3 * gap:.0f} mm and "
+                f"{1e3 * turn:.0f} mrad apart (rms)."
             )
     data = filtered(recording, notes)
     return ReplayTrial(

@@ -9,8 +9,8 @@ from scipy.spatial.transform import Rotation
 from mocobot_sim.replay import colours
 from mocobot_sim.replay.colours import Colour
 from mocobot_sim.replay.diagnosis import VERDICTS, Diagnosis
-from mocobot_sim.replay.log_robots import FORCE_M_PER_N
 from mocobot_sim.replay.replay_trial import ReplayTrial
+from mocobot_sim.replay.sizes import FORCE_M_PER_N
 
 Array = NDArray[np.float64]
 
@@ -34,7 +34,7 @@ def summary(trial: ReplayTrial) -> str:
 
 def _verdict(diagnosis: Diagnosis) -> str:
     lines = [f"**Diagnosis: {VERDICTS[diagnosis.verdict]}.**"]
-    lines += [f"- **{cause.name}**: {_plain(cause.sentence)}" for cause in diagnosis.causes]
+    lines += [f"- **{_plain(cause.name)}**: {_plain(cause.sentence)}" for cause in diagnosis.causes]
     if not diagnosis.causes:
         lines.append("No cause is named.")
     return lines[0] + "\n\n" + "\n".join(lines[1:])

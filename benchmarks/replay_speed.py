@@ -1,0 +1,58 @@
+"""Time to log a replay, and size of its file: python benchmarks/replay_speed.py [REC.parquet]
+
+Without a recording, a random trial of 110 s with three robots is simulated; `nominal` sensors repeat values, `ideal`
+ones never do, so that their file is as large as such a trial's can be. Reading and estimating are not counted.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from estimator.estimate import estimate_payload
+from estimator.recording import Recording, read_recording
+from mocobot_sim.replay.outputs import save_replay
+from mocobot_sim.replay.replay_trial import replay_trial
+from mocobot_sim.sensors import sensor_preset
+from mocobot_sim.simulate import TrialRequest, simulate
+
+RUNS = 5
+
+
+def measure(recording: Recording) -> tuple[list[float], list[float], float]:
+    """Seconds to work out what is drawn, seconds to log and write it, and the file's size [MB]."""
+    estimate = estimate_payload([recording])
+    prepare, write = [], []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "replay.rrd"
+        for _ in range(RUNS):
+            start = time.perf_counter()
+            trial = replay_trial(recording, "trial", estimate)
+            ready = time.perf_counter()
+            save_replay([trial], path)
+            prepare.append(ready - start)
+            write.append(time.perf_counter() - ready)
+        return prepare, write, path.stat().st_size / 1e6
+
+
+def main() -> None:
+    """Print times and sizes."""
+    if sys.argv[1:]:
+        recordings = {sys.argv[1]: read_recording(sys.argv[1])}
+    else:
+        presets = [sensor_preset(name) for name in ("nominal", "ideal")]
+        recordings = simulate(TrialRequest("a", "random"), presets).recordings
+    for name, recording in recordings.items():
+        prepare, write, size = measure(recording)
+        total = sorted(p + w for p, w in zip(prepare, write, strict=True))
+        print(
+            f"{name}: {recording.time[-1] - recording.time[0]:.1f} s, {recording.metadata.robots} robots: "
+            f"prepare {min(prepare):.2f} s, log and write {min(write):.2f} s, together {total[0]:.2f} .. "
+            f"{total[-1]:.2f} s of {RUNS}; {size:.1f} MB"
+        )
+
+
+if __name__ == "__main__":
+    main()
