@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from array_log import ArrayLog, stream, tones
 from estimator.errors import InputError
@@ -37,7 +39,7 @@ def retimed(row: int, time_s: float) -> Samples:
 
 
 @pytest.mark.parametrize("rows", [1, 700, 3000])
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e300])
 def test_a_value_that_is_no_number(value, rows):
     message = refusal(GOOD, changed(1234, 5, value), rows=rows)
     assert f"robot 2: theta_x is {value} in row 1234, 12.34 s after its first sample" in message
@@ -147,3 +149,34 @@ def test_crowding_rows_are_refused_before_anything_is_made_of_them():
     time[1::2] += 1e-6
     message = refusal(stream(time, VALUES[:16]))
     assert "allowed" in message or "within a quarter" in message
+
+
+STEPS_NS = st.sampled_from(
+    [10**7] * 12 + [10**7 + 300_000, 10**7 - 700_000, 2 * 10**7, 10**6, 1, 0, -1, 6 * 10**7, 10**12, 2**61]
+)
+
+
+@settings(max_examples=150, deadline=None)
+@given(
+    steps=st.lists(st.lists(STEPS_NS, min_size=0, max_size=60), min_size=1, max_size=3),
+    spoil=st.sampled_from([0.0, 0.0, 0.0, np.nan, 1e99]),
+    repeat=st.booleans(),
+    rows=st.integers(1, 70),
+)
+def test_whatever_comes_ends_in_numbers_or_one_sentence(steps, spoil, repeat, rows):
+    streams = []
+    for robot in steps:
+        stamp = np.cumsum(np.array([0, *robot], np.int64))  # may wrap around
+        values = np.outer(np.ones(9) if repeat else np.arange(9.0), np.ones(len(stamp))).T
+        values[len(stamp) // 2, 3] += spoil
+        streams.append(Samples(stamp, values))
+    message, result = "", None
+    try:
+        result = resample(ArrayLog(streams, rows))
+    except InputError as error:
+        message = str(error)
+    if result is None:
+        assert message.startswith("made.log: ")
+        assert len(message) < 400
+    else:
+        assert all(np.isfinite(values).all() and len(values) >= 16 for values in result.values)

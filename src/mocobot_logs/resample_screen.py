@@ -10,6 +10,8 @@ from mocobot_logs.log import NS, Array, Samples, Stamps
 
 LONGEST_S = 1e8
 """Three years [s]: whatever lasts longer is two clocks, and nanoseconds of it would overflow."""
+LARGEST = 1e100
+"""Larger values are no measurements, and arithmetic would overflow."""
 
 
 class Screen:
@@ -47,7 +49,7 @@ class Screen:
         same = stamp == before
         same[0] &= self._last is not None
         repeats = same & np.all(values == above, axis=1)
-        finite = np.isfinite(values).all(axis=1)
+        finite = _is_number(values).all(axis=1)
         bad = ~finite | (stamp < before) | (same & ~repeats) | self._leaps(stamp, before)
         if bad.any():
             self._refuse(int(np.argmax(bad)), stamp, before, values, above)
@@ -73,11 +75,11 @@ class Screen:
         row = self.rows + k
         assert self.first_ns is not None
         here = f"row {row}, {_seconds(int(stamp[k]) - self.first_ns)} s after its first sample"
-        faulty = np.flatnonzero(~np.isfinite(values[k]))
+        faulty = np.flatnonzero(~_is_number(values[k]))
         if len(faulty):
             raise InputError(
                 f"{self._where}: {self._channels[faulty[0]]} is {values[k, faulty[0]]} in {here}; "
-                "every value must be a finite number"
+                f"every value must be a finite number, smaller than {LARGEST:g}"
             )
         if stamp[k] < before[k]:
             raise InputError(
@@ -94,6 +96,10 @@ class Screen:
             f"{self._where}: time leaps by {_seconds(int(stamp[k]) - int(before[k]))} s in {here}; "
             "all stamps of a robot must come from one clock"
         )
+
+
+def _is_number(values: Array) -> NDArray[np.bool_]:
+    return np.abs(values) < LARGEST  # false for NaN
 
 
 def _seconds(ns: int) -> str:
