@@ -148,6 +148,29 @@ def test_transient_in_place_is_found_and_noise_alone_is_not():
     assert [c.cause for c in overfit.rejected] in ([], ["push"])
 
 
+def test_short_transient_with_a_tolerance_is_tested_inside_its_interval():
+    """It is there for 2 s; taking out the trial's own unknowns leaves a trace of its columns in all 10 s of it."""
+
+    class ShortRig(FakeRig):
+        def _burst_columns(self, t, candidate):
+            columns = super()._burst_columns(t, candidate)
+            columns[:50], columns[76:] = 0.0, 0.0
+            return columns
+
+        def transients(self, remaining):
+            return [cause("push", None, 0.2, 2, "push", super().transients(remaining)[0].detail)]
+
+    rig = ShortRig({}, burst=(1, 0.0, 2))
+    push = rig.transients([])[0]
+    x, local, shared = rig.data[1]
+    rig.data[1] = x + rig.columns(push)[1] @ np.array([4.0, -3.0]), local, shared
+    explanation = search(rig)
+    assert names(explanation.found) == ["push"]
+    assert len(explanation.found[0].folds) == 4
+    assert min(explanation.found[0].folds) > 0.1 * sum(explanation.found[0].folds)  # each has a share of it
+    np.testing.assert_allclose(explanation.found[0].values, [4.0, -3.0], atol=0.6)
+
+
 def test_overfit_transient_is_rejected_by_blocks_left_out():
     """A hundred columns always find something in 200 numbers of a large misfit; what they find does not carry over."""
     rig = FakeRig({}, burst=(1, 30.0, 100))

@@ -227,8 +227,8 @@ def test_causes_that_are_no_errors_of_readings_leave_signals_alone(case, name):
     assert cause.undo(case.signals, case.linear, 0, 0, values, shape) is None
 
 
-def test_friction_at_rest_is_an_unknown_of_its_own(case):
-    """A joint stands still from 6 s to 8 s: one unknown torque for that while, and none for one that moves on."""
+def test_friction_at_rest_takes_any_force_that_changes_slowly(case):
+    """A joint stands still from 6 s to 8 s: a torque that drifts then is an unknown, and none while it moves on."""
     s = case.signals
     frozen = s.phi.copy()
     start, stop = 600, 800
@@ -238,12 +238,14 @@ def test_friction_at_rest_is_an_unknown_of_its_own(case):
     cause = CAUSES["joint_friction"]
     unknowns = cause.unknowns(linear, 1, 0, {"slow_rad_per_s": 1e-3})
     moves = cause.unknowns(case.linear, 1, 0, {"slow_rad_per_s": 1e-3})
-    torque = np.zeros((len(s.time), 3))
-    torque[start + 5 : stop - 5, 0] = 1.0
-    expected = case.linear.of_signals(1, tau=torque)
-    best = max(unknowns, key=lambda u: np.abs(u).sum())
-    assert len(unknowns) == len(moves) + 1
-    assert np.linalg.norm(best - expected) < 0.35 * np.linalg.norm(expected)
+    assert len(moves) < len(unknowns) <= len(moves) + 6  # 2 s, a knot every half second
+    added = np.stack([u.ravel() for u in unknowns], axis=1)
+    for drift in (0.0, 0.7):
+        torque = np.zeros((len(s.time), 3))
+        torque[start + 5 : stop - 5, 0] = 1.0 - drift * np.linspace(0.0, 1.0, stop - start - 10)
+        expected = case.linear.of_signals(1, tau=torque).ravel()
+        left = expected - added @ np.linalg.lstsq(added, expected, rcond=None)[0]
+        assert np.linalg.norm(left) < 0.35 * np.linalg.norm(expected)
 
 
 def team_of(case, robots):

@@ -12,6 +12,8 @@ from discrepancy.rig import Candidate
 
 SHORT_ROWS = 24
 """A transient of fewer rows (2 s) cannot be split and tested on its own; its evidence has to do."""
+INSIDE = 0.1
+"""Rows that a transient reaches at all: taking out a trial's own unknowns spreads a trace of it everywhere."""
 FOLDS = 0.75
 """Share of the trials on which a cause must help when it was fitted to the others."""
 
@@ -67,9 +69,10 @@ def shares(problem: Problem, free: Sequence[int], index: int) -> tuple[float, fl
 def _interleaved(
     problem: Problem, free: Sequence[int], index: int, trial: int, blocks: int = 4
 ) -> list[float]:
-    """The same within the trial of a transient: fitted to all but every fourth block of it."""
+    """The same within the trial of a transient, against none at all: fitted to all but every fourth block of it."""
     rows = problem.rows[trial]
-    inside = np.flatnonzero(np.abs(rows[..., problem.spans[index]]).sum(axis=(1, 2)) > 1e-6)
+    size = np.abs(rows[..., problem.spans[index]]).sum(axis=(1, 2))
+    inside = np.flatnonzero(size > INSIDE * size.max())
     if len(inside) < SHORT_ROWS:
         return []
     width = max(1, len(inside) // (2 * blocks))
@@ -80,8 +83,8 @@ def _interleaved(
         apart = np.einsum("nck,ncl->kl", rows[out], rows[out], optimize=True)
         gram = problem.grams.sum(axis=0) - apart
         ends = []
-        for chosen in (tuple(free), (*free, index)):
-            x = np.append(-Fit.of(problem, gram, chosen).coefficients, 1.0)
+        for fit in (Fit.of(problem, gram, tuple(free), held=(index,)), Fit.of(problem, gram, (*free, index))):
+            x = np.append(-fit.coefficients, 1.0)
             ends.append(float(x @ apart @ x))
         gains.append(ends[0] - ends[1])
     return gains

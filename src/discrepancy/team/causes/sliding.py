@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -11,6 +13,7 @@ from estimator.filtering import differentiate, low_pass
 Array = NDArray[np.float64]
 
 SHORTEST_REST_S = 0.15
+KNOTS_S = 0.5
 
 
 def sliding(x: Array, rate_hz: float, slow: float) -> tuple[Array, Array]:
@@ -23,13 +26,20 @@ def sliding(x: Array, rate_hz: float, slow: float) -> tuple[Array, Array]:
 
 
 def rests(x: Array, rate_hz: float, slow: float) -> list[Array]:
-    """One indicator (Q,) per interval of rest: there friction has an unknown value of its own."""
+    """Columns (Q,) of what friction does while it holds: any force that it takes, as it changes with the load.
+
+    Per interval of rest, straight lines between knots at most ``KNOTS_S`` apart.
+    """
     still = np.abs(sliding(x, rate_hz, slow)[0]) < 1.0
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int))).reshape(-1, 2)
     out = []
     for start, stop in edges:
-        if stop - start >= SHORTEST_REST_S * rate_hz:
-            indicator = np.zeros(len(x))
-            indicator[start:stop] = 1.0
-            out.append(indicator)
+        if stop - start < SHORTEST_REST_S * rate_hz:
+            continue
+        pieces = math.ceil((stop - start) / rate_hz / KNOTS_S)
+        knots = np.linspace(start, stop - 1, pieces + 1)
+        for unit in np.eye(pieces + 1):
+            column = np.zeros(len(x))
+            column[start:stop] = np.interp(np.arange(start, stop), knots, unit)
+            out.append(column)
     return out
