@@ -114,6 +114,7 @@ def test_one_axis_of_the_frames_is_enough():
 # --- standard errors
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("shade", ["white", "slow"])
 def test_standard_errors_hold(shade):
     """The same motion again and again with new noise: what is claimed is what is found."""
