@@ -11,6 +11,9 @@ from mcap_ros2.writer import Writer as Ros2Writer
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
+from mocobot_logs.bag_read import open_bag
+from mocobot_logs.log import CHANNELS, collect
+
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
 JOINT_STATE = "sensor_msgs/msg/JointState"
 POINT = "geometry_msgs/msg/PointStamped"
@@ -106,6 +109,12 @@ class Team:
         ]
         return sorted(every, key=lambda s: s.log_ns)
 
+    def places(self):
+        """Robot, sample and message, in the order of ``said``."""
+        every = [(robot, k) for robot in range(len(self.stamps)) for k in range(self.stamps.shape[1])]
+        every.sort(key=lambda place: self.log_ns(*place))
+        return [(*place, message) for place, message in zip(every, self.said(), strict=True)]
+
     def wrist(self, robot):
         """Channels h, theta (z, y, x), force."""
         place = [OMNID.index(name) for name in ("x", "y", "z", "gimbal_z", "gimbal_y", "gimbal_x")]
@@ -167,8 +176,34 @@ def record(opcode: int, content: bytes, claim: int | None = None) -> bytes:
     return struct.pack("<BQ", opcode, len(content) if claim is None else claim) + content
 
 
+def wrist_map(field="position", **more):
+    """The map of an Omnid, to change."""
+    topic = "/omnid{robot}/joint/joint_states"
+    channels = {
+        **{f"h_{a}": {"joint": a, "field": field, "unit": "m"} for a in "xyz"},
+        **{f"theta_{a}": {"joint": f"gimbal_{a}", "field": "position", "unit": "rad"} for a in "xyz"},
+        **{f"force_{a}": {"joint": a, "field": "effort", "unit": "N"} for a in "xyz"},
+    }
+    return {"version": 1, "level": "wrist", "defaults": {"topic": topic}, "channels": channels, **more}
+
+
 UNCHUNKED = {"use_chunking": False}
 NO_SUMMARY = {
     "use_chunking": False, "index_types": IndexType.NONE, "repeat_channels": False, "repeat_schemas": False,
     "use_statistics": False, "use_summary_offsets": False,
 }  # fmt: skip
+
+
+def assert_holds(path, team, log_map=None):
+    source = open_bag(path, log_map)
+    log = collect(source)
+    assert (log.level, log.robots, log.channels) == ("wrist", len(team.stamps), CHANNELS["wrist"])
+    for robot, stream in enumerate(log.streams):
+        np.testing.assert_array_equal(stream.stamp_ns, team.stamps[robot])
+        np.testing.assert_array_equal(stream.values, team.wrist(robot))
+        logged = [team.log_ns(robot, k) for k in range(len(stream.stamp_ns))]
+        np.testing.assert_array_equal(stream.log_ns, logged)
+    told = []
+    list(source.chunks(told.append))
+    assert sum(told) == source.size
+    assert min(told) >= 0

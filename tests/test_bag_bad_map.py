@@ -4,7 +4,7 @@ import numpy as np
 
 import bags
 from bag_refusals import TEAM, refuses
-from bags import Team, raw_mcap, said
+from bags import Team, raw_mcap, said, wrist_map
 from mocobot_logs.bag_write import write_bag
 from mocobot_logs.map_parse import parse_map
 from mocobot_logs.maps import builtin_map
@@ -40,19 +40,9 @@ def test_robots_that_are_missing(tmp_path):
         path,
         "there are topics of robots 1 and 3, but none of robot 2; robots are counted from 1 without a gap",
     )
-    fewer = parse_map({"robots": 4, **_map()}, "test")
+    fewer = parse_map({"robots": 4, **wrist_map()}, "test")
     whole = raw_mcap(tmp_path / "b.mcap", TEAM.said())
     refuses(whole, "no topic '/omnid4/joint/joint_states' for h_x of robot 4 by map test", fewer)
-
-
-def _map(field="position", **more):
-    topic = "/omnid{robot}/joint/joint_states"
-    channels = {
-        **{f"h_{a}": {"joint": a, "field": field, "unit": "m"} for a in "xyz"},
-        **{f"theta_{a}": {"joint": f"gimbal_{a}", "field": "position", "unit": "rad"} for a in "xyz"},
-        **{f"force_{a}": {"joint": a, "field": "effort", "unit": "N"} for a in "xyz"},
-    }
-    return {"version": 1, "level": "wrist", "defaults": {"topic": topic}, "channels": channels, **more}
 
 
 def test_joints_that_are_missing(tmp_path):
@@ -86,7 +76,7 @@ def test_efforts_that_are_missing(tmp_path):
     refuses(
         raw_mcap(tmp_path / "b.mcap", TEAM.said()),
         r"joint 'x', wanted for h_x of robot 1, has no velocity in every message",
-        parse_map(_map("velocity"), "test"),
+        parse_map(wrist_map("velocity"), "test"),
     )
 
 
@@ -105,7 +95,7 @@ def test_messages_of_another_type(tmp_path):
         r"topic /omnid1/joint/joint_states holds geometry_msgs/msg/PointStamped; a map's key joint goes with "
         r"sensor_msgs/msg/JointState, and a dotted path as field with other messages",
     )
-    by_path = _map()
+    by_path = wrist_map()
     for k, table in enumerate(by_path["channels"].values()):
         del table["joint"]
         table["field"] = f"point.w{k}"
@@ -147,7 +137,7 @@ def test_metadata_of_the_recording(tmp_path):
     path = raw_mcap(tmp_path / "a.mcap", [said("/mocobot/metadata", 1, bags.text("{}")), *TEAM.said()])
     refuses(path, "/mocobot/metadata: missing key|/mocobot/metadata: .*format")
     write_bag(small_recording(rows=20), tmp_path / "b.mcap")
-    two = parse_map({"robots": 2, **_map()}, "test")
+    two = parse_map({"robots": 2, **wrist_map()}, "test")
     refuses(tmp_path / "b.mcap", "/mocobot/metadata: robots is 3, but the bag has topics of 2", two)
     broken = bags.Said("/mocobot/metadata", 1, "std_msgs/msg/String", b"\0\1\0\0\xff\xff\xff\xff")
     path = raw_mcap(tmp_path / "c.mcap", [broken, *TEAM.said()])

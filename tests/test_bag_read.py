@@ -1,38 +1,24 @@
 """Bags that other libraries wrote, read back equal to what was put in and to what the libraries read."""
 
 import io
+import sqlite3
+import tracemalloc
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
+from mcap.writer import Writer as McapWriter
 from mcap_ros2.decoder import DecoderFactory
 from rosbags.highlevel import AnyReader
 
 import bags
-from bags import EPOCH_NS, NO_SUMMARY, OMNID, UNCHUNKED, Team, raw_mcap, rosbags_bag, said
+from bags import NO_SUMMARY, OMNID, UNCHUNKED, Team, raw_mcap, rosbags_bag, said
 from estimator.errors import InputError
 from mocobot_logs.bag_read import is_bag, open_bag
-from mocobot_logs.log import CHANNELS, REF, collect
-from mocobot_logs.map_parse import parse_map
-from mocobot_logs.maps import builtin_map
+from mocobot_logs.log import collect
 
 TEAM = Team.draw()
-
-
-def assert_holds(path, team, log_map=None):
-    source = open_bag(path, log_map)
-    log = collect(source)
-    assert (log.level, log.robots, log.channels) == ("wrist", len(team.stamps), CHANNELS["wrist"])
-    for robot, stream in enumerate(log.streams):
-        np.testing.assert_array_equal(stream.stamp_ns, team.stamps[robot])
-        np.testing.assert_array_equal(stream.values, team.wrist(robot))
-        logged = [team.log_ns(robot, k) for k in range(len(stream.stamp_ns))]
-        np.testing.assert_array_equal(stream.log_ns, logged)
-    told = []
-    list(source.chunks(told.append))
-    assert sum(told) == source.size
-    assert min(told) >= 0
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
@@ -41,15 +27,15 @@ def assert_holds(path, team, log_map=None):
 def test_bags_of_rosbags(tmp_path, storage, compression, version):
     path = rosbags_bag(tmp_path / "bag", TEAM.said(), storage, compression, version)
     assert is_bag(path)
-    assert_holds(path, TEAM)
+    bags.assert_holds(path, TEAM)
     if compression != "message":  # nothing but metadata.yaml tells that messages are compressed
         (single,) = (entry for entry in path.iterdir() if entry.suffix != ".yaml")
         assert is_bag(single)
-        assert_holds(single, TEAM)
+        bags.assert_holds(single, TEAM)
 
 
 def test_chunks_that_rosbags_compresses(tmp_path):
-    assert_holds(rosbags_bag(tmp_path / "bag", TEAM.said(), "mcap", "storage"), TEAM)
+    bags.assert_holds(rosbags_bag(tmp_path / "bag", TEAM.said(), "mcap", "storage"), TEAM)
 
 
 def test_the_library_reads_the_same(tmp_path):
@@ -80,7 +66,7 @@ def test_files_of_mcap_ros2_support(tmp_path):
             }
             messages.append((bags.topic(robot + 1), TEAM.log_ns(robot, k), bags.JOINT_STATE, fields))
     path = bags.mcap_ros2_bag(tmp_path / "lab.mcap", messages)
-    assert_holds(path, TEAM)
+    bags.assert_holds(path, TEAM)
     log = collect(open_bag(path, None))
     reader = make_reader(io.BytesIO(path.read_bytes()), decoder_factories=[DecoderFactory()])
     theirs = [m.decoded_message.position[0] for m in reader.iter_decoded_messages(topics=[bags.topic(2)])]
@@ -102,7 +88,7 @@ def test_files_of_mcap_ros2_support(tmp_path):
     ],
 )
 def test_every_kind_of_mcap_file(tmp_path, options):
-    assert_holds(raw_mcap(tmp_path / "a.mcap", TEAM.said(), **options), TEAM)
+    bags.assert_holds(raw_mcap(tmp_path / "a.mcap", TEAM.said(), **options), TEAM)
 
 
 def test_loose_messages_longer_than_a_window(tmp_path):
@@ -110,13 +96,13 @@ def test_loose_messages_longer_than_a_window(tmp_path):
     team = Team.draw(robots=1, rows=300)
     big = said("/image", team.log_ns(0, 7), bags.text("p" * 300_000))
     messages = sorted([*team.said(frame="f" * 777), big], key=lambda s: s.log_ns)
-    assert_holds(raw_mcap(tmp_path / "a.mcap", messages, **UNCHUNKED), team)
+    bags.assert_holds(raw_mcap(tmp_path / "a.mcap", messages, **UNCHUNKED), team)
 
 
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_large_messages_of_other_topics_do_not_matter(tmp_path, storage):
     huge = said("/points", int(TEAM.stamps[0, 0]), bags.text("p" * (17 << 20)))
-    assert_holds(rosbags_bag(tmp_path / "bag", [huge, *TEAM.said()], storage), TEAM)
+    bags.assert_holds(rosbags_bag(tmp_path / "bag", [huge, *TEAM.said()], storage), TEAM)
     # The one topic that is read at once, since it says what the recording is.
     metadata = bags.Said("/mocobot/metadata", 1, huge.kind, huge.data)
     path = rosbags_bag(tmp_path / "bag2", [metadata, *TEAM.said()], storage)
@@ -138,28 +124,19 @@ def test_a_bag_of_several_files(tmp_path, storage):
     told = yaml.read_text()
     yaml.write_text(told.replace(f"  - bag{suffix}\n", f"  - bag/bag{suffix}\n  - bag/bag_1{suffix}\n"))
     assert yaml.read_text() != told
-    assert_holds(path, TEAM)
+    bags.assert_holds(path, TEAM)
 
 
 def test_big_endian(tmp_path):
-    messages = [said(s.topic, s.log_ns, TEAM.message(r, k), little=False) for r, k, s in _places(TEAM)]
-    assert_holds(raw_mcap(tmp_path / "a.mcap", messages), TEAM)
-
-
-def _places(team):
-    order = iter(team.said())
-    every = sorted(
-        ((r, k) for r in range(len(team.stamps)) for k in range(team.stamps.shape[1])),
-        key=lambda p: team.log_ns(*p),
-    )
-    return [(r, k, next(order)) for r, k in every]
+    messages = [said(s.topic, s.log_ns, TEAM.message(r, k), little=False) for r, k, s in TEAM.places()]
+    bags.assert_holds(raw_mcap(tmp_path / "a.mcap", messages), TEAM)
 
 
 def test_layouts_may_change_within_a_topic(tmp_path):
     """Frames of changing length, joints in changing order, velocities or none, both byte orders."""
     rng = np.random.default_rng(4)
     messages = []
-    for robot, k, s in _places(TEAM):
+    for robot, k, s in TEAM.places():
         order = rng.permutation(6)
         message = bags.joint_state(
             TEAM.position[robot, k, order],
@@ -170,7 +147,38 @@ def test_layouts_may_change_within_a_topic(tmp_path):
             frame="f" * int(rng.integers(0, 12)),
         )
         messages.append(said(s.topic, s.log_ns, message, little=bool(rng.integers(2))))
-    assert_holds(raw_mcap(tmp_path / "a.mcap", messages, chunk_size=1 << 20), TEAM)
+    bags.assert_holds(raw_mcap(tmp_path / "a.mcap", messages, chunk_size=1 << 20), TEAM)
+
+
+@pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
+def test_a_topic_that_is_listed_twice(tmp_path, storage):
+    """Recorders list a topic once for each quality of service that its publishers offer."""
+    messages = TEAM.said()
+    if storage == "mcap":
+        path = tmp_path / "a.mcap"
+        with path.open("wb") as file:
+            writer = McapWriter(file)
+            writer.start(profile="ros2")
+            schema = writer.register_schema(
+                bags.JOINT_STATE, "ros2msg", bags.definition(bags.JOINT_STATE).encode()
+            )
+            channels = {
+                t: [writer.register_channel(t, "cdr", schema) for _ in range(2)]
+                for t in map(bags.topic, (1, 2, 3))
+            }
+            for k, s in enumerate(messages):
+                writer.add_message(channels[s.topic][k % 2], s.log_ns, s.data, s.log_ns)
+            writer.finish()
+    else:
+        path = rosbags_bag(tmp_path / "bag", messages, storage) / "bag.db3"
+        connection = sqlite3.connect(path)
+        connection.execute(
+            "INSERT INTO topics SELECT id + 10, name, type, serialization_format, '', type_description_hash FROM topics"
+        )
+        connection.execute("UPDATE messages SET topic_id = topic_id + 10 WHERE id % 2")
+        connection.commit()
+        connection.close()
+    bags.assert_holds(path, TEAM)
 
 
 def test_several_publishers_with_a_part_of_the_joints_each(tmp_path):
@@ -190,186 +198,8 @@ def test_several_publishers_with_a_part_of_the_joints_each(tmp_path):
     np.testing.assert_array_equal(stream.values, want)
 
 
-def test_the_recorders_clock(tmp_path):
-    log_map = parse_map({**MAP, "time": {"clock": "log"}}, "test")
-    # Without stamps, as of a driver that never set them.
-    messages = [said(s.topic, s.log_ns, _unstamped(TEAM, r, k)) for r, k, s in _places(TEAM)]
-    path = raw_mcap(tmp_path / "a.mcap", messages)
-    log = collect(open_bag(path, log_map))
-    for robot, stream in enumerate(log.streams):
-        np.testing.assert_array_equal(stream.stamp_ns, [TEAM.log_ns(robot, k) for k in range(50)])
-    with pytest.raises(InputError, match="the header stamp is zero in every message; with clock = 'log'"):
-        collect(open_bag(path, None))
-
-
-def _unstamped(team, robot, k):
-    return bags.joint_state(team.position[robot, k], team.effort[robot, k], 0)
-
-
-MAP = {
-    "version": 1,
-    "level": "wrist",
-    "defaults": {"topic": "/omnid{robot}/joint/joint_states"},
-    "channels": {
-        **{f"h_{a}": {"joint": a, "field": "position", "unit": "m"} for a in "xyz"},
-        **{f"theta_{a}": {"joint": f"gimbal_{a}", "field": "position", "unit": "rad"} for a in "xyz"},
-        **{f"force_{a}": {"joint": a, "field": "effort", "unit": "N"} for a in "xyz"},
-    },
-}
-
-
-def test_units_signs_and_overrides(tmp_path):
-    changed = {**MAP["channels"], "h_z": {"joint": "z", "field": "position", "unit": "mm", "offset": 250.0}}
-    override = {"2": {"channels": {"theta_y": {"sign": -1, "unit": "deg"}}}}
-    log_map = parse_map({**MAP, "channels": changed, "robot": override}, "test")
-    log = collect(open_bag(raw_mcap(tmp_path / "a.mcap", TEAM.said()), log_map))
-    np.testing.assert_allclose(log.streams[0].values[:, 2], (TEAM.position[0, :, 2] + 250) / 1000, rtol=1e-15)
-    np.testing.assert_allclose(log.streams[1].values[:, 4], -np.radians(TEAM.position[1, :, 4]), rtol=1e-15)
-    np.testing.assert_array_equal(log.streams[0].values[:, 4], TEAM.position[0, :, 4])
-
-
-def test_all_robots_on_one_topic(tmp_path):
-    """Robots that share a topic are counted by the names of their joints."""
-    channels = {
-        key: {**table, "joint": f"omnid{{robot}}_{table['joint']}"} for key, table in MAP["channels"].items()
-    }
-    log_map = parse_map({**MAP, "defaults": {"topic": "/joint_states"}, "channels": channels}, "test")
-    names = [f"omnid{robot}_{name}" for robot in (1, 2, 3) for name in OMNID]
-    messages = [
-        said(
-            "/joint_states",
-            int(TEAM.stamps[0, k]),
-            bags.joint_state(
-                TEAM.position[:, k].ravel(), TEAM.effort[:, k].ravel(), int(TEAM.stamps[0, k]), names
-            ),
-        )
-        for k in range(50)
-    ]
-    log = collect(open_bag(raw_mcap(tmp_path / "a.mcap", messages), log_map))
-    assert log.robots == 3
-    for robot, stream in enumerate(log.streams):
-        np.testing.assert_array_equal(stream.values, TEAM.wrist(robot))
-
-
-@pytest.mark.parametrize("chunk_size", [1, 4096, 1 << 20])
-def test_channels_from_several_topics(tmp_path, chunk_size):
-    """Other messages by dotted path; messages of one robot with one stamp are one sample."""
-    rng = np.random.default_rng(5)
-    team = Team.draw(robots=2)
-    command = rng.normal(size=(2, 50, 3))
-    messages = team.said()
-    for robot in range(2):
-        for k in range(50):
-            if k == 20:
-                continue  # a command that was not sent
-            log_ns = team.log_ns(robot, k) + int(rng.integers(-4_000_000, 4_000_000))
-            message = bags.point(command[robot, k], int(team.stamps[robot, k]))
-            messages.append(said(f"/omnid{robot + 1}/wrist/command", log_ns, message))
-    messages.sort(key=lambda s: s.log_ns)
-    log = collect(open_bag(raw_mcap(tmp_path / "a.mcap", messages, chunk_size=chunk_size), None))
-    assert log.channels == CHANNELS["wrist"] + REF
-    sent = np.arange(50) != 20
-    for robot, stream in enumerate(log.streams):
-        np.testing.assert_array_equal(stream.stamp_ns, team.stamps[robot])
-        np.testing.assert_array_equal(stream.values[:, :9], team.wrist(robot))
-        np.testing.assert_array_equal(stream.values[sent, 9:], command[robot][sent])
-        assert np.isfinite(stream.values).all()  # interpolated
-
-
-def test_commands_that_nobody_sent_are_left_out(tmp_path):
-    """A recorder lists every topic it listened to."""
-    for storage in ("mcap", "sqlite3"):
-        empty = [(f"/omnid{robot}/wrist/command", bags.POINT) for robot in (1, 2, 3)]
-        assert_holds(rosbags_bag(tmp_path / storage, TEAM.said(), storage, empty=empty), TEAM)
-
-
-def test_arrays_by_index(tmp_path):
-    """As microcontrollers publish them: plain arrays without a header."""
-    rng = np.random.default_rng(6)
-    data = rng.integers(-100_000, 100_000, (30, 9))
-    log_map = {
-        "version": 1,
-        "level": "joint",
-        "time": {"clock": "log"},
-        "defaults": {"topic": "/omnid{robot}/raw"},
-        "channels": {
-            name: {"field": f"data[{k}]", "unit": "mNm" if k > 5 else "rad"}
-            for k, name in enumerate(CHANNELS["joint"])
-        },
-    }
-    layout = bags.TYPES.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
-    kind = bags.TYPES.types["std_msgs/msg/Int32MultiArray"]
-    messages = [
-        said("/omnid1/raw", EPOCH_NS + k, kind(layout=layout, data=data[k].astype(np.int32)))
-        for k in range(30)
-    ]
-    path = raw_mcap(tmp_path / "a.mcap", messages)
-    stream = collect(open_bag(path, parse_map(log_map, "test"))).streams[0]
-    np.testing.assert_array_equal(stream.values[:, :6], data[:, :6])
-    np.testing.assert_array_equal(stream.values[:, 6:], data[:, 6:] * 1e-3)
-    log_map["time"] = {"clock": "header"}
-    with pytest.raises(InputError, match="Int32MultiArray has no header and so no stamp of its own"):
-        open_bag(path, parse_map(log_map, "test"))
-
-
-def test_types_without_definitions(tmp_path):
-    """Bags of old recorders do not define their types; those of ROS 2 are known, the others are not."""
-    import sqlite3
-
-    path = rosbags_bag(tmp_path / "bag", TEAM.said(), "sqlite3")
-    with sqlite3.connect(path / "bag.db3") as connection:
-        connection.execute("DROP TABLE message_definitions")
-        connection.execute("DROP TABLE schema")
-    connection.close()
-    assert_holds(path, TEAM)
-    with sqlite3.connect(path / "bag.db3") as connection:
-        connection.execute("UPDATE topics SET type = 'lab_msgs/msg/JointState'")
-    connection.close()
-    with pytest.raises(
-        InputError, match=r"holds lab_msgs/msg/JointState, a type that the bag does not define"
-    ):
-        open_bag(path, builtin_map("omnid-ros2"))
-
-
-def test_types_of_ones_own(tmp_path):
-    """A type of a lab, defined in the bag only."""
-    told = (
-        "lab/Arm[2] arms\nbool up\nfloat32 gain\n" + "=" * 80 + "\nMSG: lab/Arm\nstring name\nfloat64[3] q\n"
-    )
-    log_map = {
-        "version": 1,
-        "level": "joint",
-        "time": {"clock": "log"},
-        "defaults": {"topic": "/team", "unit": "rad"},
-        "channels": {
-            **{f"phi{k}": {"field": f"arms[{{robot0}}].q[{k - 1}]"} for k in (1, 2, 3)},
-            **{
-                f"theta_{a}": {"field": f, "unit": "rad"}
-                for a, f in zip("zyx", ("gain", "up", "gain2"), strict=True)
-            },
-            **{f"tau{k}": {"field": f"arms[{{robot0}}].q[{k - 1}]", "unit": "Nm"} for k in (1, 2, 3)},
-        },
-    }
-    told = told.replace("float32 gain\n", "float32 gain\nuint8 gain2\n")
-    # name: 4 + 2 bytes, q at 8 and, after the second name at 32, at 40; up at 64, gain at 68, gain2 at 72
-    import struct
-
-    body = struct.pack("<I2sxx3dI2sxx3d?xxxfB", 2, b"a\0", 1, 2, 3, 2, b"b\0", 4, 5, 6, True, 0.5, 7)
-    message = bags.Said("/team", 1, "lab/msg/Team", b"\0\1\0\0" + body)
-    path = raw_mcap(tmp_path / "a.mcap", [message], definitions={"lab/msg/Team": ("ros2msg", told)})
-    with pytest.raises(InputError, match="are the same number of topic /team"):
-        open_bag(path, parse_map(log_map, "test"))
-    for k in (1, 2, 3):
-        log_map["channels"][f"tau{k}"]["field"] = f"arms[1].q[{k - 1}]"
-        log_map["channels"][f"phi{k}"]["field"] = f"arms[0].q[{k - 1}]"
-    (stream,) = collect(open_bag(path, parse_map(log_map, "test"))).streams
-    assert stream.values.tolist() == [[1, 2, 3, 0.5, 1, 7, 4, 5, 6]]
-
-
 def test_memory_of_a_long_bag_stays_bounded(tmp_path):
     """A bag of 60 MB in chunks of 1 MiB needs a few blocks of memory, not the bag."""
-    import tracemalloc
-
     team = Team.draw(robots=1, rows=400)
     messages = team.said(frame="f" * 1000)
     many = [bags.Said(s.topic, s.log_ns + n, s.kind, s.data) for n in range(120) for s in messages]

@@ -17,6 +17,8 @@ from mocobot_logs.log import Stamps
 
 STAMPS = 1000
 """So many stamps of a topic are looked at."""
+_ENOUGH_BLOCKS = 64
+"""After so many blocks those stamps will do that were found."""
 _NAMES_BYTES = 64 << 10  # several publishers may have a part of the joints each
 
 
@@ -81,14 +83,14 @@ class Look:
             t: CdrReader(message_type(self._topics[t], self._bag), (), clock == "header") for t in missing
         }
         found: dict[str, list[Stamps]] = {topic: [np.empty(0, np.int64)] for topic in missing}
-        wanted = {topic for topic in missing if self.has_messages(topic)}
-        for block in blocks(self._files, tuple(wanted), lambda _: None) if wanted else ():
+        wanted = tuple(topic for topic in missing if self.has_messages(topic))
+        looked_at = blocks(self._files, wanted, lambda _: None) if wanted else ()
+        for number, block in enumerate(looked_at, 1):
             for topic, messages in block.items():
                 stamps = readers[topic].read(messages)[0] if clock == "header" else messages.log_ns
                 found[topic].append(stamps)
-                if sum(map(len, found[topic])) >= STAMPS:
-                    wanted.discard(topic)
-            if not wanted:
+            enough = STAMPS if number < _ENOUGH_BLOCKS else 1
+            if all(sum(map(len, found[topic])) >= enough for topic in wanted):
                 break
         for topic, parts in found.items():
             self._stamps[topic, clock] = np.concatenate(parts)[:STAMPS]
