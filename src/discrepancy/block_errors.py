@@ -15,14 +15,21 @@ Array = NDArray[np.float64]
 
 
 def with_block_errors(explanation: Explanation, rows_per_block: int) -> Explanation:
-    """The explanation with the causes' covariances from ``block_covariance``."""
+    """The explanation with the causes' covariances from ``block_covariance``.
+
+    A transient fits into a block or two, which says nothing of how it would scatter; it keeps the fit's own covariance,
+    scaled by what is left.
+    """
     if not explanation.found:
         return explanation
+    inflation = max(1.0, explanation.after / explanation.samples)
     covariance = block_covariance(explanation.fit, rows_per_block)
     found = []
     for index, item in zip(explanation.fit.free, explanation.found, strict=True):
         units = explanation.problem.candidates[index].units
         part = part_of(explanation.fit, covariance, index)
+        if item.candidate.detail:
+            part = inflation * explanation.fit.part(index)[1]
         found.append(replace(item, covariance=part * np.outer(units, units)))
     return replace(explanation, found=tuple(found))
 

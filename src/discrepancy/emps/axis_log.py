@@ -42,6 +42,11 @@ class AxisLog:
     notes: tuple[str, ...] = ()
 
     @property
+    def saturated(self) -> NDArray[np.bool_]:
+        """Samples at which the drive gives all it has, shape (Q,): its law does not hold there."""
+        return np.abs(self.voltage) >= LIMIT_V * (1.0 - 1e-6)
+
+    @property
     def rate_hz(self) -> float:
         """Sampling rate [Hz]."""
         return (len(self.time) - 1) / float(self.time[-1] - self.time[0])

@@ -2,7 +2,8 @@
 
 Weights must suit what will be left over. What no cause describes is larger than the sensors' noise and of another
 colour; weighting by the sensors' noise alone would put trust in frequencies where the model has least. So the colour
-is that of what the whole catalogue leaves, and the level that of the part of it that does not repeat.
+is that of what the whole catalogue leaves, and the level that of the part of it that does not repeat. The position's
+rounding is in both at its full size, since it is in the columns, too, and a fit would hide it by shrinking gains.
 """
 
 from __future__ import annotations
@@ -70,21 +71,22 @@ def from_repeats(left: list[Array], signals: Signals, reduction: Reduction, peri
     deviation, cycles = _deviations(signals.residual, period, usable)
     measured = np.column_stack([signals.log.position, signals.log.voltage])
     apart, _ = _deviations(measured, period, usable)
-    rows = reduction(deviation + _rounding(signals))
+    rounding = _rounding(signals)
+    rows = reduction(deviation + rounding)
     position, voltage = np.sqrt(np.mean(apart[usable] ** 2, axis=0))
     step = resolution(signals.log.position).step_m
-    draws = draws_of(left)
+    draws = draws_of([a + b for a, b in zip(left, reduction(rounding), strict=True)])
     white = Whitening.of(draws, draws.shape[1], order)
     level = np.sqrt(np.mean([np.mean(white(r)[order:] ** 2, axis=0) for r in draws_of(rows)], axis=0))
     return Noise(draws * level, cycles, float(np.hypot(position, step / np.sqrt(12.0))), float(voltage))
 
 
-def from_remainder(left: list[Array], signals: Signals) -> Noise:
-    """Noise as all of what the whole catalogue leaves, rows (n, 2) per block."""
+def from_remainder(left: list[Array], signals: Signals, reduction: Reduction) -> Noise:
+    """Noise as all of what the whole catalogue leaves, rows (n, 2) per block, and the position's rounding."""
     step = resolution(signals.log.position).step_m
     high = signals.log.position - signals.x
     return Noise(
-        draws_of(left),
+        draws_of([a + b for a, b in zip(left, reduction(_rounding(signals)), strict=True)]),
         0,
         float(np.hypot(np.std(high), step / np.sqrt(12.0))),
         float(np.sqrt(np.mean(np.concatenate(left)[:, 1] ** 2))),
@@ -110,14 +112,16 @@ def _deviations(x: Array, period: int, usable: NDArray[np.bool_]) -> tuple[Array
     return out * scale[:, None], int(np.ceil(len(x) / period))
 
 
+def dither(signals: Signals) -> Array:
+    """A fresh draw of the position's rounding errors [m], shape (Q,); zero where it shows no steps."""
+    step = resolution(signals.log.position).step_m
+    return np.random.default_rng(DITHER_SEED).uniform(-0.5 * step, 0.5 * step, len(signals.x))
+
+
 def _rounding(signals: Signals) -> Array:
     """What a fresh draw of rounding errors of the position does to the nominal residual, shape (Q, 2)."""
     log = signals.log
-    step = resolution(log.position).step_m
-    if step == 0:
-        return np.zeros((len(log.time), 2))
-    error = np.random.default_rng(DITHER_SEED).uniform(-0.5 * step, 0.5 * step, len(log.time))
-    x = smooth(error, log.rate_hz)
+    x = smooth(dither(signals), log.rate_hz)
     v = differentiate(x, log.rate_hz)
     return np.column_stack(
         [-FIRST_GUESS_KG * differentiate(v, log.rate_hz), log.kv_Vs_per_m * (log.kp_per_s * x + v)]

@@ -63,9 +63,11 @@ def checked(log: AxisLog) -> AxisLog:
             f"qm comes in steps of {1e6 * step:.3g} um, so what moves less, and forces that change quickly, are lost "
             "in rounding."
         )
-    clipped = np.abs(log.voltage) >= LIMIT_V * (1 - 1e-6)
-    if clipped.any():
-        notes.append(f"The drive saturates (+-{LIMIT_V:g} V) in {clipped.sum()} of {len(clipped)} samples.")
+    if log.saturated.any():
+        notes.append(
+            f"The drive saturates (+-{LIMIT_V:g} V) in {log.saturated.sum()} of {len(log.time)} samples; rows there "
+            "are left out."
+        )
     return replace(log, usable=usable, notes=tuple(notes))
 
 

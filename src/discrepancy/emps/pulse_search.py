@@ -26,7 +26,7 @@ def pulse_train(residual: Array, rate_hz: float) -> PulseTrain:
     time = (np.arange(count) + 0.5) * step / rate_hz
     level = coarse - np.median(coarse)
     duration = count * step / rate_hz
-    frequencies = np.arange(1.0 / min(LONGEST_S, duration / 2.0), 1.0 / SHORTEST_S, 0.05 / duration)
+    frequencies = np.arange(1.0 / min(LONGEST_S, duration / 2.0), 1.0 / SHORTEST_S, 0.1 / duration)
     best = (-np.inf, 1.0, 0.0, 0.5)
     for frequency in frequencies:
         power, phase, width = _box(level, time * frequency % 1.0)
@@ -36,7 +36,19 @@ def pulse_train(residual: Array, rate_hz: float) -> PulseTrain:
     start %= period
     if start + width > period:  # on already when the recording begins
         start -= period
-    return _sharpened(residual, rate_hz, PulseTrain(start, period, width, 0.0))
+    found = _sharpened(residual, rate_hz, PulseTrain(start, period, width, 0.0))
+    return _from_zero(residual, rate_hz, found)
+
+
+def _from_zero(residual: Array, rate_hz: float, train: PulseTrain) -> PulseTrain:
+    """The train, or what is between its pulses if that is further from zero."""
+    on = rectangle(np.arange(len(residual)) / rate_hz, train) > 0.5
+    if not on.any() or on.all() or abs(np.median(residual[on])) >= abs(np.median(residual[~on])):
+        return train
+    start, width = train.start_s + train.width_s, train.period_s - train.width_s
+    if start > train.period_s or (start - train.period_s + width > 0.0 and start - train.period_s < 0.0):
+        start -= train.period_s  # one was on already when the recording began
+    return PulseTrain(start, train.period_s, width, -train.size)
 
 
 def rectangle(time: Array, train: PulseTrain) -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from discrepancy.emps.axis_log import AxisLog
 from discrepancy.emps.blocks import blocks, period_of
-from discrepancy.emps.catalogue import DEFAULTS, Tolerances, candidate_of, remainder
+from discrepancy.emps.catalogue import DEFAULTS, Tolerances, candidate_of, hidden_by_rounding, remainder
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.causes.base import Hints
 from discrepancy.emps.extended import write_extended
@@ -52,7 +52,7 @@ class EmpsRig:
         noise: what is not to be explained.
         whitening: of every block.
         tolerances: standard deviations by cause and parameter.
-        excluded: causes left out of the catalogue.
+        excluded: causes left out of the catalogue, on request or because the position is too coarse for them.
     """
 
     log: AxisLog
@@ -79,18 +79,23 @@ class EmpsRig:
         signals = Signals.of(log)
         period = period_of(log.reference, log.rate_hz)
         cut = blocks(signals, period)
-        reduction = Reduction.of(log.rate_hz, cut, log.usable)
+        reduction = Reduction.of(log.rate_hz, cut, log.usable & ~log.saturated)
         cut, reduction = _long_enough(log, cut, reduction)
         hints = hints_of(signals, reduction)
         left = remainder(signals, reduction, hints)
         if period is not None and repeated(signals, period):
             noise = from_repeats(left, signals, reduction, period, AR_ORDER)
         else:
-            noise = from_remainder(left, signals)
+            noise = from_remainder(left, signals, reduction)
         shared = Whitening.of(noise.draws, noise.draws.shape[1], AR_ORDER)
         whitening = tuple(replace(shared, moving=len(rows)) for rows in reduction.samples)
         known = DEFAULTS if tolerances is None else tolerances
-        return cls(log, signals, tuple(cut), reduction, hints, noise, whitening, known, frozenset(excluded))
+        hidden = hidden_by_rounding(signals, reduction, hints, shared)
+        if hidden:
+            said = f"The position's rounding hides {', '.join(hidden)}: they are not looked for."
+            log = replace(log, notes=(*log.notes, said))
+        left_out = frozenset([*excluded, *hidden])
+        return cls(log, signals, tuple(cut), reduction, hints, noise, whitening, known, left_out)
 
     @property
     def trials(self) -> Sequence[str]:
@@ -175,7 +180,7 @@ class EmpsRig:
         """Whether such values can be: no friction or play that is negative beyond two standard errors, or rounding."""
         cause = CAUSES[candidate.cause]
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        return cause.visible(self.signals, values) and all(
+        return cause.visible(self.signals, self.hints, values) and all(
             values[k] > -2.0 * se[k] for k, n in enumerate(cause.parameters) if n in cause.positive
         )
 

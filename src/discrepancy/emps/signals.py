@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from discrepancy.emps.axis_log import LIMIT_V, AxisLog
+from discrepancy.emps.axis_log import AxisLog
 from discrepancy.emps.plant import FIRST_GUESS_KG
 from estimator.filtering import differentiate, low_pass
 
@@ -30,7 +30,6 @@ class Signals:
             the mean of the hold before and after it: half a period old on average.
         error: reference minus position [m].
         command: what the nominal loop asks for [V].
-        linear: 1 where the drive was within its limits, else 0: a saturated voltage says nothing about the law.
     """
 
     log: AxisLog
@@ -41,7 +40,6 @@ class Signals:
     force: Array
     error: Array
     command: Array
-    linear: Array
 
     @classmethod
     def of(cls, log: AxisLog) -> Signals:
@@ -52,14 +50,13 @@ class Signals:
         a = differentiate(v, rate)
         error = reference - x
         command = log.kv_Vs_per_m * (log.kp_per_s * error - v)
-        within = np.abs(log.voltage) < LIMIT_V * (1.0 - 1e-6)
         force = log.gain_N_per_V * at_delay(u, rate, 0.5 / rate)
-        return cls(log, x, v, a, u, force, error, command, within.astype(float))
+        return cls(log, x, v, a, u, force, error, command)
 
     @property
     def residual(self) -> Array:
         """Nominal residual, shape (Q, 2): force told minus that of a frictionless mass [N], voltage minus law [V]."""
-        return np.column_stack([self.force - FIRST_GUESS_KG * self.a, self.linear * (self.u - self.command)])
+        return np.column_stack([self.force - FIRST_GUESS_KG * self.a, self.u - self.command])
 
 
 def smooth(x: Array, rate_hz: float) -> Array:

@@ -35,7 +35,7 @@ class Backlash(Cause):
         second = differentiate(differentiate(side, rate), rate)
         return force(-0.5 * CARRIAGE * FIRST_GUESS_KG * second)
 
-    def visible(self, signals, values):
+    def visible(self, signals, hints, values):
         # Rounding by whole steps has a hysteresis of its own.
         return abs(values[0]) > STEPS * resolution(signals.log.position).step_m
 

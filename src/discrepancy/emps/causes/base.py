@@ -16,6 +16,9 @@ from discrepancy.emps.signals import Signals
 Array = NDArray[np.float64]
 Shape = Mapping[str, float]
 
+SHORTEST_RIPPLE_M = 1e-3
+"""Shorter ripples are faster than the rows at most speeds."""
+
 
 @dataclass(frozen=True, eq=False)
 class Hints:
@@ -23,11 +26,15 @@ class Hints:
 
     Attributes:
         wavelength_m: of the strongest ripple along the way.
-        train: ``start_s``, ``period_s`` and ``width_s`` of what looks most like rectangular pulses.
+        voltage_train, force_train: ``start_s``, ``period_s``, ``width_s`` of what looks most like rectangles.
+        voltage_spread, force_spread: what is left around these [V, N], standard deviation of rows.
     """
 
     wavelength_m: float
-    train: Shape
+    voltage_train: Shape
+    force_train: Shape
+    voltage_spread: float
+    force_spread: float
 
 
 class Cause(ABC):
@@ -71,8 +78,8 @@ class Cause(ABC):
         """Shapes near a chosen one, for a second look."""
         return []
 
-    def visible(self, signals: Signals, values: Array) -> bool:
-        """Whether a cause of that size can be told from the position's rounding."""
+    def visible(self, signals: Signals, hints: Hints, values: Array) -> bool:
+        """Whether a cause of that size stands out of the position's rounding, or of what it was searched in."""
         return True
 
     def rests(self, signals: Signals, shape: Shape) -> list[Array]:

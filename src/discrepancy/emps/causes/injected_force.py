@@ -25,5 +25,16 @@ class InjectedForce(Cause):
         train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], float(values[0]))
         return replace(plant, force_pulses=(*plant.force_pulses, train))
 
+    def visible(self, signals, hints, values):
+        # Of all rectangles that were tried, the best always fits something.
+        return abs(values[0]) > hints.force_spread
+
     def shapes(self, hints):
-        return [dict(hints.train)]
+        return [dict(hints.force_train)]
+
+    def finer(self, shape):
+        return [
+            dict(shape) | {name: shape[name] + off}
+            for name in ("start_s", "width_s")
+            for off in (-1e-3, 1e-3)
+        ]

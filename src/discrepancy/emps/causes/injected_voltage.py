@@ -20,11 +20,22 @@ class InjectedVoltage(Cause):
 
     def columns(self, signals, shape):
         train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], 1.0)
-        return voltage(signals.linear * smooth(rectangle(signals.log.time, train), signals.log.rate_hz))
+        return voltage(smooth(rectangle(signals.log.time, train), signals.log.rate_hz))
 
     def apply(self, plant, values, shape):
         train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], float(values[0]))
         return replace(plant, voltage_pulses=(*plant.voltage_pulses, train))
 
+    def visible(self, signals, hints, values):
+        # Of all rectangles that were tried, the best always fits something.
+        return abs(values[0]) > hints.voltage_spread
+
     def shapes(self, hints):
-        return [dict(hints.train)]
+        return [dict(hints.voltage_train)]
+
+    def finer(self, shape):
+        return [
+            dict(shape) | {name: shape[name] + off}
+            for name in ("start_s", "width_s")
+            for off in (-1e-3, 1e-3)
+        ]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.causes.base import SHORTEST_RIPPLE_M, Cause, force
 from discrepancy.emps.plant import Ripple
 
 
@@ -26,7 +26,8 @@ class PositionForce(Cause):
         return replace(plant, ripples=(*plant.ripples, ripple))
 
     def shapes(self, hints):
-        return [{"wavelength_m": factor * hints.wavelength_m} for factor in (1.0, 0.5, 2.0)]
+        lengths = (factor * hints.wavelength_m for factor in (1.0, 0.5, 2.0))
+        return [{"wavelength_m": length} for length in lengths if length >= SHORTEST_RIPPLE_M]
 
     def finer(self, shape):
         return [

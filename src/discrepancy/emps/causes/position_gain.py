@@ -16,7 +16,7 @@ class PositionGain(Cause):
     separate = "A motion at constant speed, where the tracking error is the speed over this gain."
 
     def columns(self, signals, shape):
-        return voltage(signals.linear * signals.log.kv_Vs_per_m * signals.error)
+        return voltage(signals.log.kv_Vs_per_m * signals.error)
 
     def apply(self, plant, values, shape):
         return replace(plant, kp_per_s=plant.kp_per_s + values[0])

@@ -7,7 +7,7 @@ import numpy as np
 from discrepancy.emps.causes.base import Cause, force
 from discrepancy.emps.causes.sliding import direction
 
-SPEEDS_MPS = (0.01, 0.003, 0.005, 0.02, 0.04)
+SPEEDS_MPS = (0.01, 0.004, 0.02, 0.04)
 SLOW_MPS = 1e-3
 
 
@@ -15,7 +15,7 @@ class Stribeck(Cause):
     """Dry friction differs near standstill, by ``excess_N`` that fades with exp(-|v| / ``speed_mps``)."""
 
     name = "stribeck"
-    family = "dry_friction"
+    family = "low_speed_friction"
     parameters = ("excess_N",)
     scales = (1.0,)
     separate = "Steady motions at low speeds."
@@ -32,5 +32,5 @@ class Stribeck(Cause):
 
     def finer(self, shape):
         near = (factor * shape["speed_mps"] for factor in (0.7, 0.85, 1.2, 1.4))
-        # Beyond that it is viscous friction by another name.
-        return [{"speed_mps": speed} for speed in near if min(SPEEDS_MPS) / 2 <= speed <= max(SPEEDS_MPS)]
+        # Slower than that it is how dry friction fades, faster it is viscous friction by another name.
+        return [{"speed_mps": speed} for speed in near if min(SPEEDS_MPS) <= speed <= max(SPEEDS_MPS)]

@@ -16,7 +16,7 @@ class VelocityGain(Cause):
     separate = "The drive's voltage against the loop's own velocity error."
 
     def columns(self, signals, shape):
-        return voltage(signals.linear * (signals.log.kp_per_s * signals.error - signals.v))
+        return voltage(signals.log.kp_per_s * signals.error - signals.v)
 
     def apply(self, plant, values, shape):
         return replace(plant, kv_Vs_per_m=plant.kv_Vs_per_m + values[0])

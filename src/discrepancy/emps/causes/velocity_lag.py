@@ -17,12 +17,12 @@ class VelocityLag(Cause):
     separate = "The loop's own velocity signal in the log."
 
     def columns(self, signals, shape):
-        return voltage(signals.linear * signals.log.kv_Vs_per_m * signals.a)
+        return voltage(signals.log.kv_Vs_per_m * signals.a)
 
     def exact(self, signals, values, shape):
         log = signals.log
         change = signals.v - at_delay(signals.v, log.rate_hz, values[0])
-        return voltage(signals.linear * log.kv_Vs_per_m * change)[..., 0]
+        return voltage(log.kv_Vs_per_m * change)[..., 0]
 
     def apply(self, plant, values, shape):
         return replace(plant, velocity_lag_s=max(plant.velocity_lag_s + values[0], 0.0))
