@@ -17,7 +17,8 @@ from mocobot_sim.trajectories import minimum_jerk
 
 Array = NDArray[np.float64]
 
-# No stiffness. A little damping keeps a payload that nobody holds from gliding on for ever.
+# No stiffness. The SEA torque loop lags behind the changing lever arms, which takes about 1.4 N s/m of damping away
+# per arm (measured with payload (a)); a little more than that brings a payload that nobody holds to rest.
 FLOAT_GAINS = ControlGains(stiffness_N_per_m=0.0, damping_Ns_per_m=2.0)
 
 

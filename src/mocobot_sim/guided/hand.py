@@ -95,13 +95,13 @@ class _OnPayload:
         arm = R @ self._point_1
         mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_XBODY, self._body, self._velocity, 0)
         turning = self._velocity[:3].copy()
-        moving = self._velocity[3:] + np.asarray(np.cross(turning, arm), dtype=np.float64)
+        moving = self._velocity[3:] + _cross(turning, arm)
         return data.xpos[self._body] + arm, R, moving, turning
 
     def _press(self, force: Array, moment: Array, at: Array) -> None:
         applied = self._stage.data.xfrc_applied[self._body]
         applied[:3] += force
-        applied[3:] += moment + np.cross(at - self._stage.data.xipos[self._body], force)
+        applied[3:] += moment + _cross(at - self._stage.data.xipos[self._body], force)
 
     def log(self) -> HandLog:
         """What has happened."""
@@ -148,7 +148,7 @@ class GuidingHand(_OnPayload):
         # What MuJoCo knows of the payload's pose is one step old, so the path is read there too.
         was = max(tick - 1, 0)
         position, R, moving, turning = self._at()
-        tilt = Rotation.from_matrix(R @ self._R[was].T).as_rotvec()
+        tilt = _rotvec(R @ self._R[was].T)
         grip = self._grip
         force = grip.stiffness_N_per_m * (self._position[was] - position) + grip.damping_Ns_per_m * (
             self._velocity_of[was] - moving
@@ -200,3 +200,19 @@ def hand_path(moves: Sequence[Move], start_s: float, ticks: int, rate_hz: float)
         path[on] = before + minimum_jerk((time[on] - begin) / move.duration_s)[:, None] * (after - before)
         before, begin = after, begin + move.duration_s + move.rest_s
     return path[:, :3], path[:, 3:]
+
+
+# MuJoCo's small-vector functions: numpy's and scipy's cost more than a step of the physics.
+
+
+def _cross(a: Array, b: Array) -> Array:
+    product = np.empty(3)
+    mujoco.mju_cross(product, a, b)
+    return product
+
+
+def _rotvec(R: Array) -> Array:
+    quaternion, rotvec = np.empty(4), np.empty(3)
+    mujoco.mju_mat2Quat(quaternion, np.ascontiguousarray(R).ravel())
+    mujoco.mju_quat2Vel(rotvec, quaternion, 1.0)
+    return rotvec
