@@ -150,13 +150,21 @@ def test_lists_of_fixed_and_of_open_length(path: Path) -> None:
 
 
 def test_lists_of_several_lengths(path: Path, table: pa.Table) -> None:
+    """One short row, one that makes up for it, and an inner list that is not there."""
     rows = RECORDING.phi[:, 0].tolist()
-    rows[40] = rows[40][:2]
-    plain = table.replace_schema_metadata(None).append_column("phi", pa.array(rows))
-    pq.write_table(plain, path)
-    common = {**JOINT.common, "phi1": replace(JOINT.common["phi1"], column="phi[{robot0}]")}
-    message = refused(path, replace(JOINT, common=common, robots=1))
-    assert "column 'phi' has rows of different lengths; all must have the shape (3,)" in message
+    nested = RECORDING.phi.tolist()
+    fixed = pa.list_(pa.list_(pa.float64(), 3), 3)
+    cases = [
+        ("(3,)", pa.array([*rows[:40], rows[40][:2], *rows[41:]])),
+        ("(3,)", pa.array([*rows[:40], rows[40][:2], [*rows[41], 0.5], *rows[42:]])),
+        ("(3, 3)", pa.array([*nested[:40], [[1.0] * 3, None, [1.0] * 3], *nested[41:]], fixed)),
+    ]
+    for shape, values in cases:
+        pq.write_table(table.replace_schema_metadata(None).append_column("phi", values), path)
+        index = "[0]" if shape == "(3,)" else "[0, 0]"
+        common = {**JOINT.common, "phi1": replace(JOINT.common["phi1"], column=f"phi{index}")}
+        message = refused(path, replace(JOINT, common=common, robots=1))
+        assert f"column 'phi' has rows of different lengths; all must have the shape {shape}" in message
 
 
 @pytest.mark.parametrize("values", [["a"] * 60, [True] * 60, [b"x"] * 60], ids=["text", "bool", "binary"])
