@@ -108,21 +108,26 @@ def _residuals(trial: ReplayTrial) -> str:
 
 
 def _key(trial: ReplayTrial) -> str:
-    lines = [
-        f"- arrows at the grasps: force of each robot on the payload, 100 N is {100 * FORCE_M_PER_N:g} m",
-        "- red, green, blue: x, y, z of a grasp frame",
-        f"- line behind a wrist: its path, in the robot's colour; {_name(colours.COMMAND)}: the command",
-        "- series: the robot's colour; dark, plain, light for its joints 1, 2, 3 or axes x, y, z (theta: z, y, x)",
-    ]
+    lines = []
+    if trial.data is not None:
+        lines.append(
+            f"- arrows at the grasps: force of each robot on the payload, 100 N is {100 * FORCE_M_PER_N:g} m"
+        )
     if trial.facts is not None and trial.motion is not None:
+        lines.append("- red, green, blue arrows: x, y, z of a grasp frame")
         lines.append(
             f"- {_name(colours.ESTIMATE)}: estimated centre of mass, principal axes, and the solid ellipsoid of that "
             "mass and inertia"
         )
-    if trial.truth is not None:
+    if trial.truth is not None and trial.motion is not None:
         lines.append(f"- {_name(colours.TRUTH)}, thin: the same in truth; true grasp frames are longer")
     if trial.diagnosis is not None and trial.diagnosis.causes:
         lines.append(f"- {_name(colours.FAULT)} ball: a cause that the diagnosis names sits there")
+    commanded = f"; {_name(colours.COMMAND)}: the command" if trial.recording.ref is not None else ""
+    lines.append(f"- line at a wrist: its path, in the robot's colour{commanded}")
+    lines.append(
+        "- series: the robot's colour; dark, plain, light for its joints 1, 2, 3 or axes x, y, z (theta: z, y, x)"
+    )
     return "**Key**\n\n" + "\n".join(lines)
 
 
@@ -142,11 +147,16 @@ def _pose(p: Array, R: Array) -> str:
 def _with_errors(values: Array, errors: Array | None, digits: int) -> str:
     if errors is None:
         return _vector(values, digits)
-    return ", ".join(f"{v:.{digits}f} ± {e:.{digits}f}" for v, e in zip(values, errors, strict=True))
+    return ", ".join(f"{_fixed(v, digits)} ± {e:.{digits}f}" for v, e in zip(values, errors, strict=True))
 
 
 def _vector(values: Array, digits: int) -> str:
-    return ", ".join(f"{value:.{digits}f}" for value in values)
+    return ", ".join(_fixed(value, digits) for value in values)
+
+
+def _fixed(value: float, digits: int) -> str:
+    """Fixed digits, and no minus before a zero."""
+    return f"{round(float(value), digits) + 0.0:.{digits}f}"
 
 
 def _rms(values: Array) -> float:
