@@ -233,29 +233,38 @@ def test_a_laboratory_with_a_topic_per_sensor(tmp_path, clock):
     np.testing.assert_allclose(stream.values[10:-10, 3:6], wave(inside, 0.7, 3)[10:-10], atol=1e-6)
 
 
-def test_commands_with_stamps_of_their_own_are_left_out(tmp_path):
-    """They may be missing, and must not cost the samples; commands that the map insists on are interpolated."""
+@pytest.mark.parametrize(
+    "sent",
+    [lambda stamps: stamps + 3_000_000, lambda stamps: stamps[::10], lambda stamps: stamps - 100_000_000_000],
+    ids=["in between", "seldom", "long ago"],
+)
+def test_commands_that_do_not_go_with_the_samples_are_left_out(tmp_path, sent):
+    """They may be missing, and must not cost the samples."""
     team = bags.Team.draw(robots=1, rows=200)
     messages = team.said()
-    sent = team.stamps[0] + 3_000_000
-    messages += [said("/omnid1/wrist/command", int(t), bags.point([1, 2, 3], int(t))) for t in sent]
+    messages += [
+        said("/omnid1/wrist/command", team.log_ns(0, k), bags.point([1, 2, 3], int(t)))
+        for k, t in enumerate(sent(team.stamps[0]))
+    ]
     messages.sort(key=lambda s: s.log_ns)
-    path = raw_mcap(tmp_path / "a.mcap", messages)
-    log = collect(open_bag(path))
+    log = collect(open_bag(raw_mcap(tmp_path / "a.mcap", messages)))
     assert log.channels == CHANNELS["wrist"]
     np.testing.assert_array_equal(log.streams[0].values, team.wrist(0))
+
+
+def test_commands_that_a_map_insists_on_are_interpolated(tmp_path):
+    team = bags.Team.draw(robots=1, rows=200)
+    messages = team.said()
+    messages += [
+        said("/omnid1/wrist/command", int(t), bags.point([1, 2, 3], int(t)))
+        for t in team.stamps[0] + 3_000_000
+    ]
+    messages.sort(key=lambda s: s.log_ns)
+    path = raw_mcap(tmp_path / "a.mcap", messages)
     topic = "/omnid{robot}/wrist/command"
-    joint = "/omnid{robot}/joint/joint_states"
-    channels = {
-        **{f"h_{a}": {"topic": joint, "joint": a, "field": "position", "unit": "m"} for a in "xyz"},
-        **{
-            f"theta_{a}": {"topic": joint, "joint": f"gimbal_{a}", "field": "position", "unit": "rad"}
-            for a in "xyz"
-        },
-        **{f"force_{a}": {"topic": joint, "joint": a, "field": "effort", "unit": "N"} for a in "xyz"},
-        **{f"ref_{a}": {"topic": topic, "field": f"point.{a}", "unit": "m"} for a in "xyz"},
-    }
-    log = collect(open_bag(path, parse_map({"version": 1, "level": "wrist", "channels": channels}, "test")))
+    log_map = bags.wrist_map()
+    log_map["channels"] |= {f"ref_{a}": {"topic": topic, "field": f"point.{a}", "unit": "m"} for a in "xyz"}
+    log = collect(open_bag(path, parse_map(log_map, "test")))
     assert log.channels == CHANNELS["wrist"] + REF
     np.testing.assert_array_equal(log.streams[0].stamp_ns, team.stamps[0][1:])
     np.testing.assert_allclose(log.streams[0].values[:, 9:], np.tile([1.0, 2, 3], (199, 1)), rtol=1e-12)
