@@ -92,7 +92,9 @@ class EmpsRig:
         known = DEFAULTS if tolerances is None else tolerances
         hidden = hidden_by_rounding(signals, reduction, hints, shared)
         if hidden:
-            said = f"The position's rounding hides {', '.join(hidden)}: they are not looked for."
+            said = (
+                f"The position's rounding hides some causes, which are not looked for: {', '.join(hidden)}."
+            )
             log = replace(log, notes=(*log.notes, said))
         left_out = frozenset([*excluded, *hidden])
         return cls(log, signals, tuple(cut), reduction, hints, noise, whitening, known, left_out)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.causes.base import Cause, filtered, force
 from discrepancy.emps.causes.sliding import SLOW, direction
 
 
@@ -21,7 +21,7 @@ class AsymmetricCoulomb(Cause):
     )
 
     def columns(self, signals, shape):
-        return force(np.abs(direction(signals, shape["slow_mps"])))
+        return force(filtered(signals, np.abs(direction(signals, shape["slow_mps"]))))
 
     def apply(self, plant, values, shape):
         forward, backward = plant.coulomb_N

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.causes.base import Cause, filtered, force
 
 
 class AsymmetricViscous(Cause):
@@ -19,7 +19,7 @@ class AsymmetricViscous(Cause):
     )
 
     def columns(self, signals, shape):
-        return force(np.abs(signals.v))
+        return force(filtered(signals, np.abs(signals.v)))
 
     def apply(self, plant, values, shape):
         forward, backward = plant.viscous_Ns_per_m

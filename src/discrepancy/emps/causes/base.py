@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.emps.plant import Plant
-from discrepancy.emps.signals import Signals
+from discrepancy.emps.signals import Signals, smooth
 
 Array = NDArray[np.float64]
 Shape = Mapping[str, float]
@@ -85,6 +85,11 @@ class Cause(ABC):
     def rests(self, signals: Signals, shape: Shape) -> list[Array]:
         """Forces (Q,) that the cause leaves open, such as dry friction at rest, one unit each."""
         return []
+
+
+def filtered(signals: Signals, column: Array) -> Array:
+    """A column that is no linear function of smoothed signals, through their filter, shape (Q,)."""
+    return smooth(column, signals.log.rate_hz)
 
 
 def force(*columns: Array) -> Array:

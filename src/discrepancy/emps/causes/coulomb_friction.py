@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.causes.base import Cause, filtered, force
 from discrepancy.emps.causes.sliding import SLOW, direction, rests
 
 
@@ -17,7 +17,7 @@ class CoulombFriction(Cause):
     separate = "A steady motion at several speeds in one direction."
 
     def columns(self, signals, shape):
-        return force(direction(signals, shape["slow_mps"]))
+        return force(filtered(signals, direction(signals, shape["slow_mps"])))
 
     def apply(self, plant, values, shape):
         forward, backward = plant.coulomb_N

@@ -2,10 +2,9 @@
 
 from dataclasses import replace
 
-from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.causes.base import Cause, filtered, force
 from discrepancy.emps.plant import PulseTrain
 from discrepancy.emps.pulse_search import rectangle
-from discrepancy.emps.signals import smooth
 
 
 class InjectedForce(Cause):
@@ -19,7 +18,7 @@ class InjectedForce(Cause):
 
     def columns(self, signals, shape):
         train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], 1.0)
-        return force(smooth(rectangle(signals.log.time, train), signals.log.rate_hz))
+        return force(filtered(signals, rectangle(signals.log.time, train)))
 
     def apply(self, plant, values, shape):
         train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], float(values[0]))

@@ -2,10 +2,9 @@
 
 from dataclasses import replace
 
-from discrepancy.emps.causes.base import Cause, voltage
+from discrepancy.emps.causes.base import Cause, filtered, voltage
 from discrepancy.emps.plant import PulseTrain
 from discrepancy.emps.pulse_search import rectangle
-from discrepancy.emps.signals import smooth
 
 
 class InjectedVoltage(Cause):
@@ -20,7 +19,7 @@ class InjectedVoltage(Cause):
 
     def columns(self, signals, shape):
         train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], 1.0)
-        return voltage(smooth(rectangle(signals.log.time, train), signals.log.rate_hz))
+        return voltage(filtered(signals, rectangle(signals.log.time, train)))
 
     def apply(self, plant, values, shape):
         train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], float(values[0]))

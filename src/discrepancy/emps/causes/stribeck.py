@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.causes.base import Cause, filtered, force
 from discrepancy.emps.causes.sliding import direction
 
 SPEEDS_MPS = (0.01, 0.004, 0.02, 0.04)
@@ -22,7 +22,7 @@ class Stribeck(Cause):
 
     def columns(self, signals, shape):
         fade = np.exp(-np.abs(signals.v) / shape["speed_mps"])
-        return force(direction(signals, SLOW_MPS) * fade)
+        return force(filtered(signals, direction(signals, SLOW_MPS) * fade))
 
     def apply(self, plant, values, shape):
         return replace(plant, stribeck_N=plant.stribeck_N + values[0], stribeck_mps=shape["speed_mps"])
