@@ -176,12 +176,13 @@ def test_side_by_side_layouts(recording: Recording) -> None:
     for count in (1, 2, 5):
         trials = [replace(trial, name=name) for name in distinct_names([Path("x.parquet")] * count)]
         assert blueprint(trials).root_container is not None
-    assert distinct_names([Path("a/x.p"), Path("x.q"), Path("x-2.p"), Path("b/x.p")]) == [
-        "x",
-        "x-2",
-        "x-2-2",
-        "x-3",
-    ]
+
+
+def test_names_are_distinct_and_safe_in_entity_paths() -> None:
+    files = [Path("a/x.p"), Path("x.q"), Path("x-2.p"), Path("b/x.p")]
+    assert distinct_names(files) == ["x", "x-2", "x-2-2", "x-3"]
+    odd = [Path("trial 1 (ü).parquet"), Path("trial_1_(é).parquet"), Path("__init__.py"), Path("a#b.parquet")]
+    assert distinct_names(odd) == ["trial_1____", "trial_1____-2", "_init__", "a_b"]
 
 
 def test_metadata_helper_is_of_the_shipped_design(recording: Recording) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -150,13 +151,18 @@ def replay_trial(
 
 
 def distinct_names(recordings: Sequence[Path]) -> list[str]:
-    """File names without their ending, with a running number where two are alike."""
+    """File names without their ending, with a running number where two are alike.
+
+    What is not a letter, a digit, a dot or a hyphen becomes an underscore: names are parts of entity paths.
+    """
     names: list[str] = []
     for path in recordings:
-        name, k = path.stem, 1
+        stem = re.sub(r"[^A-Za-z0-9.-]", "_", path.stem)
+        stem = re.sub(r"^_+(?=_)", "", stem)  # two underscores in front are Rerun's own
+        name, k = stem, 1
         while name in names:
             k += 1
-            name = f"{path.stem}-{k}"
+            name = f"{stem}-{k}"
         names.append(name)
     return names
 

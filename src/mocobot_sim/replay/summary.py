@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -22,7 +24,8 @@ def summary(trial: ReplayTrial) -> str:
     robots = "1 robot" if trial.robots == 1 else f"{trial.robots} robots"
     parts = [
         f"**{_plain(trial.name)}**: {meta.trial} trial, {robots}{payload}, {trial.time[-1]:.1f} s at "
-        f"{meta.rate_hz:g} Hz. {_plain(meta.source)}. Time 0 is {trial.recording.time[0]:g} s in the recording.",
+        f"{meta.rate_hz:g} Hz, from {_plain(Path(trial.recording.name).name)} ({_plain(meta.source)}). Time 0 is "
+        f"{trial.recording.time[0]:g} s in the recording.",
         *([_verdict(trial.diagnosis)] if trial.diagnosis else []),
         _estimate(trial),
         _residuals(trial),
