@@ -70,6 +70,23 @@ def test_all_robots_on_one_topic(tmp_path):
         np.testing.assert_array_equal(stream.values, TEAM.wrist(robot))
 
 
+def test_robots_with_some_channels_on_a_shared_topic(tmp_path):
+    """A topic of all robots counts nobody."""
+    log_map = wrist_map()
+    log_map["channels"] |= {
+        f"h_{a}": {"topic": "/team", "field": f"data[{k}]", "unit": "m"} for k, a in enumerate("xyz")
+    }
+    del log_map["channels"]["h_x"]["topic"], log_map["channels"]["h_x"]["field"]
+    log_map["channels"]["h_x"] |= {"joint": "x", "field": "position"}
+    layout = bags.TYPES.types["std_msgs/msg/MultiArrayLayout"](dim=[], data_offset=0)
+    array = bags.TYPES.types["std_msgs/msg/Float64MultiArray"](layout=layout, data=np.zeros(3))
+    path = raw_mcap(tmp_path / "a.mcap", [said("/team", 1, array), *TEAM.said()])
+    with pytest.raises(
+        InputError, match="h_y of robot 1 and h_y of robot 2 are the same number of topic /team"
+    ):
+        open_bag(path, parse_map(log_map, "test"))
+
+
 @pytest.mark.parametrize("chunk_size", [1, 4096, 1 << 20])
 def test_channels_from_several_topics(tmp_path, chunk_size):
     """Other messages by dotted path; messages of one robot with one stamp are one sample."""
@@ -172,6 +189,11 @@ def test_types_of_ones_own(tmp_path):
     body = struct.pack("<I2sxx3dI2sxx3d?xxxfB", 2, b"a\0", 1, 2, 3, 2, b"b\0", 4, 5, 6, True, 0.5, 7)
     message = bags.Said("/team", 1, "lab/msg/Team", b"\0\1\0\0" + body)
     path = raw_mcap(tmp_path / "a.mcap", [message], definitions={"lab/msg/Team": ("ros2msg", told)})
+    with pytest.raises(
+        InputError, match="map test: missing key 'robots'; robots that have neither topics nor joints"
+    ):
+        open_bag(path, parse_map(log_map, "test"))
+    log_map["robots"] = 1
     with pytest.raises(InputError, match="are the same number of topic /team"):
         open_bag(path, parse_map(log_map, "test"))
     for k in (1, 2, 3):

@@ -149,20 +149,29 @@ def _check(kind: MessageType, selectors: tuple[Selector, ...], log_map: LogMap) 
 def _count_robots(bag: str, topics: Mapping[str, Topic], log_map: LogMap, names: Names) -> int:
     if log_map.robots is not None:
         return log_map.robots
-    if log_map.one_robot_only("topic"):
-        return 1
+
+    def joints_of(topic: str) -> tuple[str, ...]:
+        return names(topic) if topic in topics else ()
 
     def is_there(robot: int) -> bool:
         channels, others = log_map.channels(robot), log_map.channels(robot + 1)
         for name in CHANNELS[log_map.level]:
-            channel = channels[name]
-            if channel.topic in topics:
-                # Robots that share a topic are told apart by their joints.
-                shared = channel.topic == others[name].topic and channel.joint is not None
-                if not shared or channel.joint in names(channel.topic or ""):
-                    return True
+            channel, other = channels[name], others[name]
+            # Robots that share a topic are told apart by their joints.
+            is_own = channel.topic != other.topic or (
+                channel.joint != other.joint and channel.joint in joints_of(channel.topic or "")
+            )
+            if channel.topic in topics and is_own:
+                return True
         return False
 
+    if log_map.one_robot_only("topic"):
+        if log_map.channels(1) != log_map.channels(2):
+            raise InputError(
+                f"map {log_map.name}: missing key 'robots'; robots that have neither topics nor joints of their own "
+                "cannot be counted"
+            )
+        return 1
     count = 0
     while is_there(count + 1):
         count += 1
