@@ -20,7 +20,7 @@ from fuzzing.originals import FORMATS, write_original
 from fuzzing.trial import LONGEST_S, Outcome, check_original, try_damaged
 from mocobot.progress import bar
 
-AT_A_TIME = 100
+AT_A_TIME = 500
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,13 @@ import pyarrow as pa
 import pyarrow.csv as pcsv
 import pyarrow.parquet as pq
 
+from estimator.design import load_design
 from estimator.recording import Recording, write_recording
 from estimator.recording_metadata import RecordingMetadata
 from mocobot_logs.bag_write import write_bag
 from mocobot_logs.maps import MAPS, builtin_map_text
-from mocobot_sim.models import omnid_design
 
+DESIGN = Path(__file__).parents[2] / "models" / "omnid" / "design.toml"
 FORMATS = (
     "csv",
     "npz",
@@ -37,7 +38,7 @@ FORMATS = (
 
 def small_recording(rows: int = 200, robots: int = 2, seed: int = 0) -> Recording:
     """Random plausible samples of a few robots."""
-    rng, shape, design = np.random.default_rng(seed), (rows, robots, 3), omnid_design()
+    rng, shape, design = np.random.default_rng(seed), (rows, robots, 3), load_design(DESIGN)
     metadata = RecordingMetadata(robots, 100.0, "random", "fuzzing", None, None, design)
     return Recording(
         time=np.arange(rows) / 100.0,
