@@ -1,6 +1,6 @@
 """One Omnid drives a square and turns in place on its mecanum wheels: what was commanded, what it did, what slipped.
 
-python scenarios/drive_square.py [--out FOLDER]
+python scenarios/drive_square.py [--pace SECONDS] [--out FOLDER]
 """
 
 from __future__ import annotations
@@ -20,59 +20,68 @@ from mocobot_sim.base.motion import Leg, PlanarMotion, plan
 from mocobot_sim.base.pictures import Camera, Marks, make_folder, render
 from mocobot_sim.base.snapshots import Snapshots
 from mocobot_sim.base.solo import build_solo, compile_solo, drive_solo
+from mocobot_sim.trajectories import RATE_HZ
 
 SIDE_M = 0.8
+HURRY_S = 0.9  # a side: asks for 5.7 m/s^2, and the rollers' grip ends at 4.9
 SIDES = ("forward", "left", "backward", "right")
 
 
-def square(side_s: float, turn_s: float) -> PlanarMotion:
-    """Four sides without turning, then one turn in place."""
+def square(side_s: float) -> tuple[PlanarMotion, np.ndarray]:
+    """Four sides without turning, then one turn in place, twice as long; and when the legs begin and end [s]."""
     corners = [(SIDE_M, 0.0), (SIDE_M, SIDE_M), (0.0, SIDE_M), (0.0, 0.0)]
     legs = [Leg((x, y, 0.0), side_s, rest_s=0.5) for x, y in corners]
-    return plan((0.0, 0.0, 0.0), [*legs, Leg((0.0, 0.0, 2.0 * np.pi), turn_s, rest_s=0.5)], rest_s=0.5)
+    legs.append(Leg((0.0, 0.0, 2.0 * np.pi), 2.0 * side_s, rest_s=0.5))
+    ends = 0.5 + np.cumsum([0.0, *(leg.duration_s + leg.rest_s for leg in legs)])
+    return plan((0.0, 0.0, 0.0), legs, rest_s=0.5), ends
 
 
 def main() -> None:
     """Drive with the textbook's kinematics, with those of twelve rollers, and in too much of a hurry."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("out/drive_square"), help="folder for the pictures")
-    out = parser.parse_args().out
+    parser.add_argument(
+        "--pace", type=float, default=4.0, help="seconds per side of 0.8 m; a full turn takes two"
+    )
+    options = parser.parse_args()
     try:
-        make_folder(out)
+        compare(options.pace, options.out)
     except InputError as error:
         parser.error(str(error))
-    design, model = base_design(), compile_solo(build_solo())
-    calm, hasty = square(4.0, 8.0), square(0.9, 4.0)
-    stops = np.array([0.5, *np.cumsum([4.5] * 4 + [8.5]) + 0.5])
 
-    snapshots = Snapshots([21.0])
+
+def compare(pace_s: float, out: Path) -> None:
+    """Drive three times, print what happened, and draw it."""
+    calm, hasty = square(pace_s), square(HURRY_S)
+    make_folder(out)
+    design, model = base_design(), compile_solo(build_solo())
+    turning = 0.5 * (calm[1][4] + calm[1][5]) - 0.25  # amid the turn
+    snapshots = Snapshots([turning])
     runs = {
         "textbook kinematics": (MecanumKinematics.textbook(design), calm, None),
         "kinematics with rollers": (MecanumKinematics.with_rollers(design), calm, snapshots),
-        "the same, 0.9 s a side": (MecanumKinematics.with_rollers(design), hasty, None),
+        f"the same, {HURRY_S:g} s a side": (MecanumKinematics.with_rollers(design), hasty, None),
     }
-    logs = {}
-    for name, (kinematics, motion, watch) in runs.items():
-        log = drive_solo(model, BaseDrive(motion, kinematics), motion.duration_s, snapshots=watch)
-        logs[name] = log
-        ends = stops if motion is calm else np.array([0.5, *np.cumsum([1.4] * 4 + [4.5]) + 0.5])
-        print(f"{name}\n{table(log, ends)}\n")
+    logs = []
+    for name, (kinematics, (motion, ends), watch) in runs.items():
+        logs.append(drive_solo(model, BaseDrive(motion, kinematics), motion.duration_s, snapshots=watch))
+        print(f"{name}\n{table(logs[-1], ends)}\n")
 
-    plot(logs["textbook kinematics"], logs["kinematics with rollers"], out / "drive_square.png")
+    plot(logs[0], logs[1], out / "drive_square.png")
     print(out / "drive_square.png")
-    log = logs["kinematics with rollers"]
-    marks, way = Marks(), log.true[::10, 0, :2]
+    marks, way = Marks(), logs[1].true[::10, 0, :2]
     marks.path(np.column_stack([way, np.full(len(way), 0.004)]), 0.006, (0.16, 0.44, 0.82, 1.0))
-    views = (
-        Camera((0.36, 0.30, 0.26), 2.3, 215.0, -32.0),
-        Camera((*(log.true[2100, 0, :2] + [-0.12, -0.14]), 0.12), 0.75, 40.0, -14.0),
-    )
-    pictures = [render(model, snapshots.qpos, view, [marks], 1000, 800) for view in views]
-    if isinstance(pictures[0], str) or isinstance(pictures[1], str):
-        print(next(words for words in pictures if isinstance(words, str)))
-    else:
-        imsave(out / "drive_square_scene.png", np.hstack([pictures[0][0], pictures[1][0]]))
+    wheel = logs[1].true[round(turning * RATE_HZ), 0, :2] + [-0.12, -0.14]
+    pictures = [
+        render(model, snapshots.qpos, view, [marks], 1000, 800)
+        for view in (Camera((0.36, 0.30, 0.26), 2.3, 215.0, -32.0), Camera((*wheel, 0.12), 0.75, 40.0, -14.0))
+    ]
+    made = [picture[0] for picture in pictures if not isinstance(picture, str)]
+    if len(made) == len(pictures):
+        imsave(out / "drive_square_scene.png", np.hstack(made))
         print(out / "drive_square_scene.png")
+    else:
+        print(next(words for words in pictures if isinstance(words, str)))
 
 
 def table(log: DriveLog, ends: np.ndarray) -> str:
