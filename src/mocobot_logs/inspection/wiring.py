@@ -18,6 +18,7 @@ from mocobot_logs.inspection.misfit import SUSPICIOUS, Misfit, team_misfit
 from mocobot_logs.inspection.mistakes import SUSPICIONS, Mistake, suspects, wrong_zero
 from mocobot_logs.inspection.mistakes.wrong_zero import WrongZero
 from mocobot_logs.inspection.motion import Fault, Grasp, arm_motion, gimbal_motion, grasp_motion
+from mocobot_logs.inspection.rigid_body import Body, rigid_body
 from mocobot_logs.inspection.signals import Signals
 
 DECISIVE = 4.0
@@ -75,6 +76,9 @@ class Wiring:
     tried: int
 
 
+Told = tuple[Grasp | None, tuple[Fault, ...]]
+
+
 class Team:
     """Misfits of one log with mistakes undone; what a mistake does not touch is not computed again."""
 
@@ -89,10 +93,11 @@ class Team:
                 grasp_motion(signals, robot, self._arms[robot], self._gimbals[robot], design)
                 for robot in robots
             ]
-        self.misfit = self._judge(self._told)
+            self._body = rigid_body([t[0] for t in self._told if t[0] is not None])
+        self.misfit = self._judge(self._told, self._body)
 
-    def without(self, mistake: Mistake) -> Misfit:
-        """The misfit with a mistake undone."""
+    def without(self, mistake: Mistake, enough: float = np.inf) -> Misfit:
+        """The misfit with a mistake undone; one beyond ``enough`` need not be exact."""
         signals, told = mistake.undo(self.signals), list(self._told)
         same_arms = signals.position is self.signals.position
         same_gimbals = signals.theta is self.signals.theta
@@ -101,14 +106,15 @@ class Team:
                 arm = self._arms[robot] if same_arms else arm_motion(signals, robot, self._design)
                 gimbal = self._gimbals[robot] if same_gimbals else gimbal_motion(signals, robot, self._design)
                 told[robot] = grasp_motion(signals, robot, arm, gimbal, self._design)
-        return self._judge(told)
+        return self._judge(told, self._body if same_arms and same_gimbals else None, enough)
 
     def undone(self, mistake: Mistake) -> Team:
         """The team with a mistake undone."""
         return Team(mistake.undo(self.signals), self._design)
 
-    def _judge(self, told: Sequence[tuple[Grasp | None, tuple[Fault, ...]]]) -> Misfit:
-        return team_misfit([t[0] for t in told], [t[1] for t in told], self._design.gravity_mps2)
+    def _judge(self, told: Sequence[Told], body: Body | None, enough: float = np.inf) -> Misfit:
+        grasps, faults = [t[0] for t in told], [t[1] for t in told]
+        return team_misfit(grasps, faults, self._design.gravity_mps2, body, enough)
 
 
 def check_wiring(
@@ -152,12 +158,16 @@ def _best(
 ) -> tuple[Mistake, tuple[Mistake, ...], float]:
     """The mistake that explains most, and those that explain as much."""
     tried: list[tuple[float, int, Mistake]] = []
+    least = np.inf
     for suspicion in SUSPICIONS:
         # Single encoders with a wrong zero are many, and looked at only if nothing else will do.
-        if suspicion is wrong_zero and min(tried)[0] <= max(WORTH_TRYING, team.misfit.total / OVERWHELMING):
+        if suspicion is wrong_zero and least <= max(WORTH_TRYING, team.misfit.total / OVERWHELMING):
             break
         for mistake in suspicion.suspects(team.signals, design):
-            tried.append((team.without(mistake).total, len(tried), mistake))
+            enough = ALIKE * least + 1e-9
+            total = team.without(mistake, enough).total
+            least = min(least, total)
+            tried.append((total, len(tried), mistake))
             advance(1)
     tried.sort(key=lambda entry: entry[:2])
     top = []
@@ -209,10 +219,11 @@ def _hidden(
 ) -> tuple[tuple[Mistake, ...], int]:
     """Mistakes that would not have been found, had they been made."""
     hidden, tried = [], 0
+    enough = max(SUSPICIOUS, DECISIVE * team.misfit.total)
     for mistake in suspects(team.signals, design):
         if not isinstance(mistake, WrongZero):
             tried += 1
-            if not shows(team.without(mistake).total, team.misfit.total):
+            if not shows(team.without(mistake, enough).total, team.misfit.total):
                 hidden.append(mistake)
             advance(1)
     return tuple(hidden), tried
