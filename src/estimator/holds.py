@@ -79,20 +79,10 @@ def find_holds(
     Q = data.samples
     if window > Q or window < 3:
         return []
-    force = np.einsum("qiab,qib->qia", data.R_bi, data.wrench[..., 3:]).reshape(Q, -1)
-    variance = _noise_variance(force, data.rate_hz, window)  # (windows, 3N)
-    smooth = uniform_filter1d(force, _odd(_SMOOTH_S * data.rate_hz), axis=0, mode="nearest")
-    slow = variance * min(1.0, _LAG_S / _SMOOTH_S)
-
-    steady = _half_range(force, window) <= tolerance_N + _SIGMAS * np.sqrt(variance)
-    # The running mean looks half its length beyond the window, where the payload may already move.
-    edge = min(_odd(_SMOOTH_S * data.rate_hz) // 2, (window - 1) // 2)
-    inner = _half_range(smooth, window - 2 * edge)[edge : edge + len(steady)]
-    steady &= inner <= tolerance_N + _SLOW_SIGMAS * np.sqrt(slow)
-    still = np.ones(len(steady), dtype=bool)
-    for part, limit in ((data.twist[..., 3:], STILL_SPEED_MPS), (data.twist[..., :3], STILL_RATE_RADPS)):
-        still &= np.sqrt(_window_mean(np.sum(part**2, axis=2), window)).max(axis=1) <= limit
-    starts = np.flatnonzero(steady.all(axis=1) & still)
+    steady = np.ones(Q - window + 1, dtype=bool)
+    for robot in range(data.robots):  # one at a time, for the sake of memory
+        steady &= _rests(data, robot, window, tolerance_N)
+    starts = np.flatnonzero(steady)
     if not len(starts):
         return []
     runs = np.split(starts, np.flatnonzero(np.diff(starts) > 1) + 1)
@@ -103,6 +93,25 @@ def find_holds(
             first = holds.pop()[0]
         holds.append((first, last))
     return [_hold(data, first, last) for first, last in holds]
+
+
+def _rests(data: GraspData, robot: int, window: int, tolerance_N: float) -> NDArray[np.bool_]:
+    """Whether one robot's forces are constant and its grasp is still, in every window; shape (Q - window + 1,)."""
+    force = np.einsum("qab,qb->qa", data.R_bi[:, robot], data.wrench[:, robot, 3:])
+    variance = _noise_variance(force, data.rate_hz, window)  # (windows, 3)
+    smooth = uniform_filter1d(force, _odd(_SMOOTH_S * data.rate_hz), axis=0, mode="nearest")
+    slow = variance * min(1.0, _LAG_S / _SMOOTH_S)
+
+    steady = _half_range(force, window) <= tolerance_N + _SIGMAS * np.sqrt(variance)
+    # The running mean looks half its length beyond the window, where the payload may already move.
+    edge = min(_odd(_SMOOTH_S * data.rate_hz) // 2, (window - 1) // 2)
+    inner = _half_range(smooth, window - 2 * edge)[edge : edge + len(steady)]
+    steady &= inner <= tolerance_N + _SLOW_SIGMAS * np.sqrt(slow)
+    rests = steady.all(axis=1)
+    for part, limit in ((slice(3, 6), STILL_SPEED_MPS), (slice(0, 3), STILL_RATE_RADPS)):
+        square = np.sum(data.twist[:, robot, part] ** 2, axis=1, keepdims=True)
+        rests &= np.sqrt(_window_mean(square, window))[:, 0] <= limit
+    return rests
 
 
 def _hold(data: GraspData, first: int, last: int) -> Hold:

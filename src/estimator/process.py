@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.arm_dynamics import wrench_on_payload
 from estimator.checks import check_duration, check_recording
 from estimator.delta import leg_geometry, wrist_motion
+from estimator.design import OmnidDesign
 from estimator.errors import InputError
 from estimator.filtering import differentiate, low_pass, trim_slice
 from estimator.gimbal import angular_motion, rotation
 from estimator.grasp_data import GraspData
 from estimator.recording import Recording
+
+Array = NDArray[np.float64]
 
 
 def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: float = 2.0) -> GraspData:
@@ -39,10 +43,29 @@ def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: floa
         )
     rate_hz, design = recording.metadata.rate_hz, recording.metadata.design
     keep = trim_slice(len(recording.time), rate_hz, trim_s)
-    sensors = recording.phi, recording.theta, recording.tau
-    phi, theta, tau = (low_pass(samples, rate_hz, cutoff_hz) for samples in sensors)
-    phi_dot, theta_dot = differentiate(phi, rate_hz), differentiate(theta, rate_hz)
-    phi_ddot, theta_ddot = differentiate(phi_dot, rate_hz), differentiate(theta_dot, rate_hz)
+    time = recording.time[keep]
+    shape = len(time), recording.metadata.robots
+    data = GraspData(
+        time=time,
+        R_bi=np.empty((*shape, 3, 3)),
+        p_bi=np.empty((*shape, 3)),
+        twist=np.empty((*shape, 6)),
+        twist_dot=np.empty((*shape, 6)),
+        wrench=np.empty((*shape, 6)),
+        rate_hz=rate_hz,
+        gravity_mps2=design.gravity_mps2,
+    )
+    for robot in range(shape[1]):  # one at a time: what lies between takes ten times the memory of the result
+        sensors = (samples[:, robot] for samples in (recording.phi, recording.theta, recording.tau))
+        _fill(data, robot, tuple(low_pass(samples, rate_hz, cutoff_hz) for samples in sensors), keep, design)
+    return data
+
+
+def _fill(data: GraspData, robot: int, sensors: tuple[Array, ...], keep: slice, design: OmnidDesign) -> None:
+    """Data points of one robot from its filtered phi, theta and tau, each (Q, 3)."""
+    phi, theta, tau = sensors
+    phi_dot, theta_dot = differentiate(phi, data.rate_hz), differentiate(theta, data.rate_hz)
+    phi_ddot, theta_ddot = differentiate(phi_dot, data.rate_hz), differentiate(theta_dot, data.rate_hz)
     phi, phi_dot, phi_ddot = phi[keep], phi_dot[keep], phi_ddot[keep]
     theta, theta_dot, theta_ddot = theta[keep], theta_dot[keep], theta_ddot[keep]
 
@@ -50,15 +73,10 @@ def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: floa
     h_dot, h_ddot = wrist_motion(legs, phi_dot, phi_ddot)
     R_bi = rotation(theta)
     omega, omega_dot = angular_motion(theta, theta_dot, theta_ddot)
-    v = np.einsum("...ji,...j->...i", R_bi, h_dot)
-    v_dot = np.einsum("...ji,...j->...i", R_bi, h_ddot) - np.cross(omega, v)
-    return GraspData(
-        time=recording.time[keep],
-        R_bi=R_bi,
-        p_bi=legs.h,
-        twist=np.concatenate([omega, v], axis=-1),
-        twist_dot=np.concatenate([omega_dot, v_dot], axis=-1),
-        wrench=wrench_on_payload((phi, phi_dot, phi_ddot), (theta, theta_dot, theta_ddot), tau[keep], design),
-        rate_hz=rate_hz,
-        gravity_mps2=design.gravity_mps2,
-    )
+    data.R_bi[:, robot], data.p_bi[:, robot] = R_bi, legs.h
+    data.twist[:, robot, :3], data.twist_dot[:, robot, :3] = omega, omega_dot
+    data.twist[:, robot, 3:] = np.einsum("...ji,...j->...i", R_bi, h_dot)
+    v_dot = np.einsum("...ji,...j->...i", R_bi, h_ddot) - np.cross(omega, data.twist[:, robot, 3:])
+    data.twist_dot[:, robot, 3:] = v_dot
+    motion = (phi, phi_dot, phi_ddot), (theta, theta_dot, theta_ddot)
+    data.wrench[:, robot] = wrench_on_payload(*motion, tau[keep], design)
