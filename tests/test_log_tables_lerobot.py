@@ -61,6 +61,14 @@ def test_episodes_are_of_lerobot_only(tmp_path: Path) -> None:
     assert "is not a LeRobot dataset, so it has no episode 0" in refused(path, episode=0)
 
 
+def test_a_recording_that_merely_lies_there(dataset: Path) -> None:
+    recording = small_recording(rows=60)
+    write_recording(recording, dataset / "data" / "chunk-000" / "own.parquet")
+    log = read_log(dataset / "data" / "chunk-000" / "own.parquet")
+    assert_same(log, recording)
+    assert log.metadata == recording.metadata
+
+
 def test_numbers_by_index_and_by_feature_and_name(dataset: Path, episodes: list[Recording]) -> None:
     common = {c: m for c, m in JOINT.common.items() if not c.startswith("ref")}
     common["phi1"] = replace(common["phi1"], column="observation.state[0]")
