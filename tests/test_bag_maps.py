@@ -165,6 +165,13 @@ def test_types_without_definitions(tmp_path):
         open_bag(path, builtin_map("omnid-ros2"))
 
 
+def test_names_of_types_without_msg(tmp_path):
+    """Some writers leave it out."""
+    messages = [bags.Said(s.topic, s.log_ns, "sensor_msgs/JointState", s.data) for s in TEAM.said()]
+    told = {"sensor_msgs/JointState": ("ros2msg", bags.definition(bags.JOINT_STATE))}
+    bags.assert_holds(raw_mcap(tmp_path / "a.mcap", messages, definitions=told), TEAM)
+
+
 def test_types_of_ones_own(tmp_path):
     """A type of a lab, defined in the bag only."""
     told = (
