@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from emps_data import VARIABLE, data_folder
 GAIN, KP, KV, RATE_HZ = 35.15065188248547, 160.18, 243.45, 1000.0
 CYCLE_S, CYCLES = 2.4, 3
 STEP_M = 2e-7
-FINE_S = 1e-4
+FINE_S = 2.5e-4
 
 
 def nominal() -> Plant:
@@ -37,6 +38,7 @@ def reference(cycles: int = CYCLES) -> np.ndarray:
     return np.tile(x - x[-1] * np.arange(len(x)) / len(x), cycles)
 
 
+@cache
 def recorded(plant: Plant, seed: int = 0, cycles: int = CYCLES, name: str = "made.mat") -> AxisLog:
     """A recording of a plant: fine integration, quantised position, a little friction noise.
 

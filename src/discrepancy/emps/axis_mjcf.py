@@ -86,7 +86,8 @@ def _general(
 ) -> None:
     actuator = spec.add_actuator(name=name, target=joint, trntype=mujoco.mjtTrn.mjTRN_JOINT)
     actuator.gaintype, actuator.biastype = mujoco.mjtGain.mjGAIN_FIXED, mujoco.mjtBias.mjBIAS_AFFINE
-    actuator.gainprm = [0.0] * 10
+    # Not zero: MuJoCo takes an affine bias without stiffness or gain for a damping ratio, if it is positive.
+    actuator.gainprm = [1e-9, *[0.0] * 9]
     actuator.biasprm = [*bias, *[0.0] * 7]
     if force_range is not None:
         actuator.forcelimited = True

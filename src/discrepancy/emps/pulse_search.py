@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 SHORTEST_S, LONGEST_S = 0.2, 6.0
 BINS = 50
 FOLD_HZ = 100.0
+WIDTHS = np.arange(2, BINS - 1)
 
 
 def pulse_train(residual: Array, rate_hz: float) -> PulseTrain:
@@ -67,16 +68,13 @@ def _box(level: Array, phase: Array) -> tuple[float, float, float]:
     total, number = sums.sum(), counts.sum()
     doubled = np.concatenate([[0.0], np.cumsum(np.tile(sums, 2))])
     many = np.concatenate([[0.0], np.cumsum(np.tile(counts, 2))])
-    best = (-np.inf, 0.0, 0.5)
-    for width in range(2, BINS - 1):
-        inside = doubled[width : width + BINS] - doubled[:BINS]
-        n = many[width : width + BINS] - many[:BINS]
-        spread = np.maximum(n * (number - n) / number, 1e-9)
-        power = (inside - total * n / number) ** 2 / spread
-        k = int(np.argmax(power))
-        if power[k] > best[0]:
-            best = (float(power[k]), k / BINS, width / BINS)
-    return best
+    start = np.arange(BINS)
+    stop = start + WIDTHS[:, None]
+    inside, n = doubled[stop] - doubled[start], many[stop] - many[start]
+    spread = np.maximum(n * (number - n) / number, 1e-9)
+    power = (inside - total * n / number) ** 2 / spread
+    k, at = np.unravel_index(int(np.argmax(power)), power.shape)
+    return float(power[k, at]), at / BINS, WIDTHS[k] / BINS
 
 
 def _sharpened(residual: Array, rate_hz: float, train: PulseTrain) -> PulseTrain:
