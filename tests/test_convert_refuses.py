@@ -307,6 +307,7 @@ def test_read_only_targets(log: Path, refused: Callable[..., str], name: str) ->
     assert f"/proc/self/{name}: cannot be written (" in refused(log, Path("/proc/self") / name)
 
 
+@pytest.mark.slow
 def test_a_full_disk(tmp_path: Path) -> None:
     """Files must not grow beyond 20 kB, which the system reports while they are written."""
     log, out = tmp_path / "log.parquet", tmp_path / "out"

@@ -200,7 +200,7 @@ def good_map(level: str) -> dict[str, Any]:
     return {"version": 1, "level": level, "channels": channels, "time": {"column": "t", "unit": "s"}}
 
 
-@settings(BOUNDED, max_examples=400)
+@settings(BOUNDED, max_examples=250)
 @given(
     level=st.sampled_from(["joint", "wrist"]),
     changes=st.lists(st.tuples(st.lists(KEYS, min_size=1, max_size=3), TABLES), max_size=3),
