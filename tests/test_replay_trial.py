@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from diagnosed import small_diagnosis
 from estimator.errors import InputError
 from estimator.estimate import estimate_payload
 from estimator.recording import Recording
 from mocobot_sim.replay.blueprint import blueprint
-from mocobot_sim.replay.diagnosis import Cause, Diagnosis
+from mocobot_sim.replay.diagnosis import Cause, Diagnosis, read_diagnosis
 from mocobot_sim.replay.outputs import save_replay
-from mocobot_sim.replay.payload_shape import BAR_M
+from mocobot_sim.replay.payload_shape import BAR_M, cad_shape, held_elsewhere
+from mocobot_sim.replay.placement import Grasps
 from mocobot_sim.replay.replay_trial import distinct_names, replay_trial
 from mocobot_sim.replay.summary import summary
 from mocobot_sim.sensors import measure, sensor_preset
@@ -107,6 +111,22 @@ def test_a_label_whose_cad_does_not_fit_is_not_believed(recording: Recording) ->
     assert len(asked.shape.rgba) != len(trial.shape.rgba)
 
 
+@pytest.mark.parametrize(("turn_deg", "shift_m", "fits"), [
+    (10.0, 0.0, True), (20.0, 0.0, False), (0.0, 0.08, True), (0.0, 0.12, False),
+])  # fmt: skip
+def test_cad_fits_grasps_nearby(turn_deg: float, shift_m: float, fits: bool) -> None:
+    _, cad = cad_shape("a", 3)
+    R, p = cad.R_1i.copy(), cad.p_1i.copy()
+    R[2] = R[2] @ Rotation.from_rotvec([0.0, turn_deg, 0.0], degrees=True).as_matrix()
+    p[1] += [0.0, 0.0, shift_m]
+    said = held_elsewhere(cad, Grasps(R, p))
+    if fits:
+        assert said is None
+    else:
+        assert said is not None
+        assert said.startswith("grasp 3 is 0.00 m and 20" if turn_deg else "grasp 2 is 0.12 m")
+
+
 def test_payload_for_other_robots(recording: Recording, tmp_path: Path) -> None:
     with pytest.raises(InputError, match="has 5 grasps; the recording is of 3 robots"):
         replay_trial(recording, "rec", payload=FIVE.write(tmp_path))
@@ -141,6 +161,29 @@ def test_axes_that_are_not_determined_are_not_drawn(recording: Recording, tmp_pa
 
 def cause(name: str, robot: int | None, body: str | None) -> Cause:
     return Cause(name, robot, body, f"{name} [is] *here*.")
+
+
+@pytest.mark.parametrize(
+    ("name", "robot", "joint", "body"),
+    [
+        ("joint_friction", 1, 3, "proximal3"),
+        ("theta_zero", 1, 1, "yoke"),
+        ("gimbal_friction", 2, 2, "ring"),
+        ("theta_zero", 1, 3, "flange"),
+        ("tether", 3, None, "flange"),
+        ("clock_delay", 3, None, None),
+        ("drag", None, None, None),
+    ],
+)
+def test_causes_sit_at_bodies(
+    tmp_path: Path, name: str, robot: int | None, joint: int | None, body: str | None
+) -> None:
+    """The gimbal's joints 1, 2, 3 are z, y, x; those of the other causes are the legs."""
+    values = small_diagnosis()
+    values["causes"][0] |= {"cause": name, "robot": robot, "joint": joint}
+    (tmp_path / "diagnosis.json").write_text(json.dumps(values), encoding="utf-8")
+    (found,) = read_diagnosis(tmp_path).causes
+    assert (found.name, found.robot, found.body) == (name, robot, body)
 
 
 def test_causes_are_marked_where_they_sit(recording: Recording, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ TRAIL_S = 3.0
 """Length of the visible wrist paths."""
 PATH_EYE_M = np.array([0.11, -0.11, 0.08])
 """From where a wrist's path is seen."""
-BACKGROUND = (128, 137, 150)
+BACKGROUND = (100, 108, 120)
 
 
 def blueprint(trials: Sequence[ReplayTrial], tab: str | None = None) -> rrb.Blueprint:

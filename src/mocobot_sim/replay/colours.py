@@ -37,7 +37,7 @@ def shades(robot: int, saturation: float = 1.0) -> list[Colour]:
 def pale(colour: Colour) -> Colour:
     """A light shade of a colour, for text on the viewer's dark labels."""
     h, lightness, s = colorsys.rgb_to_hls(*(part / 255.0 for part in colour))
-    return _bytes(colorsys.hls_to_rgb(h, lightness + 0.75 * (1.0 - lightness), s))
+    return _bytes(colorsys.hls_to_rgb(h, lightness + 0.8 * (1.0 - lightness), s))
 
 
 def _bytes(rgb: tuple[float, float, float]) -> Colour:

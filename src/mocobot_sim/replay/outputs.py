@@ -8,6 +8,7 @@ import shutil
 import sys
 import uuid
 import warnings
+import webbrowser
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from urllib.parse import quote
@@ -103,14 +104,18 @@ def serve_replay(trials: Sequence[ReplayTrial], progress: Progress = None) -> tu
     stream = new_stream()
     try:
         data = stream.serve_grpc()
-        rr.serve_web_viewer(web_port=WEB_PORT, open_browser=has_display(), connect_to=data)
+        rr.serve_web_viewer(web_port=WEB_PORT, open_browser=False)
         log_replay(stream, trials, progress)
         stream.flush(timeout_sec=FLUSH_S)
     except (RuntimeError, ValueError, OSError) as error:
         raise InputError(
             f"the replay cannot be served ({_line(error)}); is another one running on ports {WEB_PORT} and {DATA_PORT}?"
         ) from error
-    return stream, f"http://localhost:{WEB_PORT}?url={quote(data, safe='')}"
+    # Labels are drawn for the dark theme, whatever the browser prefers.
+    address = f"http://localhost:{WEB_PORT}?url={quote(data, safe='')}&theme=dark"
+    if has_display():
+        webbrowser.open(address)
+    return stream, address
 
 
 def _check_complete(path: Path) -> None:
