@@ -19,10 +19,12 @@ from discrepancy.emps.rig import EmpsRig
 from emps_data import DATA, PULSES, needed_folder
 
 
-def found_pulses(path: Path) -> tuple[EmpsRig, Diagnosis, PulseTrain | None, float]:
+def found_pulses(
+    path: Path, *, closed_loop: bool = True
+) -> tuple[EmpsRig, Diagnosis, PulseTrain | None, float]:
     """The rig, the diagnosis, the pulses that it names (size in V) or None, and the size's standard error [V]."""
     rig = EmpsRig.of(read_emps(path))
-    diagnosis = diagnose_axis(rig)
+    diagnosis = diagnose_axis(rig, closed_loop=closed_loop)
     for item in diagnosis.causes:
         if item.candidate.cause == "injected_voltage":
             shape = item.candidate.shape

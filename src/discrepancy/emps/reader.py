@@ -34,7 +34,8 @@ def read_emps(path: Path) -> AxisLog:
         InputError: the file cannot be read or is no such recording.
     """
     try:
-        found = loadmat(path, variable_names=[*SERIES, *NUMBERS])
+        with path.open("rb") as file:
+            found = loadmat(file, variable_names=[*SERIES, *NUMBERS])
     except NotImplementedError as error:
         raise InputError(f"{path}: is a MATLAB 7.3 file; save it with -v7 instead") from error
     except OSError as error:
