@@ -4,7 +4,8 @@
     python benchmarks/emps_sysid.py
 
 ``mujoco.sysid`` fits the closed loop of the MJCF by non-linear least squares on position and voltage; the diagnosis'
-problem is linear in the force. Both results are judged alike: by force, and by the digital loop run again.
+problem is linear in the force, whitened as in a diagnosis or plain. All are judged alike: by force, and by the digital
+loop run again.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.staircase import Active, errors
 from discrepancy.problem import Problem
 from emps_data import DATA, PULSES, needed_folder
+from emps_gain import plain_fit
 
 NAMES = ("mass", "coulomb_friction", "viscous_friction", "asymmetric_viscous")
 LAG_S = 1e-3
@@ -127,16 +129,20 @@ def main() -> None:
     rigs = [EmpsRig.of(read_emps(folder / name)) for name in (DATA, PULSES)]
     injected = candidate_of("injected_voltage", rigs[1].hints, DEFAULTS), np.array([5.0695])
     a, a_se, a_s = ours(rigs[0])
+    start = time.perf_counter()
+    plain = np.array([float(values[0]) for _, values in plain_fit(rigs[0], NAMES)])
+    plain = np.array([rigs[0].nominal.mass_kg + plain[0], plain[1], plain[2] + plain[3], plain[2] - plain[3]])
+    plain_s = time.perf_counter() - start
     b, b_se, b_s, calls = theirs(rigs[0])
-    print(f"{'':<26}{'diagnosis':>22}{'mujoco.sysid':>22}")
+    print(f"{'':<26}{'rows, whitened':>22}{'rows, plain':>14}{'mujoco.sysid':>22}")
     for k, name in enumerate(("mass [kg]", "Coulomb [N]", "viscous forwards [N s/m]", "viscous backwards")):
-        print(f"{name:<26}{a[k]:>12.3f} +- {a_se[k]:<6.3f}{b[k]:>12.3f} +- {b_se[k]:<6.3f}")
-    print(f"{'seconds':<26}{a_s:>16.2f}{b_s:>22.1f}   ({calls} models built and simulated)")
+        print(f"{name:<26}{a[k]:>12.3f} +- {a_se[k]:<6.3f}{plain[k]:>14.3f}{b[k]:>12.3f} +- {b_se[k]:<6.3f}")
+    print(f"{'seconds':<26}{a_s:>16.2f}{plain_s:>20.2f}{b_s:>16.1f}   ({calls} models built and simulated)")
     for rig, extra in zip(rigs, ([], [injected]), strict=True):
-        for name, numbers in (("diagnosis", a), ("mujoco.sysid", b)):
+        for name, numbers in (("rows, whitened", a), ("rows, plain", plain), ("mujoco.sysid", b)):
             e = errors(rig, [[*model_of(rig, numbers), *extra]] * len(rig.blocks))
             print(
-                f"{rig.log.name:<24}{name:<14}force {e.force_percent:.2f} %, position {e.position_um:.3g} um, "
+                f"{rig.log.name:<24}{name:<16}force {e.force_percent:.2f} %, position {e.position_um:.3g} um, "
                 f"voltage {e.voltage_mV:.4g} mV"
             )
 

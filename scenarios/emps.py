@@ -44,9 +44,7 @@ def main() -> None:
         values, se = other.effect_parameters(item.candidate, item.values, item.covariance)
         print(EmpsWords().describe(item.candidate, values, se))
 
-    print(
-        "\n=== What every cause is worth; the second recording with the pulses found in it and nothing else fitted.\n"
-    )
+    print("\n=== What every cause is worth; in the second recording nothing but the pulses was fitted.\n")
     print(format_staircase(staircase(rig, diagnosis.explanation, (other, pulses)), paths[1].name))
 
 
