@@ -6,6 +6,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
 from mocobot_sim.base.design import WHEELS, BaseDesign, base_design, load_base_design
@@ -105,6 +106,16 @@ def test_wheels_are_round_as_far_as_mujoco_is_concerned(solo):
     np.testing.assert_allclose(reach, wheel_reach(DESIGN, angles), rtol=0, atol=1e-9)
     assert np.ptp(wheel_reach(DESIGN, np.linspace(-HALF_PITCH, HALF_PITCH, 1001))) < 0.075e-3
     assert np.abs(wheel_reach(DESIGN, angles) - DESIGN.wheel_radius_m).max() < 0.05e-3
+
+
+def test_poses_are_read_off_the_free_joints(solo):
+    """A chassis that is tilted, too; yaw as scipy has it."""
+    data, index = mujoco.MjData(solo), BaseIndex.of(solo)
+    for turn in Rotation.random(20, np.random.default_rng(9)):
+        at = index.free_qpos[0]
+        data.qpos[at : at + 7] = [0.4, -1.2, 0.1, *turn.as_quat(scalar_first=True)]
+        R = turn.as_matrix()
+        np.testing.assert_allclose(index.poses(data), [[0.4, -1.2, np.arctan2(R[1, 0], R[0, 0])]], atol=1e-12)
 
 
 def test_neighbouring_rollers_clear_each_other(solo):

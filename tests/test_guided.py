@@ -2,18 +2,22 @@
 
 from dataclasses import replace
 
+import mujoco
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
 from estimator.payload_estimate import PayloadEstimate
-from mocobot_sim.control import ControlGains
+from mocobot_sim.actors import Stage
+from mocobot_sim.assemble import assemble_at_home
+from mocobot_sim.control import ControlGains, TeamController
 from mocobot_sim.guided.float_arms import FLOAT_GAINS, FloatArms
 from mocobot_sim.guided.hand import Grip, GuidingHand, HandLog, Move, PushingHand, hand_path
 from mocobot_sim.guided.weight import Payload, up_in_payload, weight_shares
 from mocobot_sim.models import omnid_design
 from mocobot_sim.scene import TeamScene, build_team
+from mocobot_sim.team_index import TeamIndex
 from mocobot_sim.trajectories import RATE_HZ, Trajectory
 from mocobot_sim.trial import run_trial
 from mocobot_sim.truth import GroundTruth
@@ -165,6 +169,66 @@ def test_there_and_back_takes_no_work_but_the_damping(scene, truth):
     lifting = 11.672 * G * 0.04
     assert work == pytest.approx(lost, abs=0.01 * lifting)
     assert lost < 0.05 * lifting
+
+
+def _stage(scene: TeamScene, rng: np.random.Generator) -> Stage:
+    """The team in a shaken state: turned, moving, as MuJoCo has it after a forward pass."""
+    model = scene.compile()
+    data, index = mujoco.MjData(model), TeamIndex.of(model)
+    assemble_at_home(scene, model, data, index)
+    data.qpos[:] += rng.uniform(-0.1, 0.1, model.nq)
+    data.qvel[:] = rng.normal(size=model.nv)
+    mujoco.mj_forward(model, data)
+    controller = TeamController(index, omnid_design(), FLOAT_GAINS, data)
+    return Stage(model, data, index, controller, 1000.0, 10, 100)
+
+
+def test_a_hands_damper_sees_the_velocity_of_its_point_and_acts_there(scene):
+    """Against MuJoCo's point Jacobian, and its own way of applying a wrench at a point."""
+    stage, point_1 = _stage(scene, np.random.default_rng(6)), np.array([0.3, -0.4, 0.2])
+    model, data, body = stage.model, stage.data, stage.index.payload_body
+    hand = GuidingHand(point_1, STAY, 1.0, Grip(0.0, 7.0, 0.0, 3.0))
+    hand.start(stage)
+    data.xfrc_applied[body] = 0.0
+    hand.act(0)
+
+    at = data.xpos[body] + data.xmat[body].reshape(3, 3) @ point_1
+    moving, turning = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    mujoco.mj_jac(model, data, moving, turning, at, body)
+    force, moment = -7.0 * moving @ data.qvel, -3.0 * turning @ data.qvel
+    np.testing.assert_allclose(hand.log().force[0], force, atol=1e-10)
+    np.testing.assert_allclose(hand.log().moment[0], moment, atol=1e-10)
+    expected = np.zeros(model.nv)
+    mujoco.mj_applyFT(model, data, force, moment, at, body, expected)
+    without = data.qfrc_smooth.copy()
+    mujoco.mj_forward(model, data)
+    np.testing.assert_allclose(data.qfrc_smooth - without, expected, atol=1e-9)
+    assert hand.log().power[0] == pytest.approx(force @ (moving @ data.qvel) + moment @ (turning @ data.qvel))
+
+
+def test_a_hands_spring_turns_the_payload_back(scene):
+    """The moment is against the rotation vector from the wanted orientation, in the world."""
+    stage = _stage(scene, np.random.default_rng(7))
+    data, body = stage.data, stage.index.payload_body
+    turn = Rotation.from_rotvec([0.3, -0.2, 0.1])
+    hand = GuidingHand(
+        HANDLE, (Move((0.0, 0.0, 0.0), tuple(turn.as_rotvec()), 0.001),), 0.0, Grip(0.0, 0.0, 50.0, 0.0)
+    )
+    hand.start(stage)
+    hand.act(50)
+    np.testing.assert_allclose(hand.log().moment[0], 50.0 * turn.as_rotvec(), atol=1e-9)
+    np.testing.assert_allclose(hand.log().tilt[0], -turn.as_rotvec(), atol=1e-10)
+    assert data.xfrc_applied[body, 3:] @ turn.as_rotvec() > 0
+
+
+def test_forces_of_the_start_are_kept_whoever_leans_on_the_payload(scene, truth):
+    """A hand that moves it during the first second, when arms would take its load up, changes nothing."""
+    move = (Move((0.0, 0.0, 0.03), (0.0, 0.0, 0.0), 0.5, 0.5),)
+    hold = Trajectory("static", np.tile(scene.wrist_home_b, (121, 1, 1)))
+    log = run_trial(scene, hold, FLOAT_GAINS, actors=[GuidingHand(HANDLE, move, 0.1, FIRM), FloatArms(None)])
+    expected = np.zeros((3, 3))
+    expected[:, 2] = weight_shares(truth, [0.0, 0.0, 1.0], G)
+    np.testing.assert_allclose(log.feed_forward, expected, atol=0.02)
 
 
 def test_paths_of_hands():
