@@ -84,7 +84,9 @@ def _check(options: Replay) -> None:
 
 def _check_rerun() -> None:
     """Refuse in one sentence if Rerun is missing, or is not the version that this code speaks to."""
-    os.environ.setdefault("RUST_LOG", "off")  # or the SDK repeats in its own words what we say in one sentence
+    os.environ.setdefault(
+        "RUST_LOG", "off"
+    )  # or the SDK repeats in its own words what we say in one sentence
     try:
         import rerun
         from rerun.chunk import RrdReader  # noqa: F401
