@@ -86,7 +86,7 @@ MISTAKES = [
     Miswired("tau in mN m", lambda p, t, f: _scale(f, 1e3), "wrong_unit", ALL, TAU, "in mN m, not N m"),
     Miswired("tau scaled twice", lambda p, t, f: _scale(f, 1e-3), "wrong_unit", ALL, TAU, "was in N m"),
     Miswired("phi swapped", lambda p, t, f: _swap(p, 0, 1), "swapped_robots", (1, 2), PHI, "phi columns are exch"),
-    Miswired("theta swapped", lambda p, t, f: _swap(t, 0, 2), "swapped_robots", (1, 3), THETA, "theta columns are exch"),
+    Miswired("theta swapped", lambda p, t, f: _swap(t, 0, 2), "swapped_robots", (1, 3), THETA, "theta columns are"),
     Miswired("tau swapped", lambda p, t, f: _swap(f, 1, 2), "swapped_robots", (2, 3), TAU, "tau columns are exch"),
     Miswired(
         "gimbal order of one", lambda p, t, f: _exchange(t, 1, 0, 2), "gimbal_axes", (2,), ("theta_x", "theta_z"),
@@ -98,8 +98,8 @@ MISTAKES = [
     ),
     Miswired("gimbal sign", lambda p, t, f: _turn(t, 2, 0), "gimbal_axes", (3,), ("theta_z",), "has the wrong sign"),
     Miswired("all gimbal signs", lambda p, t, f: _turn(t, EVERY, 0, 1, 2), "gimbal_axes", ALL, THETA, "wrong sign"),
-    Miswired("torque sign", lambda p, t, f: _turn(f, EVERY, 0, 1, 2), "torque_sign", ALL, TAU, "tau has the wrong sign"),
-    Miswired("torque sign of one", lambda p, t, f: _turn(f, 1, 0, 1, 2), "torque_sign", (2,), TAU, "has the wrong sign"),
+    Miswired("torque sign", lambda p, t, f: _turn(f, EVERY, 0, 1, 2), "torque_sign", ALL, TAU, "tau has the wrong"),
+    Miswired("torque sign of one", lambda p, t, f: _turn(f, 1, 0, 1, 2), "torque_sign", (2,), TAU, "has the wrong"),
     Miswired("one torque's sign", lambda p, t, f: _turn(f, 2, 0), "torque_sign", (3,), ("tau1",), "has the wrong sign"),
     Miswired("torque order", lambda p, t, f: _roll(f, 0), "joint_order", (1,), TAU, "column tau2 holds tau1"),
     Miswired(
