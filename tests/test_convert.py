@@ -11,13 +11,15 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from estimator.errors import InputError
 from estimator.estimate import estimate_payload
 from estimator.recording import Recording, read_recording, write_recording
 from log_files import write_lerobot, write_text
 from mocobot.cli import main
+from mocobot_logs.table_write import write_csv, write_npz
 from omnid_design import DESIGN
 from recorded_team import Sines, carry
-from recordings import metadata
+from recordings import metadata, small_recording
 
 FORMATS = ["log.csv", "log.npz", "log.parquet", "log.mcap", "log.db3", "bag"]
 
@@ -106,6 +108,15 @@ def test_files_say_what_they_hold(trial: Path, tmp_path: Path, convert: Callable
         assert np.array_equal(arrays["phi"], original.phi)
         assert np.array_equal(arrays["ref"], original.ref)
         assert str(arrays["mocobot"]) == original.metadata.to_json()
+
+
+def test_arms_without_a_wrist_are_not_written(tmp_path: Path) -> None:
+    """Driven angles at which the rods cannot meet: the sentence names the recording, and nothing is left."""
+    recording = replace(small_recording(rows=20, ref=False), phi=np.full((20, 3, 3), -1.5), name="folded")
+    for write in (write_csv, write_npz):
+        with pytest.raises(InputError, match="^folded: "):
+            write(recording, tmp_path / "log", "wrist")
+    assert not list(tmp_path.iterdir())
 
 
 # Logs of others

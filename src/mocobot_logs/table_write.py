@@ -57,7 +57,10 @@ def write_npz(recording: Recording, path: Path, level: Level = "joint") -> None:
     """
     arrays = {"time": recording.time, "phi": recording.phi, "theta": recording.theta, "tau": recording.tau}
     if level == "wrist":
-        h, force = wrist_of(recording.phi, recording.tau, recording.metadata.design)
+        try:
+            h, force = wrist_of(recording.phi, recording.tau, recording.metadata.design)
+        except InputError as error:
+            raise InputError(f"{recording.name}: {error}") from error
         arrays = {"time": recording.time, "h": h, "theta": recording.theta, "force": force}
     if recording.ref is not None:
         arrays["ref"] = recording.ref
