@@ -114,7 +114,7 @@ def test_arms_without_a_wrist_are_not_written(tmp_path: Path) -> None:
     """Driven angles at which the rods cannot meet: the sentence names the recording, and nothing is left."""
     recording = replace(small_recording(rows=20, ref=False), phi=np.full((20, 3, 3), -1.5), name="folded")
     for write in (write_csv, write_npz):
-        with pytest.raises(InputError, match="^folded: "):
+        with pytest.raises(InputError, match=r"^folded: "):
             write(recording, tmp_path / "log", "wrist")
     assert not list(tmp_path.iterdir())
 
