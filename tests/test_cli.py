@@ -261,8 +261,11 @@ def test_paper_refuses(capsys: pytest.CaptureFixture[str], arguments: list[str],
         assert word in message
 
 
+COMMANDS = ("paper", "estimate", "diagnose", "simulate", "convert", "inspect", "replay")
+
+
 def test_help_of_the_installed_command() -> None:
-    for arguments in ([], ["paper"], ["estimate"], ["diagnose"], ["simulate"]):
+    for arguments in ([], *([name] for name in COMMANDS)):
         command = [sys.executable, "-m", "mocobot", *arguments, "--help"]
         done = subprocess.run(command, capture_output=True, text=True, check=True)
         assert "usage: mocobot" in done.stdout
