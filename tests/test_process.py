@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from estimator import process
 from estimator.errors import InputError
 from estimator.process import process_recording
 from recorded_team import GRASPS, INERTIA, Sines, carry, inertia_by_least_squares
-from recordings import small_recording
+from recordings import metadata, small_recording
 
 PERIODIC = [*np.deg2rad([3.5, 3.5, 3.5]), 0.01, 0.01, 0.01]
 RANDOM = [*np.deg2rad([3.0, 3.0, 1.5]), 0.015, 0.015, 0.015]
@@ -47,6 +48,24 @@ def test_data_points_are_the_truth_where_the_filter_is_transparent(fast):
     assert rms((data.wrench - fast.wrench[keep])[..., 3:], fast.wrench[..., 3:]) < 1e-6
     assert rms((data.wrench - fast.wrench[keep])[..., :3], fast.wrench[..., :3]) < 1e-5
     assert np.abs(fast.wrench[..., :3]).max() > 1e-4
+
+
+def test_blocks_and_robots_do_not_show_in_the_result(fast, monkeypatch):
+    """Bit for bit: the whole trial at once, in small blocks, and every robot alone."""
+    fields = ("time", "R_bi", "p_bi", "twist", "twist_dot", "wrench")
+    monkeypatch.setattr(process, "BLOCK", 10**9)
+    whole = process_recording(fast.recording)
+    for block in (1, 7, 1000):
+        monkeypatch.setattr(process, "BLOCK", block)
+        split = process_recording(fast.recording)
+        for field in fields:
+            assert np.array_equal(getattr(split, field), getattr(whole, field)), (block, field)
+    recording = fast.recording
+    for robot in range(3):
+        parts = {name: getattr(recording, name)[:, [robot]] for name in ("phi", "theta", "tau")}
+        alone = process_recording(dataclasses.replace(recording, metadata=metadata(robots=1), **parts))
+        for field in fields[1:]:
+            assert np.array_equal(getattr(alone, field)[:, 0], getattr(whole, field)[:, robot]), field
 
 
 def test_poses(fast):

@@ -320,7 +320,7 @@ def test_what_has_no_wrist_position_is_not_written(path) -> None:
     recording.phi[4, 1] = [3.0, 0.6, 0.6]
     with pytest.raises(
         InputError,
-        match=r"recording: a leg is folded past its stretched position at phi = \(3, 0\.6, 0\.6\) rad",
+        match=r"recording: omnid2: a leg is folded past its stretched position at phi = \(3, 0\.6, 0\.6\) rad",
     ):
         write_recording(recording, path)
     assert not path.exists()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -37,43 +37,57 @@ RESTING = 0.5
 
 
 def estimate_payload(
-    recordings: Sequence[Recording],
+    recordings: Iterable[Recording],
     method: Method = "auto",
     cutoff_hz: float = 5.0,
     trim_s: float = 2.0,
     window_s: float = WINDOW_S,
+    say: Callable[[str], object] = lambda _: None,
 ) -> PayloadEstimate:
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
 
     Args:
-        recordings: one or several trials with the same robots and grasps.
+        recordings: one or several trials with the same robots and grasps; taken one after the other, so that an
+            iterator need not hold more than one.
         method: ``"staged"``, the paper's sequence (grasps from motion; mass and centre of mass from static
             holds; inertia from motion); ``"joint"``, one least squares for mass, centre of mass and inertia;
             ``"auto"``, staged when the holds determine the centre of mass, else joint.
         cutoff_hz: cut-off of the low-pass filter [Hz].
         trim_s: time dropped at both ends of each recording [s].
         window_s: length of the windows for standard errors [s].
+        say: takes the name of the stage that begins.
 
     Raises:
         InputError: the recordings do not belong together or contradict each other, the method needs what
             they lack, nothing can be estimated from them, or their numbers are beyond arithmetic.
     """
+    trials: list[Trial] = []
+    names: list[str] = []
     try:
         with np.errstate(over="raise", divide="raise"):
-            trials = [
-                Trial(r.name, r.metadata.trial, r.metadata.payload, process_recording(r, cutoff_hz, trim_s))
-                for r in recordings
-            ]
-            return estimate_from_trials(trials, method, window_s)
+            for recording in recordings:
+                names.append(recording.name)
+                trials.append(_trial(recording, cutoff_hz, trim_s))
+                del recording  # or the next one would be read before this one is let go
+            return estimate_from_trials(trials, method, window_s, say)
     except (FloatingPointError, np.linalg.LinAlgError) as error:
-        names = ", ".join(r.name for r in recordings)
         raise InputError(
-            f"{names}: the equations cannot be solved ({error}); are the numbers in 'design' plausible?"
+            f"{', '.join(names)}: the equations cannot be solved ({error}); are the numbers in 'design' plausible?"
         ) from error
 
 
+def _trial(recording: Recording, cutoff_hz: float, trim_s: float) -> Trial:
+    labels = recording.metadata
+    return Trial(
+        recording.name, labels.trial, labels.payload, process_recording(recording, cutoff_hz, trim_s)
+    )
+
+
 def estimate_from_trials(
-    trials: Sequence[Trial], method: Method = "auto", window_s: float = WINDOW_S
+    trials: Sequence[Trial],
+    method: Method = "auto",
+    window_s: float = WINDOW_S,
+    say: Callable[[str], object] = lambda _: None,
 ) -> PayloadEstimate:
     """The same from processed data; see ``estimate_payload``."""
     if method not in ("auto", "staged", "joint"):
@@ -81,14 +95,17 @@ def estimate_from_trials(
     payload = check_same_payload(trials)
     names = _distinct([trial.name for trial in trials])
     trials = [replace(trial, name=name) for trial, name in zip(trials, names, strict=True)]
+    say("static holds")
     holds = [find_holds(trial.data) for trial in trials]
     records = [
         RecordingEstimate(t.name, t.kind, t.data.samples / t.data.rate_hz, len(h))
         for t, h in zip(trials, holds, strict=True)
     ]
     flags: list[str] = []
+    say("grasps")
     grasps, steps = _grasps(trials, records, flags, window_s)
 
+    say("mass and centre of mass")
     every_hold = [hold for found in holds for hold in found]
     mass, com, com_step = _from_holds(every_hold, grasps, trials[0].data.gravity_mps2)
     if method == "staged" and not every_hold:
@@ -101,6 +118,7 @@ def estimate_from_trials(
     if method == "joint":
         if grasps is None:
             raise InputError(f"nothing can be estimated jointly: {_why(steps)}")
+        say("mass, centre of mass and inertia")
         joint, joint_steps = estimate_joint([trial.data for trial in trials], grasps, window_s)
         mass, com, inertia = joint.mass, joint.com, joint.inertia
         steps += joint_steps
@@ -110,9 +128,11 @@ def estimate_from_trials(
     if grasps is not None and com is not None:
         upstream = com.own_covariance[1:, 1:], com.grasp_jacobian
         if method == "staged":
+            say("inertia")
             data = [trials[k].data for k in moving]
             inertia, step = estimate_inertia(data, grasps, com.p_1c, upstream, window_s)
             steps.append(step)
+        say("each recording alone")
         for k in moving:
             records[k] = replace(records[k], inertia=_alone(trials[k], grasps, com, method, window_s))
         for k, trial in enumerate(trials):

@@ -100,13 +100,13 @@ def estimate_joint(
     # Directions without excitation leave the fit, the others of an open inertia stay: they explain moments.
     turning = _excited(inertia_report)
     basis = _blocks(np.eye(4), turning)
-    theta, weights = _weighted_solve(Y @ basis, w)
+    theta, weights = _weighted_solve(_spanned(Y, basis), w)
     if theta[0] <= 0:
         raise InputError(
             f"the estimated mass is {theta[0]:.3g} kg: the robots do not lift anything; "
             "check the sign of the torques"
         )
-    residual = w - Y @ basis @ theta
+    residual = w - _spanned(Y, basis) @ theta
     rms = np.sqrt(np.mean(residual.reshape(-1, 2, 3) ** 2, axis=(0, 2)))  # force, moment
     com_report = judge(
         "centre of mass p_1c",
@@ -123,22 +123,25 @@ def estimate_joint(
     )
     if not com_report.determined:
         basis = _blocks(np.eye(1), _excited(com_report), turning)
-        theta, weights = _weighted_solve(Y @ basis, w)
-        residual = w - Y @ basis @ theta
+        theta, weights = _weighted_solve(_spanned(Y, basis), w)
+        residual = w - _spanned(Y, basis) @ theta
         if inertia_report.determined:
             inertia_report = refuse(inertia_report, np.eye(6), "it needs the centre of mass")
     # How many of (m, p_1c, inertia) are reported.
     K = 1 if not com_report.determined else 4 if not inertia_report.determined else 10
-    Y_b = Y @ basis
+    Y_b = _spanned(Y, basis)
 
     scale = np.sqrt(np.einsum("qrk,qrk->k", Y_b, Y_b) / used)
     parts = trial_windows(trials, window_s)
-    normals, scores = window_normals(weights[:, None] * Y_b / scale, weights * residual, parts)
+    J_weighted = weights[:, None] * Y_b
+    J_weighted /= scale  # in place: these arrays are the largest of an estimate
+    normals, scores = window_normals(J_weighted, weights * residual, parts)
+    del J_weighted
     covariance = window_covariance(normals, scores) / np.outer(scale, scale)
 
     def moved(x: Array) -> Array:
         equations = _equations([fuse(trial, grasps.moved(x)) for trial in thin], thin)
-        return _centred(_solve(equations[0] @ basis, equations[1], weights), K)
+        return _centred(_solve(_spanned(equations[0], basis), equations[1], weights), K)
 
     stride = max(1, used // _JACOBIAN_SAMPLES)
     thin = [every(trial, stride) for trial in trials]
@@ -187,6 +190,12 @@ def _excited(report: StepReport) -> Array:
     if report.determined:
         return np.eye(len(report.parameters))
     return np.asarray(null_space(np.array([direction.vector for direction in report.weak])), dtype=float)
+
+
+def _spanned(Y: Array, basis: Array) -> Array:
+    """Y @ basis, without a copy where nothing is left out."""
+    complete = basis.shape[0] == basis.shape[1] and bool(np.all(basis == np.eye(len(basis))))
+    return Y if complete else Y @ basis
 
 
 def _blocks(*blocks: Array) -> Array:

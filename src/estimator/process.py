@@ -17,6 +17,9 @@ from estimator.recording import Recording
 
 Array = NDArray[np.float64]
 
+BLOCK = 16_384
+"""Samples of one robot that are converted at a time; the result does not depend on it."""
+
 
 def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: float = 2.0) -> GraspData:
     """Filter, differentiate and convert a recording to poses, twists, twist derivatives and wrenches.
@@ -55,28 +58,42 @@ def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: floa
         rate_hz=rate_hz,
         gravity_mps2=design.gravity_mps2,
     )
-    for robot in range(shape[1]):  # one at a time: what lies between takes ten times the memory of the result
+    for robot in range(shape[1]):
         sensors = (samples[:, robot] for samples in (recording.phi, recording.theta, recording.tau))
-        _fill(data, robot, tuple(low_pass(samples, rate_hz, cutoff_hz) for samples in sensors), keep, design)
+        phi, theta, tau = (low_pass(samples, rate_hz, cutoff_hz) for samples in sensors)
+        driven, gimbal = (_derivatives(angles, rate_hz, keep) for angles in (phi, theta))
+        tau = tau[keep]
+        # In blocks: what lies between takes ten times the memory of the result.
+        for first in range(0, len(time), BLOCK):
+            block = slice(first, first + BLOCK)
+            _fill(data, robot, block, driven[:, block], gimbal[:, block], tau[block], design)
     return data
 
 
-def _fill(data: GraspData, robot: int, sensors: tuple[Array, ...], keep: slice, design: OmnidDesign) -> None:
-    """Data points of one robot from its filtered phi, theta and tau, each (Q, 3)."""
-    phi, theta, tau = sensors
-    phi_dot, theta_dot = differentiate(phi, data.rate_hz), differentiate(theta, data.rate_hz)
-    phi_ddot, theta_ddot = differentiate(phi_dot, data.rate_hz), differentiate(theta_dot, data.rate_hz)
-    phi, phi_dot, phi_ddot = phi[keep], phi_dot[keep], phi_ddot[keep]
-    theta, theta_dot, theta_ddot = theta[keep], theta_dot[keep], theta_ddot[keep]
+def _derivatives(angles: Array, rate_hz: float, keep: slice) -> Array:
+    """Angles [rad], rates and accelerations of the samples to be kept, shape (3, q, 3)."""
+    rate = differentiate(angles, rate_hz)
+    return np.stack([angles[keep], rate[keep], differentiate(rate, rate_hz)[keep]])
 
-    legs = leg_geometry(phi, design)
-    h_dot, h_ddot = wrist_motion(legs, phi_dot, phi_ddot)
-    R_bi = rotation(theta)
-    omega, omega_dot = angular_motion(theta, theta_dot, theta_ddot)
-    data.R_bi[:, robot], data.p_bi[:, robot] = R_bi, legs.h
-    data.twist[:, robot, :3], data.twist_dot[:, robot, :3] = omega, omega_dot
-    data.twist[:, robot, 3:] = np.einsum("...ji,...j->...i", R_bi, h_dot)
-    v_dot = np.einsum("...ji,...j->...i", R_bi, h_ddot) - np.cross(omega, data.twist[:, robot, 3:])
-    data.twist_dot[:, robot, 3:] = v_dot
-    motion = (phi, phi_dot, phi_ddot), (theta, theta_dot, theta_ddot)
-    data.wrench[:, robot] = wrench_on_payload(*motion, tau[keep], design)
+
+def _fill(
+    data: GraspData,
+    robot: int,
+    block: slice,
+    phi: Array,
+    theta: Array,
+    tau: Array,
+    design: OmnidDesign,
+) -> None:
+    """Data points of one robot from its angles with their derivatives, (3, q, 3), and its torques, (q, 3)."""
+    legs = leg_geometry(phi[0], design)
+    h_dot, h_ddot = wrist_motion(legs, phi[1], phi[2])
+    R_bi = rotation(theta[0])
+    omega, omega_dot = angular_motion(theta[0], theta[1], theta[2])
+    v = np.einsum("...ji,...j->...i", R_bi, h_dot)
+    v_dot = np.einsum("...ji,...j->...i", R_bi, h_ddot) - np.cross(omega, v)
+    data.R_bi[block, robot], data.p_bi[block, robot] = R_bi, legs.h
+    data.twist[block, robot] = np.concatenate([omega, v], axis=-1)
+    data.twist_dot[block, robot] = np.concatenate([omega_dot, v_dot], axis=-1)
+    wrench = wrench_on_payload((phi[0], phi[1], phi[2]), (theta[0], theta[1], theta[2]), tau, design)
+    data.wrench[block, robot] = wrench

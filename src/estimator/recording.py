@@ -6,6 +6,7 @@ import contextlib
 import difflib
 import os
 import uuid
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -90,10 +91,13 @@ class Recording:
         """
         if self.metadata.level == "joint":
             return self.columns()
-        try:
-            h, force = wrist_of(self.phi, self.tau, self.metadata.design)
-        except InputError as error:
-            raise InputError(f"{self.name}: {error}") from error
+        h, force = np.empty_like(self.phi), np.empty_like(self.tau)
+        for robot in range(self.metadata.robots):
+            try:
+                converted = wrist_of(self.phi[:, robot], self.tau[:, robot], self.metadata.design)
+            except InputError as error:
+                raise InputError(f"{self.name}: omnid{robot + 1}: {error}") from error
+            h[:, robot], force[:, robot] = converted
         return self._named("wrist", {"h": h, "theta": self.theta, "force": force, "ref": self.ref})
 
     def _named(self, level: Level, fields: dict[str, Array | None]) -> dict[str, Array]:
@@ -141,42 +145,74 @@ def read_recording(path: Path | str) -> Recording:
         InputError: the file cannot be read, is not a recording, or its content is not plausible.
     """
     path = Path(path)
-    table = _read_table(path)
-    text = (table.schema.metadata or {}).get(METADATA_KEY)
-    if text is None:
-        raise InputError(f"{path}: not a recording, the schema metadata has no key {METADATA_KEY.decode()!r}")
-    metadata = RecordingMetadata.from_json(text, where=f"{path}: metadata")
-    _check_column_names(table.column_names, metadata, path)
-    if table.num_rows == 0:
-        raise InputError(f"{path}: the file has no rows")
-    values = {name: _column(table, name, path) for name in table.column_names}
-
-    def stack(suffixes: tuple[str, ...]) -> Array:
-        names = [f"omnid{i}.{s}" for i in range(1, metadata.robots + 1) for s in suffixes]
-        return np.stack([values[name] for name in names], axis=-1).reshape(-1, metadata.robots, 3)
-
-    channels = CHANNELS[metadata.level]
-    arrays = {field: stack(suffixes) for field, suffixes in channels.items() if field != "ref"}
-    ref = stack(channels["ref"]) if any(".ref_" in name for name in values) else None
+    with _opened(path) as file:
+        schema = file.schema_arrow
+        text = (schema.metadata or {}).get(METADATA_KEY)
+        if text is None:
+            raise InputError(
+                f"{path}: not a recording, the schema metadata has no key {METADATA_KEY.decode()!r}"
+            )
+        metadata = RecordingMetadata.from_json(text, where=f"{path}: metadata")
+        _check_column_names(schema.names, metadata, path)
+        if file.metadata.num_rows == 0:
+            raise InputError(f"{path}: the file has no rows")
+        for field in schema:
+            _check_type(field, path)
+        time, arrays = _read_columns(file, metadata)
     if metadata.level == "wrist":
-        check_finite(str(path), values)
-        phi, tau = _joints(arrays.pop("h"), arrays.pop("force"), metadata, path)
-        arrays |= {"phi": phi, "tau": tau}
-    recording = Recording(time=values["time"], ref=ref, metadata=metadata, name=str(path), **arrays)
+        named = {
+            f"omnid{robot + 1}.{name}": arrays[field][:, robot, k]
+            for field, names in CHANNELS["wrist"].items()
+            for k, name in enumerate(names)
+            for robot in range(metadata.robots if field in arrays else 0)
+        }
+        check_finite(str(path), {"time": time} | named)
+        arrays["phi"], arrays["tau"] = _joints(arrays.pop("h"), arrays.pop("force"), metadata, path)
+    ref = arrays.pop("ref", None)
+    recording = Recording(time=time, ref=ref, metadata=metadata, name=str(path), **arrays)
     check_recording(recording)
     return recording
 
 
+def _read_columns(file: pq.ParquetFile, metadata: RecordingMetadata) -> tuple[Array, dict[str, Array]]:
+    """Time (Q,) and the fields, each (Q, N, 3); one column after the other, so that nothing is in memory twice."""
+    rows, names = file.metadata.num_rows, set(file.schema_arrow.names)
+
+    def column(name: str) -> Array:
+        read = file.read(columns=[name], use_threads=False).column(name)
+        # Empty cells become NaN, which the checks report with their row.
+        return read.cast(pa.float64(), safe=False).to_numpy()
+
+    arrays: dict[str, Array] = {}
+    for field, suffixes in CHANNELS[metadata.level].items():
+        if f"omnid1.{suffixes[0]}" in names:
+            arrays[field] = np.empty((rows, metadata.robots, 3))
+            for robot in range(metadata.robots):
+                for k, suffix in enumerate(suffixes):
+                    arrays[field][:, robot, k] = column(f"omnid{robot + 1}.{suffix}")
+    return column("time").copy(), arrays
+
+
 def _joints(h: Array, force: Array, metadata: RecordingMetadata, path: Path) -> tuple[Array, Array]:
-    if (fault := wrist_fault(h, metadata.design)) is None:
-        return joints_of(h, force, metadata.design)
-    (row, robot), sentence = fault
-    in_mm = np.abs(h).max() > 2.0 and wrist_fault(1e-3 * h, metadata.design) is None
-    hint = "the values look like millimetres" if in_mm else "are zero, signs and order of its axes right?"
-    raise InputError(f"{path}: omnid{robot + 1}.h_x, .h_y, .h_z in row {row}: {sentence} - {hint}")
+    """Driven angles and torques in the place of wrist positions and forces, robot by robot for the sake of memory."""
+    for robot in range(metadata.robots):
+        fault = wrist_fault(h[:, robot], metadata.design)
+        if fault is not None:
+            (row,), sentence = fault
+            in_mm = np.abs(h).max() > 2.0 and wrist_fault(1e-3 * h[:, robot], metadata.design) is None
+            hint = (
+                "the values look like millimetres"
+                if in_mm
+                else "are zero, signs and order of its axes right?"
+            )
+            raise InputError(f"{path}: omnid{robot + 1}.h_x, .h_y, .h_z in row {row}: {sentence} - {hint}")
+        h[:, robot], force[:, robot] = joints_of(h[:, robot], force[:, robot], metadata.design)
+    return h, force
 
 
-def _read_table(path: Path) -> pa.Table:
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[pq.ParquetFile]:
+    """The file; whatever goes wrong with it inside the block becomes one sentence."""
     try:
         exists, is_file = path.exists(), path.is_file()
     except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL in it
@@ -187,9 +223,12 @@ def _read_table(path: Path) -> pa.Table:
         what = "a directory" if path.is_dir() else "not a regular file"
         raise InputError(f"{path}: is {what}; it must be a recording file")
     try:
-        # ParquetFile, not read_table: the latter turns folder names such as a=1 into extra columns.
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            return file.read(use_threads=False)
+        # ParquetFile, not read_table: the latter turns folder names such as a=1 into extra columns. Not pre-buffered:
+        # that keeps whole row groups.
+        with pq.ParquetFile(path, page_checksum_verification=True, pre_buffer=False) as file:
+            yield file
+    except InputError:
+        raise
     except PermissionError as error:
         raise InputError(f"{path}: cannot be read (permission denied)") from error
     except Exception as error:  # on damaged bytes pyarrow raises many types, not all of them its own
@@ -225,10 +264,7 @@ def _check_column_names(names: list[str], metadata: RecordingMetadata, path: Pat
             raise InputError(f"{path}: missing column {name!r}; {rule} (ref_* for all robots or for none)")
 
 
-def _column(table: pa.Table, name: str, path: Path) -> Array:
-    column = table.column(name)
-    kind = column.type
+def _check_type(field: pa.Field, path: Path) -> None:
+    kind = field.type
     if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)):
-        raise InputError(f"{path}: column {name!r} holds {kind}; it must hold numbers (float64)")
-    # Empty cells become NaN, which the checks report with their row.
-    return column.cast(pa.float64(), safe=False).to_numpy()
+        raise InputError(f"{path}: column {field.name!r} holds {kind}; it must hold numbers (float64)")

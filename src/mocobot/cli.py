@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
@@ -58,19 +58,21 @@ class Estimate:
     def run(self) -> None:
         """Run the command."""
         from estimator.estimate import estimate_payload
-        from estimator.recording import read_recording
+        from estimator.recording import Recording, read_recording
         from estimator.report import format_estimate
-        from mocobot.progress import bar
+        from mocobot.progress import stages
 
         if not self.rec:
             raise InputError("no recording given; name at least one file")
         check_recordings(self.rec, self.out)
-        with bar(len(self.rec), "reading", "file") as advance:
-            recordings = []
-            for path in self.rec:
-                recordings.append(read_recording(path))
-                advance(1)
-        estimate = estimate_payload(recordings, self.method, self.cutoff_hz)
+        with stages() as (say, _):
+
+            def each() -> Iterator[Recording]:
+                for path in self.rec:
+                    say(f"reading {path.name}")
+                    yield read_recording(path)
+
+            estimate = estimate_payload(each(), self.method, self.cutoff_hz, say=say)
         if self.out:
             write_json(self.out, estimate.to_dict())
         print(format_estimate(estimate))
