@@ -64,16 +64,28 @@ def hidden_by_rounding(signals: Signals, reduction: Reduction, hints: Hints, whi
 
 
 def remainder(signals: Signals, reduction: Reduction, hints: Hints) -> list[Array]:
-    """Rows (n, 2) that all causes of the catalogue together leave."""
+    """Rows (n, 2) that all causes of the catalogue together leave; a second step allows for what is not linear."""
     causes = [candidate_of(name, hints, DEFAULTS) for name in CAUSES if name != "push"]
     columns = [reduction(CAUSES[c.cause].columns(signals, c.shape)) for c in causes]
-    rows = reduction(signals.residual)
-    out = [np.empty_like(r) for r in rows]
+    counts = np.cumsum([len(c.parameters) for c in causes])[:-1]
+    values, left = [np.zeros(len(c.parameters)) for c in causes], signals.residual
+    for _ in range(2):
+        step = _least_squares(columns, reduction(left))
+        values = [v + d for v, d in zip(values, np.split(step, counts), strict=True)]
+        left = signals.residual
+        for cause, value in zip(causes, values, strict=True):
+            left = left - CAUSES[cause.cause].exact(signals, value, cause.shape)
+    return reduction(left)
+
+
+def _least_squares(columns: list[list[Array]], rows: list[Array]) -> Array:
+    """Values of all columns; each acts in one channel only, and the channels are fitted apart."""
+    whole = np.concatenate([np.concatenate([c[t] for c in columns], axis=2) for t in range(len(rows))])
+    residual, out = np.concatenate(rows), np.zeros(whole.shape[2])
     for channel in range(2):
-        A = [np.concatenate([c[t][:, channel] for c in columns], axis=1) for t in range(len(rows))]
-        whole, y = np.concatenate(A), np.concatenate([r[:, channel] for r in rows])
-        size = np.maximum(np.linalg.norm(whole, axis=0), 1e-300)
-        x = np.linalg.lstsq(whole / size, y, rcond=1e-9)[0] / size
-        for t, r in enumerate(rows):
-            out[t][:, channel] = r[:, channel] - A[t] @ x
+        A = whole[:, channel]
+        size = np.linalg.norm(A, axis=0)
+        used = size > 0
+        scaled = A[:, used] / size[used]
+        out[used] = np.linalg.lstsq(scaled, residual[:, channel], rcond=1e-9)[0] / size[used]
     return out

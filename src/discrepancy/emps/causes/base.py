@@ -16,6 +16,8 @@ from discrepancy.emps.signals import Signals, smooth
 Array = NDArray[np.float64]
 Shape = Mapping[str, float]
 
+GIVEN_TO = 1e-4
+"""Share by which a gain may be off for the digits it is given with."""
 SHORTEST_RIPPLE_M = 1e-3
 """Shorter ripples are faster than the rows at most speeds."""
 
@@ -79,7 +81,7 @@ class Cause(ABC):
         return []
 
     def visible(self, signals: Signals, hints: Hints, values: Array) -> bool:
-        """Whether a cause of that size stands out of the position's rounding, or of what it was searched in."""
+        """Whether a cause of that size stands out of rounding, or of what it was searched in."""
         return True
 
     def rests(self, signals: Signals, shape: Shape) -> list[Array]:

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from discrepancy.emps.causes.base import Cause, voltage
+from discrepancy.emps.causes.base import GIVEN_TO, Cause, voltage
 
 
 class PositionGain(Cause):
@@ -17,6 +17,9 @@ class PositionGain(Cause):
 
     def columns(self, signals, shape):
         return voltage(signals.log.kv_Vs_per_m * signals.error)
+
+    def visible(self, signals, hints, values):
+        return abs(values[0]) > GIVEN_TO * signals.log.kp_per_s
 
     def apply(self, plant, values, shape):
         return replace(plant, kp_per_s=plant.kp_per_s + values[0])

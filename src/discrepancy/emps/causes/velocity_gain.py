@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from discrepancy.emps.causes.base import Cause, voltage
+from discrepancy.emps.causes.base import GIVEN_TO, Cause, voltage
 
 
 class VelocityGain(Cause):
@@ -17,6 +17,9 @@ class VelocityGain(Cause):
 
     def columns(self, signals, shape):
         return voltage(signals.log.kp_per_s * signals.error - signals.v)
+
+    def visible(self, signals, hints, values):
+        return abs(values[0]) > GIVEN_TO * signals.log.kv_Vs_per_m
 
     def apply(self, plant, values, shape):
         return replace(plant, kv_Vs_per_m=plant.kv_Vs_per_m + values[0])
