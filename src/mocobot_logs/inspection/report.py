@@ -137,7 +137,8 @@ def _wiring(found: Inspection) -> list[str]:
     wiring = found.wiring
     assert wiring is not None
     lines = [
-        f"    misfit to robots that carry one rigid payload: {wiring.as_is.total:.2g} (1: poorly calibrated robots)"
+        f"    misfit to robots that carry one rigid payload: {wiring.as_is.total:.2g} "
+        "(about 1 for poorly calibrated robots)"
     ]
     if wiring.as_is.scaled:
         lines.append(f"        most of it: {evidence(wiring.as_is)}")
