@@ -2,6 +2,8 @@
 # They need Python 3.11 or 3.12 and make; everything else goes into .venv.
 PYTHON ?= python3
 JOBS ?= 2
+# The matrices are small, and threads that share them only wait for each other.
+export OPENBLAS_NUM_THREADS ?= 1
 BIN := .venv/bin
 MARK := .venv/.installed
 
