@@ -159,6 +159,9 @@ def test_rest_is_not_stuck() -> None:
     values = values * (1 - blend) + values[2000] * blend
     values[4000:] = values[4000]
     assert frozen(np.round(values / 1e-4) * 1e-4, RATE) == []
+    exact = motion(60.0, noise=0.0)  # sensors without noise and steps
+    exact[5000:] = exact[5000]
+    assert frozen(exact, RATE) == []
 
 
 def test_a_channel_that_is_not_moved_is_not_stuck() -> None:
