@@ -129,9 +129,8 @@ def team_misfit(
 def _balanced(told: list[Grasp], body: Body, motion: Misfit, gravity: float) -> Misfit:
     """Total force and moment in {1} by the ten inertial parameters."""
     N, Q = len(told), len(told[0].omega)
-    force = np.stack([g.wrench[:, 3:] @ R.T for g, R in zip(told, body.R_1i, strict=True)])
-    moment = np.stack([g.wrench[:, :3] @ R.T for g, R in zip(told, body.R_1i, strict=True)])
-    moment += cross(body.p_1i[:, None], force)
+    force = np.stack([g.force @ R.T for g, R in zip(told, body.R_1i, strict=True)])
+    moment = cross(body.p_1i[:, None], force)
     reach = max(min(body.span, FARTHEST_M), _LEAST_SPAN_M)
     weights = np.repeat([1.0, 1.0 / reach], 3)
     total = np.concatenate([force.sum(axis=0), moment.sum(axis=0)], axis=1)
@@ -156,7 +155,7 @@ def _vertical(told: list[Grasp], body: Body, faults: tuple[Fault, ...], gravity:
     lift = np.sum([g.lift for g in told], axis=0)
     rise = gravity + np.mean([g.rise for g in told], axis=0)
     mass = float(lift @ rise / (rise @ rise))
-    exerted = rms(np.sum([np.linalg.norm(g.wrench[:, 3:], axis=-1) for g in told], axis=0))
+    exerted = rms(np.sum([np.linalg.norm(g.force, axis=-1) for g in told], axis=0))
     noise = float(np.sqrt(len(told)) * body.noise[2])
     _add("lift", rms(lift - mass * rise), exerted, noise, relative, scaled)
     if mass <= 0:

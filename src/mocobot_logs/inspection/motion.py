@@ -1,4 +1,4 @@
-"""Motion and wrench of one robot's grasp from its channels, however wrong these may be."""
+"""Motion and force of one robot's grasp from its channels, however wrong these may be."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.arm_dynamics import arm_torque, gimbal_torque
+from estimator.arm_dynamics import arm_torque
 from estimator.checks import TORQUE_FACTOR
 from estimator.delta import (
     LegGeometry,
@@ -18,7 +18,7 @@ from estimator.delta import (
     wrist_motion,
 )
 from estimator.design import OmnidDesign
-from estimator.gimbal import angular_motion, rate_matrix, rotation
+from estimator.gimbal import angular_motion, rotation
 from estimator.wrist_level import driven_motion
 from mocobot_logs.inspection.signals import Signals, noise_gains
 
@@ -37,7 +37,8 @@ class Grasp:
         omega, alpha: angular velocity [rad/s] and acceleration [rad/s^2] in {i}, shape (Q, 3).
         velocity, acceleration: of the origin of {i} [m/s, m/s^2], in {i}, shape (Q, 3).
         up: unit vector against gravity in {i}, shape (Q, 3).
-        wrench: on the payload, (m_i [N m], f_i [N]) in {i}, shape (Q, 6).
+        force: on the payload in {i} [N], shape (Q, 3); the moment that moves the gimbal's own bodies, some mN m, is
+            left out.
         lift: vertical force on the payload [N], shape (Q,).
         rise: vertical acceleration of the wrist [m/s^2], shape (Q,).
         noise: of one component of omega [rad/s], velocity [m/s], force [N] and up [rad].
@@ -48,7 +49,7 @@ class Grasp:
     velocity: Array
     acceleration: Array
     up: Array
-    wrench: Array
+    force: Array
     lift: Array
     rise: Array
     noise: Array
@@ -92,14 +93,12 @@ class Gimbal:
     Attributes:
         R_bi: orientation of {i} in {b}, shape (Q, 3, 3).
         omega, alpha: its angular velocity [rad/s] and acceleration [rad/s^2] in {i}, shape (Q, 3).
-        moment: on the payload in {i} [N m], shape (Q, 3).
         faults: why the angles cannot be right.
     """
 
     R_bi: Array
     omega: Array
     alpha: Array
-    moment: Array
     faults: tuple[Fault, ...]
 
 
@@ -126,16 +125,14 @@ def gimbal_motion(signals: Signals, robot: int, design: OmnidDesign) -> Gimbal:
     theta = signals.theta.values[:, :, robot]
     limit = design.gimbal_limit_rad
     omega, alpha = angular_motion(theta[0], theta[1], theta[2])
-    axes_T = np.swapaxes(rate_matrix(theta[0]), -1, -2)
-    moment = -_solve(axes_T, gimbal_torque(theta[0], theta[1], theta[2], design))
     faults = _out_of_range("theta", theta[0], -limit, limit, "rad", robot)
-    return Gimbal(rotation(theta[0]), omega, alpha, moment, faults)
+    return Gimbal(rotation(theta[0]), omega, alpha, faults)
 
 
 def grasp_motion(
     signals: Signals, robot: int, arm: Arm | Fault, gimbal: Gimbal, design: OmnidDesign
 ) -> tuple[Grasp | None, tuple[Fault, ...]]:
-    """Motion and wrench at one grasp, None where the arm cannot be in such postures.
+    """Motion and force at one grasp, None where the arm cannot be in such postures.
 
     Args:
         signals: the team's channels.
@@ -174,7 +171,7 @@ def grasp_motion(
         velocity=_into(gimbal.R_bi, arm.h_dot),
         acceleration=_into(gimbal.R_bi, arm.h_ddot),
         up=gimbal.R_bi[:, 2, :],
-        wrench=np.concatenate([gimbal.moment, _into(gimbal.R_bi, force)], axis=1),
+        force=_into(gimbal.R_bi, force),
         lift=force[:, 2],
         rise=arm.h_ddot[:, 2],
         noise=np.array(noise),

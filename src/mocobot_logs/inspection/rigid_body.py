@@ -65,7 +65,7 @@ def rigid_body(told: Sequence[Grasp]) -> Body | None:
     Args:
         told: what the robots say, the first one being {1}.
     """
-    if not told or not all(np.isfinite(np.sum(g.wrench)) and np.isfinite(np.sum(g.omega)) for g in told):
+    if not told or not all(np.isfinite(np.sum(g.force)) and np.isfinite(np.sum(g.omega)) for g in told):
         return None
     N, Q = len(told), len(told[0].omega)
     R = np.stack([np.eye(3), *(rotation_onto(told[0].omega, g.omega) for g in told[1:])])
