@@ -145,6 +145,18 @@ def test_a_stuck_second_is_found(step: float, start: int) -> None:
     assert found[0].stop - found[0].start == pytest.approx(100, abs=20)
 
 
+def test_a_stuck_second_of_a_noisy_channel_is_found_where_it_hardly_moves() -> None:
+    """No jump gives it away, but noise as large as the steps never repeats itself for a second."""
+    rng = np.random.default_rng(4)
+    values = motion(30.0)
+    values[:, 8] = np.round((2 * values[:, 8] + 0.01 * rng.standard_normal(3000)) / 0.01) * 0.01
+    values[1000:1100, 8] = values[1000, 8]
+    values[1100:, 8] += values[1099, 8] - values[1100, 8]
+    (found,) = frozen(values, RATE)
+    assert (found.kind, found.channel) == ("stuck", 8)
+    assert (found.start, found.stop) == (pytest.approx(1000, abs=3), pytest.approx(1100, abs=3))
+
+
 def test_a_dead_channel_is_stuck_all_the_time() -> None:
     values = motion(30.0)
     values[:, 7] = 0.25

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mocobot_logs.inspection.resolution import quantisation_step
+from mocobot_logs.inspection.resolution import noise_level, quantisation_step
 
 Array = NDArray[np.float64]
 
@@ -19,6 +19,7 @@ CLIPPED_SAMPLES = 5
 _MOVES = 0.05  # others move: by this share of their range
 _JUMP = 4.0  # times the usual large step from sample to sample
 _CORNER = 0.3  # of the same
+_NOISY = 0.5  # of the quantisation step; rounding alone looks like 0.3
 _SPEED_S, _AT_SPEED = 0.1, 0.5  # time over which speed is taken; share of the usual high speed
 
 
@@ -44,7 +45,8 @@ def frozen(values: Array, rate_hz: float) -> list[Frozen]:
     """Stuck and clipped stretches of one robot's channels.
 
     A channel that stands because nothing moves is not stuck; nor is one that rests while others move. A stuck one jumps
-    when it comes back, stops dead before the log ends, or repeats a value that has no steps.
+    when it comes back, stops dead before the log ends, or repeats itself
+    although it has no steps or more noise than steps.
 
     Args:
         values: samples of the robot's channels, finite, shape (q, C).
@@ -60,15 +62,16 @@ def frozen(values: Array, rate_hz: float) -> list[Frozen]:
                 found.append(Frozen("stuck", channel, 0, len(x), float(x[0])))
             continue
         usual = float(np.quantile(steps[steps > 0], 0.95))
-        # Without a resolution, no two samples of a live channel are equal.
-        continuous = np.mean(steps == 0) < 0.5 and quantisation_step(x) is None
+        # Without a resolution, or with noise that covers it, a live channel does not repeat itself for long.
+        resolution = quantisation_step(x)
+        restless = np.mean(steps == 0) < 0.5 and (resolution is None or noise_level(x) > _NOISY * resolution)
         for start, stop in _runs(x):
             if stop - start < CLIPPED_SAMPLES or not _others_move(values, ranges, channel, start, stop):
                 continue
             back = steps[stop - 1] if stop < len(x) else 0.0
             into = steps[start - 1] if start else 0.0
             if stop - start >= max(STUCK_S * rate_hz, CLIPPED_SAMPLES) and (
-                continuous or max(back, into) > _JUMP * usual or _stops_dead(x, steps, start, stop, rate_hz)
+                restless or max(back, into) > _JUMP * usual or _stops_dead(x, steps, start, stop, rate_hz)
             ):
                 found.append(Frozen("stuck", channel, start, stop, float(x[start])))
     return found + _clipped(values)

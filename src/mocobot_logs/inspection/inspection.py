@@ -143,6 +143,8 @@ def _motion(
     if wiring.found:
         right = [(start, _undone(part, wiring, result.level)) for start, part in parts]
         undone = readiness(result.name, result.level, right, result.design)
+        if clocks is not None and not clocks.determined:
+            clocks = _known(clocks, _clocks(right))
     return replace(
         result,
         checked=tuple((start, len(part) / RATE_HZ) for start, part in parts),
@@ -162,6 +164,22 @@ def _clocks(parts: list[tuple[float, Array]]) -> ClockEstimate | None:
     start, part = max(parts, key=lambda entry: len(entry[1]))
     theta = [np.ascontiguousarray(part[:, robot, 3:6]) for robot in range(part.shape[1])]
     return estimate_clocks(theta, np.full(len(theta), start), RATE_HZ)
+
+
+def _known(clocks: ClockEstimate, again: ClockEstimate | None) -> ClockEstimate:
+    """What is known of each clock as it is, and of the others with all mistakes undone."""
+    if again is None:
+        return clocks
+    new = np.array([why is not None for why in clocks.why_not])
+    return replace(
+        clocks,
+        offset_s=np.where(new, again.offset_s, clocks.offset_s),
+        drift=np.where(new, again.drift, clocks.drift),
+        covariance=np.where(new[:, None, None], again.covariance, clocks.covariance),
+        mismatch=np.where(new, again.mismatch, clocks.mismatch),
+        repeats_s=np.where(new, again.repeats_s, clocks.repeats_s),
+        why_not=tuple(b if a else None for a, b in zip(clocks.why_not, again.why_not, strict=True)),
+    )
 
 
 def differs(clocks: ClockEstimate, robot: int) -> bool:

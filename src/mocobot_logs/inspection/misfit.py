@@ -95,6 +95,7 @@ def team_misfit(
     gravity_mps2: float,
     body: Body | None = None,
     enough: float = np.inf,
+    most_noise: Array | None = None,
 ) -> Misfit:
     """Compare the robots that can be told; those that cannot are faults already.
 
@@ -104,13 +105,14 @@ def team_misfit(
         gravity_mps2: magnitude of gravity.
         body: motion of the payload, where it is known from the same grasps.
         enough: a misfit beyond this need not be exact: forces are left out once the motion alone makes it as large.
+        most_noise: bound of the noise, as in ``Grasp``: what makes noise of the signals explains nothing.
     """
     every = tuple(fault for of_robot in faults for fault in of_robot)
     told = [grasp for grasp in grasps if grasp is not None]
     if not told:
         return Misfit({}, {}, every, determined=False)
     with np.errstate(all="ignore"):  # absurd channels may overflow: an infinite misfit
-        body = body or rigid_body(told)
+        body = body or rigid_body(told, most_noise)
         if body is None:
             return Misfit({}, {}, (*every, Fault(1.0, "the numbers overflow")), determined=False)
         if len(told) > 1 and not body.turns:

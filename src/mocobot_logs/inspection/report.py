@@ -168,15 +168,15 @@ def ready_line(found: Inspection) -> str:
     """The verdict."""
     if found.unchecked is not None or found.ready is None or found.wiring is None:
         return f"ready for: nothing ({found.unchecked})"
+    clocks = "; clocks to be corrected" if found.skewed else ""
     if found.ready_undone is not None:
         count = len(found.wiring.found)
         what = "the mistake above" if count == 1 else f"the {count} mistakes above"
         if found.wiring.undone.suspicious:
             return f"ready for: nothing (even with {what} undone, the robots do not carry one rigid payload)"
-        return f"ready for: nothing as it is; with {what} undone: {verdict(found.ready_undone)}"
+        return f"ready for: nothing as it is; with {what} undone: {verdict(found.ready_undone)}{clocks}"
     if found.wiring.as_is.suspicious:
         return "ready for: nothing (the channels do not fit robots that carry one rigid payload)"
-    clocks = "; clocks to be corrected" if found.skewed else ""
     return f"ready for: {verdict(found.ready)}{clocks}"
 
 

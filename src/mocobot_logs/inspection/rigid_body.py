@@ -57,13 +57,14 @@ class Body:
         return self.__dict__["Y"]
 
 
-def rigid_body(told: Sequence[Grasp]) -> Body | None:
+def rigid_body(told: Sequence[Grasp], most_noise: Array | None = None) -> Body | None:
     """The motion that fits best, or None where no robot tells or the numbers overflow.
 
     Rotations by Wahba's problem (paper, (3)-(5)), positions by linear least squares (6)-(8), both against robot 1.
 
     Args:
         told: what the robots say, the first one being {1}.
+        most_noise: bound of the noise, as in ``Grasp``.
     """
     if not told or not all(np.isfinite(np.sum(g.force)) and np.isfinite(np.sum(g.omega)) for g in told):
         return None
@@ -78,6 +79,8 @@ def rigid_body(told: Sequence[Grasp]) -> Body | None:
         p[j] = _position((omega[0] + omega[j]) / 2, velocity[j] - velocity[0])
     w, a = omega.mean(axis=0), alpha.mean(axis=0)
     noise = np.max([g.noise for g in told], axis=0)
+    if most_noise is not None:
+        noise = np.minimum(noise, most_noise)
     least = float(np.linalg.eigvalsh(cross_information(omega[0]))[0])
     spread: dict[str, tuple[float, float, float]] = {}
     if N > 1:

@@ -114,7 +114,8 @@ class Team:
 
     def _judge(self, told: Sequence[Told], body: Body | None, enough: float = np.inf) -> Misfit:
         grasps, faults = [t[0] for t in told], [t[1] for t in told]
-        return team_misfit(grasps, faults, self._design.gravity_mps2, body, enough)
+        most_noise = self._body.noise if self._body is not None else None
+        return team_misfit(grasps, faults, self._design.gravity_mps2, body, enough, most_noise)
 
 
 def check_wiring(
