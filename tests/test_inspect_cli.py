@@ -200,6 +200,19 @@ def test_a_broken_log_is_reported_and_not_refused(
     assert out.splitlines()[-1].startswith("ready for: grasps yes")
 
 
+def test_a_robot_that_the_log_lacks(
+    look: Callable[..., tuple[str, dict]], recording: Recording, tmp_path: Path
+) -> None:
+    """Two of three robots: they move alike, and their forces are not all that carries."""
+    parts = {name: getattr(recording, name)[:, :2] for name in ("phi", "theta", "tau", "ref")}
+    labels = replace(recording.metadata, robots=2, control=None)
+    write_recording(replace(recording, metadata=labels, **parts), tmp_path / "two.parquet")
+    out, report = look(tmp_path / "two.parquet")
+    assert report["wiring"]["found"] == []
+    assert "so does the log lack a robot" in sentences(report)[0]
+    assert out.splitlines()[-1].startswith("ready for: nothing (the channels do not fit robots")
+
+
 def test_clocks_that_differ(
     look: Callable[..., tuple[str, dict]], recording: Recording, tmp_path: Path
 ) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from estimator.checks import TORQUE_FACTOR
 from mocobot_logs.inspection.channels import Channel, Stretch
 from mocobot_logs.inspection.inspection import FASTEST_HZ, MOSTLY, SLOWEST_HZ, Inspection, differs
-from mocobot_logs.inspection.misfit import Misfit
+from mocobot_logs.inspection.misfit import SUSPICIOUS, Misfit
 from mocobot_logs.inspection.mistakes.base import listed
 from mocobot_logs.inspection.timing import Timing
 from mocobot_logs.inspection.wiring import Found
@@ -216,8 +216,16 @@ def _of_wiring(found: Inspection) -> Iterator[str]:
         what = "even then the" if wiring.found else "the"
         yield (
             f"{what} channels do not fit robots that carry one rigid payload ({evidence(wiring.undone)}), and no "
-            f"{'other ' if wiring.found else ''}mistake that is looked for explains it"
+            f"{'other ' if wiring.found else ''}mistake that is looked for explains it{_missing(wiring.undone)}"
         )
+
+
+def _missing(misfit: Misfit) -> str:
+    """A hint where the robots move together and only their forces do not fit."""
+    moving = [value for name, value in misfit.scaled.items() if name not in ("force", "moment")]
+    if misfit.determined and not misfit.faults and max(moving, default=0.0) ** 2 < SUSPICIOUS:
+        return ": they move together, so does the log lack a robot, or does something else carry or push?"
+    return ""
 
 
 def wiring_sentence(found: Found) -> str:

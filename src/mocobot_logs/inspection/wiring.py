@@ -208,7 +208,9 @@ def _needed(
         others = first
         for mistake, _ in (*chain[:k], *chain[k + 1 :]):
             others = others.undone(mistake)
-        if others.misfit.total <= HELPS * team.misfit.total:
+        # Where something else is wrong, too, only what is beyond doubt is accused.
+        worth = OVERWHELMING if team.misfit.suspicious else HELPS
+        if others.misfit.total <= worth * team.misfit.total:
             chain, team = [*chain[:k], *chain[k + 1 :]], others
         else:
             found.append(Found(chain[k][0], _alike(others, *chain[k]), others.misfit, team.misfit.total))
