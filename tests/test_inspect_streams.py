@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+
 import numpy as np
 import pytest
 
@@ -10,9 +12,13 @@ from mocobot_logs.inspection import survey as survey_module
 from mocobot_logs.inspection.channels import Channel
 from mocobot_logs.inspection.excerpt import clean_stream, stretches
 from mocobot_logs.inspection.frozen import frozen
+from mocobot_logs.inspection.inspection import inspect_log
+from mocobot_logs.inspection.report import format_inspection
+from mocobot_logs.inspection.report_json import inspection_dict
 from mocobot_logs.inspection.resolution import noise_level, quantisation_step
 from mocobot_logs.inspection.survey import Survey, survey
-from mocobot_logs.log import CHANNELS, Samples
+from mocobot_logs.log import CHANNELS, Level, Samples
+from omnid_design import DESIGN
 
 RATE = 100.0
 
@@ -255,6 +261,32 @@ def test_faster_streams_are_averaged_to_the_same_motion() -> None:
     assert start == pytest.approx(0.0045)
     assert part[:, 0] == pytest.approx(fast[first : first + 10 * len(part) : 10], abs=2e-3)
     assert np.ptp(slow) > 0.5
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda x: x * 1e300,
+        lambda x: x * 1e-300,
+        lambda x: np.full_like(x, np.nan),
+        lambda x: np.zeros_like(x),
+        lambda x: np.where(np.arange(len(x))[:, None] % 2, 1e308, -1e308) * np.ones_like(x),
+        lambda x: x[:3],
+        lambda x: x[:0],
+        lambda x: x[:, ::-1],
+    ],
+    ids=["huge", "tiny", "NaN", "zero", "flicker", "three rows", "none", "reversed"],
+)
+@pytest.mark.parametrize("rate_hz", [100.0, 5000.0])
+@pytest.mark.parametrize("level", ["joint", "wrist"])
+def test_absurd_logs_are_reported(spoil, rate_hz: float, level: Level) -> None:
+    """Warnings are errors here; no number may do harm."""
+    whole = motion(5.0, rate_hz)
+    spoiled = spoil(motion(5.0, rate_hz, seed=1))
+    log = ArrayLog([regular(whole, rate_hz), regular(spoiled, rate_hz)], level=level)
+    found = inspect_log(log, DESIGN)
+    assert format_inspection(found).splitlines()[-1].startswith("ready for: nothing")
+    json.dumps(inspection_dict(found), allow_nan=False)
 
 
 def test_streams_without_common_time() -> None:

@@ -20,6 +20,8 @@ Array = NDArray[np.float64]
 
 MAX_GAP_S = 0.05
 SHORTEST_S = 2 * TRIM_S + 2.0
+ABSURD = 1e9
+"""No angle, length, torque or force in any unit is as large [SI]."""
 _PERIODS = 3.5  # a gap in a slow log
 
 
@@ -38,7 +40,7 @@ def clean_stream(
     """
     time_s = np.asarray((samples.stamp_ns - origin_ns) * NS, dtype=np.float64)
     values = samples.values[:, :9]
-    good = np.isfinite(values).all(axis=1)
+    good = (np.abs(values) < ABSURD).all(axis=1)  # neither NaN nor infinite, either
     for start_ns, stop_ns in faulty:
         good &= (samples.stamp_ns < start_ns) | (samples.stamp_ns >= stop_ns)
     time_s, values = time_s[good], values[good]
@@ -49,7 +51,7 @@ def clean_stream(
     if len(time_s) < 2:
         return time_s, values
     k = round(1.0 / float(np.median(np.diff(time_s))) / RATE_HZ)
-    if k >= 2:
+    if 2 <= k <= len(time_s):
         # Means over the output's period: crude against aliases, but what is looked at ends at 5 Hz.
         starts = np.arange(0, len(time_s) - k + 1, k)
         time_s = np.asarray(np.add.reduceat(time_s[: starts[-1] + k], starts) / k, dtype=np.float64)

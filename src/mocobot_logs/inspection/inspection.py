@@ -134,7 +134,7 @@ def _motion(
     if not parts:
         return replace(
             result,
-            unchecked=f"the robots share no {SHORTEST_S:g} s of samples without a gap and without NaN",
+            unchecked=f"the robots share no {SHORTEST_S:g} s of samples that can be used, without a gap",
         )
     noise = np.array([[c.white_noise for c in of_robot[:9]] for of_robot in result.survey.channels])
     samples = [part for _, part in parts]

@@ -88,6 +88,7 @@ def _timing(t: Timing, origin_ns: int) -> dict[str, Any]:
 def _channel(c: Channel) -> dict[str, Any]:
     values = asdict(c)
     del values["name"]
+    values |= {"step": _number(c.step), "noise": _number(c.noise)}
     return values | {"stuck": list(values["stuck"]), "clipped": list(values["clipped"])}
 
 

@@ -122,8 +122,12 @@ class _Robot:
         forward = np.diff(time_s)
         forward = forward[forward > 0]
         rate_hz = 1.0 / float(np.median(forward)) if len(forward) else None
-        self.channels.add(time_s, block.values, rate_hz)
-        theta = block.values[:, self._theta : self._theta + 3]
+        with np.errstate(all="ignore"):  # absurd values overflow; they are reported by their range
+            self.channels.add(time_s, block.values, rate_hz)
+            self._note_motion(time_s, block.values)
+
+    def _note_motion(self, time_s: Array, values: Array) -> None:
+        theta = values[:, self._theta : self._theta + 3]
         change = np.nansum(np.square(np.where(np.isfinite(theta), theta, np.nan)[1:] - theta[:-1]), axis=1)
         bins, where = np.unique((time_s[1:] // _BIN_S).astype(np.int64), return_inverse=True)
         for k, energy, count in zip(bins, np.bincount(where, change), np.bincount(where), strict=True):
