@@ -336,3 +336,19 @@ def test_standard_errors_of_derived_parameters():
     )
     assert np.isnan(se["length_m"])
     assert se["mass_kg"] == pytest.approx(0.01)
+
+
+def test_a_mass_swings_only_if_it_is_there_and_within_reach():
+    """What a look-alike leaves over fits a pendulum of no mass far outside, or one that hardly swings."""
+    slosh, se = CAUSES["slosh"], np.array([1e-3, 1e-3, 1e-3, 1e-3])
+    assert slosh.possible(np.array([0.02, 0.01, -0.02, 0.0]), se)
+    assert not slosh.possible(np.array([1.5e-3, 0.0, 0.0, 0.0]), se)  # within two standard errors of nothing
+    assert not slosh.possible(np.array([-0.02, 0.0, 0.0, 0.0]), se)
+    assert not slosh.possible(np.array([0.02, 0.0, 0.05, 0.0]), se)  # hangs 2.5 m from the centre
+    assert slosh.possible(np.array([0.02, 0.0, 0.05, 0.0]), np.array([1e-3, 1e-3, 0.02, 1e-3]))
+    shape = {"length_m": 0.97, "damping_ratio": 0.28}
+    for _ in range(3):
+        near = slosh.finer(shape)
+        assert near
+        assert all(0.04 <= s["length_m"] <= 1.0 and s["damping_ratio"] <= 0.3 for s in near)
+        shape = max(near, key=lambda s: (s["damping_ratio"], s["length_m"]))

@@ -202,10 +202,8 @@ class TeamRig:
             return None
 
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
-        """Whether such values can be: no negative mass, stiffness or friction beyond two standard errors."""
-        cause = CAUSES[candidate.cause]
-        se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        return all(values[k] > -2.0 * se[k] for k, n in enumerate(cause.parameters) if n in cause.positive)
+        """Whether such values can be: no negative stiffness or friction, no mass that swings outside the payload."""
+        return CAUSES[candidate.cause].possible(values, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
 
     def can_run_again(self) -> str | None:
         """Why the recordings cannot be simulated again, or None."""

@@ -81,6 +81,10 @@ class Cause(ABC):
         """Columns (n, C) of what the cause leaves open in one trial, such as the friction of a joint at rest."""
         return []
 
+    def possible(self, values: Array, se: Array) -> bool:
+        """Whether such values (standard errors ``se``) can be: nothing negative beyond two standard errors."""
+        return all(values[k] > -2.0 * se[k] for k, n in enumerate(self.parameters) if n in self.positive)
+
     def physical(self, values: Array, context: Context) -> dict[str, float]:
         """The effect's parameters (names as in the simulator) from the columns' values."""
         return dict(zip(self.parameters, values.tolist(), strict=True))

@@ -8,6 +8,11 @@ from scipy.signal import cont2discrete, lfilter
 from discrepancy.team.causes.base import Array, Cause, stack
 from estimator.fusion import fuse
 
+LENGTHS_M, MOST_DAMPED = (0.04, 1.0), 0.3
+"""Pendulums of 0.5 to 2.5 Hz that swing; what is slower, faster or damped more looks like drag or play."""
+REACH_M = 1.5
+"""From the centre of mass to where it hangs at most: a payload that three robots carry is no larger."""
+
 
 class Slosh(Cause):
     """A pendulum that hangs from a point of the payload; what it does beyond riding along rigidly.
@@ -26,7 +31,6 @@ class Slosh(Cause):
         for length in (0.2, 0.05, 0.065, 0.085, 0.11, 0.145, 0.27, 0.37, 0.5, 0.7)
         for damping in (0.05, 0.15)
     )
-    positive = ("mass_kg",)
     separate = "Motion near the pendulum's own frequency."
 
     def columns(self, trial, robot, joint, shape):
@@ -56,9 +60,18 @@ class Slosh(Cause):
         longer = (0.85, 0.9, 0.95, 0.975, 0.9875, 1.0125, 1.025, 1.05, 1.1, 1.15)
         more = (0.5, 0.7, 0.85, 0.95, 1.05, 1.2, 1.4)  # swings less: the mass comes out larger
         length, damping = shape["length_m"], shape["damping_ratio"]
-        return [{**shape, "length_m": length * x} for x in longer] + [
-            {"length_m": length * x, "damping_ratio": damping * y} for x in (0.98, 1.0, 1.02) for y in more
+        shapes = [(length * x, damping) for x in longer]
+        shapes += [(length * x, damping * y) for x in (0.98, 1.0, 1.02) for y in more]
+        return [
+            {"length_m": x, "damping_ratio": y}
+            for x, y in shapes
+            if LENGTHS_M[0] <= x <= LENGTHS_M[1] and y <= MOST_DAMPED
         ]
+
+    def possible(self, values, se):
+        """A mass that is there, and hangs within the payload's reach."""
+        within = np.abs(values[1:]) <= REACH_M * max(values[0], 0.0) + 2.0 * se[1:]
+        return bool(values[0] > 2.0 * se[0] and within.all())
 
     def physical(self, values, context):
         mass = values[0] if abs(values[0]) > 1e-6 else 1e-6
