@@ -1,15 +1,163 @@
-"""Tables II-V as text: the paper's columns, then one column per sensor preset."""
+"""Tables II-V: the paper's columns, then one column per sensor preset, as rows of numbers and as text."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from estimator.paper_tables import published_errors
 
 PAIRS = ("12", "23", "31")
 MOMENTS = ("Ixx", "Iyy", "Izz")
+PAPER = "paper"
+"""Name of the column of published figures."""
 Scores = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One number, with its spread where it is a mean of several; None marks what there is not."""
+
+    value: float | None
+    spread: float | None = None
+
+
+@dataclass(frozen=True)
+class Row:
+    """One quantity of one payload.
+
+    Attributes:
+        payload: its name; empty in the summary, which is over all payloads.
+        quantity: such as ``R12`` or ``mass``.
+        unit: of the numbers.
+        cells: one per column of the table.
+    """
+
+    payload: str
+    quantity: str
+    unit: str
+    cells: tuple[Cell, ...]
+
+
+@dataclass(frozen=True)
+class PaperTable:
+    """A table with one column of published figures, then ours.
+
+    Attributes:
+        number: of the paper's table, such as ``II``; empty for the summary.
+        title: what it shows.
+        note: what the numbers are.
+        columns: ``paper``, then the presets.
+        rows: payload by payload.
+    """
+
+    number: str
+    title: str
+    note: str
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+    def part(self, unit: str) -> PaperTable:
+        """The rows of one unit only."""
+        rows = tuple(row for row in self.rows if row.unit == unit)
+        return PaperTable(self.number, self.title, self.note, self.columns, rows)
+
+
+def paper_tables(scores: Mapping[str, Mapping[str, Scores]]) -> list[PaperTable]:
+    """Tables II, III, IV and V.
+
+    Args:
+        scores: by preset, then payload, as in ``paper.json``.
+    """
+    columns, payloads = _columns(scores)
+
+    def table(
+        number: str, title: str, note: str, kinds: Sequence[tuple[str, str, Callable[[Scores], Cell]]]
+    ) -> PaperTable:
+        rows = tuple(
+            Row(payload, quantity, unit, tuple(cell(column[payload]) for column in columns.values()))
+            for payload in payloads
+            for quantity, unit, cell in kinds
+        )
+        return PaperTable(number, title, note, tuple(columns), rows)
+
+    return [
+        table(
+            "II",
+            "Relative grasp orientation: error angle [deg]",
+            "mean +- standard deviation over the random trials",
+            [(f"R{pair}", "deg", lambda s, key=f"R{pair}_deg": _mean(s[key])) for pair in PAIRS],
+        ),
+        table(
+            "III",
+            "Relative grasp position: error [m] and error relative to |p| [%]",
+            "mean +- standard deviation over the random trials",
+            [
+                (f"p{pair}", unit, lambda s, key=f"p{pair}_{key}": _mean(s[key]))
+                for pair in PAIRS
+                for unit, key in (("m", "m"), ("%", "percent"))
+            ],
+        ),
+        table(
+            "IV",
+            "Mass and centre of mass: error, and error relative to the truth [%]",
+            "one set of six static holds",
+            [
+                (quantity, unit, lambda s, key=key: Cell(s[key]))
+                for quantity, unit, key in (
+                    ("m", "kg", "m_kg"),
+                    ("m", "%", "m_percent"),
+                    ("p1c", "m", "p1c_m"),
+                    ("p1c", "%", "p1c_percent"),
+                )
+            ],
+        ),
+        table(
+            "V",
+            "Principal moments of inertia: error [kg m^2] and relative error [%]",
+            "|mean error| +- standard deviation of the estimates over random and periodic trials",
+            [(name, "kg m^2", lambda s, n=name: _mean(s["all"][n])) for name in MOMENTS]
+            + [
+                (name, "%", lambda s, n=name: Cell(s["all"][n]["percent"], s["all"][n]["std_percent"]))
+                for name in MOMENTS
+            ],
+        ),
+    ]
+
+
+def summary_table(scores: Mapping[str, Mapping[str, Scores]]) -> PaperTable:
+    """The largest mean error of every kind over payloads (and pairs or moments), the paper's beside ours."""
+    columns, payloads = _columns(scores)
+
+    def moments(kind: str) -> Callable[[Scores], list[float | None]]:
+        return lambda s: [s[kind][name]["percent"] for name in MOMENTS] if kind in s else []
+
+    kinds: list[tuple[str, str, float, Callable[[Scores], list[float | None]]]] = [
+        ("grasp rotation", "deg", 1.0, lambda s: [s[f"R{pair}_deg"]["mean"] for pair in PAIRS]),
+        ("grasp position", "mm", 1e3, lambda s: [s[f"p{pair}_m"]["mean"] for pair in PAIRS]),
+        ("grasp position", "%", 1.0, lambda s: [s[f"p{pair}_percent"]["mean"] for pair in PAIRS]),
+        ("mass", "%", 1.0, lambda s: [s["m_percent"]]),
+        ("centre of mass", "mm", 1e3, lambda s: [s["p1c_m"]]),
+        ("centre of mass", "%", 1.0, lambda s: [s["p1c_percent"]]),
+        ("inertia, all trials", "%", 1.0, moments("all")),
+        ("inertia, periodic trials", "%", 1.0, moments("periodic")),
+        ("inertia, random trials", "%", 1.0, moments("random")),
+    ]
+
+    def largest(
+        column: Mapping[str, Scores], scale: float, values: Callable[[Scores], list[float | None]]
+    ) -> Cell:
+        found = [
+            scale * value for payload in payloads for value in values(column[payload]) if value is not None
+        ]
+        return Cell(max(found, default=None))
+
+    rows = tuple(
+        Row("", quantity, unit, tuple(largest(column, scale, values) for column in columns.values()))
+        for quantity, unit, scale, values in kinds
+    )
+    return PaperTable("", "largest error over the payloads", "", tuple(columns), rows)
 
 
 def format_tables(scores: Mapping[str, Mapping[str, Scores]]) -> str:
@@ -18,97 +166,42 @@ def format_tables(scores: Mapping[str, Mapping[str, Scores]]) -> str:
     Args:
         scores: by preset, then payload, as in ``paper.json``.
     """
-    presets = list(scores)
-    payloads = list(scores[presets[0]])
-
-    def table(title: str, note: str, rows: Sequence[tuple[str, Callable[[Scores], str]]]) -> str:
-        columns = [("paper", {p: published_errors(p) for p in payloads}), *scores.items()]
-        cells = [["", "", *(name for name, _ in columns)]]
-        for payload in payloads:
-            for k, (label, cell) in enumerate(rows):
-                head = f"({payload})" if k == 0 else ""
-                cells.append([head, label, *(cell(column[payload]) for _, column in columns)])
-        return f"{title}\n{note}\n\n{_align(cells)}"
-
-    return "\n\n".join(
-        [
-            table(
-                "Table II. Relative grasp orientation: error angle [deg]",
-                "mean +- standard deviation over the random trials",
-                [(f"R{pair}", lambda s, key=f"R{pair}_deg": _spread(s[key])) for pair in PAIRS],
-            ),
-            table(
-                "Table III. Relative grasp position: error [m] and error relative to |p| [%]",
-                "mean +- standard deviation over the random trials",
-                [
-                    (f"p{pair} {unit}", lambda s, key=f"p{pair}_{key}": _spread(s[key]))
-                    for pair in PAIRS
-                    for unit, key in (("[m]", "m"), ("[%]", "percent"))
-                ],
-            ),
-            table(
-                "Table IV. Mass and centre of mass: error, and error relative to the truth [%]",
-                "one set of six static holds",
-                [
-                    (label, lambda s, key=key: _number(s[key]))
-                    for label, key in (
-                        ("m [kg]", "m_kg"),
-                        ("m [%]", "m_percent"),
-                        ("p1c [m]", "p1c_m"),
-                        ("p1c [%]", "p1c_percent"),
-                    )
-                ],
-            ),
-            table(
-                "Table V. Principal moments of inertia: error [kg m^2] and relative error [%]",
-                "|mean error| +- standard deviation of the estimates over random and periodic trials",
-                [(f"{name} [kg m^2]", lambda s, n=name: _spread(s["all"][n])) for name in MOMENTS]
-                + [
-                    (
-                        f"{name} [%]",
-                        lambda s, n=name: _pair(s["all"][n]["percent"], s["all"][n]["std_percent"]),
-                    )
-                    for name in MOMENTS
-                ],
-            ),
-        ]
-    )
+    blocks = []
+    for table in paper_tables(scores):
+        cells, last = [["", "", *table.columns]], ""
+        for row in table.rows:
+            head = f"({row.payload})" if row.payload != last else ""
+            label = row.quantity if row.unit == "deg" else f"{row.quantity} [{row.unit}]"
+            cells.append([head, label, *map(format_cell, row.cells)])
+            last = row.payload
+        blocks.append(f"Table {table.number}. {table.title}\n{table.note}\n\n{_align(cells)}")
+    return "\n\n".join(blocks)
 
 
 def format_summary(scores: Mapping[str, Mapping[str, Scores]]) -> str:
-    """The largest mean error of every kind over payloads (and pairs or moments), the paper's beside ours."""
-    payloads = list(next(iter(scores.values())))
-    columns = [("paper", {p: published_errors(p) for p in payloads}), *scores.items()]
-
-    def largest(column: Mapping[str, Scores], values: Callable[[Scores], list[float | None]]) -> str:
-        found = [value for payload in payloads for value in values(column[payload]) if value is not None]
-        return _number(max(found, default=None))
-
-    def moments(kind: str) -> Callable[[Scores], list[float | None]]:
-        return lambda s: [s[kind][name]["percent"] for name in MOMENTS] if kind in s else []
-
-    rows: list[tuple[str, Callable[[Scores], list[float | None]]]] = [
-        ("grasp rotation [deg]", lambda s: [s[f"R{pair}_deg"]["mean"] for pair in PAIRS]),
-        ("grasp position [mm]", lambda s: [1e3 * s[f"p{pair}_m"]["mean"] for pair in PAIRS]),
-        ("grasp position [%]", lambda s: [s[f"p{pair}_percent"]["mean"] for pair in PAIRS]),
-        ("mass [%]", lambda s: [s["m_percent"]]),
-        ("centre of mass [mm]", lambda s: [None if s["p1c_m"] is None else 1e3 * s["p1c_m"]]),
-        ("centre of mass [%]", lambda s: [s["p1c_percent"]]),
-        ("inertia, all trials [%]", moments("all")),
-        ("inertia, periodic trials [%]", moments("periodic")),
-        ("inertia, random trials [%]", moments("random")),
-    ]
-    cells = [["largest error over the payloads", *(name for name, _ in columns)]]
-    cells += [[label, *(largest(column, values) for _, column in columns)] for label, values in rows]
+    """The summary as text."""
+    table = summary_table(scores)
+    cells = [[table.title, *table.columns]]
+    cells += [[f"{row.quantity} [{row.unit}]", *map(format_cell, row.cells)] for row in table.rows]
     return _align(cells)
 
 
-def _spread(entry: Mapping[str, float | None]) -> str:
-    return _pair(entry["mean"], entry["std"])
+def format_cell(cell: Cell) -> str:
+    """``0.94 +- 0.21``, two significant digits; ``none`` where there is no number."""
+    value = _number(cell.value)
+    return value if cell.spread is None else f"{value} +- {_number(cell.spread)}"
 
 
-def _pair(mean: float | None, std: float | None) -> str:
-    return _number(mean) if std is None else f"{_number(mean)} +- {_number(std)}"
+def _columns(
+    scores: Mapping[str, Mapping[str, Scores]],
+) -> tuple[dict[str, Mapping[str, Scores]], list[str]]:
+    """The columns by name, the published figures first, and the payloads."""
+    payloads = list(next(iter(scores.values())))
+    return {PAPER: {p: published_errors(p) for p in payloads}, **scores}, payloads
+
+
+def _mean(entry: Mapping[str, float | None]) -> Cell:
+    return Cell(entry["mean"], entry["std"])
 
 
 def _number(value: float | None) -> str:
