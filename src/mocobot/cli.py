@@ -6,7 +6,7 @@ import io
 import os
 import sys
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Annotated, Literal
 
@@ -61,6 +61,7 @@ class Estimate:
         from estimator.recording import Recording, read_recording
         from estimator.report import format_estimate
         from mocobot.progress import stages
+        from mocobot.provenance import provenance
 
         if not self.rec:
             raise InputError("no recording given; name at least one file")
@@ -74,7 +75,8 @@ class Estimate:
 
             estimate = estimate_payload(each(), self.method, self.cutoff_hz, say=say)
         if self.out:
-            write_json(self.out, estimate.to_dict())
+            made = provenance("estimate", asdict(self), self.rec)
+            write_json(self.out, estimate.to_dict() | {"provenance": made})
         print(format_estimate(estimate))
 
 

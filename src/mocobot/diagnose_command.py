@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from contextlib import nullcontext
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -26,6 +27,7 @@ from estimator.statics import CONTRADICTION
 from mocobot.diagnose_folder import check_options, write_diagnosis
 from mocobot.folders import whole_folder
 from mocobot.progress import bar, stages
+from mocobot.provenance import file_facts, provenance
 from mocobot_sim.truth import truth_path
 
 if TYPE_CHECKING:
@@ -52,6 +54,8 @@ def run(options: Diagnose) -> None:
                 recordings.append(read_recording(path))
                 advance(1)
         _check_recordings(recordings)
+        inputs = [*options.rec, *([options.tolerances] if options.tolerances else [])]
+        made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
         with stages() as (say, advance):
             say("estimate")
             estimate = estimate_payload(recordings)
@@ -65,6 +69,9 @@ def run(options: Diagnose) -> None:
             values = _values(diagnosis, rig, options.rec)
             if folder is not None:
                 say("write")
+                if "errors" in values["gain"]:
+                    made_with["files"] += [file_facts(truth_path(path)) for path in options.rec]
+                values["provenance"] = made_with
                 shown = (rig, diagnosis.explanation)
                 write_diagnosis(folder, values, diagnosis, rig, TeamWords(), lambda: traces(*shown))
         print(format_diagnosis(values))

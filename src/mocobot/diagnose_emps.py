@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import nullcontext
+from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from discrepancy.diagnosis_json import diagnosis_to_dict
@@ -19,6 +20,7 @@ from estimator.errors import InputError
 from mocobot.diagnose_folder import check_options, write_diagnosis
 from mocobot.folders import whole_folder
 from mocobot.progress import stages
+from mocobot.provenance import provenance
 
 if TYPE_CHECKING:
     from mocobot.cli import Diagnose
@@ -41,6 +43,8 @@ def run(options: Diagnose) -> None:
         with stages() as (say, advance):
             say("read")
             log = read_emps(next(iter(options.rec)))
+            inputs = [*options.rec, *([options.tolerances] if options.tolerances else [])]
+            made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
             rig = EmpsRig.of(log, tolerances, options.exclude)
             diagnosis = diagnose_axis(
                 rig, closed_loop=options.closed_loop, jobs=options.jobs, say=say, simulated=advance
@@ -48,6 +52,7 @@ def run(options: Diagnose) -> None:
             values = diagnosis_to_dict(diagnosis, rig, EmpsWords())
             if folder is not None:
                 say("write")
+                values["provenance"] = made_with
                 shown = (rig, diagnosis.explanation)
                 write_diagnosis(folder, values, diagnosis, rig, EmpsWords(), lambda: traces(*shown))
         print(format_diagnosis(values))

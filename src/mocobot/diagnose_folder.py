@@ -13,6 +13,8 @@ from discrepancy.plots import PLOTS, save_plots
 from discrepancy.report import format_diagnosis
 from discrepancy.rig import Rig
 from discrepancy.traces import Trace
+from discrepancy.traces_file import NAME as RESIDUALS
+from discrepancy.traces_file import save_traces
 from discrepancy.words import Words
 from estimator.errors import InputError
 from mocobot.files import write_json, write_text
@@ -21,7 +23,7 @@ from mocobot.folders import check_folder
 if TYPE_CHECKING:
     from mocobot.cli import Diagnose
 
-JSON, REPORT, EXTENDED = "diagnosis.json", "report.txt", "extended"
+JSON, REPORT, EXTENDED, PAGE = "diagnosis.json", "report.txt", "extended", "report.html"
 
 
 def check_options(options: Diagnose, causes: Collection[str]) -> None:
@@ -55,7 +57,7 @@ def _is_diagnosis(folder: Path) -> bool:
         ours = json.loads((folder / JSON).read_text(encoding="utf-8"))["format"] == FORMAT
     except (OSError, ValueError, TypeError, KeyError):
         return False
-    known = [JSON, REPORT, EXTENDED, *PLOTS]
+    known = [JSON, REPORT, RESIDUALS, EXTENDED, PAGE, *PLOTS]
     return ours and all(any(path.match(pattern) for pattern in known) for path in folder.iterdir())
 
 
@@ -67,7 +69,7 @@ def write_diagnosis(
     words: Words,
     traces: Callable[[], Sequence[Trace]],
 ) -> None:
-    """Write extended model, pictures, JSON and report into an existing folder.
+    """Write extended model, residuals, pictures, JSON and report into an existing folder.
 
     Args:
         folder: where.
@@ -75,13 +77,15 @@ def write_diagnosis(
         diagnosis: the verdict.
         rig: what was diagnosed.
         words: of the rig.
-        traces: makes the residuals for the pictures.
+        traces: makes the residuals for file and pictures.
     """
     if diagnosis.causes:
         try:
             rig.write_extended(diagnosis.explanation, folder / EXTENDED)
         except InputError as error:  # values that no effect can have, such as a negative friction
             values["notes"].append(f"There is no extended model: {error}.")
-    save_plots(values, diagnosis.explanation, traces(), rig.channels, words, folder)
+    residuals = traces()
+    save_traces(residuals, rig.channels, folder / RESIDUALS)
+    save_plots(values, diagnosis.explanation, residuals, rig.channels, words, folder)
     write_json(folder / JSON, values)
     write_text(folder / REPORT, format_diagnosis(values) + "\n")

@@ -10,13 +10,14 @@ from estimator.errors import InputError
 from estimator.recording import write_recording
 from mocobot.files import make_folder, write_json, write_text
 from mocobot.progress import bar
+from mocobot.provenance import NAME, folder_provenance, provenance
 from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
 from mocobot_sim.paper.plots import save_plots
 from mocobot_sim.paper.tables import format_summary, format_tables
 from mocobot_sim.scene import build_team
 from mocobot_sim.sensors import sensor_preset
 from mocobot_sim.simulate import draw_units
-from mocobot_sim.truth import GroundTruth, write_truth
+from mocobot_sim.truth import GroundTruth, truth_path, write_truth
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -38,17 +39,18 @@ def run(options: Paper) -> None:
         raise InputError(f"jobs is {options.jobs}; it must be at least 1")
     if options.out:
         make_folder(options.out)
-    start = time.perf_counter()
+    start, made_with = time.perf_counter(), provenance("paper", asdict(options))
     with bar(plan.steps, "paper", "step") as advance:
         result = run_paper(plan, options.jobs, advance)
     tables = f"{format_tables(result.scores)}\n\n{format_summary(result.scores)}"
     print(tables)
     print(f"\n{_summary(result)} Wall time {time.perf_counter() - start:.0f} s.")
     if options.out:
-        _write(options.out, plan, result, tables)
+        written = _write(options.out, plan, result, tables)
         if options.recordings:
-            _write_recordings(make_folder(options.out / "recordings"), plan, result)
-        print(f"Written to {options.out}: paper.json, tables.txt, estimates and plots.")
+            written += _write_recordings(make_folder(options.out / "recordings"), plan, result)
+        write_json(options.out / NAME, folder_provenance(made_with, options.out, written))
+        print(f"Written to {options.out}: paper.json, tables.txt, provenance.json, estimates and plots.")
 
 
 def _summary(result: PaperResult) -> str:
@@ -62,18 +64,24 @@ def _summary(result: PaperResult) -> str:
     )
 
 
-def _write(folder: Path, plan: PaperPlan, result: PaperResult, tables: str) -> None:
-    write_json(folder / "paper.json", result.scores)
-    write_text(folder / "tables.txt", tables + "\n")
-    write_json(folder / "trials.json", {"trials": [asdict(trial) for trial in result.trials]})
+def _write(folder: Path, plan: PaperPlan, result: PaperResult, tables: str) -> list[Path]:
+    """Write scores, tables, estimates and plots, and say where."""
+    scores, text, trials = (folder / name for name in ("paper.json", "tables.txt", "trials.json"))
+    write_json(scores, result.scores)
+    write_text(text, tables + "\n")
+    write_json(trials, {"trials": [asdict(trial) for trial in result.trials]})
+    written = [scores, text, trials]
     estimates = make_folder(folder / "estimates")
     for preset in plan.presets:
         for payload in plan.payloads:
-            write_json(estimates / f"{payload}_{preset}.json", result.estimates[preset][payload].to_dict())
-    save_plots(result.scores, folder)
+            written.append(estimates / f"{payload}_{preset}.json")
+            write_json(written[-1], result.estimates[preset][payload].to_dict())
+    return written + save_plots(result.scores, folder)
 
 
-def _write_recordings(folder: Path, plan: PaperPlan, result: PaperResult) -> None:
+def _write_recordings(folder: Path, plan: PaperPlan, result: PaperResult) -> list[Path]:
+    """Write recordings with the truth beside each, and say where."""
+    written = []
     for payload in plan.payloads:
         for preset in plan.presets:
             truth = GroundTruth.of(build_team(payload, draw_units(payload, sensor_preset(preset), plan.seed)))
@@ -81,3 +89,5 @@ def _write_recordings(folder: Path, plan: PaperPlan, result: PaperResult) -> Non
                 path = folder / f"{recording.name}.parquet"
                 write_recording(recording, path)
                 write_truth(truth, path)
+                written += [path, truth_path(path)]
+    return written
