@@ -13,17 +13,17 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from discrepancy.explanation import Explanation
-from discrepancy.rig import Candidate, Channel, Parameter, Rows
+from discrepancy.rig import Candidate, Channel, Rows
+from discrepancy.team.candidates import every_candidate, nearby_pushes, other_shapes, worst_pushes
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
+from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.linear import TrialLinear, start_bases
 from discrepancy.team.noise import Noise
-from discrepancy.team.pushes import intervals_near, push, worst_intervals
 from discrepancy.team.reduction import Reduction
 from discrepancy.team.resimulate import errors_of_rerun, team_of
 from discrepancy.team.signals import Signals
 from discrepancy.team.start import exact_residual, gauss_newton, linearised, start_shared
-from discrepancy.team.tolerances import DEFAULTS
 from discrepancy.team.undecidable import statements
 from discrepancy.whitening import Whitening
 from estimator.errors import InputError
@@ -142,27 +142,7 @@ class TeamRig:
 
     def candidates(self) -> list[Candidate]:
         """Every cause of the catalogue at every place; transients come from ``transients``."""
-        out = []
-        for cause in CAUSES.values():
-            if cause.name in self.excluded or cause.name == "push":
-                continue
-            joints = range(1, 4) if cause.per == "joint" else (None,)
-            robots = (None,) if cause.per == "payload" else range(1, self.robots + 1)
-            for robot in robots:
-                for joint in joints:
-                    out += self._split(cause, robot, joint)
-        return out
-
-    def _split(self, cause: Any, robot: int | None, joint: int | None) -> list[Candidate]:
-        given = self.tolerances.get(cause.name, {})
-        scales = cause.scales or tuple(
-            given.get(name) or DEFAULTS[cause.name][name] for name in cause.parameters
-        )
-        parameters = tuple(
-            Parameter(name, given.get(name, 0.0), scale)
-            for name, scale in zip(cause.parameters, scales, strict=True)
-        )
-        return [Candidate(cause.name, cause.family, robot, joint, parameters, dict(cause.shapes[0]))]
+        return every_candidate(self.robots, self.tolerances, self.excluded)
 
     def columns(self, candidate: Candidate) -> list[Array]:
         """Whitened columns of one candidate, one array (n, C, k) per trial."""
@@ -300,12 +280,8 @@ class TeamRig:
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a transient with its interval moved."""
         if candidate.detail:
-            given = self.tolerances.get("push", {})
-            near = intervals_near(candidate.shape["start_s"], candidate.shape["duration_s"])
-            return [push(int(candidate.detail["trial"]), start, duration, given) for start, duration in near]
-        cause = CAUSES[candidate.cause]
-        shapes = cause.finer(candidate.shape) if finer else cause.shapes
-        return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
+            return nearby_pushes(candidate, self.tolerances.get("push", {}))
+        return other_shapes(candidate, finer=finer)
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the wrench balance is worst.
@@ -315,24 +291,12 @@ class TeamRig:
         """
         if "push" in self.excluded:
             return []
-        out = []
-        for t, z in enumerate(remaining):
-            moving, time = self.linear[t].reduction.moving, self.linear[t].reduction.time
-            found = worst_intervals(time[:moving], np.sum(z[:moving, -6:] ** 2, axis=1))
-            out += [push(t, start, duration, self.tolerances.get("push", {})) for start, duration in found]
-        return out
+        reductions = [linear.reduction for linear in self.linear]
+        return worst_pushes(reductions, remaining, self.tolerances.get("push", {}))
 
     def quantities(self, trial: int) -> dict[str, Array]:
         """Speed of the payload [m/s], its distance from where it started [m], load [N m]: shape (n,) each."""
-        linear = self.linear[trial]
-        at = linear.reduction.sample
-        twist = linear.data.twist[at]
-        h = linear.data.p_bi[at]
-        return {
-            "speed": np.sqrt(np.mean(twist[..., 3:] ** 2, axis=(1, 2))),
-            "position": np.sqrt(np.mean((h - h.mean(axis=0)) ** 2, axis=(1, 2))),
-            "load": np.sqrt(np.mean(linear.s[at, :, 18:] ** 2, axis=(1, 2))),
-        }
+        return quantities_of(self.linear[trial])
 
     def row_rate_hz(self, trial: int) -> float:
         """Rate of a trial's moving rows [Hz]."""
@@ -340,16 +304,7 @@ class TeamRig:
 
     def directions(self, trial: int) -> dict[str, Array]:
         """Directions of every spring torque and every gimbal axis, from the linearisation."""
-        linear, white = self.linear[trial], self.whitening[trial]
-        at = linear.reduction.sample
-        out = {}
-        for robot in range(self.robots):
-            J = linear.J[robot][at]
-            for k in range(3):
-                out[f"robot {robot + 1}'s torque channel {k + 1}"] = _unit(white.rows_only(J[:, :, 18 + k]))
-                out[f"robot {robot + 1}'s driven angle {k + 1}"] = _unit(white.rows_only(J[:, :, k]))
-                out[f"robot {robot + 1}'s gimbal angle {'zyx'[k]}"] = _unit(white.rows_only(J[:, :, 9 + k]))
-        return out
+        return directions_of(self.linear[trial], self.whitening[trial])
 
     def write_extended(self, explanation: Explanation, folder: Path) -> None:
         """Write the estimated team with the named causes in it; ``mocobot simulate --model`` takes it.
@@ -380,8 +335,3 @@ class TeamRig:
 
 def _impossible() -> None:
     return None
-
-
-def _unit(x: Array) -> Array:
-    """Rows (n, C) to unit length, as one direction each, shape (n, C, 1)."""
-    return (x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-300))[..., None]

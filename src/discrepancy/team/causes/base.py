@@ -43,6 +43,7 @@ class Cause(ABC):
         parameters: names of the columns' parameters, units as suffix.
         scales: typical sizes, for causes that have no tolerance.
         per: ``joint``, ``robot`` or ``payload``: where it can sit.
+        joints: those that it can sit at, from 1.
         shapes: alternatives of what changes the columns themselves; the first is the catalogue's.
         positive: parameters that cannot be negative.
         separate: what experiment would tell it from its look-alikes.
@@ -53,6 +54,7 @@ class Cause(ABC):
     parameters: ClassVar[tuple[str, ...]]
     scales: ClassVar[tuple[float, ...]] = ()
     per: ClassVar[Literal["joint", "robot", "payload"]] = "joint"
+    joints: ClassVar[tuple[int, ...]] = (1, 2, 3)
     shapes: ClassVar[tuple[Shape, ...]] = ({},)
     positive: ClassVar[tuple[str, ...]] = ()
     separate: ClassVar[str] = ""

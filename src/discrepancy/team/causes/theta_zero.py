@@ -11,6 +11,7 @@ class ThetaZero(Cause):
     name = "theta_zero"
     family = "gimbal_zero"
     parameters = ("zero_rad",)
+    joints = (1, 2)  # no recording shows the last one's
     separate = (
         "The zero of the last gimbal axis is part of the grasp frame; only a known grasp would show it."
     )

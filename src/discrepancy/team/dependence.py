@@ -1,0 +1,41 @@
+"""What a team's misfit may depend on, and in which channel it may sit: for pictures and the residual's signature."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.team.linear import TrialLinear
+from discrepancy.whitening import Whitening
+
+Array = NDArray[np.float64]
+
+
+def quantities_of(linear: TrialLinear) -> dict[str, Array]:
+    """Speed of the payload [m/s], its distance from where it started [m], load [N m]: shape (n,) each."""
+    at = linear.reduction.sample
+    twist = linear.data.twist[at]
+    h = linear.data.p_bi[at]
+    return {
+        "speed": np.sqrt(np.mean(twist[..., 3:] ** 2, axis=(1, 2))),
+        "position": np.sqrt(np.mean((h - h.mean(axis=0)) ** 2, axis=(1, 2))),
+        "load": np.sqrt(np.mean(linear.s[at, :, 18:] ** 2, axis=(1, 2))),
+    }
+
+
+def directions_of(linear: TrialLinear, white: Whitening) -> dict[str, Array]:
+    """Unit directions in the whitened rows of every spring torque and angle, shape (n, C, 1) each."""
+    at = linear.reduction.sample
+    out = {}
+    for robot in range(linear.robots):
+        J = linear.J[robot][at]
+        for k in range(3):
+            out[f"robot {robot + 1}'s torque channel {k + 1}"] = _unit(white.rows_only(J[:, :, 18 + k]))
+            out[f"robot {robot + 1}'s driven angle {k + 1}"] = _unit(white.rows_only(J[:, :, k]))
+            out[f"robot {robot + 1}'s gimbal angle {'zyx'[k]}"] = _unit(white.rows_only(J[:, :, 9 + k]))
+    return out
+
+
+def _unit(x: Array) -> Array:
+    """Rows (n, C) to unit length, as one direction each, shape (n, C, 1)."""
+    return (x / np.maximum(np.linalg.norm(x, axis=1, keepdims=True), 1e-300))[..., None]
