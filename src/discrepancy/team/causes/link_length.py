@@ -10,7 +10,8 @@ class LinkLength(Cause):
     """True length minus design.
 
     At the same wrist the leg's joint then stands at another angle: a length is an error of phi that depends on the
-    pose, and by virtual power one of the torques.
+    pose, and by virtual power one of the torques. What hangs on the link and at the knee takes no part in that: it
+    is weighed at the true angle.
     """
 
     name = "link_length"
@@ -20,23 +21,34 @@ class LinkLength(Cause):
 
     def columns(self, trial, robot, joint, shape):
         phi, tau = trial.s[:, robot, :3], trial.s[:, robot, 18:]
-        columns = []
-        errors, slopes = _phi_error(phi, joint, trial.design), _slopes(phi, joint, trial.design)
-        for error, slope in zip(errors, slopes, strict=True):
-            # (I - d(error)/d(phi))^-T on the torque, to first order.
-            torque = -slope * tau[:, joint, None]
-            columns.append(trial.of_signals(robot, phi=one_joint(error, joint), tau=torque))
-        return stack(columns)
+        angle, torque = _errors(phi, tau, joint, trial.design)
+        return stack(
+            [
+                trial.of_signals(robot, phi=one_joint(a, joint), tau=t)
+                for a, t in zip(angle, torque, strict=True)
+            ]
+        )
 
     def undo(self, signals, trial, robot, joint, values, shape):
-        phi = signals.phi[:, robot]
-        error = values @ np.array(_phi_error(phi, joint, trial.design))
-        slope = np.tensordot(values, _slopes(phi, joint, trial.design), axes=1)
-        torque = -slope * signals.tau[:, robot, joint, None]
+        angle, torque = _errors(signals.phi[:, robot], signals.tau[:, robot], joint, trial.design)
         return signals.minus(
-            phi=one_robot(one_joint(error, joint), trial.robots, robot),
-            tau=one_robot(torque, trial.robots, robot),
+            phi=one_robot(one_joint(values @ angle, joint), trial.robots, robot),
+            tau=one_robot(np.tensordot(values, torque, axes=1), trial.robots, robot),
         )
+
+
+def _errors(phi, tau, joint, design):
+    """Readings minus those of a leg of design lengths, per metre: angles (3, Q) and torques (3, Q, 3)."""
+    angle, slopes = np.array(_phi_error(phi, joint, design)), _slopes(phi, joint, design)
+    gravity, at = design.gravity_mps2, phi[:, joint]
+    at_knee = 0.5 * design.rod_mass_kg * gravity
+    weight = design.proximal_mass_kg * gravity * design.proximal_com_m + at_knee * design.proximal_length_m
+    # (I - d(error)/d(phi))^-T on what drives the wrist, to first order ...
+    torque = -slopes * (tau[:, joint] - weight * np.cos(at))[:, None]
+    # ... and the weight of link and knee at another angle, and of the knee on a longer lever.
+    torque[:, :, joint] -= weight * np.sin(at) * angle
+    torque[0, :, joint] += at_knee * np.cos(at)
+    return angle, torque
 
 
 def _slopes(phi, joint, design, step=1e-5):
