@@ -32,8 +32,8 @@ class LinkLength(Cause):
     def undo(self, signals, trial, robot, joint, values, shape):
         angle, torque = _errors(signals.phi[:, robot], signals.tau[:, robot], joint, trial.design)
         return signals.minus(
-            phi=one_robot(one_joint(values @ angle, joint), trial.robots, robot),
-            tau=one_robot(np.tensordot(values, torque, axes=1), trial.robots, robot),
+            phi=one_robot(one_joint(np.einsum("k,kq->q", values, angle), joint), trial.robots, robot),
+            tau=one_robot(np.einsum("k,kqj->qj", values, torque), trial.robots, robot),
         )
 
 
