@@ -13,7 +13,7 @@ paper: $(MARK)
 	$(BIN)/mocobot paper --jobs $(JOBS) --out out/paper
 
 test: $(MARK) lint
-	$(BIN)/pytest
+	$(BIN)/pytest -n $(JOBS) --dist loadfile
 
 lint: $(MARK)
 	$(BIN)/ruff check .

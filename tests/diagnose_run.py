@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pytest
 
-from mocobot.cli import main
+import command
 
 BIAS_NM = 0.08
 """Torque zero that the recordings hide in robot 2, joint 1."""
@@ -18,24 +18,12 @@ Edit = Callable[[pa.Table], pa.Table]
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
     """Exit code, standard output and standard error of ``mocobot diagnose``."""
-    try:
-        main(["diagnose", *map(str, arguments)])
-        code = 0
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return code, out, err.removesuffix("\n")
+    return command.run(capsys, "diagnose", *arguments)
 
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    """The one sentence of a command that must exit with 2."""
-    code, out, err = run(capsys, *arguments)
-    assert code == 2, (out, err)
-    assert out == ""
-    assert err.startswith("mocobot: ")
-    assert "\n" not in err
-    assert "Traceback" not in err
-    return err
+    """The one sentence of ``mocobot diagnose`` where it must exit with 2."""
+    return command.refused(capsys, "diagnose", *arguments)
 
 
 def with_metadata(**changes: object) -> Edit:

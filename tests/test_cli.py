@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from command import refused, run
 from mocobot.cli import main
 
 Edit = Callable[[pa.Table], pa.Table]
@@ -24,28 +25,6 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("cli") / "rec.parquet"
     main(["simulate", "--payload", "b", "--vias", "8", "--seed", "3", "--out", str(path)])
     return path
-
-
-def run(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    """Exit code, standard output and standard error."""
-    try:
-        main(list(arguments))
-        code = 0
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return code, out, err.removesuffix("\n")
-
-
-def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
-    """The one sentence on standard error of a command that must exit with 2."""
-    code, out, err = run(capsys, *arguments)
-    assert code == 2, (out, err)
-    assert out == ""
-    assert err.startswith("mocobot: ")
-    assert "\n" not in err
-    assert "Traceback" not in err
-    return err
 
 
 def column(name: str, change: Callable[[np.ndarray], np.ndarray]) -> Edit:

@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+import command
 from diagnosed import small_diagnosis
 from mocobot.cli import main
 from replay_case import Replayed
@@ -33,23 +34,11 @@ def no_display(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def replay(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    capsys.readouterr()
-    try:
-        main(["replay", *map(str, arguments)])
-        code = 0
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return code, out, err.removesuffix("\n")
+    return command.run(capsys, "replay", *arguments)
 
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    code, out, err = replay(capsys, *arguments)
-    assert code == 2, (out, err)
-    assert out == ""
-    assert err.startswith("mocobot: ")
-    assert "\n" not in err
-    return err
+    return command.refused(capsys, "replay", *arguments)
 
 
 def diagnosis(folder: Path, change: Change = lambda values: None) -> Path:
