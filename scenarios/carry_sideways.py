@@ -18,10 +18,12 @@ from estimator.delta import forward_kinematics
 from estimator.errors import InputError
 from mocobot_sim.base.drive import BaseDrive, DriveLog
 from mocobot_sim.base.motion import Leg, PlanarMotion, carried, plan
-from mocobot_sim.base.pictures import Camera, Marks, make_folder, render
 from mocobot_sim.base.planar import compose, relative, yaw_of
 from mocobot_sim.base.snapshots import Snapshots
 from mocobot_sim.models import omnid_design
+from mocobot_sim.pictures.camera import Camera
+from mocobot_sim.pictures.marks import Marks
+from mocobot_sim.pictures.render import make_folder, render
 from mocobot_sim.scene import TeamScene, build_team
 from mocobot_sim.trajectories import RATE_HZ, Trajectory
 from mocobot_sim.trial import TrialLog, run_trial

@@ -17,9 +17,11 @@ from mocobot_sim.base.design import WHEELS, base_design
 from mocobot_sim.base.drive import BaseDrive, DriveLog
 from mocobot_sim.base.mecanum import MecanumKinematics
 from mocobot_sim.base.motion import Leg, PlanarMotion, plan
-from mocobot_sim.base.pictures import Camera, Marks, make_folder, render
 from mocobot_sim.base.snapshots import Snapshots
 from mocobot_sim.base.solo import build_solo, compile_solo, drive_solo
+from mocobot_sim.pictures.camera import Camera
+from mocobot_sim.pictures.marks import Marks
+from mocobot_sim.pictures.render import make_folder, render
 from mocobot_sim.trajectories import RATE_HZ
 
 SIDE_M = 0.8

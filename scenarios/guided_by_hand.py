@@ -24,12 +24,14 @@ from estimator.estimate import estimate_payload
 from estimator.payload_estimate import PayloadEstimate
 from mocobot_sim.base.drive import DriveLog
 from mocobot_sim.base.follow import FollowingDrive
-from mocobot_sim.base.pictures import Camera, Marks, make_folder, render
 from mocobot_sim.base.snapshots import Snapshots
 from mocobot_sim.control import ControlGains
 from mocobot_sim.guided.float_arms import FLOAT_GAINS, FloatArms
 from mocobot_sim.guided.hand import Grip, GuidingHand, HandLog, Move
 from mocobot_sim.guided.weight import Payload
+from mocobot_sim.pictures.camera import Camera
+from mocobot_sim.pictures.marks import Marks
+from mocobot_sim.pictures.render import make_folder, render
 from mocobot_sim.scene import TeamScene, build_team
 from mocobot_sim.sensors import sensor_preset
 from mocobot_sim.simulate import TrialRequest, draw_units, simulate

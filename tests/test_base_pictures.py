@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from estimator.errors import InputError
-from mocobot_sim.base.pictures import Camera, Marks, make_folder, render
 from mocobot_sim.base.solo import build_solo, compile_solo
+from mocobot_sim.pictures.camera import Camera
+from mocobot_sim.pictures.marks import Marks
+from mocobot_sim.pictures.render import make_folder, render
 
 SCENARIOS = Path(__file__).resolve().parents[1] / "scenarios"
 VIEW = Camera((0.0, 0.0, 0.3), 2.0, 215.0, -30.0)

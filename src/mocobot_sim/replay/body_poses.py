@@ -36,8 +36,7 @@ class BodyMotion:
 def body_motion(phi: Array, theta: Array, design: OmnidDesign) -> BodyMotion:
     """Solve the arms and gimbals of all robots.
 
-    A link turns by phi about minus its driven axis. Seen from the knee, the rod's direction (x, y, z) in the link is
-    Ry(swing) Rz(tilt) e_x = (cos swing cos tilt, sin tilt, -sin swing cos tilt).
+    A link turns by phi about minus its driven axis, the rod by Ry(swing) Rz(tilt) against the link.
 
     Args:
         phi: driven angles [rad], shape (Q, N, 3).
@@ -47,18 +46,41 @@ def body_motion(phi: Array, theta: Array, design: OmnidDesign) -> BodyMotion:
     Raises:
         InputError: the rods do not meet at some sample.
     """
-    legs = leg_geometry(phi, design)
+    wrist, swing, tilt = rod_angles(phi, design)
     turns = {}
-    for leg, u in zip(LEGS, LEG_DIRECTIONS, strict=True):
-        angle, rod = phi[..., leg - 1], legs.rod[..., leg - 1, :] / design.rod_length_m
+    for leg in LEGS:
+        turns[f"proximal{leg}"] = _about(1, -phi[..., leg - 1])
+        turns[f"rod{leg}"] = _about_y_then_z(swing[..., leg - 1], tilt[..., leg - 1])
+    for column, (name, axis) in enumerate(zip(GIMBAL, (2, 1, 0), strict=True)):
+        turns[name] = _about(axis, theta[..., column])
+    return BodyMotion(wrist, turns)
+
+
+def rod_angles(phi: Array, design: OmnidDesign) -> tuple[Array, Array, Array]:
+    """Where the arms are, from the driven angles alone.
+
+    Seen from the knee, the rod's direction (x, y, z) in the link is
+    Ry(swing) Rz(tilt) e_x = (cos swing cos tilt, sin tilt, -sin swing cos tilt).
+
+    Args:
+        phi: driven angles [rad], shape (..., 3).
+        design: the robots' numbers.
+
+    Returns:
+        Wrist positions in {b} [m], and swing and tilt of each leg's rod against its link [rad]; shapes (..., 3).
+
+    Raises:
+        InputError: the rods do not meet at some sample.
+    """
+    legs = leg_geometry(phi, design)
+    swing, tilt = np.empty_like(legs.h), np.empty_like(legs.h)
+    for k, u in enumerate(LEG_DIRECTIONS):
+        angle, rod = phi[..., k], legs.rod[..., k, :] / design.rod_length_m
         outward, aside, up = rod @ u, rod @ [-u[1], u[0], 0.0], rod[..., 2]
         x = np.cos(angle) * outward + np.sin(angle) * up
         z = np.cos(angle) * up - np.sin(angle) * outward
-        turns[f"proximal{leg}"] = _about(1, -angle)
-        turns[f"rod{leg}"] = _about_y_then_z(np.arctan2(-z, x), np.arcsin(np.clip(aside, -1.0, 1.0)))
-    for column, (name, axis) in enumerate(zip(GIMBAL, (2, 1, 0), strict=True)):
-        turns[name] = _about(axis, theta[..., column])
-    return BodyMotion(legs.h, turns)
+        swing[..., k], tilt[..., k] = np.arctan2(-z, x), np.arcsin(np.clip(aside, -1.0, 1.0))
+    return legs.h, swing, tilt
 
 
 def _about(axis: int, angle: Array) -> Array:

@@ -13,13 +13,11 @@ from mocobot_sim.replay.colours import Colour
 from mocobot_sim.replay.diagnosis import Cause
 from mocobot_sim.replay.log_time import send, send_poses
 from mocobot_sim.replay.replay_trial import ReplayTrial
-from mocobot_sim.replay.robot import PATHS, fixed_frames, robot_shapes
+from mocobot_sim.replay.robot import PATHS, TINTED, fixed_frames, robot_shapes
 from mocobot_sim.replay.sizes import FORCE_M_PER_N, MARK_M
 
 Array = NDArray[np.float64]
 
-TINTED = ("proximal1", "proximal2", "proximal3")
-"""Bodies drawn in their robot's colour, which its series have, too."""
 TRAIL_HZ = 25.0
 """Pieces of a wrist path per second; it is drawn only, the samples are among the series."""
 

@@ -45,9 +45,36 @@ def cad_shape(payload: str | Path, robots: int) -> tuple[Shape | None, Grasps]:
     return body_shape(model, list(range(1, model.nbody))), grasps
 
 
-def is_shipped(payload: str | None) -> bool:
-    """Whether a recording's payload label names a payload whose geometry we have."""
-    return payload is not None and payload in payload_names()
+def drawn_payload(
+    payload: str | Path | None, label: str | None, grasps: Grasps, notes: list[str]
+) -> str | Path | None:
+    """Which payload's CAD is to be drawn in given grasps; None for bars.
+
+    Args:
+        payload: what was asked for, a name or a payload MJCF; None for what the label names, if that fits.
+        label: the recording's payload.
+        grasps: how the payload is held.
+        notes: what a viewer should know is added.
+
+    Raises:
+        InputError: what was asked for is not a payload for so many robots.
+    """
+    wanted = payload if payload is not None else label if label in payload_names() else None
+    if wanted is None:
+        return None
+    try:
+        elsewhere = held_elsewhere(cad_shape(wanted, len(grasps.p_1i))[1], grasps)
+    except InputError as error:
+        if payload is not None:
+            raise
+        elsewhere = str(error)
+    if elsewhere is None:
+        return wanted
+    if payload is not None:
+        notes.append(f"The geometry of payload {str(wanted)!r} is drawn as asked, but {elsewhere}.")
+        return wanted
+    notes.append(f"The geometry of payload {str(wanted)!r} is not drawn: {elsewhere}.")
+    return None
 
 
 def held_elsewhere(cad: Grasps, grasps: Grasps) -> str | None:

@@ -21,7 +21,7 @@ from mocobot_sim.replay.body_facts import BodyFacts, facts_of
 from mocobot_sim.replay.body_poses import BodyMotion, body_motion
 from mocobot_sim.replay.body_shapes import Shape
 from mocobot_sim.replay.diagnosis import Diagnosis
-from mocobot_sim.replay.payload_shape import bars, cad_shape, held_elsewhere, is_shipped
+from mocobot_sim.replay.payload_shape import bars, cad_shape, drawn_payload
 from mocobot_sim.replay.placement import (
     Bases,
     Grasps,
@@ -206,26 +206,12 @@ def _shape(
     notes: list[str],
 ) -> Shape | None:
     """The payload's geometry: by CAD if that fits the grasps, else bars."""
-    robots, label = recording.metadata.robots, recording.metadata.payload
-    asked = payload is not None
-    wanted = payload if payload is not None else label if is_shipped(label) else None
-    if wanted is not None:
-        try:
-            shape, cad = cad_shape(wanted, robots)
-            elsewhere = None if grasps is None else held_elsewhere(cad, grasps)
-        except InputError as error:
-            if asked:
-                raise
-            shape, elsewhere = None, str(error)
-        if grasps is None:
-            return None
-        if elsewhere is None:
-            return shape
-        notes.append(
-            f"The geometry of payload {str(wanted)!r} is drawn as asked, but {elsewhere}."
-            if asked
-            else f"The geometry of payload {str(wanted)!r} is not drawn: {elsewhere}."
-        )
-        if asked:
-            return shape
-    return None if grasps is None else bars(facts or BodyFacts(grasps, None, None, None, None))
+    meta = recording.metadata
+    if grasps is None:
+        if payload is not None:
+            cad_shape(payload, meta.robots)  # refuse what cannot be drawn even where nothing is
+        return None
+    drawn = drawn_payload(payload, meta.payload, grasps, notes)
+    if drawn is not None:
+        return cad_shape(drawn, meta.robots)[0]
+    return bars(facts or BodyFacts(grasps, None, None, None, None))

@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 LEGS = (1, 2, 3)
 GIMBAL = ("yoke", "ring", "flange")
+TINTED = ("proximal1", "proximal2", "proximal3")
+"""Bodies drawn in their robot's colour, which its series have, too."""
 PATHS: dict[str, str] = {
     **{f"proximal{k}": f"base/leg{k}/proximal" for k in LEGS},
     **{f"rod{k}": f"base/leg{k}/proximal/knee/rod" for k in LEGS},
@@ -49,7 +51,7 @@ class RobotShapes:
 def robot_shapes(design: OmnidDesign) -> RobotShapes:
     """The Omnid with a design's lengths."""
     model = mujoco.MjModel.from_xml_path(str(models_dir() / "omnid" / "omnid.xml"))
-    _fit(model, design)
+    fit_design(model, design)
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     base = model.body("base").id
@@ -64,22 +66,30 @@ def robot_shapes(design: OmnidDesign) -> RobotShapes:
     )
 
 
-def _fit(model: mujoco.MjModel, design: OmnidDesign) -> None:
-    """Stretch links, plates and driven axes of the shipped Omnid to another design; nothing here has mass."""
+def fit_design(model: mujoco.MjModel, design: OmnidDesign, prefix: str = "") -> None:
+    """Stretch links, plates and driven axes of the shipped Omnid to another design, for the eye: no mass changes.
+
+    Args:
+        model: a model that holds the shipped Omnid.
+        design: the lengths it shall have.
+        prefix: of the Omnid's names in the model.
+    """
     shipped = omnid_design()
     wider = design.base_radius_m - shipped.base_radius_m
     for k, u in zip(LEGS, LEG_DIRECTIONS, strict=True):
-        model.body_pos[model.body(f"proximal{k}").id] = design.base_radius_m * u
-        model.body_pos[model.body(f"rod{k}").id] = [design.proximal_length_m, 0.0, 0.0]
-        model.geom_pos[model.geom(f"actuator{k}").id] += wider * u
+        model.body_pos[model.body(f"{prefix}proximal{k}").id] = design.base_radius_m * u
+        model.body_pos[model.body(f"{prefix}rod{k}").id] = [design.proximal_length_m, 0.0, 0.0]
+        model.geom_pos[model.geom(f"{prefix}actuator{k}").id] += wider * u
         for name, length in (
-            (f"proximal{k}", design.proximal_length_m),
-            (f"rod{k}", design.rod_length_m),
+            (f"{prefix}proximal{k}", design.proximal_length_m),
+            (f"{prefix}rod{k}", design.rod_length_m),
         ):
             geom = model.geom(name).id
             model.geom_pos[geom, 0] = model.geom_size[geom, 1] = 0.5 * length
-    model.geom_size[model.geom("base_plate").id, 0] += wider
-    model.geom_size[model.geom("platform").id, 0] += design.platform_radius_m - shipped.platform_radius_m
+    model.geom_size[model.geom(f"{prefix}base_plate").id, 0] += wider
+    model.geom_size[model.geom(f"{prefix}platform").id, 0] += (
+        design.platform_radius_m - shipped.platform_radius_m
+    )
 
 
 def fixed_frames(design: OmnidDesign) -> dict[str, tuple[Array, Array]]:
