@@ -86,7 +86,7 @@ def _middle(across: Array, depth: Array) -> float:
     return low if low == high else float(root_scalar(excess, bracket=(low, high)).root)
 
 
-def pixels(camera: Camera, points: ArrayLike, width: int, height: int, fovy_deg: float) -> Array:
+def pixels(camera: Camera, points: ArrayLike, width: float, height: float, fovy_deg: float) -> Array:
     """Where points lie in a picture: columns from the left and rows from the top, NaN if behind; shape (K, 2).
 
     Args:

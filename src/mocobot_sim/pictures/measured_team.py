@@ -31,8 +31,8 @@ Array = NDArray[np.float64]
 
 SAMPLES = 2000
 """Samples, spread over a recording, from which bases are placed."""
-GHOST = 0.45
-"""Opacity of a payload that must not hide what is inside."""
+GHOST = 0.15
+"""Opacity of a payload that must not hide what is inside; MuJoCo draws what is translucent twice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +137,6 @@ def _model(bases: Bases, payload: str | Path | None, design: OmnidDesign, height
     if payload is not None:
         root.worldbody.attach(load_payload(payload)).add("freejoint")
     model = mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
-    model.light_pos[:, :2] += bases.p_Wb[:, :2].mean(axis=0) - model.stat.center[:2]
     for i in range(1, len(turns) + 1):
         fit_design(model, design, f"omnid{i}/")
         for name in TINTED:

@@ -40,13 +40,24 @@ def _picture(
     data.qpos[:] = task[f"qpos{k}"]
     mujoco.mj_forward(model, data)
     renderer.update_scene(data, camera)
+    plain = renderer.render()
+    if not any(len(task[f"{kind}{k}"]) for kind in ("lines", "arrows", "ellipsoids")):
+        return plain
+    # Marks throw no shadow: what they change is taken from a picture without any.
+    renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
+    bare = renderer.render()
+    _mark(renderer.scene, task, k)
+    marked = renderer.render()
+    return np.where((marked != bare).any(axis=-1, keepdims=True), marked, plain)
+
+
+def _mark(scene: mujoco.MjvScene, task: Mapping[str, np.ndarray], k: int) -> None:
     for row in task[f"lines{k}"]:
-        _connect(renderer.scene, mujoco.mjtGeom.mjGEOM_CAPSULE, row)
+        _connect(scene, mujoco.mjtGeom.mjGEOM_CAPSULE, row)
     for row in task[f"arrows{k}"]:
-        _connect(renderer.scene, mujoco.mjtGeom.mjGEOM_ARROW, row)
+        _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, row)
     for row in task[f"ellipsoids{k}"]:
-        _add(renderer.scene, mujoco.mjtGeom.mjGEOM_ELLIPSOID, row[12:15], row[:3], row[3:12], row[15:])
-    return renderer.render()
+        _add(scene, mujoco.mjtGeom.mjGEOM_ELLIPSOID, row[12:15], row[:3], row[3:12], row[15:])
 
 
 def _connect(scene: mujoco.MjvScene, kind: mujoco.mjtGeom, row: np.ndarray) -> None:

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 from pathlib import Path
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator import so3
 from estimator.errors import InputError
 from estimator.payload_estimate import PayloadEstimate
 from estimator.recording import Recording
 from mocobot_sim.assemble import assemble_at_home
 from mocobot_sim.models import models_dir
-from mocobot_sim.pictures.camera import corners, framing
+from mocobot_sim.pictures.camera import Camera, corners, framing, pixels
 from mocobot_sim.pictures.marks import Marks
 from mocobot_sim.pictures.measured_team import MeasuredTeam, measured_team
 from mocobot_sim.pictures.render import Shot
@@ -33,6 +35,8 @@ ASPECT = 1.6
 """Width over height of a picture that shots are framed for, if nothing else is said."""
 AZIMUTH, ELEVATION, FOVY = 125.0, -24.0, 28.0
 """Direction and angle of view [deg]; a long lens, which does not blow up what is near."""
+TURNS = (0.0, *(sign * turn for turn in range(15, 180, 15) for sign in (-1, 1)), 180.0)
+"""Other directions that are tried [deg]; the first of equal ones is taken."""
 ABOVE = -34.0
 """Elevation [deg] where marks at the payload are to be seen."""
 LONG_M = 0.17
@@ -141,10 +145,29 @@ def axis_shot(aspect: float = ASPECT) -> Shot:
 def _shot(
     model: mujoco.MjModel, qpos: Array, marks: Marks, says: str, aspect: float, elevation: float = ELEVATION
 ) -> Shot:
+    """Look from where the robots hide each other least, with the light behind the camera's shoulder."""
     model.vis.global_.fovy = FOVY
     points = np.concatenate([corners(model, qpos), marks.points()])
-    camera = framing(points, AZIMUTH, elevation, aspect, FOVY)
-    return Shot(model, qpos, camera, marks, says)
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_kinematics(model, data)
+    feet = np.array(
+        [data.xpos[b] for b in range(model.nbody) if model.body(b).name.endswith("/chassis")]
+    ).reshape(-1, 3)
+
+    def apart(camera: Camera) -> float:
+        """Least distance of two robots in the picture, widths counting double, because robots are tall."""
+        at = pixels(camera, feet, 2.0 * aspect, 1.0, FOVY)
+        return min((float(np.linalg.norm(a - b)) for a, b in combinations(at, 2)), default=0.0)
+
+    cameras = [framing(points, AZIMUTH + turn, elevation, aspect, FOVY) for turn in TURNS]
+    best = max(cameras, key=apart)
+    turn = so3.exp(np.array([0.0, 0.0, np.deg2rad(best.azimuth - AZIMUTH)]))
+    centre = model.stat.center * [1.0, 1.0, 0.0]
+    moved = np.append(feet.mean(axis=0)[:2], 0.0) if len(feet) else centre
+    model.light_pos[:] = (model.light_pos - centre) @ turn.T + moved
+    model.light_dir[:] = model.light_dir @ turn.T
+    return Shot(model, qpos, best, marks, says)
 
 
 def _says(recording: Recording, team: MeasuredTeam, truth: BodyFacts | None, *, marked: bool = True) -> str:
@@ -210,9 +233,6 @@ def _facts(marks: Marks, team: MeasuredTeam, facts: BodyFacts, colour: Colour, t
             0.004 * thick,
             (*rgb, 1.0),
         )
-    if facts.axes_known:
-        for axis in (R * semi_axes).T:
-            marks.arrow(centre, centre + axis, 0.007 * thick, (*rgb, 1.0))
 
 
 def _names(marks: Marks, team: MeasuredTeam) -> None:
