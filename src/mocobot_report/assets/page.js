@@ -1,0 +1,118 @@
+"use strict";
+(() => {
+  const root = document.documentElement;
+  const system = matchMedia("(prefers-color-scheme: dark)");
+  const button = document.getElementById("theme");
+  const figures = new Map();  // element -> its data, for drawing again in another theme
+  const narrow = matchMedia("(max-width: 40rem)");
+
+  // Theme: the system's until the button is used.
+  const stored = () => { try { return localStorage.getItem("mocobot-theme"); } catch { return null; } };
+  const store = (value) => { try { localStorage.setItem("mocobot-theme", value); } catch { /* not kept */ } };
+  let chosen = stored();
+  const dark = () => (chosen ? chosen === "dark" : system.matches);
+  const setTheme = () => {
+    root.dataset.theme = dark() ? "dark" : "light";
+    button.textContent = dark() ? "Light theme" : "Dark theme";
+    for (const plot of figures.keys()) if (plot.dataset.drawn) draw(plot);
+  };
+  button.addEventListener("click", () => { chosen = dark() ? "light" : "dark"; store(chosen); setTheme(); });
+  system.addEventListener("change", setTheme);
+
+  // Colours are written @name, arrays that several lines share #name.
+  const themed = (value, style, arrays) => {
+    if (typeof value === "string") {
+      if (value[0] === "@") return style.getPropertyValue("--" + value.slice(1)).trim();
+      return value[0] === "#" && arrays && value.slice(1) in arrays ? arrays[value.slice(1)] : value;
+    }
+    if (Array.isArray(value)) return value.map((item) => themed(item, style, arrays));
+    if (value && typeof value === "object") {
+      return Object.fromEntries(Object.entries(value).map(([key, item]) => [key, themed(item, style, arrays)]));
+    }
+    return value;
+  };
+  const config = {
+    responsive: true, displaylogo: false, displayModeBar: !narrow.matches && "hover",
+    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "zoomIn2d", "zoomOut2d"],
+    toImageButtonOptions: { format: "svg" },
+  };
+  const hiddenGroups = (plot) => new Set(
+    [...plot.closest("figure").querySelectorAll('.legend button[aria-pressed="false"]')].map((b) => b.dataset.group));
+
+  function draw(plot) {
+    const figure = figures.get(plot);
+    const style = getComputedStyle(root);
+    const data = themed(figure.data, style, figure.arrays);
+    const layout = themed(figure.layout, style);
+    layout.font.family = getComputedStyle(document.body).fontFamily;
+    layout.dragmode = narrow.matches ? false : "zoom";  // a finger scrolls the page
+    if (narrow.matches && figure.narrow) {
+      for (const [path, value] of Object.entries(figure.narrow)) {
+        const keys = path.split(".");
+        const last = keys.pop();
+        keys.reduce((at, key) => (at[key] ??= {}), layout)[last] = value;
+      }
+    }
+    const hidden = hiddenGroups(plot);
+    for (const line of data) if (hidden.has(line.legendgroup)) line.visible = false;
+    Plotly.react(plot, data, layout, config).then(() => { plot.dataset.drawn = "yes"; });
+  }
+  for (const plot of document.querySelectorAll(".plot")) {
+    figures.set(plot, JSON.parse(document.getElementById(plot.dataset.figure).textContent));
+  }
+  const near = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      if (!entry.isIntersecting) continue;
+      near.unobserve(entry.target);
+      draw(entry.target);
+    }
+  }, { rootMargin: "600px 0px" });
+  for (const plot of figures.keys()) near.observe(plot);
+  const drawAll = () => { for (const plot of figures.keys()) if (!plot.dataset.drawn) { near.unobserve(plot); draw(plot); } };
+
+  for (const toggle of document.querySelectorAll(".legend button")) {
+    toggle.addEventListener("click", () => {
+      toggle.setAttribute("aria-pressed", toggle.getAttribute("aria-pressed") === "true" ? "false" : "true");
+      const plot = toggle.closest("figure").querySelector(".plot");
+      if (plot.dataset.drawn) draw(plot);
+    });
+  }
+
+  // One panel of several at a time.
+  const show = (tabs) => {
+    for (const input of tabs.querySelectorAll("input")) {
+      document.getElementById(input.value).hidden = !input.checked;
+    }
+  };
+  for (const tabs of document.querySelectorAll(".tabs")) {
+    show(tabs);
+    tabs.addEventListener("change", () => show(tabs));
+  }
+  addEventListener("beforeprint", () => {
+    for (const panel of document.querySelectorAll("[data-panel]")) panel.hidden = false;
+    for (const part of document.querySelectorAll("details")) part.open = true;
+    drawAll();
+  });
+  addEventListener("afterprint", () => { for (const tabs of document.querySelectorAll(".tabs")) show(tabs); });
+
+  // A table that is wider than its place can be scrolled with the keyboard.
+  const reachable = () => {
+    for (const box of document.querySelectorAll(".scroll")) {
+      if (box.scrollWidth > box.clientWidth + 1) box.tabIndex = 0; else box.removeAttribute("tabindex");
+    }
+  };
+  new ResizeObserver(reachable).observe(document.body);
+
+  // Where in the page the reader is.
+  const links = new Map([...document.querySelectorAll("nav a")].map((a) => [a.hash.slice(1), a]));
+  const spy = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      if (!entry.isIntersecting) continue;
+      for (const a of links.values()) a.removeAttribute("aria-current");
+      links.get(entry.target.id).setAttribute("aria-current", "true");
+    }
+  }, { rootMargin: "-10% 0px -80% 0px" });
+  for (const id of links.keys()) { const part = document.getElementById(id); if (part) spy.observe(part); }
+
+  setTheme();
+})();

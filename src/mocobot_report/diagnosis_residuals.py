@@ -1,0 +1,210 @@
+"""The residual over time, against what it may depend on, and by channel, without and with the named causes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.traces import Group, Trace, groups
+from mocobot_report.blocks import Entry, paragraph, section, table, tabs, value, verdict
+from mocobot_report.book import Book
+from mocobot_report.charts import Json, Key, axis, chart, layout, log_axis, numbers
+from mocobot_report.folder import Diagnosed
+from mocobot_report.html import Node, el
+from mocobot_report.numbers import fitting
+from mocobot_report.residual_statistics import binned, running_rms, spectrum
+from mocobot_report.series import Line, Panel, height, runs, stacked, thinned
+from mocobot_report.units import QUANTITIES
+
+Array = NDArray[np.float64]
+COLOURS = ("c1", "c2", "c3")
+BEFORE, AFTER = Key("before", "as simulated", "before"), Key("after", "with the causes and tolerances", "after")
+TOLERATED = Key("after", "with tolerances", "after")
+CLEAN = Key("", "clean data", "text", "dash")
+BAND = Key("", "±2 standard deviations of clean data", "band", "band")
+LOG_FROM = 8.0
+"""Multiples of clean noise above which an axis is logarithmic."""
+
+
+def residual_sections(book: Book, diagnosed: Diagnosed, names: Sequence[str]) -> list[Node]:
+    """Sections made of ``residuals.npz``; without it, what is missing."""
+    if not diagnosed.traces:
+        said = "residuals.npz is not in the folder, so there are no plots over time; diagnose again to get it."
+        return [section(book, "Residuals", verdict("warn", "No residuals", said))]
+    grouped, named = groups(diagnosed.channels), bool(diagnosed.values["causes"])
+    trials = []
+    for trace, name in zip(diagnosed.traces, names, strict=True):
+        book.say(f"residuals of {name}")
+        trials.append((name, _over_time(book, trace, name, grouped, named=named)))
+    note = paragraph(
+        "Recorded minus simulated. Left in physical units, right in multiples of what clean data of these sensors would "
+        "leave: 1 is clean. Zooming one plot in time zooms those above and below.",
+        kind="note",
+    )
+    return [
+        section(book, "Residuals over time", note, *tabs(book, "Trial", trials), _rms(diagnosed, grouped, named=named)),
+        section(book, "What the residual depends on", *_against(book, diagnosed, grouped, named=named)),
+    ]
+
+
+def _over_time(book: Book, trace: Trace, name: str, grouped: Sequence[Group], *, named: bool) -> Node:
+    run = runs(trace.time[: trace.moving], 1.0 / trace.rate_hz)
+    most = max((len(group.columns) for group in grouped), default=1)
+    keys = [Key(f"c{k + 1}", "", COLOURS[k % 3]) for k in range(most)]
+    labels = {k: group.components[k] for group in grouped for k in range(len(group.columns)) if len(group.columns) > 1}
+    keys = [Key(key.group, labels.get(k, "value"), key.colour) for k, key in enumerate(keys)]
+    views = [("as simulated", trace.before)]
+    views += [("with the named causes", trace.after)] if named else []
+    limits = [_limits(trace.before[:, list(group.columns)], trace.sigma[:, list(group.columns)]) for group in grouped]
+    panels = [
+        (label, _physical(book, trace, name, label, values, grouped, keys, limits, run)) for label, values in views
+    ]
+    left = el("div", *tabs(book, "Residual", panels))
+    return el("div", left, _multiples(book, trace, name, grouped, run, named=named), class_="pair")
+
+
+def _limits(values: Array, sigma: Array) -> float:
+    return float(max(np.abs(values).max(initial=0.0), 2.5 * sigma.max(initial=0.0))) * 1.05 or 1.0
+
+
+def _physical(
+    book: Book, trace: Trace, name: str, label: str, values: Array, grouped: Sequence[Group], keys: Sequence[Key],
+    limits: Sequence[float], run: Array,
+) -> Node:  # fmt: skip
+    panels = []
+    for group, limit in zip(grouped, limits, strict=True):
+        unit, scale = fitting(group.unit, limit)
+        columns = list(group.columns)
+        time, shown = thinned(trace.time[: trace.moving], scale * values[: trace.moving, columns], run)
+        lines = [Line(keys[k], time, shown[:, k]) for k in range(len(columns))]
+        alone = slice(trace.moving, None)
+        if trace.moving < len(trace.time):
+            lines += [
+                Line(keys[k], trace.time[alone], scale * values[alone, c], points=True) for k, c in enumerate(columns)
+            ]
+        band = 2.0 * scale * float(np.median(trace.sigma[:, columns].max(axis=1)))
+        panels.append(Panel(group.name, unit, lines, (-scale * limit, scale * limit), band=band))
+    legend = [*keys, BAND] if len(keys) > 1 else [BAND]
+    title = f"{name}: residual {label}"
+    return chart(
+        book, title, stacked(panels), height=height(panels), keys=legend, note="both views have the same scale",
+        label=f"{title}, every group of channels over time; rms values are in the table below.",
+    )  # fmt: skip
+
+
+def _multiples(
+    book: Book, trace: Trace, name: str, grouped: Sequence[Group], run: Array, *, named: bool
+) -> Node:
+    keys = (BEFORE, AFTER if named else TOLERATED)
+    panels = []
+    for group in grouped:
+        lines, top = [], 1.0
+        for key, white in zip(keys, (trace.white_before, trace.white_after), strict=True):
+            square = np.mean(white[:, list(group.columns)] ** 2, axis=1)
+            moving = running_rms(square[: trace.moving], trace.rate_hz)
+            alone = np.sqrt(square[trace.moving :])
+            top = max(top, float(moving.max(initial=0.0)), float(alone.max(initial=0.0)))
+            time, shown = thinned(trace.time[: trace.moving], moving[:, None], run)
+            lines.append(Line(key, time, shown[:, 0]))
+            if len(alone):
+                lines.append(Line(key, trace.time[trace.moving :], alone, points=True))
+        log = top > LOG_FROM
+        panels.append(
+            Panel(group.name, "× clean", lines, (0.4, top) if log else (0.0, max(2.0, 1.1 * top)), rule=1.0, log=log)
+        )
+    title = f"{name}: rms over 1 s in multiples of clean noise"
+    return chart(
+        book, title, stacked(panels), height=height(panels), keys=[*keys, CLEAN],
+        note=None if named else "nothing is named",
+        label=f"{title}, every group of channels over time.",
+    )  # fmt: skip
+
+
+def _rms(diagnosed: Diagnosed, grouped: Sequence[Group], *, named: bool) -> Node:
+    """Physical and whitened rms of every channel, over all trials."""
+    rows: list[list[Entry]] = []
+    for group in grouped:
+        pairs = zip(group.columns, group.components, strict=True)
+        for k, (column, component) in enumerate(pairs):
+            together = {
+                name: np.concatenate([getattr(trace, name)[:, column] for trace in diagnosed.traces])
+                for name in ("before", "after", "white_before", "white_after")
+            }
+            root = {name: float(np.sqrt(np.mean(values**2))) for name, values in together.items()}
+            unit, scale = fitting(group.unit, root["before"])
+            physical = [scale * root["before"], scale * root["after"]][: 1 + named]
+            component = component if len(group.columns) > 1 else ""
+            rows.append(
+                [group.name if k == 0 else "", component, unit, *(value(v) for v in physical),
+                 value(root["white_before"]), value(root["white_after"])]
+            )  # fmt: skip
+    head = ["channel", "", "unit", *(["before", "after"] if named else ["rms"])]
+    head += ["before [× clean]", ("after" if named else "within tolerances") + " [× clean]"]
+    return table("Rms of the residual over all trials", head, rows, groups=True, headers=2)
+
+
+def _against(book: Book, diagnosed: Diagnosed, grouped: Sequence[Group], *, named: bool) -> list[Node]:
+    traces = diagnosed.traces
+    book.say("dependence of the residual")
+    panels = []
+    for quantity in traces[0].quantities:
+        unit = QUANTITIES.get(quantity, "")
+        label = f"{quantity} [{unit}]" if unit else quantity
+        charts = [_dependence(book, traces, group, quantity, label, named=named) for group in grouped]
+        panels.append((quantity, el("div", *charts, class_="trio")))
+    charts = [_dependence(book, traces, group, None, "frequency [Hz]", named=named) for group in grouped]
+    panels.append(("frequency", el("div", *charts, class_="trio")))
+    note = paragraph(
+        "Whitened rms in multiples of clean data, all trials together: in bins of equal counts against speed, position, load "
+        "and the like; against frequency as a spectrum. What rises with load is elastic, what rises with speed rubs, a "
+        "peak is something that swings.",
+        kind="note",
+    )
+    return [note, *tabs(book, "Against", panels)]
+
+
+def _dependence(
+    book: Book, traces: Sequence[Trace], group: Group, quantity: str | None, label: str, *, named: bool
+) -> Node:
+    keys = (BEFORE, AFTER if named else TOLERATED)
+    data: list[Json] = []
+    top, low = 1.0, 1.0
+    for key, attribute in zip(keys, ("white_before", "white_after"), strict=True):
+        columns = list(group.columns)
+        found = spectrum(traces, attribute, columns) if quantity is None else binned(traces, attribute, columns, quantity)
+        if found is None:
+            continue
+        x, y = found
+        top, low = max(top, float(y.max())), min(low, float(y.min()))
+        data.append(
+            {
+                "type": "scatter", "mode": "lines" if quantity is None else "lines+markers", "x": numbers(x),
+                "y": numbers(y), "name": key.label, "legendgroup": key.group,
+                "line": {"color": f"@{key.colour}", "width": 1.6}, "marker": {"color": f"@{key.colour}", "size": 5},
+                "hovertemplate": f"{key.label}<br>%{{x:.3g}}: %{{y:.3g}} × clean<extra></extra>",
+            }
+        )  # fmt: skip
+    vertical = (
+        log_axis("× clean", max(low, 0.05), top)
+        if top > LOG_FROM
+        else axis("× clean", range=[0.0, max(2.0, 1.12 * top)], zeroline=False, nticks=5)
+    )
+    figure: Json = {
+        "data": data,
+        "layout": layout(
+            xaxis=axis(label, zeroline=False, nticks=6),
+            yaxis=vertical,
+            shapes=[
+                {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": "y", "y0": 1.0, "y1": 1.0,
+                 "line": {"color": "@text", "width": 1, "dash": "dash"}}
+            ],
+            margin={"l": 52, "r": 10, "t": 8, "b": 42},
+        ),
+    }  # fmt: skip
+    what = label.split(" [")[0]
+    return chart(
+        book, f"{group.name} against {what}", figure, height=200, keys=keys,
+        label=f"Whitened rms of {group.name} against {what}, before and after.",
+    )  # fmt: skip

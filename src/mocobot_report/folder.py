@@ -1,0 +1,207 @@
+"""What a folder holds that a report can be made of."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from discrepancy.diagnosis_json import FORMAT as DIAGNOSIS
+from discrepancy.diagnosis_json import VERSION as DIAGNOSIS_VERSION
+from discrepancy.report import format_diagnosis
+from discrepancy.rig import Channel
+from discrepancy.traces import Trace
+from discrepancy.traces_file import NAME as RESIDUALS
+from discrepancy.traces_file import load_traces
+from estimator.errors import InputError
+from estimator.estimate_json import FORMAT as ESTIMATE
+from estimator.estimate_json import VERSION as ESTIMATE_VERSION
+from estimator.payload_estimate import PayloadEstimate
+from mocobot_sim.paper.tables import paper_tables, summary_table
+from mocobot_sim.replay.fact_files import read_estimate, read_json
+
+SOUGHT = (
+    "paper.json of `mocobot paper --out`, diagnosis.json of `mocobot diagnose --out`, or JSON files of "
+    "`mocobot estimate --out`"
+)
+PROVENANCE = "mocobot-provenance"
+TRIAL_KEYS = ("rotation_deg", "torque_Nm", "rod_error_m", "weld_error_m", "weld_error_deg")
+Json = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Paper:
+    """What ``mocobot paper --out`` wrote.
+
+    Attributes:
+        scores: by preset, then payload.
+        trials: summaries of the simulated trials; empty where there are none.
+        estimates: by (payload, preset), those that are there.
+        provenance: of the run, or None.
+    """
+
+    scores: Mapping[str, Mapping[str, Any]]
+    trials: tuple[Json, ...]
+    estimates: Mapping[tuple[str, str], PayloadEstimate]
+    provenance: Json | None
+
+
+@dataclass(frozen=True)
+class Estimated:
+    """One file of ``mocobot estimate --out``."""
+
+    path: Path
+    estimate: PayloadEstimate
+    provenance: Json | None
+
+
+@dataclass(frozen=True)
+class Diagnosed:
+    """What ``mocobot diagnose --out`` wrote.
+
+    Attributes:
+        folder: where.
+        values: the diagnosis as ``discrepancy.diagnosis_json`` documents it.
+        traces: residuals of every trial; empty where the folder has none.
+        channels: of the residuals.
+    """
+
+    folder: Path
+    values: Json
+    traces: tuple[Trace, ...]
+    channels: tuple[Channel, ...]
+
+    @property
+    def provenance(self) -> Json | None:
+        """Of the run, or None."""
+        return self.values.get("provenance")
+
+
+@dataclass(frozen=True)
+class Contents:
+    """Everything found, and the files that it was read from."""
+
+    paper: Paper | None
+    estimates: tuple[Estimated, ...]
+    diagnosis: Diagnosed | None
+    files: tuple[Path, ...]
+
+
+def read_folder(folder: Path) -> Contents:
+    """Read all results that a folder holds.
+
+    Raises:
+        InputError: there is no such folder, it holds no result, or one of them cannot be read.
+    """
+    try:
+        if not folder.exists():
+            raise InputError(f"{folder}: there is no such folder; it must hold {SOUGHT}")
+        if not folder.is_dir():
+            raise InputError(f"{folder}: is a file; name the folder that holds it")
+        jsons = sorted(path for path in folder.glob("*.json") if path.is_file())
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be read ({error.strerror or error})") from error
+    paper = diagnosis = None
+    estimates, files = [], []
+    for path in jsons:
+        if path.name == "paper.json":
+            paper = _paper(folder)
+            files.append(path)
+        elif path.name not in ("trials.json", "provenance.json") and not path.name.endswith(".truth.json"):
+            values = read_json(path, "a result of mocobot")
+            if path.name == "diagnosis.json" or values.get("format") == DIAGNOSIS:
+                diagnosis = _diagnosis(path, values, diagnosis)
+                files.append(path)
+            elif values.get("format") == ESTIMATE:
+                estimates.append(_estimate(path, values))
+                files.append(path)
+    if paper is None and diagnosis is None and not estimates:
+        raise InputError(f"{folder}: holds no result of mocobot; a report is made of {SOUGHT}")
+    if paper is not None:
+        files += [p for p in (folder / "trials.json", folder / "provenance.json") if p.is_file()]
+        files += [folder / "estimates" / f"{p}_{preset}.json" for p, preset in paper.estimates]
+    if diagnosis is not None and diagnosis.traces:
+        files.append(folder / RESIDUALS)
+    return Contents(paper, tuple(estimates), diagnosis, tuple(files))
+
+
+def _paper(folder: Path) -> Paper:
+    path = folder / "paper.json"
+    scores = read_json(path, "the scores of the paper's experiment")
+    try:
+        tables = [*paper_tables(scores), summary_table(scores)]
+        cells = [cell for table in tables for row in table.rows for cell in row.cells]
+        if not cells or not all(_number(x) for cell in cells for x in (cell.value, cell.spread)):
+            raise ValueError("it must hold errors, numbers of at least 0 or null")
+    except (KeyError, TypeError, ValueError, AttributeError, StopIteration) as error:
+        raise InputError(f"{path}: not the scores of the paper's experiment ({_words(error)})") from error
+    found = {
+        (payload, preset): read_estimate(file)
+        for preset, by_payload in scores.items()
+        for payload in by_payload
+        if (file := folder / "estimates" / f"{payload}_{preset}.json").is_file()
+    }
+    return Paper(scores, _trials(folder / "trials.json"), found, _provenance(folder / "provenance.json"))
+
+
+def _trials(path: Path) -> tuple[Json, ...]:
+    if not path.is_file():
+        return ()
+    trials = read_json(path, "the checks of the trials").get("trials")
+    fine = isinstance(trials, list) and all(
+        isinstance(t, dict) and isinstance(t.get("name"), str) and all(_number(t.get(k, "")) for k in TRIAL_KEYS)
+        for t in trials
+    )
+    if not fine:
+        keys = ", ".join(TRIAL_KEYS)
+        raise InputError(f"{path}: not the checks of the trials; each must have a name, and the numbers {keys}")
+    return tuple(trials)
+
+
+def _provenance(path: Path) -> Json | None:
+    if not path.is_file():
+        return None
+    values = read_json(path, "the provenance of a result")
+    return values if values.get("format") == PROVENANCE else None
+
+
+def _estimate(path: Path, values: Json) -> Estimated:
+    if values.get("version") != ESTIMATE_VERSION:
+        raise InputError(
+            f"{path}: is an estimate of version {values.get('version')!r:.40}; this mocobot reads version "
+            f"{ESTIMATE_VERSION}"
+        )
+    found = values.get("provenance")
+    return Estimated(path, read_estimate(path), found if isinstance(found, dict) else None)
+
+
+def _diagnosis(path: Path, values: Json, other: Diagnosed | None) -> Diagnosed:
+    if other is not None:
+        raise InputError(f"{path}: is a second diagnosis in one folder; a report takes one")
+    if values.get("format") != DIAGNOSIS:
+        raise InputError(f"{path}: not a diagnosis; it must have format {DIAGNOSIS!r}")
+    if values.get("version") != DIAGNOSIS_VERSION:
+        raise InputError(
+            f"{path}: is a diagnosis of version {values.get('version')!r:.40}; this mocobot reads version "
+            f"{DIAGNOSIS_VERSION}"
+        )
+    try:
+        format_diagnosis(values)  # touches every key that a report has to show
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
+        raise InputError(f"{path}: not a complete diagnosis ({_words(error)})") from error
+    file = path.parent / RESIDUALS
+    traces, channels = load_traces(file) if file.is_file() else ([], [])
+    if traces and [trace.name for trace in traces] != list(values["recordings"]):
+        raise InputError(f"{file}: is of other trials than {path.name}; diagnose again")
+    return Diagnosed(path.parent, values, tuple(traces), tuple(channels))
+
+
+def _number(value: Any) -> bool:
+    """Whether a score is null or a finite number of at least 0."""
+    return value is None or (isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < 1e300)
+
+
+def _words(error: Exception) -> str:
+    text = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) and error.args else str(error)
+    return " ".join(text.split())[:120] or type(error).__name__

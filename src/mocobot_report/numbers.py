@@ -1,0 +1,85 @@
+"""Numbers as people read them: as many digits as the standard error has meaning, units that fit their size."""
+
+from __future__ import annotations
+
+import math
+
+MINUS, PLUS_MINUS, NONE, THIN = "\u2212", "\u00b1", "\u2013", "\u00a0"
+SUPERSCRIPTS = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
+
+
+def plain(value: float | None, digits: int = 3) -> str:
+    """``0.00123``, ``11.7``, ``5.6 x 10^-5`` with superscripts; a dash where there is no number."""
+    if value is None or not math.isfinite(value):
+        return NONE
+    if value == 0:
+        return "0"
+    power = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if not -4 <= power < 6:
+        mantissa = _signed(f"{value / 10.0**power:.{digits - 1}f}")
+        return f"{mantissa}{THIN}×{THIN}10{str(power).translate(SUPERSCRIPTS)}"
+    return _signed(f"{value:.{max(0, digits - 1 - power)}f}")
+
+
+def measured(value: float | None, se: float | None) -> tuple[str, str]:
+    """Value and standard error, both to the second digit of the error; without one, four digits and an empty text."""
+    if value is None or not math.isfinite(value):
+        return NONE, ""
+    if se is None or not math.isfinite(se) or se <= 0:
+        return plain(value, 4), ""
+    digits = 1 - math.floor(math.log10(se))
+    if digits > 9:  # too fine for a fixed point
+        return plain(value, 4), plain(se, 2)
+    rounded = round(value, digits)
+    return _signed(f"{rounded:.{max(0, digits)}f}"), f"{round(se, digits):.{max(0, digits)}f}"
+
+
+def with_error(value: float | None, se: float | None, unit: str = "") -> str:
+    """``11.67196 +- 0.00019 kg`` in one text."""
+    shown, error = measured(value, se)
+    text = f"{shown} {PLUS_MINUS} {error}" if error else shown
+    return f"{text}{THIN}{unit}" if unit and shown != NONE else text
+
+
+def percent(share: float | None) -> str:
+    """``99 %``; more digits near 0 and 100 %."""
+    if share is None or not math.isfinite(share):
+        return NONE
+    value = 100.0 * share
+    digits = 0 if 1.0 <= value <= 99.0 or value in (0.0, 100.0) else 1 if 0.05 <= value <= 99.95 else 2
+    return f"{_signed(f'{value:.{digits}f}')}{THIN}%"
+
+
+def power(log10: float) -> str:
+    """A probability given by its logarithm."""
+    return plain(10.0**log10, 2) if log10 > -4 else f"10{str(round(log10)).translate(SUPERSCRIPTS)}"
+
+
+def size(count: int) -> str:
+    """``1.4 MB``."""
+    for unit, scale in (("MB", 1e6), ("kB", 1e3)):
+        if count >= scale:
+            return f"{count / scale:.1f}{THIN}{unit}"
+    return f"{count}{THIN}B"
+
+
+SMALL = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "N m": ("mN m", 1e3), "m/s": ("mm/s", 1e3), "V": ("mV", 1e3)}
+SMALLER = {"m": ("µm", 1e6), "rad": ("µrad", 1e6), "N m": ("µN m", 1e6), "N": ("mN", 1e3)}
+
+
+def fitting(unit: str, largest: float) -> tuple[str, float]:
+    """A unit in which numbers of up to a size are easy to read, and the factor to it."""
+    if largest < 1e-4 and unit in SMALLER:
+        return SMALLER[unit]
+    return SMALL[unit] if largest < 0.1 and unit in SMALL else (unit, 1.0)
+
+
+def spelled(unit: str) -> str:
+    """A unit as printed: ``kg m^2`` with a superscript."""
+    for ascii_power, shown in (("^2", "²"), ("^3", "³"), ("^4", "⁴")):
+        unit = unit.replace(ascii_power, shown)
+    return unit.replace(" ", THIN)
+
+
+def _signed(text: str) -> str:
+    return text.replace("-", MINUS)

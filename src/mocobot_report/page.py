@@ -1,0 +1,157 @@
+"""The whole page: header, answer, parts, provenance, in one file that needs nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
+from pathlib import Path
+
+from plotly.offline import get_plotlyjs
+
+from mocobot_report import diagnosis_part, estimate_part, paper_part, palette
+from mocobot_report.book import Book
+from mocobot_report.folder import Contents, read_folder
+from mocobot_report.html import Node, el, raw, to_bytes, variables, words
+from mocobot_report.provenance_part import provenance_part
+
+MARK = "mocobot report"
+"""Generator that the page names; a file without it is no report."""
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; "
+    "form-action 'none'"
+)
+"""What the page may load: nothing but itself."""
+Say = Callable[[str], object]
+
+
+def make_page(folder: Path, say: Say = lambda _: None) -> bytes:
+    """The report of a result folder, HTML in UTF-8; the same files give the same bytes.
+
+    Args:
+        folder: what ``mocobot paper``, ``estimate`` or ``diagnose`` wrote.
+        say: takes the name of every stage that begins.
+
+    Raises:
+        InputError: the folder holds no result, or one that cannot be read.
+    """
+    say("reading")
+    contents = read_folder(folder)
+    book = Book(say)
+    parts = _parts(book, contents)
+    parts.append(("provenance", "Provenance", provenance_part(book, contents, folder)))
+    title, top = _top(contents)
+    main = [el("section", el("h1", title), *top, id="answer", aria_label="Answer")]
+    for identity, name, blocks in parts:
+        heading = el("h2", name, id=f"{identity}-heading")
+        main.append(el("section", heading, *blocks, id=identity, class_="part", aria_labelledby=f"{identity}-heading"))
+    say("pictures")
+    book.gallery.fill()
+    say("page")
+    return to_bytes(_document(title, main))
+
+
+def is_report(path: Path) -> bool:
+    """Whether a file is a page that this module made."""
+    try:
+        with path.open("rb") as file:
+            head = file.read(4096)
+    except OSError:
+        return False
+    return head.startswith(b"<!doctype html>") and f'<meta name="generator" content="{MARK}">'.encode() in head
+
+
+def _parts(book: Book, contents: Contents) -> list[tuple[str, str, list[Node]]]:
+    """Id, heading and content of every part."""
+    parts = []
+    if contents.paper is not None:
+        parts.append(("paper", "The paper's experiment", paper_part.sections(book, contents.paper)))
+    for k, estimated in enumerate(contents.estimates, start=1):
+        name = "Estimate" if len(contents.estimates) == 1 else f"Estimate {estimated.path.name}"
+        parts.append((f"estimate-{k}", name, estimate_part.sections(book, estimated)))
+    if contents.diagnosis is not None:
+        parts.append(("diagnosis", "Diagnosis", diagnosis_part.sections(book, contents.diagnosis)))
+    return parts
+
+
+def _top(contents: Contents) -> tuple[str, list[Node]]:
+    """Title of the page, and the answers of all that it holds."""
+    answers: list[tuple[str, list[Node]]] = []
+    if contents.paper is not None:
+        answers.append((paper_part.title(contents.paper), paper_part.answer(contents.paper)))
+    for estimated in contents.estimates:
+        name = f": {estimated.path.name}" if len(contents.estimates) > 1 else ""
+        answers.append((f"{estimate_part.title(estimated)}{name}", estimate_part.answer(estimated)))
+    if contents.diagnosis is not None:
+        answers.append((diagnosis_part.title(contents.diagnosis), diagnosis_part.answer(contents.diagnosis)))
+    if len(answers) == 1:
+        return answers[0]
+    return f"{len(answers)} results", [node for name, nodes in answers for node in (el("h2", name), *nodes)]
+
+
+def _navigation(main: list[Node]) -> Node:
+    """Links to every part and its sections."""
+    entries = [el("li", el("a", "Answer", href="#answer"))]
+    for part in main[1:]:
+        inner = [
+            el("li", el("a", words(child[0]), href=f"#{child.get('id')}")) for child in part if child.tag == "section"
+        ]
+        entries.append(el("li", el("a", words(part[0]), href=f"#{part.get('id')}"), el("ol", *inner) if inner else None))
+    return el("nav", el("p", "Contents", class_="contents"), el("ol", *entries), aria_label="Contents")
+
+
+def _document(title: str, main: list[Node]) -> Node:
+    assets = files("mocobot_report").joinpath("assets")
+    style, script = (assets.joinpath(name).read_text(encoding="utf-8") for name in ("style.css", "page.js"))
+    dark = f"color-scheme:dark;{variables(palette.DARK)}"
+    colours = (
+        f":root{{{variables(palette.LIGHT)}}}"
+        f"@media (prefers-color-scheme: dark){{:root:not([data-theme=light]){{{dark}}}}}"
+        f":root[data-theme=dark]{{{dark}}}"
+    )
+    return el(
+        "html",
+        el(
+            "head",
+            el("meta", charset="utf-8"),
+            el("meta", name="generator", content=MARK),
+            el("title", f"{title} | mocobot report"),
+            el("meta", name="viewport", content="width=device-width, initial-scale=1"),
+            el("meta", http_equiv="Content-Security-Policy", content=POLICY),
+            el("link", rel="icon", href="data:,"),
+            raw("style", colours + style),
+        ),
+        el(
+            "body",
+            el("a", "Skip to the results", href="#main", class_="skip"),
+            el(
+                "header",
+                el("div", "mocobot ", el("span", "report"), class_="brand"),
+                el("button", "Dark theme", type="button", id="theme"),
+                class_="top",
+            ),
+            el(
+                "div",
+                _navigation(main),
+                el(
+                    "main",
+                    el("noscript", el("p", "Plots need JavaScript; everything else on this page does not.")),
+                    *main,
+                    el("p", f"Made by mocobot {_version()}. This file is complete: it loads nothing from anywhere.", class_="foot"),
+                    id="main",
+                    tabindex="-1",
+                ),
+                class_="frame",
+            ),
+            raw("script", get_plotlyjs()),
+            raw("script", script),
+        ),
+        lang="en",
+    )
+
+
+def _version() -> str:
+    try:
+        return version("mocobot")
+    except PackageNotFoundError:
+        return "from source"

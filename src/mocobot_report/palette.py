@@ -1,0 +1,97 @@
+"""Colours of the page, light and dark. Series follow Okabe and Ito's colour-blind safe set, each made darker or lighter
+until it stands out from its background."""
+
+from __future__ import annotations
+
+LIGHT = {
+    "page": "#f6f7f9",
+    "card": "#ffffff",
+    "sunk": "#eef1f5",
+    "text": "#18202b",
+    "soft": "#4f5b6b",
+    "line": "#d5dbe3",
+    "grid": "#e3e8ee",
+    "link": "#0a5ca8",
+    "focus": "#0a5ca8",
+    "good": "#116b43",
+    "good-card": "#e3f4eb",
+    "warn": "#804d00",
+    "warn-card": "#fdf0d8",
+    "bad": "#a3261b",
+    "bad-card": "#fde8e5",
+    "paper": "#59616d",
+    "ideal": "#00805c",
+    "nominal": "#0068b0",
+    "uncalibrated": "#c24e00",
+    "before": "#c24e00",
+    "after": "#0068b0",
+    "truth": "#00805c",
+    "band": "#dde3ea",
+    "c1": "#a6407d",
+    "c2": "#8a6a00",
+    "c3": "#00805c",
+    "r1": "#0068b0",
+    "r2": "#c24e00",
+    "r3": "#00805c",
+    "r4": "#a6407d",
+    "r5": "#8a6a00",
+    "r6": "#59616d",
+}
+DARK = {
+    "page": "#0f141a",
+    "card": "#171d25",
+    "sunk": "#1f2731",
+    "text": "#e8edf3",
+    "soft": "#a9b5c3",
+    "line": "#34404e",
+    "grid": "#2a3440",
+    "link": "#7cc0ff",
+    "focus": "#7cc0ff",
+    "good": "#63d6a1",
+    "good-card": "#12352a",
+    "warn": "#f2bd5c",
+    "warn-card": "#3a2c10",
+    "bad": "#ff9c90",
+    "bad-card": "#431d1a",
+    "paper": "#b8c1cc",
+    "ideal": "#2fc49a",
+    "nominal": "#56b4e9",
+    "uncalibrated": "#f2904a",
+    "before": "#f2904a",
+    "after": "#56b4e9",
+    "truth": "#2fc49a",
+    "band": "#2b3541",
+    "c1": "#e08fc0",
+    "c2": "#e3c04a",
+    "c3": "#2fc49a",
+    "r1": "#56b4e9",
+    "r2": "#f2904a",
+    "r3": "#2fc49a",
+    "r4": "#e08fc0",
+    "r5": "#e3c04a",
+    "r6": "#b8c1cc",
+}
+
+TEXTS = (
+    ("text", "page"), ("text", "card"), ("text", "sunk"), ("soft", "page"), ("soft", "card"), ("soft", "sunk"),
+    ("link", "page"), ("link", "card"), ("good", "good-card"), ("warn", "warn-card"), ("bad", "bad-card"),
+    ("text", "good-card"), ("text", "warn-card"), ("text", "bad-card"), ("good", "card"), ("bad", "card"),
+)  # fmt: skip
+"""Text and background that meet on the page; WCAG AA asks for a contrast of 4.5."""
+MARKS = ("paper", "ideal", "nominal", "uncalibrated", "before", "after", "truth", "c1", "c2", "c3", "r1", "r2", "r3",
+         "r4", "r5", "r6", "focus")  # fmt: skip
+"""Colours of lines and points on a card; WCAG AA asks for 3."""
+PRESETS = {"paper": "diamond", "ideal": "triangle-down", "nominal": "circle", "uncalibrated": "square"}
+"""Marker of each column of the paper's tables."""
+
+
+def contrast(one: str, other: str) -> float:
+    """Contrast ratio of two colours ``#rrggbb`` as WCAG 2.2 defines it."""
+    light, dark = sorted((_luminance(one), _luminance(other)), reverse=True)
+    return (light + 0.05) / (dark + 0.05)
+
+
+def _luminance(colour: str) -> float:
+    parts = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
+    red, green, blue = (p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
+    return 0.2126 * red + 0.7152 * green + 0.0722 * blue

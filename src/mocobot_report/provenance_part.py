@@ -1,0 +1,87 @@
+"""Where the numbers come from: versions, options, files and their hashes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from estimator.errors import InputError
+from mocobot_report.blocks import Entry, Num, facts, folded, paragraph, section, table
+from mocobot_report.book import Book
+from mocobot_report.folder import Contents
+from mocobot_report.html import Node, el
+from mocobot_report.numbers import size
+
+
+def provenance_part(book: Book, contents: Contents, folder: Path) -> list[Node]:
+    """One section per result, and the files that this page was made from."""
+    found: list[tuple[str, Any]] = []
+    if contents.paper is not None:
+        found.append(("paper", contents.paper.provenance))
+    found += [(e.path.name, e.provenance) for e in contents.estimates]
+    if contents.diagnosis is not None:
+        found.append(("diagnosis", contents.diagnosis.provenance))
+    out = [section(book, f"How {name} was made", *_one(made)) for name, made in found]
+    return [*out, section(book, "What this page was made from", _read(contents, folder))]
+
+
+def _one(made: Any) -> list[Node]:
+    if not isinstance(made, Mapping):
+        return [paragraph("The result does not say how it was made; it is of an older mocobot.")]
+    packages = made.get("packages")
+    versions = ", ".join(f"{k} {v}" for k, v in packages.items()) if isinstance(packages, Mapping) else ""
+    commit = str(made.get("commit") or "not from a checkout")
+    entries: list[tuple[str, Node | str]] = [
+        ("command", el("code", f"mocobot {made.get('command', '')}")),
+        ("mocobot", f"{made.get('mocobot', '')}"),
+        ("commit", el("code", commit)),
+        ("Python", f"{made.get('python', '')} on {made.get('platform', '')}"),
+        ("packages", versions),
+    ]
+    options = made.get("options")
+    if isinstance(options, Mapping):
+        entries += [(f"option {name}", el("code", _text(v))) for name, v in options.items()]
+    out = [facts(entries)]
+    for key, title in (("files", "Made from"), ("written", "Written")):
+        listed = made.get(key)
+        if isinstance(listed, list) and listed:
+            shown = _files(title, [entry for entry in listed if isinstance(entry, Mapping)])
+            out.append(shown if len(listed) <= 12 else folded(f"{title}: {len(listed)} files", shown))
+    return out
+
+
+def _text(option: Any) -> str:
+    if isinstance(option, list):
+        return " ".join(map(str, option)) or "none"
+    return {None: "none", True: "yes", False: "no"}.get(option, str(option)) if not isinstance(option, dict) else str(option)
+
+
+def _files(caption: str, listed: list[Mapping[str, Any]]) -> Node:
+    rows: list[list[Entry]] = [
+        [
+            el("code", str(entry.get("path", entry.get("name", "")))), Num(_size(entry.get("bytes"))),
+            el("span", str(entry.get("sha256", "")), class_="hash"),
+        ]
+        for entry in listed
+    ]  # fmt: skip
+    return table(caption, ["file", "size", "SHA-256"], rows)
+
+
+def _size(count: Any) -> str:
+    return size(count) if isinstance(count, int) else ""
+
+
+def _read(contents: Contents, folder: Path) -> Node:
+    import hashlib
+
+    listed = []
+    for path in contents.files:
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
+        listed.append(
+            {"path": path.relative_to(folder).as_posix(), "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+        )
+    return _files("Read from the folder", listed)

@@ -1,0 +1,73 @@
+"""Recordings that a result was made from, if they are still where its provenance says and have not changed."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from estimator.errors import InputError
+from estimator.recording import Recording, read_recording
+
+SUFFIX = ".parquet"
+
+
+@dataclass(frozen=True)
+class Source:
+    """One recording.
+
+    Attributes:
+        name: of the file.
+        path: where it is, or None.
+        why: why it is not used, a sentence without its end; empty if it is.
+    """
+
+    name: str
+    path: Path | None
+    why: str = ""
+
+    def read(self) -> Recording | str:
+        """The recording, or why it cannot be read."""
+        if self.path is None:
+            return self.why
+        try:
+            return read_recording(self.path)
+        except InputError as error:
+            return str(error)
+
+
+def sources(provenance: dict[str, Any] | None, folder: Path) -> list[Source]:
+    """Recordings that a provenance lists.
+
+    Each is sought where the user named it (from the current folder on), beside the result, and under its name there;
+    the hash must be the same.
+    """
+    files = provenance.get("files") if isinstance(provenance, dict) else None
+    listed = files if isinstance(files, list) else []
+    return [_found(entry, folder) for entry in listed if _is_recording(entry)]
+
+
+def _is_recording(entry: Any) -> bool:
+    return isinstance(entry, dict) and str(entry.get("path", "")).endswith(SUFFIX)
+
+
+def _found(entry: dict[str, Any], folder: Path) -> Source:
+    name, changed = str(entry.get("name", "")), False
+    for path in _places(str(entry["path"]), name, folder):
+        try:
+            with path.open("rb") as file:
+                same = hashlib.file_digest(file, "sha256").hexdigest() == entry.get("sha256")
+        except (OSError, ValueError):  # a name with a NUL
+            continue
+        if same:
+            return Source(name, path)
+        changed = True
+    if changed:
+        return Source(name, None, f"{name} is no longer the file that the result was made from")
+    return Source(name, None, f"{name} is no longer where it was ({entry['path']})")
+
+
+def _places(path: str, name: str, folder: Path) -> Iterator[Path]:
+    yield from (Path(path), folder / path, folder / name, folder.parent / name)
