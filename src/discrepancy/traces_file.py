@@ -30,6 +30,9 @@ Array = NDArray[np.float64]
 
 NAME = "residuals.npz"
 FORMAT, VERSION = "mocobot-residuals", 1
+BROKEN = (OSError, ValueError, EOFError, KeyError, TypeError, AttributeError, NotImplementedError, RuntimeError,
+          SyntaxError, MemoryError, OverflowError, zipfile.BadZipFile, zlib.error)  # fmt: skip
+"""What numpy and zipfile say of a file that is no archive of arrays."""
 TABLES = ("before", "after", "sigma", "white_before", "white_after")
 
 
@@ -73,14 +76,17 @@ def load_traces(path: Path) -> tuple[list[Trace], list[Channel]]:
         InputError: there is no such file, or it is not whole.
     """
     try:
-        with np.load(path, allow_pickle=False) as file:
-            arrays = {name: file[name] for name in file.files}
+        with path.open("rb") as file:
+            archive = np.load(file, allow_pickle=False)
+            if not isinstance(archive, np.lib.npyio.NpzFile):
+                raise ValueError("it holds one array")
+            with archive:
+                arrays = {name: archive[name] for name in archive.files}
     except FileNotFoundError as error:
         raise InputError(
             f"{path}: there is no such file; it would be the residuals of a diagnosis"
         ) from error
-    except (OSError, ValueError, EOFError, KeyError, AttributeError, NotImplementedError, zipfile.BadZipFile,
-            zlib.error) as error:  # fmt: skip
+    except BROKEN as error:
         raise InputError(f"{path}: not the residuals of a diagnosis, or damaged ({_words(error)})") from error
     try:
         facts = json.loads(arrays["facts"].tobytes())

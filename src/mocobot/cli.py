@@ -284,7 +284,18 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _run(arguments: Sequence[str] | None) -> None:
-    from mocobot_sim.trial import TrialError
+    try:
+        from mocobot_sim.trial import TrialError
+    except (AttributeError, ImportError, RuntimeError) as error:
+        renderer = os.environ.get("MUJOCO_GL")
+        if not renderer:
+            raise
+        said = " ".join(str(error).split())
+        print(
+            f"mocobot: MUJOCO_GL is {renderer!r} and MuJoCo does not load so ({said}); unset it",
+            file=sys.stderr,
+        )
+        sys.exit(2)
 
     if isinstance(sys.stdout, io.TextIOWrapper):  # names may hold what the terminal cannot show
         sys.stdout.reconfigure(errors="backslashreplace")

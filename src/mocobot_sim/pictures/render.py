@@ -144,7 +144,7 @@ def _run(folder: Path) -> NDArray[np.uint8] | str:
         if done.returncode == 0 and result.is_file():
             return np.load(result)
         last = done.stderr.strip().splitlines()[-1:] or [f"exit code {done.returncode}"]
-        failed.append(f"{renderer}: {last[0][:120]}")
+        failed.append(f"{renderer}: {last[0][:200]}")
     remedy = "unset MUJOCO_GL to have EGL and OSMesa tried" if chosen else REMEDY
     reasons = "; ".join(failed)
     return f"pictures are skipped: MuJoCo cannot render without a screen here ({reasons}); {remedy}"

@@ -128,7 +128,7 @@ def diagnosis_shot(
     _names(marks, team)
     _causes(marks, team, causes)
     where = [f"{cause.name} ({_place(cause)})" for cause in causes]
-    found = f" In red: {', '.join(where)}." if where else " No cause is named."
+    found = f" Red: {', '.join(where)}." if where else " No cause is named."
     return _shot(
         team.model, team.qpos, marks, _says(recording, team, None, marked=False) + found, aspect, ABOVE
     )
@@ -171,22 +171,25 @@ def _shot(
 
 
 def _says(recording: Recording, team: MeasuredTeam, truth: BodyFacts | None, *, marked: bool = True) -> str:
-    text = f"{team.robots} Omnids at {team.time_s:.1f} s of {Path(recording.name).name}, from the measured angles"
+    """Words for what is to be seen."""
+    text = f"{_omnids(team.robots)} at {team.time_s:.1f} s of {Path(recording.name).name}, from the measured angles"
     if team.grasps is None:
         return f"{text}. {' '.join(team.notes)}"
-    text += " and the estimated grasps"
-    text += "." if team.has_cad else "; bars stand for the payload, whose shape is not known."
-    shown = [
-        *(["grasp frames"] if team.facts.grasps is not None else []),
-        *(["centre of mass"] if team.facts.p_1c is not None else []),
-        *(["inertia ellipsoid"] if team.facts.semi_axes_m() is not None else []),
-    ]
-    if marked and shown:
-        text += f" In magenta the estimated {', '.join(shown[1:]) or 'payload'};" if shown[1:] else ""
-        text += " red, green, blue: x, y, z of the grasp frames." if team.facts.grasps is not None else ""
+    bars = "" if team.has_cad else "; bars stand for the payload, whose shape is not known"
+    parts = [f"{text} and the estimated grasps{bars}."]
+    facts = team.facts
+    if marked and facts.p_1c is not None:
+        ellipsoid = " and the ellipsoid of its inertia" if facts.semi_axes_m() is not None else ""
+        parts.append(f"Magenta: the estimated centre of mass{ellipsoid}.")
+    if marked and facts.grasps is not None:
+        parts.append("Red, green and blue arrows: x, y and z of the grasp frames.")
     if truth is not None:
-        text += " Green, thin: the truth."
-    return " ".join([text, *team.notes])
+        parts.append("Green and thin: the truth.")
+    return " ".join([*parts, *team.notes])
+
+
+def _omnids(robots: int) -> str:
+    return f"{robots} Omnid{'s' if robots != 1 else ''}"
 
 
 def _in_world(team: MeasuredTeam, point: Array) -> Array:
