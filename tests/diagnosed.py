@@ -11,8 +11,11 @@ RESPONSE = {f"{c}_{kind}" for c in ("phi", "theta", "tau") for kind in ("nrmse",
 
 
 def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
-    """Assert that values have exactly the documented keys and types, and no number that is not finite."""
-    assert set(values) == {
+    """Assert that values have exactly the documented keys and types, and no number that is not finite.
+
+    Provenance may be there: commands add it.
+    """
+    assert set(values) - {"provenance"} == {
         "format", "version", "recordings", "verdict", "causes", "rejected", "gain", "not_simulated", "undecidable",
         "detection_limits", "residual", "notes",
     }  # fmt: skip

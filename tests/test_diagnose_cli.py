@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Callable
 from pathlib import Path
 
 import mujoco
+import numpy as np
 import pytest
 
 from diagnose_run import BIAS_NM, Edit, refused, run
 from diagnosed import check_schema
+from discrepancy.traces_file import load_traces
+from mocobot.diagnose_folder import _is_diagnosis
 from mocobot_sim.extended import load_extended
 
 
@@ -47,6 +51,23 @@ def test_hidden_bias_is_named_extended_and_written(
     assert load_extended(out / "extended").units[1].tau_zero_Nm[0] == pytest.approx(BIAS_NM, rel=0.1)
     mujoco.MjModel.from_xml_path(str(out / "extended" / "team.xml"))
     assert [path.name for path in tmp_path.iterdir()] == ["verdict"]
+
+    made = values["provenance"]
+    assert (made["command"], made["options"]["closed_loop"]) == ("diagnose", True)
+    truths = [path.with_suffix("").with_suffix(".truth.json") for path in biased_trials]
+    assert [entry["path"] for entry in made["files"]] == [str(path) for path in (*biased_trials, *truths)]
+    for entry in made["files"]:
+        assert entry["sha256"] == hashlib.sha256(Path(entry["path"]).read_bytes()).hexdigest()
+
+    traces, channels = load_traces(out / "residuals.npz")
+    assert [trace.name for trace in traces] == values["recordings"]
+    assert [channel.name for channel in channels[-3:]] == ["moment x", "moment y", "moment z"]
+    chi2 = sum(np.sum(trace.white_before**2) for trace in traces)
+    samples = sum(trace.white_before.size for trace in traces)
+    assert chi2 / samples == pytest.approx(values["residual"]["nominal"]["chi2_per_n"], rel=0.01)
+    assert sum(np.sum(trace.white_after**2) for trace in traces) < 0.1 * chi2
+    (out / "report.html").write_text("a page made of it")
+    assert _is_diagnosis(out)
 
     # Its own result may be replaced, but nothing that someone put there is lost.
     (out / "notes.txt").write_text("mine")

@@ -19,6 +19,7 @@ from discrepancy.emps.plant import Plant, PulseTrain
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.staircase import format_staircase, staircase
 from discrepancy.emps.words import SENTENCES, EmpsWords
+from discrepancy.traces_file import load_traces
 from emps_made import nominal, recorded, written
 
 RUBBING = replace(nominal(), mass_kg=95.0, coulomb_N=(20.0, 20.0), viscous_Ns_per_m=(160.0, 240.0))
@@ -147,6 +148,10 @@ def test_command_shows_names_extends_and_measures(tmp_path: Path, capsys: pytest
     assert {"residual_against.png", "evidence.png", "closed_loop.png"} < pictures
     assert len(pictures) == 6
     assert (out / "report.txt").read_text().strip() in text
+    traces, channels = load_traces(out / "residuals.npz")
+    assert ([trace.name for trace in traces], len(channels)) == (values["recordings"], 2)
+    assert [entry["path"] for entry in values["provenance"]["files"]] == [str(path)]
+    assert values["provenance"]["options"]["rig"] == "emps"
     model = mujoco.MjModel.from_xml_path(str(out / "extended" / "axis.xml"))
     assert model.dof_frictionloss[0] == pytest.approx(20.0, abs=0.3)
     assert model.dof_damping[0] == pytest.approx(160.0, abs=3.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from dataclasses import asdict
 from pathlib import Path
@@ -137,10 +138,21 @@ def test_everything_else_in_the_folder(folder: Path) -> None:
     }
     plots = {"grasps.png", "mass_com.png", "inertia.png"}
     assert (
-        names == {"paper.json", "tables.txt", "trials.json", "estimates/d_nominal.json"} | plots | recordings
+        names
+        == {"paper.json", "tables.txt", "trials.json", "estimates/d_nominal.json", "provenance.json"}
+        | plots
+        | recordings
     )
     for name in plots:
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
+    made = json.loads((folder / "provenance.json").read_text())
+    assert made["options"] == {
+        "payload": ["d"], "preset": ["nominal"], "trials": 1, "seed": 0, "recordings": True,
+    }  # fmt: skip
+    assert made["files"] == []
+    assert {entry["path"] for entry in made["written"]} == names - {"provenance.json"}
+    for entry in made["written"]:
+        assert entry["sha256"] == hashlib.sha256((folder / entry["path"]).read_bytes()).hexdigest()
 
 
 @pytest.mark.slow
