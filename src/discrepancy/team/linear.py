@@ -257,9 +257,11 @@ def start_bases(signals: Signals, shared: Shared, design: OmnidDesign) -> Bases:
     return Bases(np.array(turns), np.array(places))
 
 
-def noise_rows(trial: TrialLinear, noise: Noise, rng: np.random.Generator, draws: int = NOISE_DRAWS) -> Array:
-    """Residuals that the sensors' errors alone would leave, shape (draws, n, C)."""
-    out = []
+def noise_rows(
+    trial: TrialLinear, noise: Noise, rng: np.random.Generator, draws: int = NOISE_DRAWS
+) -> tuple[Array, Array]:
+    """What the sensors' errors alone would leave: residuals (draws, n, C), and the torques' own (draws, n, N, 3)."""
+    out, torques = [], []
     for _ in range(draws):
         errors = noise.draw(trial.signals, rng)
         out.append(
@@ -268,4 +270,5 @@ def noise_rows(trial: TrialLinear, noise: Noise, rng: np.random.Generator, draws
                 for i in range(trial.robots)
             )
         )
-    return np.array(out)
+        torques.append(trial.reduction(errors.tau))
+    return np.array(out), np.array(torques)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from discrepancy.explanation import Explanation
 from discrepancy.rig import Candidate, Channel, Rows
+from discrepancy.team.adjust import with_adjusted_torques
 from discrepancy.team.candidates import every_candidate, nearby_pushes, other_shapes, worst_pushes
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
@@ -91,7 +92,7 @@ class TeamRig:
         bases = [start_bases(s, shared, design) for s in signals]
         run = Parallel(n_jobs=jobs, prefer="processes" if jobs > 1 else "threads")
         tasks = [(s, b, r, k) for k, (s, b, r) in enumerate(zip(signals, bases, reductions, strict=True))]
-        linear, whitening = zip(
+        linear, whitening, torque_noise = zip(
             *run(delayed(linearised)(s, shared, b, design, r, noise, k) for s, b, r, k in tasks), strict=True
         )
         for _ in range(2):
@@ -105,6 +106,7 @@ class TeamRig:
                 )
                 for t, b in zip(linear, bases, strict=True)
             )
+        linear = [with_adjusted_torques(*pair) for pair in zip(linear, torque_noise, strict=True)]
         return cls(
             tuple(recordings),
             estimate,

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.team.adjust import TorqueNoise
 from discrepancy.team.linear import TrialLinear, linearise, noise_rows
 from discrepancy.team.noise import Noise
 from discrepancy.team.reduction import Reduction
@@ -55,10 +56,12 @@ def linearised(
     reduction: Reduction,
     noise: Noise,
     k: int,
-) -> tuple[TrialLinear, Whitening]:
+) -> tuple[TrialLinear, Whitening, TorqueNoise]:
+    """One trial's linearisation, and what the sensors' noise leaves in its rows; k is its number."""
     linear = linearise(signals, shared, bases, design, reduction, full=True)
-    draws = noise_rows(linear, noise, np.random.default_rng([20250, k]))
-    return linear, Whitening.of(draws, reduction.moving)
+    draws, torques = noise_rows(linear, noise, np.random.default_rng([20250, k]))
+    moving = reduction.moving
+    return linear, Whitening.of(draws, moving), TorqueNoise.of(draws, torques, moving)
 
 
 def exact_residual(
