@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 
 MARGIN = 0.04
 """Share of the picture that stays free at each side."""
+NEAREST = 0.1
+"""Least distance of the camera from the nearest point, over the points' spread."""
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
 
@@ -69,7 +71,9 @@ def framing(points: ArrayLike, azimuth: float, elevation: float, aspect: float, 
     x, y, z = axes @ np.asarray(points, dtype=float).T
     tangent = (1.0 - 2.0 * MARGIN) * np.tan(0.5 * np.deg2rad(fovy_deg))
     sides = (x / (aspect * tangent), y / tangent)
-    distance = max(0.5 * float(np.max(side - z) + np.max(-side - z)) for side in sides)
+    spread = float(np.linalg.norm([np.ptp(x), np.ptp(y), np.ptp(z)])) or 1.0
+    least = NEAREST * spread - float(z.min())
+    distance = max(least, *(0.5 * float(np.max(side - z) + np.max(-side - z)) for side in sides))
     shift = [_middle(across, z + distance) for across in (x, y)]
     lookat = np.array(shift) @ axes[:2]
     return Camera((float(lookat[0]), float(lookat[1]), float(lookat[2])), float(distance), azimuth, elevation)
