@@ -193,6 +193,22 @@ class Inspect:
 
 
 @dataclass(frozen=True)
+class Report:
+    """Make one HTML page of what `paper`, `estimate` or `diagnose` wrote: tables, plots, pictures, provenance."""
+
+    dir: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
+    """Folder of `mocobot paper --out` or `mocobot diagnose --out`, or one with files of `mocobot estimate --out`."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.html")] = None
+    """Page to write; DIR/report.html if not given. An earlier report is replaced."""
+
+    def run(self) -> None:
+        """Run the command."""
+        from mocobot.report_command import run
+
+        run(self)
+
+
+@dataclass(frozen=True)
 class Simulate:
     """Simulate one trial and write its recording, with the ground truth in a sidecar."""
 
@@ -306,6 +322,7 @@ def _run(arguments: Sequence[str] | None) -> None:
         | Annotated[Convert, tyro.conf.subcommand("convert")]
         | Annotated[Replay, tyro.conf.subcommand("replay")]
         | Annotated[Inspect, tyro.conf.subcommand("inspect")]
+        | Annotated[Report, tyro.conf.subcommand("report")]
         | Annotated[Simulate, tyro.conf.subcommand("simulate")],
         prog="mocobot",
         description="Simulate mobile cobots that carry an unknown payload together, estimate it, and find out what "

@@ -6,9 +6,12 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from mocobot_report.book import Book
-from mocobot_report.html import Child, Node, el
-from mocobot_report.numbers import NONE, PLUS_MINUS, measured, plain, spelled
+from mocobot_report.html import Child, Node, el, words
+from mocobot_report.numbers import MINUS, NONE, PLUS_MINUS, measured, plain, spelled
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,13 @@ def value(number: float | None, digits: int = 3, *, mark: bool = False) -> Num:
 def measurement(number: float | None, se: float | None) -> Num:
     """Value and standard error, rounded to the error's second digit."""
     return Num(*measured(number, se))
+
+
+def component(values: ArrayLike | None, errors: ArrayLike | None, k: int, scale: float = 1.0) -> Num:
+    """One component of a measured vector; a dash where it is not known."""
+    if values is None or errors is None:
+        return Num(NONE)
+    return measurement(scale * float(np.asarray(values)[k]), scale * float(np.asarray(errors)[k]))
 
 
 def table(
@@ -62,31 +72,37 @@ def table(
         first = groups and k > 0 and row[0] != ""
         cells = [_cell(entry, k < headers) for k, entry in enumerate(row)]
         body.append(el("tr", *cells, class_="first" if first else None))
-    shown = el("caption", caption, el("span", note, class_="note") if note else None)
+    shown = el("caption", el("span", caption), el("span", note, class_="note") if note else None)
     whole = el("table", shown, el("thead", el("tr", *titles)), el("tbody", *body))
     return el("div", whole, class_="scroll", role="region", aria_label=caption)
+
+
+LONG = 44
+"""Characters above which a cell's text may wrap."""
 
 
 def _cell(entry: Entry, header: bool) -> Node:
     if isinstance(entry, Num):
         error = el("span", f" {PLUS_MINUS} {entry.error}", class_="pm") if entry.error else None
         return el("td", entry.text, error, class_="num mark" if entry.mark else "num")
-    if header and not (isinstance(entry, str) and entry == ""):
-        return el("th", entry if not isinstance(entry, str) else symbols(entry), scope="row")
-    return el("td", entry if not isinstance(entry, str) else symbols(entry))
+    text = entry if isinstance(entry, str) else words(entry)
+    kind = "long" if len(text) > LONG else None
+    if header and text:
+        return el("th", entry, scope="row", class_=kind)
+    return el("td", entry, class_=kind)
 
 
 SYMBOL = re.compile(r"\b([RpIT])_?(1c|\d\d|\d|xx|yy|zz|xy|xz|yz|b)\b")
 
 
-def symbols(text: str) -> list[Child]:
-    """Text in which p12, R_1c and the like have their indices lowered."""
+def quantity(text: str) -> Node:
+    """The name of a quantity, such as ``p_1c x``, with its indices lowered."""
     out: list[Child] = []
     at = 0
     for match in SYMBOL.finditer(text):
         out += [text[at : match.start()], el("i", match[1]), el("sub", match[2])]
         at = match.end()
-    return [*out, text[at:]]
+    return el("span", *out, text[at:])
 
 
 def spelled_text(text: str) -> str:
@@ -108,12 +124,16 @@ def paragraph(*children: Child, kind: str | None = None) -> Node:
 
 def verdict(kind: str, label: str, *sentences: Child) -> Node:
     """A box that says something first: ``good``, ``warn``, ``bad`` or ``plain``."""
-    return el("div", el("p", label, class_="label"), *(el("p", s) for s in sentences), class_=f"verdict {kind}")
+    return el(
+        "div", el("p", label, class_="label"), *(el("p", s) for s in sentences), class_=f"verdict {kind}"
+    )
 
 
 def tiles(entries: Sequence[tuple[str, str, str]]) -> Node:
     """Name, value and what goes with it, side by side."""
-    boxes = [el("div", el("dt", n), el("dd", v, el("small", more) if more else None)) for n, v, more in entries]
+    boxes = [
+        el("div", el("dt", n), el("dd", v, el("small", more) if more else None)) for n, v, more in entries
+    ]
     return el("dl", *boxes, class_="tiles")
 
 
@@ -152,11 +172,8 @@ def facts(entries: Sequence[tuple[str, Child]]) -> Node:
     return el("dl", *((el("dt", n), el("dd", v if v else NONE)) for n, v in entries), class_="facts")
 
 
-def picture(caption: str, note: str, alt: str, source: str, width: int, height: int) -> Node:
-    """An image that the page carries in itself."""
-    return el(
-        "figure",
-        el("figcaption", el("b", caption), note),
-        el("img", src=source, alt=alt, width=width, height=height),
-        class_="picture",
-    )
+def tidy(sentence: str) -> str:
+    """A sentence of a result in the page's typography: ``+-`` and powers as signs, a capital at its start."""
+    text = sentence.replace(" +- ", f"\u00a0{PLUS_MINUS}\u00a0").replace("chi2/n", "chi²/n")
+    text = re.sub(r"(?<![\w.])-(?=\d)", MINUS, text)
+    return text[:1].upper() + text[1:]

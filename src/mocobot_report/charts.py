@@ -36,7 +36,14 @@ class Key:
 
 
 def chart(
-    book: Book, title: str, figure: Json, *, height: int, label: str, keys: Sequence[Key] = (), note: Child = None
+    book: Book,
+    title: str,
+    figure: Json,
+    *,
+    height: int,
+    label: str,
+    keys: Sequence[Key] = (),
+    note: Child = None,
 ) -> Node:
     """A figure with caption, legend and plot; drawn when the reader comes near.
 
@@ -60,13 +67,27 @@ def chart(
     return el(
         "figure",
         el("figcaption", el("b", spelled_text(title)), note),
-        el("div", *entries, class_="legend", role="group", aria_label="Shown lines; press to hide") if entries else None,
+        el("div", *entries, class_="legend", role="group", aria_label="Shown lines; press to hide")
+        if entries
+        else None,
         el(
-            "div", class_="plot", id=f"{name}-plot", style=f"height:{height}px", role="img", aria_label=label,
+            "div",
+            class_="plot",
+            id=f"{name}-plot",
+            style=f"height:{height}px",
+            role="img",
+            aria_label=label,
             data_figure=name,
-        ),  # fmt: skip
+        ),
         data_block(name, figure),
         class_="chart",
+    )
+
+
+def shared_legend(keys: Sequence[Key]) -> Node:
+    """What lines and points mean in several small plots."""
+    return el(
+        "div", *(el("span", _swatch(key), key.label, class_="key") for key in keys), class_="legend shared"
     )
 
 
@@ -105,7 +126,9 @@ def log_axis(title: str, low: float, high: float, **more: Any) -> Json:
     ends = [float(np.log10(low)) - 0.15, float(np.log10(high)) + 0.15]
     decades = ends[1] - ends[0]
     ticks: Json = {"dtick": "D2"} if decades < 1.3 else {"dtick": 1 if decades < 7 else 2}
-    return axis(title, type="log", range=ends, exponentformat="power", minexponent=3, **ticks, **more)
+    # Plotly writes powers larger than other labels.
+    style = {"tickfont": {"color": "@soft", "size": 9.5}, "exponentformat": "power", "minexponent": 3}
+    return axis(title, type="log", range=ends, **style, **ticks, **more)
 
 
 def dots(

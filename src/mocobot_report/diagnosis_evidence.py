@@ -6,7 +6,7 @@ import base64
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mocobot_report.blocks import paragraph, section, spelled_text
+from mocobot_report.blocks import paragraph, section, spelled_text, tidy
 from mocobot_report.book import Book
 from mocobot_report.charts import Json, Key, axis, chart, dots, layout, log_axis
 from mocobot_report.folder import Diagnosed
@@ -35,13 +35,18 @@ def evidence_sections(book: Book, diagnosed: Diagnosed, names: Sequence[str]) ->
         charts.append(_along(book, "Where the misfit as simulated points", nominal["along"], "before"))
     if left.get("along") and values["verdict"] != "consistent":
         charts.append(_along(book, "Where what is left points", left["along"], "after"))
-    said = paragraph(f"As simulated: {nominal['sentence']}", kind="note")
+    said = paragraph(f"As simulated: {tidy(nominal['sentence'])}", kind="note")
     out = [section(book, "Where the misfit sits", said, el("div", *charts, class_="pair"))] if charts else []
     return [*out, *_map(book, diagnosed)]
 
 
 def _misfit(
-    book: Book, title: str, before: Values, after: Values, shown: Mapping[str, str] | None, keys: Sequence[Key]
+    book: Book,
+    title: str,
+    before: Values,
+    after: Values,
+    shown: Mapping[str, str] | None,
+    keys: Sequence[Key],
 ) -> Node:
     """chi2/n of every channel or trial, before and after."""
     rows = list(before)
@@ -49,7 +54,9 @@ def _misfit(
     for key, values in zip(keys, (before, after), strict=True):
         numbers = [values.get(name) for name in rows]
         seen += [v for v in numbers if v]
-        text = [f"{(shown or {}).get(n, n)}, {key.label}: {plain(v)}" for n, v in zip(rows, numbers, strict=True)]
+        text = [
+            f"{(shown or {}).get(n, n)}, {key.label}: {plain(v)}" for n, v in zip(rows, numbers, strict=True)
+        ]
         trace = dots([], [], key, text=text) | {"x": numbers, "y": list(range(len(rows)))[::-1]}
         data.append(trace)
     names = [(shown or {}).get(name, name) for name in rows]
@@ -119,7 +126,8 @@ def _map(book: Book, diagnosed: Diagnosed) -> list[Node]:
         return []
     source = "data:image/png;base64," + base64.b64encode(drawn).decode("ascii")
     alt = (
-        "Bar charts of the strongest candidates: gain of chi-square of each cause at its place, before and after what is "
+        "Bar charts of the strongest candidates: gain of chi-square of each cause at its place, "
+        "before and after what is "
         "named is in the model. Names and numbers of close rivals are in the table of alternatives."
     )
     figure = el(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from discrepancy.report_gain import ERRORS
-from mocobot_report.blocks import Entry, Num, folded, paragraph, section, table, value, verdict
+from mocobot_report.blocks import Entry, Num, folded, paragraph, section, table, tidy, value, verdict
 from mocobot_report.book import Book
 from mocobot_report.charts import Json, Key, axis, chart, dots, layout, log_axis
 from mocobot_report.html import Node, el
@@ -31,7 +31,9 @@ def gain_section(book: Book, values: Values, names: Sequence[str]) -> Node | Non
     if before is not None and after is not None:
         blocks += _closed_loop(book, gain, names, named=named)
     elif values["not_simulated"]:
-        blocks.append(verdict("plain", "The closed loop was not simulated", f"{values['not_simulated']}."))
+        blocks.append(
+            verdict("plain", "The closed loop was not simulated", tidy(f"{values['not_simulated']}."))
+        )
     if "errors" in gain:
         rows: list[list[Entry]] = [
             [label.split(" [")[0], label.split("[")[-1].rstrip("]"), *_both(gain["errors"], key, named=named)]
@@ -53,7 +55,11 @@ def _both(values: Values, key: str, *, named: bool) -> list[Entry]:
 
 def _closed_loop(book: Book, gain: Values, names: Sequence[str], *, named: bool) -> list[Node]:
     before, after = gain["held_out"]["before"], gain["held_out"]["after"]
-    where = "on trials left out of the fit" if gain["validated"] else "on the trial it was fitted to: not validated"
+    where = (
+        "on trials left out of the fit"
+        if gain["validated"]
+        else "on the trial it was fitted to: not validated"
+    )
     said = f"The recorded commands are simulated again, {where}."
     if gain["removed"] is not None and named:
         low, high = gain["removed"]["interval"]

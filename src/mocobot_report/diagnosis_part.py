@@ -8,8 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.explanation import CLEAN
-from discrepancy.report_gain import ERRORS
 from estimator import so3
 from estimator.grasp_estimate import GraspEstimate
 from estimator.payload_estimate import PayloadEstimate
@@ -23,6 +21,7 @@ from mocobot_report.blocks import (
     paragraph,
     section,
     table,
+    tidy,
     tiles,
     value,
     verdict,
@@ -62,31 +61,37 @@ def is_axis(diagnosed: Diagnosed) -> bool:
 
 def title(diagnosed: Diagnosed) -> str:
     """The verdict in a word or two, and what it is of."""
-    return f"Diagnosis{' of the EMPS axis' if is_axis(diagnosed) else ''}: {VERDICTS[diagnosed.values['verdict']].lower()}"
+    of = " of the EMPS axis" if is_axis(diagnosed) else ""
+    return f"Diagnosis{of}: {VERDICTS[diagnosed.values['verdict']].lower()}"
 
 
 def answer(diagnosed: Diagnosed) -> list[Node]:
     """Verdict, causes in words, and what they are worth."""
     values = diagnosed.values
     count = len(values["recordings"])
-    what = "one real axis (the EMPS benchmark)" if is_axis(diagnosed) else "a team that carries one payload"
-    trials = f"{count} {'trial' if count == 1 else 'trials'}"
+    if is_axis(diagnosed):
+        what = f"One recording of a real axis (the EMPS benchmark), in {count} blocks that validate each other, is"
+    elif count == 1:
+        what = "One recording of a team that carries a payload is"
+    else:
+        what = f"{count} recordings of a team that carries one payload are"
     lede = paragraph(
-        f"Recordings of {what}, {trials} in all, are held against the simulation: where do they part, which physical cause "
-        "does it, and what is it worth to have it in the simulation?",
+        f"{what} held against the simulation: where do they part, which physical cause does it, and "
+        "what is it worth to "
+        "have it in the simulation?",
         kind="lede",
     )
     box = verdict(KINDS[values["verdict"]], VERDICTS[values["verdict"]], MEANING[values["verdict"]])
     if values["causes"]:
-        box.append(bullets([cause["sentence"] for cause in values["causes"]]))
+        box.append(bullets([tidy(cause["sentence"]) for cause in values["causes"]]))
     elif values["verdict"] != "consistent":
-        box.append(el("p", values["residual"]["nominal"]["signature"]["sentence"]))
+        box.append(el("p", tidy(values["residual"]["nominal"]["signature"]["sentence"])))
     return [lede, box, tiles(_tiles(values))]
 
 
 def _tiles(values: Values) -> list[tuple[str, str, str]]:
     residual, named = values["residual"], values["causes"]
-    out = [("misfit as simulated", plain(residual["nominal"]["chi2_per_n"]), f"chi²/n; clean is 1, up to {CLEAN:g} counts")]
+    out = [("misfit as simulated", plain(residual["nominal"]["chi2_per_n"]), "chi²/n; 1 is clean")]
     if named:
         out.append(("misfit with the named causes", plain(residual["chi2_per_n"]), "chi²/n"))
         held = [c["explained"]["held_out"] for c in named if c["explained"]["held_out"] is not None]
@@ -104,7 +109,7 @@ def _tiles(values: Values) -> list[tuple[str, str, str]]:
         interval = f"95 %: {percent(low)} to {percent(high)}" if low is not None and high is not None else ""
         out.append(("excess error of the response removed", percent(gain["removed"]["share"]), interval))
     elif values["not_simulated"]:
-        out.append(("closed loop", "not simulated", str(values["not_simulated"])))
+        out.append(("closed loop", "not simulated", tidy(str(values["not_simulated"]))))
     return out
 
 
@@ -141,7 +146,9 @@ def _picture(book: Book, diagnosed: Diagnosed) -> list[Node]:
             made = partial(diagnosis_shot, recording, _grasped(estimates["after"]), causes, aspect=ASPECT)
             return [book.gallery.ask([(caption, made)])]
         said.append(recording)
-    return [verdict("warn", "No picture", f"It needs one of the recordings: {'; '.join(said)}.")] if said else []
+    return (
+        [verdict("warn", "No picture", f"It needs one of the recordings: {'; '.join(said)}.")] if said else []
+    )
 
 
 def _grasped(values: Values) -> PayloadEstimate:
@@ -179,7 +186,8 @@ def _causes(book: Book, values: Values) -> list[Node]:
             ]
         )  # fmt: skip
     note = (
-        "share of the misfit as simulated that goes away; held out: fitted to the other trials; by chance: probability of so "
+        "share of the misfit as simulated that goes away; held out: fitted to the other trials; by "
+        "chance: probability of so "
         "much evidence in clean data"
     )
     out.append(table("What supports it", head, rows, note=note))
@@ -206,7 +214,11 @@ def _rivals(values: Values) -> list[Node]:
                 ]
             )  # fmt: skip
     if not rows:
-        return [paragraph("No other cause comes near." if len(values["causes"]) == 1 else "No other causes come near.")]
+        return [
+            paragraph(
+                "No other cause comes near." if len(values["causes"]) == 1 else "No other causes come near."
+            )
+        ]
     head = ["named", "alternative", "behind by [nats]", "closed loop chi²/n", "verdict"]
     out = [table("Alternatives", head, rows, note="how much less the rows speak for it", groups=True)]
     if advice:
@@ -218,11 +230,11 @@ def _rivals(values: Values) -> list[Node]:
 
 def _shapes(causes: Sequence[Values]) -> list[Node]:
     entries = [
-        (f"{cause['cause']} ({cause['place']})", ", ".join(f"{name.replace('_', ' ')} {plain(v, 4)}" for name, v in cause["shape"].items()))
+        (
+            f"{cause['cause']} ({cause['place']})",
+            ", ".join(f"{name.replace('_', ' ')} {plain(v, 4)}" for name, v in cause["shape"].items()),
+        )
         for cause in causes
         if cause["shape"]
     ]
     return [folded("Shape parameters", facts(entries))] if entries else []
-
-
-__all__ = ["ERRORS", "answer", "sections", "title"]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from discrepancy.traces import Group, Trace, groups
 from mocobot_report.blocks import Entry, paragraph, section, table, tabs, value, verdict
 from mocobot_report.book import Book
-from mocobot_report.charts import Json, Key, axis, chart, layout, log_axis, numbers
+from mocobot_report.charts import Json, Key, axis, chart, layout, log_axis, numbers, shared_legend
 from mocobot_report.folder import Diagnosed
 from mocobot_report.html import Node, el
 from mocobot_report.numbers import fitting
@@ -20,7 +20,10 @@ from mocobot_report.units import QUANTITIES
 
 Array = NDArray[np.float64]
 COLOURS = ("c1", "c2", "c3")
-BEFORE, AFTER = Key("before", "as simulated", "before"), Key("after", "with the causes and tolerances", "after")
+BEFORE, AFTER = (
+    Key("before", "as simulated", "before"),
+    Key("after", "with the causes and tolerances", "after"),
+)
 TOLERATED = Key("after", "with tolerances", "after")
 CLEAN = Key("", "clean data", "text", "dash")
 BAND = Key("", "±2 standard deviations of clean data", "band", "band")
@@ -31,7 +34,9 @@ LOG_FROM = 8.0
 def residual_sections(book: Book, diagnosed: Diagnosed, names: Sequence[str]) -> list[Node]:
     """Sections made of ``residuals.npz``; without it, what is missing."""
     if not diagnosed.traces:
-        said = "residuals.npz is not in the folder, so there are no plots over time; diagnose again to get it."
+        said = (
+            "residuals.npz is not in the folder, so there are no plots over time; diagnose again to get it."
+        )
         return [section(book, "Residuals", verdict("warn", "No residuals", said))]
     grouped, named = groups(diagnosed.channels), bool(diagnosed.values["causes"])
     trials = []
@@ -39,12 +44,19 @@ def residual_sections(book: Book, diagnosed: Diagnosed, names: Sequence[str]) ->
         book.say(f"residuals of {name}")
         trials.append((name, _over_time(book, trace, name, grouped, named=named)))
     note = paragraph(
-        "Recorded minus simulated. Left in physical units, right in multiples of what clean data of these sensors would "
-        "leave: 1 is clean. Zooming one plot in time zooms those above and below.",
+        "Recorded minus simulated, in physical units and in multiples of what clean data of these "
+        "sensors would leave: 1 is "
+        "clean. Zooming one plot in time zooms those above and below.",
         kind="note",
     )
     return [
-        section(book, "Residuals over time", note, *tabs(book, "Trial", trials), _rms(diagnosed, grouped, named=named)),
+        section(
+            book,
+            "Residuals over time",
+            note,
+            *tabs(book, "Trial", trials),
+            _rms(diagnosed, grouped, named=named),
+        ),
         section(book, "What the residual depends on", *_against(book, diagnosed, grouped, named=named)),
     ]
 
@@ -53,16 +65,31 @@ def _over_time(book: Book, trace: Trace, name: str, grouped: Sequence[Group], *,
     run = runs(trace.time[: trace.moving], 1.0 / trace.rate_hz)
     most = max((len(group.columns) for group in grouped), default=1)
     keys = [Key(f"c{k + 1}", "", COLOURS[k % 3]) for k in range(most)]
-    labels = {k: group.components[k] for group in grouped for k in range(len(group.columns)) if len(group.columns) > 1}
+    labels = {
+        k: group.components[k]
+        for group in grouped
+        for k in range(len(group.columns))
+        if len(group.columns) > 1
+    }
     keys = [Key(key.group, labels.get(k, "value"), key.colour) for k, key in enumerate(keys)]
     views = [("as simulated", trace.before)]
     views += [("with the named causes", trace.after)] if named else []
-    limits = [_limits(trace.before[:, list(group.columns)], trace.sigma[:, list(group.columns)]) for group in grouped]
-    panels = [
-        (label, _physical(book, trace, name, label, values, grouped, keys, limits, run)) for label, values in views
+    limits = [
+        _limits(trace.before[:, list(group.columns)], trace.sigma[:, list(group.columns)])
+        for group in grouped
     ]
-    left = el("div", *tabs(book, "Residual", panels))
-    return el("div", left, _multiples(book, trace, name, grouped, run, named=named), class_="pair")
+    physical = [
+        _physical(book, trace, name, label, values, grouped, keys, limits, run, named=named)
+        for label, values in views
+    ]
+    multiples = _multiples(book, trace, name, grouped, run, named=named)
+    if not named:
+        return el("div", *physical, multiples, class_="pair")
+    panels = [
+        ("in physical units", el("div", *physical, class_="pair")),
+        ("in multiples of clean noise", multiples),
+    ]
+    return el("div", *tabs(book, "Shown", panels))
 
 
 def _limits(values: Array, sigma: Array) -> float:
@@ -71,7 +98,7 @@ def _limits(values: Array, sigma: Array) -> float:
 
 def _physical(
     book: Book, trace: Trace, name: str, label: str, values: Array, grouped: Sequence[Group], keys: Sequence[Key],
-    limits: Sequence[float], run: Array,
+    limits: Sequence[float], run: Array, *, named: bool,
 ) -> Node:  # fmt: skip
     panels = []
     for group, limit in zip(grouped, limits, strict=True):
@@ -82,14 +109,18 @@ def _physical(
         alone = slice(trace.moving, None)
         if trace.moving < len(trace.time):
             lines += [
-                Line(keys[k], trace.time[alone], scale * values[alone, c], points=True) for k, c in enumerate(columns)
+                Line(keys[k], trace.time[alone], scale * values[alone, c], points=True)
+                for k, c in enumerate(columns)
             ]
         band = 2.0 * scale * float(np.median(trace.sigma[:, columns].max(axis=1)))
         panels.append(Panel(group.name, unit, lines, (-scale * limit, scale * limit), band=band))
     legend = [*keys, BAND] if len(keys) > 1 else [BAND]
-    title = f"{name}: residual {label}"
+    title, note = (
+        f"{name}: residual {label}",
+        "same scale as simulated and with the causes" if named else None,
+    )
     return chart(
-        book, title, stacked(panels), height=height(panels), keys=legend, note="both views have the same scale",
+        book, title, stacked(panels), height=height(panels), keys=legend, note=note,
         label=f"{title}, every group of channels over time; rms values are in the table below.",
     )  # fmt: skip
 
@@ -112,7 +143,14 @@ def _multiples(
                 lines.append(Line(key, trace.time[trace.moving :], alone, points=True))
         log = top > LOG_FROM
         panels.append(
-            Panel(group.name, "× clean", lines, (0.4, top) if log else (0.0, max(2.0, 1.1 * top)), rule=1.0, log=log)
+            Panel(
+                group.name,
+                "× clean",
+                lines,
+                (0.4, top) if log else (0.0, max(2.0, 1.1 * top)),
+                rule=1.0,
+                log=log,
+            )
         )
     title = f"{name}: rms over 1 s in multiples of clean noise"
     return chart(
@@ -153,12 +191,16 @@ def _against(book: Book, diagnosed: Diagnosed, grouped: Sequence[Group], *, name
         unit = QUANTITIES.get(quantity, "")
         label = f"{quantity} [{unit}]" if unit else quantity
         charts = [_dependence(book, traces, group, quantity, label, named=named) for group in grouped]
-        panels.append((quantity, el("div", *charts, class_="trio")))
+        legend = shared_legend([BEFORE, AFTER if named else TOLERATED, CLEAN])
+        panels.append((quantity, [legend, el("div", *charts, class_="trio")]))
     charts = [_dependence(book, traces, group, None, "frequency [Hz]", named=named) for group in grouped]
-    panels.append(("frequency", el("div", *charts, class_="trio")))
+    legend = shared_legend([BEFORE, AFTER if named else TOLERATED, CLEAN])
+    panels.append(("frequency", [legend, el("div", *charts, class_="trio")]))
     note = paragraph(
-        "Whitened rms in multiples of clean data, all trials together: in bins of equal counts against speed, position, load "
-        "and the like; against frequency as a spectrum. What rises with load is elastic, what rises with speed rubs, a "
+        "Whitened rms in multiples of clean data, all trials together: in bins of equal counts "
+        "against speed, position, load "
+        "and the like; against frequency as a spectrum. What rises with load is elastic, what "
+        "rises with speed rubs, a "
         "peak is something that swings.",
         kind="note",
     )
@@ -173,7 +215,11 @@ def _dependence(
     top, low = 1.0, 1.0
     for key, attribute in zip(keys, ("white_before", "white_after"), strict=True):
         columns = list(group.columns)
-        found = spectrum(traces, attribute, columns) if quantity is None else binned(traces, attribute, columns, quantity)
+        found = (
+            spectrum(traces, attribute, columns)
+            if quantity is None
+            else binned(traces, attribute, columns, quantity)
+        )
         if found is None:
             continue
         x, y = found
@@ -205,6 +251,6 @@ def _dependence(
     }  # fmt: skip
     what = label.split(" [")[0]
     return chart(
-        book, f"{group.name} against {what}", figure, height=200, keys=keys,
+        book, f"{group.name} against {what}", figure, height=210,
         label=f"Whitened rms of {group.name} against {what}, before and after.",
     )  # fmt: skip

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mocobot_report.blocks import Entry, Num, bullets, folded, paragraph, section, table
+from mocobot_report.blocks import Entry, Num, bullets, folded, paragraph, section, table, tidy
 from mocobot_report.book import Book
 from mocobot_report.folder import Diagnosed
-from mocobot_report.html import Node, el
+from mocobot_report.html import Child, Node, el
 from mocobot_report.numbers import plain, size
 from mocobot_report.units import parameter
 
@@ -29,11 +29,12 @@ def rest_sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
         entries = [
             item
             for entry in values["undecidable"]
-            for item in (el("dt", entry["what"]), el("dd", f"{entry['why']}; needs {entry['remedy']}."))
+            for item in (
+                el("dt", tidy(entry["what"])),
+                el("dd", tidy(f"{entry['why']}; needs {entry['remedy']}.")),
+            )
         ]
-        out.append(
-            section(book, "What such recordings cannot decide", el("dl", *entries, class_="list"))
-        )
+        out.append(section(book, "What such recordings cannot decide", el("dl", *entries, class_="list")))
     model = _extended(diagnosed.folder / EXTENDED)
     if model is not None:
         out.append(section(book, "The extended model", *model))
@@ -42,7 +43,7 @@ def rest_sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
         names = ", ".join(f"{c['cause']} ({c['place']})" for c in values["rejected"])
         notes.append(f"Looked likely, but did not hold on other trials: {names}.")
     if notes:
-        out.append(section(book, "Notes", bullets(notes)))
+        out.append(section(book, "Notes", bullets([tidy(note) for note in notes])))
     return out
 
 
@@ -79,13 +80,15 @@ def _extended(folder: Path) -> list[Node] | None:
     if not files:
         return None
     rows: list[list[Entry]] = [
-        [el("code", path.relative_to(folder.parent).as_posix()), Num(size(path.stat().st_size))] for path in files
+        [el("code", path.relative_to(folder.parent).as_posix()), Num(size(path.stat().st_size))]
+        for path in files
     ]
     team = any(path.name == "team.xml" for path in files)
-    how = (
-        "The estimated team with the named causes in it: team.xml loads in plain MuJoCo, and `mocobot simulate --model "
-        "extended` takes the folder. Its own README says what is where."
-        if team
-        else "The model with the named causes in it; it loads in plain MuJoCo. Its own README says what is where."
-    )
-    return [paragraph(how), table("Files beside this report", ["file", "size"], rows)]
+    how: list[Child] = [
+        "The estimated team with the named causes in it: ", el("code", "team.xml"), " loads in plain MuJoCo, and ",
+        el("code", "mocobot simulate --model extended"), " takes the folder.",
+    ] if team else ["The model with the named causes in it; it loads in plain MuJoCo."]  # fmt: skip
+    return [
+        paragraph(*how, " Its own README says what is where."),
+        table("Files beside this report", ["file", "size"], rows),
+    ]

@@ -76,22 +76,29 @@ def grasp_charts(book: Book, e: PayloadEstimate) -> Node | None:
             data.append(_sideways(values, errors, key, k, len(pairs), text))
         charts.append(
             chart(
-                book, f"Position of grasp {j} in {{1}} against the pooled estimate",
-                _figure(data, [name for name, _ in pairs], "difference [mm]"), height=_height(len(pairs)), keys=AXES,
+                book,
+                f"Position of grasp {j} in {{1}} against the pooled estimate",
+                _figure(data, [name for name, _ in pairs], "difference [mm]"),
+                height=_height(len(pairs)),
+                keys=AXES,
                 note="bars: two standard errors either way",
                 label=f"Each recording's own position of grasp {j} relative to the pooled one, with standard errors.",
-            )  # fmt: skip
+            )
         )
     return el("div", *charts, class_="pair")
 
 
-def _sideways(
-    values: list[float], errors: list[float], key: Key, k: int, rows: int, text: list[str]
-) -> Json:
+def _sideways(values: list[float], errors: list[float], key: Key, k: int, rows: int, text: list[str]) -> Json:
     """Points with horizontal bars of two standard errors, one row each, from the top."""
     trace = dots([], [], key, text=text)
     at = [rows - 1 - n + APART * (1 - k) for n in range(rows)]
-    bars = {"type": "data", "array": [2.0 * s for s in errors], "color": f"@{key.colour}", "thickness": 1.4, "width": 3}
+    bars = {
+        "type": "data",
+        "array": [2.0 * s for s in errors],
+        "color": f"@{key.colour}",
+        "thickness": 1.4,
+        "width": 3,
+    }
     return trace | {"x": values, "y": at, "error_x": bars}
 
 
@@ -126,7 +133,10 @@ def excitation_chart(book: Book, e: PayloadEstimate) -> Node:
     steps = [s for s in e.steps if s.singular_values]
     if not steps:
         return el("p", "No step had anything to solve for.")
-    key, weak = Key("signal", "a direction of the parameters", "nominal", "circle"), Key("", "too weak below", "text", "dash")
+    key, weak = (
+        Key("signal", "a direction of the parameters", "nominal", "circle"),
+        Key("", "too weak below", "text", "dash"),
+    )
     x: list[float] = []
     y: list[int] = []
     text: list[str] = []

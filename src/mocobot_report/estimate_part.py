@@ -14,11 +14,12 @@ from mocobot_report.blocks import (
     Entry,
     Num,
     bullets,
+    component,
     folded,
     measurement,
     paragraph,
+    quantity,
     section,
-    symbols,
     table,
     tiles,
     value,
@@ -49,12 +50,18 @@ def title(estimated: Estimated) -> str:
 def answer(estimated: Estimated) -> list[Node]:
     """Mass, centre of mass, inertia and grasps, and whether to trust them."""
     e = estimated.estimate
-    kinds = [f"{sum(r.trial == kind for r in e.recordings)} {kind}" for kind in dict.fromkeys(r.trial for r in e.recordings)]
+    kinds = [
+        f"{sum(r.trial == kind for r in e.recordings)} {kind}"
+        for kind in dict.fromkeys(r.trial for r in e.recordings)
+    ]
     seconds = sum(r.duration_s for r in e.recordings)
     said = (
-        f"Estimated from {len(e.recordings)} recording{'s' * (len(e.recordings) != 1)} ({', '.join(kinds)}; {seconds:.0f} s "
-        f"in all) of {e.robots} robot{'s' * (e.robots != 1)} that hold{'s' * (e.robots == 1)} the payload together, "
-        f"{'in stages as in the paper' if e.method == 'staged' else 'by one joint least squares'}. Values are given "
+        f"Estimated from {len(e.recordings)} recording{'s' * (len(e.recordings) != 1)} "
+        f"({', '.join(kinds)}; {seconds:.0f} s "
+        f"in all) of {e.robots} robot{'s' * (e.robots != 1)} that hold{'s' * (e.robots == 1)} the "
+        "payload together, "
+        f"{'in stages as in the paper' if e.method == 'staged' else 'by one joint least squares'}. "
+        "Values are given "
         "with their standard errors."
     )
     return [paragraph(said, kind="lede"), tiles(_tiles(e)), _doubts(e)]
@@ -67,13 +74,25 @@ def _tiles(e: PayloadEstimate) -> list[tuple[str, str, str]]:
     out = [("mass", mass, f"standard error {share}" if share else "")]
     if e.p_1c is not None and e.p_1c_se_m is not None:
         at = ", ".join(plain(1e3 * v, 4) for v in e.p_1c)
-        out.append(("centre of mass in {1}", f"({at}) mm", f"± {plain(1e3 * float(np.max(e.p_1c_se_m)), 2)} mm at most"))
+        out.append(
+            (
+                "centre of mass in {1}",
+                f"({at}) mm",
+                f"± {plain(1e3 * float(np.max(e.p_1c_se_m)), 2)} mm at most",
+            )
+        )
     else:
         out.append(("centre of mass in {1}", none, ""))
     if e.inertia is not None:
         moments, se = e.inertia.principal.moments, e.inertia.principal.moments_se
         each = ", ".join(plain(float(v), 4) for v in moments)
-        out.append(("principal moments of inertia", f"{each} kg m²", f"± {plain(float(np.max(se)), 2)} kg m² at most"))
+        out.append(
+            (
+                "principal moments of inertia",
+                f"{each} kg m²",
+                f"± {plain(float(np.max(se)), 2)} kg m² at most",
+            )
+        )
     else:
         out.append(("principal moments of inertia", none, ""))
     if e.robots > 1:
@@ -83,7 +102,9 @@ def _tiles(e: PayloadEstimate) -> list[tuple[str, str, str]]:
             pairs = [e.grasps.pair(1, j) for j in range(2, e.robots + 1)]
             each = ", ".join(plain(1e3 * float(np.linalg.norm(p.p_ij)), 4) for p in pairs)
             worst = 1e3 * max(p.distance_se_m for p in pairs)
-            out.append(("distance of the grasps from the first", f"{each} mm", f"± {plain(worst, 2)} mm at most"))
+            out.append(
+                ("distance of the grasps from the first", f"{each} mm", f"± {plain(worst, 2)} mm at most")
+            )
     return out
 
 
@@ -115,7 +136,9 @@ def sections(book: Book, estimated: Estimated) -> list[Node]:
     else:
         blocks.append(section(book, "Recording by recording", _recordings(e)))
     if truth is not None:
-        blocks.append(section(book, "Against the truth", paragraph(said, kind="note"), errors_table(e, truth)))
+        blocks.append(
+            section(book, "Against the truth", paragraph(said, kind="note"), errors_table(e, truth))
+        )
     blocks.append(section(book, "What the motion determines", *_excitation(book, e)))
     blocks.append(section(book, "What one rigid payload leaves over", *signal_sections(book, found, e)))
     return blocks
@@ -140,70 +163,68 @@ def _truth(found: list[Source], robots: int) -> tuple[BodyFacts | None, str]:
         except InputError:
             continue
         return truth, (
-            f"The truth is that beside {source.name}: these recordings are simulated. Error is estimate minus truth; "
-            "errors beyond two or three standard errors come from what standard errors do not cover, such as calibration."
+            f"The truth is that beside {source.name}: these recordings are simulated. Error is estimate "
+            "minus truth; "
+            "errors beyond two or three standard errors come from what standard errors do not cover, "
+            "such as calibration."
         )
     return None, ""
 
 
 def _payload(e: PayloadEstimate) -> Node:
-    rows: list[list[Entry]] = [
-        ["mass", "kg", measurement(e.mass.mass, e.mass.se) if e.mass else Num(NONE)],
-    ]
+    mass = measurement(e.mass.mass, e.mass.se) if e.mass else Num(NONE)
+    rows: list[list[Entry]] = [["mass", "kg", mass]]
     for k, name in enumerate("xyz"):
-        known = e.p_1c is not None and e.p_1c_se_m is not None
-        rows.append(
-            [_sub(f"p_1c {name}"), "mm", measurement(1e3 * e.p_1c[k], 1e3 * e.p_1c_se_m[k]) if known else Num(NONE)]
-        )
-    inertia = e.inertia
-    if inertia is None:
+        rows.append([quantity(f"p_1c {name}"), "mm", component(e.p_1c, e.p_1c_se_m, k, 1e3)])
+    if e.inertia is None:
         rows.append(["inertia", "kg m²", Num(NONE)])
     else:
-        se = np.sqrt(np.diag(inertia.covariance))
-        rows += [
-            [_sub(f"I_{name}"), "kg m²", measurement(inertia.inertia[a, b], se[k])]
-            for k, (a, b, name) in enumerate(ORDER)
-        ]
-        principal = inertia.principal
-        rows += [
-            [f"principal moment {k + 1}", "kg m²", measurement(float(v), float(s))]
-            for k, (v, s) in enumerate(zip(principal.moments, principal.moments_se, strict=True))
-        ]
-        angles, errors = principal.axis_angle_rad, principal.axis_angle_se_rad
+        se = np.sqrt(np.diag(e.inertia.covariance))
+        for k, (a, b, name) in enumerate(ORDER):
+            rows.append([quantity(f"I_{name}"), "kg m²", measurement(float(e.inertia.inertia[a, b]), se[k])])
+        principal = e.inertia.principal
+        for k in range(3):
+            moment = component(principal.moments, principal.moments_se, k)
+            rows.append([f"principal moment {k + 1}", "kg m²", moment])
         for k, name in enumerate("xyz"):
-            known = angles is not None and errors is not None
-            entry = measurement(float(np.rad2deg(angles[k])), float(np.rad2deg(errors[k]))) if known else Num(NONE)
-            rows.append([_sub(f"R_1c {name}"), "deg", entry])
+            angle = component(principal.axis_angle_rad, principal.axis_angle_se_rad, k, 180.0 / np.pi)
+            rows.append([quantity(f"R_1c {name}"), "deg", angle])
     return table(
         "Mass, centre of mass and inertia", ["", "unit", "value ± standard error"], rows,
         note="centre of mass in {1}; inertia about it, in the axes of {1}; R: rotation vector of the principal axes",
     )  # fmt: skip
 
 
-def _sub(text: str) -> Node:
-    return el("span", *symbols(text))
-
-
 def _grasps(e: PayloadEstimate) -> Node:
-    head = ["pair", "x [deg]", "y [deg]", "z [deg]", "x [mm]", "y [mm]", "z [mm]", "distance [mm]"]
     if e.grasps is None:
         return paragraph("The recordings do not determine the grasps.")
-    rows: list[list[Entry]] = []
+    positions: list[list[Entry]] = []
+    rotations: list[list[Entry]] = []
     for i, j in combinations(range(1, e.robots + 1), 2):
         pair = e.grasps.pair(i, j)
-        angles = [
-            measurement(float(np.rad2deg(v)), float(np.rad2deg(s)))
-            for v, s in zip(pair.axis_angle_rad, pair.axis_angle_se_rad, strict=True)
-        ]
-        places = [measurement(1e3 * v, 1e3 * s) for v, s in zip(pair.p_ij, pair.p_se_m, strict=True)]
+        places = [component(pair.p_ij, pair.p_se_m, k, 1e3) for k in range(3)]
         distance = measurement(1e3 * float(np.linalg.norm(pair.p_ij)), 1e3 * pair.distance_se_m)
-        rows.append([f"{i} to {j}", *angles, *places, distance])
-    return table("Grasp frames from each other", head, rows,
-                 note="rotation vector and position of frame {j} in frame {i}, ± standard error")  # fmt: skip
+        positions.append([quantity(f"p_{i}{j}"), *places, distance])
+        angles = [component(pair.axis_angle_rad, pair.axis_angle_se_rad, k, 180.0 / np.pi) for k in range(3)]
+        rotations.append([quantity(f"R_{i}{j}"), *angles])
+    return el(
+        "div",
+        table("Grasp frames from each other: position", ["", "x [mm]", "y [mm]", "z [mm]", "distance [mm]"], positions,
+              note="of frame {j} in frame {i}, ± standard error"),
+        table("Grasp frames from each other: rotation", ["", "x [deg]", "y [deg]", "z [deg]"], rotations,
+              note="rotation vector of frame {j} in frame {i}, ± standard error"),
+    )  # fmt: skip
 
 
 def _recordings(e: PayloadEstimate) -> Node:
-    head = ["recording", "trial", "length [s]", "holds", "force left over [% of weight]", "moment left over [mm]"]
+    head = [
+        "recording",
+        "trial",
+        "length [s]",
+        "holds",
+        "force left over [% of weight]",
+        "moment left over [mm]",
+    ]
     rows: list[list[Entry]] = [
         [
             Path(r.name).name, r.trial, Num(f"{r.duration_s:.1f}"), Num(str(r.holds)),
@@ -212,25 +233,31 @@ def _recordings(e: PayloadEstimate) -> Node:
         ]
         for r in e.recordings
     ]  # fmt: skip
-    return table("Recordings", head, rows, note="moment left over: the error of the centre of mass that would explain it")
+    return table(
+        "Recordings",
+        head,
+        rows,
+        note="moment left over: the error of the centre of mass that would explain it",
+    )
 
 
 def _excitation(book: Book, e: PayloadEstimate) -> list[Node]:
     head = ["step", "rank", "of", "condition", "weakest signal", "noise", "unit"]
     rows: list[list[Entry]] = [
         [
-            _sub(s.step), Num(str(s.rank)), Num(str(len(s.singular_values))), value(s.condition, 3),
+            quantity(s.step), Num(str(s.rank)), Num(str(len(s.singular_values))), value(s.condition, 3),
             value(s.singular_values[-1], 2), value(s.noise, 2), s.unit,
         ]
         for s in e.steps
     ]  # fmt: skip
     weak: list[Node] = []
     if e.undetermined:
-        listed: list[list[Entry]] = [[_sub(w.step), w.direction, w.reason] for w in e.undetermined]
+        listed: list[list[Entry]] = [[quantity(w.step), w.direction, w.reason] for w in e.undetermined]
         weak = [table("Directions that the data do not determine", ["step", "direction", "reason"], listed)]
     shown = excitation_chart(book, e)
     note = paragraph(
-        "Every step solves for some parameters; a direction in which the motion's signal does not rise above the noise is "
+        "Every step solves for some parameters; a direction in which the motion's signal does not "
+        "rise above the noise is "
         "not determined.",
         kind="note",
     )

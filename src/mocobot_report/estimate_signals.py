@@ -13,7 +13,7 @@ from estimator.payload_estimate import PayloadEstimate
 from estimator.recording import Recording
 from mocobot_report.blocks import Entry, bullets, paragraph, table, tabs, value, verdict
 from mocobot_report.book import Book
-from mocobot_report.charts import Json, Key, axis, chart, layout, log_axis, numbers
+from mocobot_report.charts import Json, Key, chart, layout, log_axis, numbers
 from mocobot_report.html import Node, el
 from mocobot_report.series import Line, Panel, height, stacked, thinned
 from mocobot_report.sources import Source
@@ -50,12 +50,14 @@ def signal_sections(book: Book, found: list[Source], e: PayloadEstimate) -> list
         return [
             verdict(
                 "warn", "No plots over time",
-                "The file does not say which recordings it was made from; estimate again with this version of mocobot.",
+                "The file does not say which recordings it was made from; estimate again with this version "
+                "of mocobot.",
             )
         ]  # fmt: skip
     panels: list[tuple[str, list[Node]]] = []
     rows: list[list[Entry]] = []
     missing: list[str] = []
+    head: list[str] = []
     for source in found:
         book.say(f"signals of {source.name}")
         recording = source.read()
@@ -71,19 +73,20 @@ def signal_sections(book: Book, found: list[Source], e: PayloadEstimate) -> list
         if not left:
             missing.append(f"{source.name}: nothing can be said without grasps and a centre of mass")
             continue
+        head = ["recording", *(f"{one.name} [{one.unit}]" for one in left)]
         rows.append([source.name, *(value(rms(one.values), 2) for one in left)])
         panels.append((source.name, _plots(book, recording, left, list(trial.notes))))
     out: list[Node] = []
     if panels:
         out.append(
             paragraph(
-                "With the estimated grasps, flanges and grasps must stay together, and the robots' forces and moments must "
-                "add up to what the payload's motion needs. What is left over is noise if the estimate is right and the "
-                "robots are as designed; a pattern in it is something that the model does not have.",
+                "With the estimated grasps, flanges and grasps must stay together, and the robots' forces and "
+                "moments must add up to what the payload's motion needs. What is left over is noise if the "
+                "estimate is right and the robots are as designed; a pattern in it is something that the model "
+                "does not have.",
                 kind="note",
             )
         )
-        head = ["recording", *(f"{one.name} [{one.unit}]" for one in left)]  # pyright: ignore[reportPossiblyUnbound]
         if len({len(row) for row in rows}) == 1:
             out.append(table("Left over, rms", head, rows))
         out += tabs(book, "Recording", panels)
@@ -139,7 +142,9 @@ def _over_time(book: Book, title: str, left: list[Left], recording: Recording) -
 def _spectrum(book: Book, one: Left) -> Node:
     """Amplitude density of each component."""
     step = float(np.median(np.diff(one.time)))
-    frequency, power = welch(one.values, 1.0 / step, nperseg=min(len(one.time), round(SEGMENT_S / step)), axis=0)
+    frequency, power = welch(
+        one.values, 1.0 / step, nperseg=min(len(one.time), round(SEGMENT_S / step)), axis=0
+    )
     density = np.sqrt(power[1:])
     shown = np.maximum(density, 1e-12)
     data: list[Json] = [

@@ -80,8 +80,9 @@ class Diagnosed:
 
 @dataclass(frozen=True)
 class Contents:
-    """Everything found, and the files that it was read from."""
+    """Everything found in a folder, and the files that it was read from."""
 
+    folder: Path
     paper: Paper | None
     estimates: tuple[Estimated, ...]
     diagnosis: Diagnosed | None
@@ -123,7 +124,7 @@ def read_folder(folder: Path) -> Contents:
         files += [folder / "estimates" / f"{p}_{preset}.json" for p, preset in paper.estimates]
     if diagnosis is not None and diagnosis.traces:
         files.append(folder / RESIDUALS)
-    return Contents(paper, tuple(estimates), diagnosis, tuple(files))
+    return Contents(folder, paper, tuple(estimates), diagnosis, tuple(files))
 
 
 def _paper(folder: Path) -> Paper:
@@ -149,14 +150,20 @@ def _trials(path: Path) -> tuple[Json, ...]:
     if not path.is_file():
         return ()
     trials = read_json(path, "the checks of the trials").get("trials")
-    fine = isinstance(trials, list) and all(
-        isinstance(t, dict) and isinstance(t.get("name"), str) and all(_number(t.get(k, "")) for k in TRIAL_KEYS)
-        for t in trials
-    )
-    if not fine:
+    if not isinstance(trials, list) or not all(map(_is_trial, trials)):
         keys = ", ".join(TRIAL_KEYS)
-        raise InputError(f"{path}: not the checks of the trials; each must have a name, and the numbers {keys}")
+        raise InputError(
+            f"{path}: not the checks of the trials; each must have a name, and the numbers {keys}"
+        )
     return tuple(trials)
+
+
+def _is_trial(values: Any) -> bool:
+    return (
+        isinstance(values, dict)
+        and isinstance(values.get("name"), str)
+        and all(values.get(key) is not None and _number(values[key]) for key in TRIAL_KEYS)
+    )
 
 
 def _provenance(path: Path) -> Json | None:
@@ -199,7 +206,9 @@ def _diagnosis(path: Path, values: Json, other: Diagnosed | None) -> Diagnosed:
 
 def _number(value: Any) -> bool:
     """Whether a score is null or a finite number of at least 0."""
-    return value is None or (isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < 1e300)
+    return value is None or (
+        isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < 1e300
+    )
 
 
 def _words(error: Exception) -> str:

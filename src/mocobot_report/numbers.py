@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 
 MINUS, PLUS_MINUS, NONE, THIN = "\u2212", "\u00b1", "\u2013", "\u00a0"
-SUPERSCRIPTS = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
+SUPERSCRIPTS = str.maketrans(
+    "-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
+)
 
 
 def plain(value: float | None, digits: int = 3) -> str:
@@ -37,7 +39,7 @@ def measured(value: float | None, se: float | None) -> tuple[str, str]:
 def with_error(value: float | None, se: float | None, unit: str = "") -> str:
     """``11.67196 +- 0.00019 kg`` in one text."""
     shown, error = measured(value, se)
-    text = f"{shown} {PLUS_MINUS} {error}" if error else shown
+    text = f"{shown}{THIN}{PLUS_MINUS}{THIN}{error}" if error else shown
     return f"{text}{THIN}{unit}" if unit and shown != NONE else text
 
 
@@ -46,8 +48,16 @@ def percent(share: float | None) -> str:
     if share is None or not math.isfinite(share):
         return NONE
     value = 100.0 * share
-    digits = 0 if 1.0 <= value <= 99.0 or value in (0.0, 100.0) else 1 if 0.05 <= value <= 99.95 else 2
+    if abs(value) < 1.0:
+        return f"{plain(value, 2)}{THIN}%"
+    digits = 1 if 99.0 < value < 99.95 else 0
     return f"{_signed(f'{value:.{digits}f}')}{THIN}%"
+
+
+def about(value: float) -> str:
+    """A ratio of two digits, thousands apart: ``53 000``."""
+    rounded = float(f"{value:.1e}")
+    return f"{rounded:,.0f}".replace(",", THIN) if rounded >= 10 else plain(value, 2)
 
 
 def power(log10: float) -> str:

@@ -9,56 +9,68 @@ from pathlib import Path
 
 from plotly.offline import get_plotlyjs
 
-from mocobot_report import diagnosis_part, estimate_part, paper_part, palette
+from mocobot_report import diagnosis_part, estimate_part, palette, paper_part
 from mocobot_report.book import Book
 from mocobot_report.folder import Contents, read_folder
 from mocobot_report.html import Node, el, raw, to_bytes, variables, words
 from mocobot_report.provenance_part import provenance_part
+from mocobot_report.target import MARK, check_target, write_page
 
-MARK = "mocobot report"
-"""Generator that the page names; a file without it is no report."""
+NAME = "report.html"
 POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; "
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: "
+    "blob:; base-uri 'none'; "
     "form-action 'none'"
 )
 """What the page may load: nothing but itself."""
 Say = Callable[[str], object]
 
 
-def make_page(folder: Path, say: Say = lambda _: None) -> bytes:
-    """The report of a result folder, HTML in UTF-8; the same files give the same bytes.
+def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: None) -> Path:
+    """Write the report of a result folder.
 
     Args:
         folder: what ``mocobot paper``, ``estimate`` or ``diagnose`` wrote.
+        out: file to write; ``report.html`` in the folder if None. An earlier report is replaced.
+        say: takes the name of every stage that begins.
+
+    Returns:
+        The file.
+
+    Raises:
+        InputError: the folder holds no result, or one that cannot be read, or the file cannot be written.
+    """
+    contents = read_folder(folder)
+    out = folder / NAME if out is None else out
+    check_target(out)
+    write_page(out, make_page(contents, say))
+    return out
+
+
+def make_page(contents: Contents, say: Say = lambda _: None) -> bytes:
+    """The page of a folder's contents, HTML in UTF-8; the same files give the same bytes.
+
+    Args:
+        contents: of a result folder.
         say: takes the name of every stage that begins.
 
     Raises:
-        InputError: the folder holds no result, or one that cannot be read.
+        InputError: a file has gone, or changed its meaning, since the folder was read.
     """
-    say("reading")
-    contents = read_folder(folder)
     book = Book(say)
     parts = _parts(book, contents)
-    parts.append(("provenance", "Provenance", provenance_part(book, contents, folder)))
+    parts.append(("provenance", "Provenance", provenance_part(book, contents)))
     title, top = _top(contents)
     main = [el("section", el("h1", title), *top, id="answer", aria_label="Answer")]
     for identity, name, blocks in parts:
         heading = el("h2", name, id=f"{identity}-heading")
-        main.append(el("section", heading, *blocks, id=identity, class_="part", aria_labelledby=f"{identity}-heading"))
+        main.append(
+            el("section", heading, *blocks, id=identity, class_="part", aria_labelledby=f"{identity}-heading")
+        )
     say("pictures")
     book.gallery.fill()
     say("page")
     return to_bytes(_document(title, main))
-
-
-def is_report(path: Path) -> bool:
-    """Whether a file is a page that this module made."""
-    try:
-        with path.open("rb") as file:
-            head = file.read(4096)
-    except OSError:
-        return False
-    return head.startswith(b"<!doctype html>") and f'<meta name="generator" content="{MARK}">'.encode() in head
 
 
 def _parts(book: Book, contents: Contents) -> list[tuple[str, str, list[Node]]]:
@@ -94,9 +106,13 @@ def _navigation(main: list[Node]) -> Node:
     entries = [el("li", el("a", "Answer", href="#answer"))]
     for part in main[1:]:
         inner = [
-            el("li", el("a", words(child[0]), href=f"#{child.get('id')}")) for child in part if child.tag == "section"
+            el("li", el("a", words(child[0]), href=f"#{child.get('id')}"))
+            for child in part
+            if child.tag == "section"
         ]
-        entries.append(el("li", el("a", words(part[0]), href=f"#{part.get('id')}"), el("ol", *inner) if inner else None))
+        entries.append(
+            el("li", el("a", words(part[0]), href=f"#{part.get('id')}"), el("ol", *inner) if inner else None)
+        )
     return el("nav", el("p", "Contents", class_="contents"), el("ol", *entries), aria_label="Contents")
 
 
@@ -137,7 +153,11 @@ def _document(title: str, main: list[Node]) -> Node:
                     "main",
                     el("noscript", el("p", "Plots need JavaScript; everything else on this page does not.")),
                     *main,
-                    el("p", f"Made by mocobot {_version()}. This file is complete: it loads nothing from anywhere.", class_="foot"),
+                    el(
+                        "p",
+                        f"Made by mocobot {_version()}. This file is complete: it loads nothing from anywhere.",
+                        class_="foot",
+                    ),
                     id="main",
                     tabindex="-1",
                 ),

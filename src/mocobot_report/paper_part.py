@@ -10,11 +10,13 @@ from estimator.paper_tables import payload_truth
 from mocobot_report.blocks import (
     Entry,
     Num,
+    bullets,
+    component,
     folded,
     measurement,
     paragraph,
+    quantity,
     section,
-    symbols,
     table,
     tabs,
     tiles,
@@ -24,7 +26,7 @@ from mocobot_report.blocks import (
 from mocobot_report.book import Book
 from mocobot_report.folder import Paper
 from mocobot_report.html import Node, el
-from mocobot_report.numbers import NONE, plain, spelled
+from mocobot_report.numbers import NONE, about, plain, spelled
 from mocobot_report.paper_charts import summary_chart, table_chart, trial_chart
 from mocobot_report.pictures import ASPECT
 from mocobot_sim.paper.tables import Cell, PaperTable, paper_tables, summary_table
@@ -51,37 +53,36 @@ def answer(paper: Paper) -> list[Node]:
     names = ", ".join(f"({name})" for name in payloads)
     out = [
         paragraph(
-            f"Simulated teams of three mobile cobots carry {'payload' if len(payloads) == 1 else 'payloads'} {names} and "
-            "estimate grasps, mass, centre of mass and inertia from joint sensors alone. The errors stand beside those "
+            f"Simulated teams of three mobile cobots carry payload{'s' * (len(payloads) > 1)} {names} and "
+            "estimate grasps, mass, centre of mass and inertia from joint sensors alone. The errors "
+            "stand beside those "
             "that Zhang, Liu, Elwin, Freeman and Lynch measured on hardware (IEEE RA-L 2025, Tables II-V).",
             kind="lede",
         )
     ]
-    sentences = [text for name in presets if (text := _against(summary, name))]
-    out.append(verdict("plain", "Our errors beside the paper's", *sentences))
+    box = verdict("plain", "Our largest errors beside the paper's")
+    box.append(bullets([item for name in presets if (item := _against(summary, name)) is not None]))
+    out.append(box)
     out.append(_trust(paper))
     return out
 
 
-def _against(summary: PaperTable, preset: str) -> str | None:
+def _against(summary: PaperTable, preset: str) -> Node | None:
     """How many times smaller or larger the largest errors are than the published ones."""
     k = summary.columns.index(preset)
-    ratios = [
-        row.cells[0].value / row.cells[k].value
-        for row in summary.rows
-        if row.cells[0].value and row.cells[k].value
-    ]
+    pairs = [(row.cells[0].value, row.cells[k].value) for row in summary.rows]
+    ratios = [published / ours for published, ours in pairs if published and ours]
     if not ratios:
         return None
     low, high = min(ratios), max(ratios)
     what = SENSORS.get(preset, "sensors of that name")
     if low >= 1.0:
-        return f"{preset} ({what}): largest errors {plain(low, 2)} to {plain(high, 2)} times smaller than the paper's."
-    if high <= 1.0:
-        return f"{preset} ({what}): largest errors {plain(1 / high, 2)} to {plain(1 / low, 2)} times the paper's."
-    return (
-        f"{preset} ({what}): largest errors between {plain(1 / high, 2)} and {plain(1 / low, 2)} times the paper's."
-    )
+        said = f"{about(low)} to {about(high)} times smaller than the paper's"
+    elif high <= 1.0:
+        said = f"{about(1 / high)} to {about(1 / low)} times the paper's"
+    else:
+        said = f"between {about(1 / high)} and {about(1 / low)} times the paper's"
+    return el("span", el("b", preset), f" ({what}): {said}.")
 
 
 def _trust(paper: Paper) -> Node:
@@ -102,7 +103,8 @@ def _trust(paper: Paper) -> Node:
         "good" if good else "bad",
         held,
         f"Their rods opened by at most {plain(1e3 * rod, 2)} mm (limit {1e3 * limits[0]:g} mm), grasps by "
-        f"{plain(1e3 * weld, 2)} mm (limit {1e3 * limits[1]:g} mm) and {plain(angle, 2)} deg (limit {limits[2]:g} deg).",
+        f"{plain(1e3 * weld, 2)} mm (limit {1e3 * limits[1]:g} mm) and {plain(angle, 2)} deg "
+        f"(limit {limits[2]:g} deg).",
     )
 
 
@@ -144,8 +146,8 @@ def sections(book: Book, paper: Paper) -> list[Node]:
 def _table_four(book: Book, four: PaperTable) -> list[Node]:
     kinds = (("m", "Table IV: mass error [%]"), ("p1c", "Table IV: centre-of-mass error [% of |p1c|]"))
     charts = []
-    for quantity, title in kinds:
-        rows = tuple(row for row in four.part("%").rows if row.quantity == quantity)
+    for name, title in kinds:
+        rows = tuple(row for row in four.part("%").rows if row.quantity == name)
         part = PaperTable(four.number, four.title, four.note, four.columns, rows)
         charts.append(table_chart(book, part, title, "one set of six static holds"))
     return [el("div", *charts, class_="pair")]
@@ -156,7 +158,7 @@ def _table(shown: PaperTable) -> Node:
     last = ""
     for row in shown.rows:
         head = f"({row.payload})" if row.payload != last else ""
-        rows.append([head, symbols_entry(row.quantity), spelled(row.unit), *map(_cell, row.cells)])
+        rows.append([head, quantity(row.quantity), spelled(row.unit), *map(_cell, row.cells)])
         last = row.payload
     caption = f"Table {shown.number}. {shown.title}".replace("[kg m^2]", "[kg m²]")
     return table(
@@ -179,16 +181,12 @@ def _cell(cell: Cell) -> Num:
     return Num(plain(cell.value, 2), "" if cell.spread is None else plain(cell.spread, 2))
 
 
-def symbols_entry(text: str) -> Node:
-    """A quantity with its indices lowered."""
-    return el("span", *symbols(text))
-
-
 def _estimates(book: Book, paper: Paper) -> list[Node]:
     payloads = list(dict.fromkeys(payload for payload, _ in paper.estimates))
     panels = [(f"payload ({payload})", _against_truth(paper, payload)) for payload in payloads]
     note = paragraph(
-        "Value ± standard error; the truth is Table I of the paper. Standard errors cover noise and quantisation, not "
+        "Value ± standard error; the truth is Table I of the paper. Standard errors cover noise "
+        "and quantisation, not "
         "calibration: on uncalibrated robots they are far too small.",
         kind="note",
     )
@@ -199,40 +197,40 @@ def _against_truth(paper: Paper, payload: str) -> Node:
     truth = payload_truth(payload)
     presets = [preset for p, preset in paper.estimates if p == payload]
     found = [paper.estimates[payload, preset] for preset in presets]
-    rows: list[list[Entry]] = [
-        ["mass", "kg", value(truth.mass, 5)]
-        + [measurement(e.mass.mass, e.mass.se) if e.mass else Num(NONE) for e in found]
-    ]
+    masses = [measurement(e.mass.mass, e.mass.se) if e.mass else Num(NONE) for e in found]
+    rows: list[list[Entry]] = [["mass", "kg", value(truth.mass, 5), *masses]]
     for k, name in enumerate("xyz"):
-        row: list[Entry] = [symbols_entry(f"p_1c {name}"), "mm", value(1e3 * truth.p_1c[k], 4)]
-        for e in found:
-            known = e.p_1c is not None and e.p_1c_se_m is not None
-            row.append(measurement(1e3 * e.p_1c[k], 1e3 * e.p_1c_se_m[k]) if known else Num(NONE))
-        rows.append(row)
+        places = [component(e.p_1c, e.p_1c_se_m, k, 1e3) for e in found]
+        rows.append([quantity(f"p_1c {name}"), "mm", value(1e3 * float(truth.p_1c[k]), 4), *places])
     for k in range(3):
-        row = [f"principal moment {k + 1}", "kg m²", value(float(truth.principal_moments[k]), 4)]
-        for e in found:
-            i = e.inertia
-            row.append(
-                measurement(i.principal.moments[k], i.principal.moments_se[k]) if i else Num(NONE)
-            )
-        rows.append(row)
+        principal = [None if e.inertia is None else e.inertia.principal for e in found]
+        moments = [component(p.moments, p.moments_se, k) if p else Num(NONE) for p in principal]
+        true = value(float(truth.principal_moments[k]), 4)
+        rows.append([f"principal moment {k + 1}", "kg m²", true, *moments])
     for j in (2, 3):
-        distance = float(np.linalg.norm(truth.T(1, j)[:3, 3]))
-        row = [symbols_entry(f"|p_1{j}|"), "mm", value(1e3 * distance, 5)]
-        for e in found:
-            pair = e.grasps.pair(1, j) if e.grasps is not None and e.robots >= j else None
-            row.append(
-                measurement(1e3 * float(np.linalg.norm(pair.p_ij)), 1e3 * pair.distance_se_m) if pair else Num(NONE)
-            )
-        rows.append(row)
+        true = value(1e3 * float(np.linalg.norm(truth.T(1, j)[:3, 3])), 5)
+        pairs = [e.grasps.pair(1, j) if e.grasps is not None and e.robots >= j else None for e in found]
+        lengths = [
+            measurement(1e3 * float(np.linalg.norm(pair.p_ij)), 1e3 * pair.distance_se_m)
+            if pair
+            else Num(NONE)
+            for pair in pairs
+        ]
+        rows.append([quantity(f"|p_1{j}|"), "mm", true, *lengths])
     return table(f"Payload ({payload})", ["", "unit", "truth", *presets], rows)
 
 
 def _trials(paper: Paper) -> Sequence[Node]:
     trials = paper.trials
     worst = {key: max(t[key] for t in trials) for key in trials[0] if key != "name"}
-    head = ["trial", "rotation [deg]", "torque [N m]", "rod error [µm]", "weld error [µm]", "weld angle [µdeg]"]
+    head = [
+        "trial",
+        "rotation [deg]",
+        "torque [N m]",
+        "rod error [µm]",
+        "weld error [µm]",
+        "weld angle [µdeg]",
+    ]
     scales = (("rotation_deg", 1.0), ("torque_Nm", 1.0), ("rod_error_m", 1e6), ("weld_error_m", 1e6),
               ("weld_error_deg", 1e6))  # fmt: skip
     rows: list[list[Entry]] = [
@@ -244,11 +242,20 @@ def _trials(paper: Paper) -> Sequence[Node]:
             ("payload rotation", f"≤ {plain(worst['rotation_deg'])} deg", ""),
             ("spring torque", f"≤ {plain(worst['torque_Nm'])} N m", ""),
             ("rod error", f"≤ {plain(1e6 * worst['rod_error_m'], 2)} µm", f"limit {1e6 * ROD_LIMIT_M:g} µm"),
-            ("grasp error", f"≤ {plain(1e6 * worst['weld_error_m'], 2)} µm", f"limit {1e6 * WELD_LIMIT_M:g} µm"),
+            (
+                "grasp error",
+                f"≤ {plain(1e6 * worst['weld_error_m'], 2)} µm",
+                f"limit {1e6 * WELD_LIMIT_M:g} µm",
+            ),
         ]
     )
     listed = folded(
         f"Every trial ({len(trials)})",
-        table("Extremes of every trial", head, rows, note="payload, kind, number, least ideal preset; largest in bold"),
+        table(
+            "Extremes of every trial",
+            head,
+            rows,
+            note="payload, kind, number, least ideal preset; largest in bold",
+        ),
     )
     return [shown, listed]

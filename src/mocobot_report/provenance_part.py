@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from estimator.errors import InputError
@@ -14,7 +14,7 @@ from mocobot_report.html import Node, el
 from mocobot_report.numbers import size
 
 
-def provenance_part(book: Book, contents: Contents, folder: Path) -> list[Node]:
+def provenance_part(book: Book, contents: Contents) -> list[Node]:
     """One section per result, and the files that this page was made from."""
     found: list[tuple[str, Any]] = []
     if contents.paper is not None:
@@ -23,7 +23,7 @@ def provenance_part(book: Book, contents: Contents, folder: Path) -> list[Node]:
     if contents.diagnosis is not None:
         found.append(("diagnosis", contents.diagnosis.provenance))
     out = [section(book, f"How {name} was made", *_one(made)) for name, made in found]
-    return [*out, section(book, "What this page was made from", _read(contents, folder))]
+    return [*out, section(book, "What this page was made from", _read(contents))]
 
 
 def _one(made: Any) -> list[Node]:
@@ -54,7 +54,11 @@ def _one(made: Any) -> list[Node]:
 def _text(option: Any) -> str:
     if isinstance(option, list):
         return " ".join(map(str, option)) or "none"
-    return {None: "none", True: "yes", False: "no"}.get(option, str(option)) if not isinstance(option, dict) else str(option)
+    return (
+        {None: "none", True: "yes", False: "no"}.get(option, str(option))
+        if not isinstance(option, dict)
+        else str(option)
+    )
 
 
 def _files(caption: str, listed: list[Mapping[str, Any]]) -> Node:
@@ -72,9 +76,7 @@ def _size(count: Any) -> str:
     return size(count) if isinstance(count, int) else ""
 
 
-def _read(contents: Contents, folder: Path) -> Node:
-    import hashlib
-
+def _read(contents: Contents) -> Node:
     listed = []
     for path in contents.files:
         try:
@@ -82,6 +84,10 @@ def _read(contents: Contents, folder: Path) -> Node:
         except OSError as error:
             raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
         listed.append(
-            {"path": path.relative_to(folder).as_posix(), "bytes": len(data), "sha256": hashlib.sha256(data).hexdigest()}
+            {
+                "path": path.relative_to(contents.folder).as_posix(),
+                "bytes": len(data),
+                "sha256": hashlib.sha256(data).hexdigest(),
+            }
         )
     return _files("Read from the folder", listed)

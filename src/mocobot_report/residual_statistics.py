@@ -46,13 +46,13 @@ def spectrum(traces: Sequence[Trace], attribute: str, columns: list[int]) -> tup
     if not used:
         return None
     segment = min(round(SEGMENT_S * rate), min(trace.moving for trace in used))
-    total = 0.0
+    total = np.zeros(segment // 2 + 1)
     for trace in used:
         series = getattr(trace, attribute)[: trace.moving, columns]
-        frequency, density = welch(series, rate, nperseg=segment, axis=0, detrend="constant")
-        total = total + trace.moving * density.mean(axis=1) * rate / 2.0
-    height = np.sqrt(np.asarray(total) / sum(trace.moving for trace in used))
+        _, density = welch(series, rate, nperseg=segment, axis=0, detrend="constant")
+        total += trace.moving * density.mean(axis=1) * rate / 2.0
+    height = np.sqrt(total / sum(trace.moving for trace in used))
     # The mean is taken out of every segment, so frequency 0 says nothing; the last one is not doubled.
     if segment % 2 == 0:
         height[-1] *= np.sqrt(2.0)
-    return frequency[1:], height[1:]  # pyright: ignore[reportPossiblyUnbound]
+    return np.asarray(np.fft.rfftfreq(segment, 1.0 / rate)[1:], dtype=float), height[1:]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +67,8 @@ def height(panels: Sequence[Panel]) -> int:
 def stacked(panels: Sequence[Panel], x_title: str = "time [s]") -> Json:
     """A plotly figure of panels above each other; zooming one in time zooms all."""
     count = len(panels)
-    gap = 0.14 / max(count, 1)
+    gap = 0.16 / max(count, 1)
+    tall = (1.0 - gap * (count - 1)) / max(count, 1)
     data, shapes, arrays = [], [], {}
     known: dict[bytes, str] = {}
 
@@ -80,8 +82,8 @@ def stacked(panels: Sequence[Panel], x_title: str = "time [s]") -> Json:
     axes: Json = {}
     for k, panel in enumerate(panels):
         number = "" if k == 0 else str(k + 1)
-        top = 1.0 - k / count
-        domain = [top - 1.0 / count + gap, top]
+        top = 1.0 - k * (tall + gap)
+        domain = [max(0.0, top - tall), top]
         title = f"{panel.title}<br>[{panel.unit}]" if panel.unit else panel.title
         style = {"domain": domain, "anchor": "x", "zeroline": not panel.log, "nticks": 5}
         if panel.log and panel.limits is not None:
@@ -154,11 +156,13 @@ def thinned(time: Array, values: Array, run: Array | None = None, most: int = MO
     if n > most:
         kept = {0, n - 1, *np.flatnonzero(np.diff(run) > 0), *(np.flatnonzero(np.diff(run) > 0) + 1)}
         edges = np.linspace(0, n, max(2, most // (2 * columns)) + 1).astype(int)
-        for start, end in zip(edges[:-1], edges[1:], strict=True):
+        for start, end in pairwise(edges):
             if end > start:
                 kept.update(start + np.argmin(values[start:end], axis=0))
                 kept.update(start + np.argmax(values[start:end], axis=0))
         chosen = np.array(sorted(int(k) for k in kept))
         time, values, run = time[chosen], values[chosen], run[chosen]
     breaks = np.flatnonzero(np.diff(run) > 0) + 1
-    return np.insert(time.astype(float), breaks, np.nan), np.insert(values.astype(float), breaks, np.nan, axis=0)
+    return np.insert(time.astype(float), breaks, np.nan), np.insert(
+        values.astype(float), breaks, np.nan, axis=0
+    )

@@ -6,8 +6,8 @@ import numpy as np
 
 from estimator.payload_estimate import PayloadEstimate
 from estimator.scoring import rotation_error_deg
-from mocobot_report.blocks import Entry, Num, symbols, table, value
-from mocobot_report.html import Node, el
+from mocobot_report.blocks import Entry, Num, quantity, table, value
+from mocobot_report.html import Node
 from mocobot_report.numbers import NONE, plain
 from mocobot_sim.replay.body_facts import BodyFacts
 
@@ -16,13 +16,15 @@ def errors_table(e: PayloadEstimate, truth: BodyFacts) -> Node:
     """Truth, error, error in percent and in standard errors, for every number that both have."""
     rows: list[list[Entry]] = []
 
-    def row(name: str, unit: str, true: float, found: float | None, se: float | None, scale: float = 1.0) -> None:
+    def row(
+        name: str, unit: str, true: float, found: float | None, se: float | None, scale: float = 1.0
+    ) -> None:
         error = None if found is None else found - true
         share = None if error is None or true == 0 else 100.0 * abs(error / true)
         ratio = None if error is None or not se else abs(error) / se
         rows.append(
             [
-                el("span", *symbols(name)), unit, value(scale * true, 5),
+                quantity(name), unit, value(scale * true, 5),
                 value(None if error is None else scale * error, 2), value(share, 2),
                 Num(NONE if ratio is None else plain(ratio, 2)),
             ]
@@ -30,10 +32,11 @@ def errors_table(e: PayloadEstimate, truth: BodyFacts) -> Node:
 
     if truth.mass_kg is not None:
         row("mass", "kg", truth.mass_kg, e.mass and e.mass.mass, e.mass and e.mass.se)
-    for k, name in enumerate("xyz" if truth.p_1c is not None else ""):
-        known = e.p_1c is not None and e.p_1c_se_m is not None
-        found, se = (float(e.p_1c[k]), float(e.p_1c_se_m[k])) if known else (None, None)
-        row(f"p_1c {name}", "mm", float(truth.p_1c[k]), found, se, 1e3)
+    if truth.p_1c is not None:
+        p, errors = e.p_1c, e.p_1c_se_m
+        for k, name in enumerate("xyz"):
+            found, se = (None, None) if p is None or errors is None else (float(p[k]), float(errors[k]))
+            row(f"p_1c {name}", "mm", float(truth.p_1c[k]), found, se, 1e3)
     if truth.principal_kgm2 is not None:
         for k, true in enumerate(np.sort(truth.principal_kgm2)):
             p = None if e.inertia is None else e.inertia.principal
@@ -48,7 +51,7 @@ def errors_table(e: PayloadEstimate, truth: BodyFacts) -> Node:
                 row(f"p_1{j} {name}", "mm", float(true[k]), found, se, 1e3)
             if e.grasps is not None:
                 angle = rotation_error_deg(truth.grasps.R_1i[j - 1], e.grasps.R_1i[j - 1])
-                rows.append([el("span", *symbols(f"R_1{j}")), "deg", Num(NONE), value(angle, 2), Num(NONE), Num(NONE)])
+                rows.append([quantity(f"R_1{j}"), "deg", Num(NONE), value(angle, 2), Num(NONE), Num(NONE)])
     return table(
         "Estimate against truth", ["", "unit", "truth", "error", "error [%]", "in standard errors"], rows,
         note="error of a rotation: its angle",

@@ -32,5 +32,7 @@ def short_names(names: list[str]) -> list[str]:
     out: list[str] = []
     for name in names:
         stem = re.split(r"[/\\]", name)[-1].removesuffix(".parquet") or "trial"
-        out.append(next(s for k in range(len(names) + 1) if (s := stem if not k else f"{stem} ({k + 1})") not in out))
+        out.append(
+            next(s for k in range(len(names) + 1) if (s := stem if not k else f"{stem} ({k + 1})") not in out)
+        )
     return out

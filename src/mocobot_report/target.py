@@ -1,0 +1,60 @@
+"""Where a report goes: nothing is overwritten but an earlier report, and a page appears whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import uuid
+from pathlib import Path
+
+from estimator.errors import InputError
+
+MARK = "mocobot report"
+"""Generator that a page names; a file without it is no report."""
+SUFFIX = ".html"
+HEAD_BYTES = 1000
+
+
+def check_target(out: Path) -> None:
+    """Find out that a page cannot be written before it is made.
+
+    Raises:
+        InputError: the name does not end in .html, is that of a folder or of a file that is no report, or its folder
+            does not exist.
+    """
+    try:
+        if out.is_dir():
+            raise InputError(f"{out}: is a folder; name the file to write")
+        if out.suffix != SUFFIX:
+            raise InputError(f"{out}: the file's name must end in {SUFFIX}")
+        if not out.parent.is_dir():
+            raise InputError(f"{out.parent}: there is no such folder")
+        if out.exists() and not is_report(out):
+            raise InputError(f"{out}: exists and is not a report of mocobot; name another file")
+    except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL
+        raise InputError(f"{out}: cannot be written ({getattr(error, 'strerror', None) or error})") from error
+
+
+def is_report(path: Path) -> bool:
+    """Whether a file is a page of this module; an empty one may be overwritten, too."""
+    with path.open("rb") as file:
+        head = file.read(HEAD_BYTES)
+    return not head or f'<meta name="generator" content="{MARK}">'.encode() in head
+
+
+def write_page(out: Path, content: bytes) -> None:
+    """Write through a temporary file beside the target.
+
+    Raises:
+        InputError: the target cannot be written.
+    """
+    real = Path(os.path.realpath(out))
+    temporary = real.parent / f".{uuid.uuid4().hex}.tmp"
+    try:
+        temporary.write_bytes(content)
+        temporary.replace(real)
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written ({error.strerror or error})") from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
