@@ -33,6 +33,9 @@ residual            {chi2_per_n, signature} of what the causes (with tolerances)
     tolerances                     {chi2, freedom, log10_p}: how hard they are used
     nominal                        {chi2_per_n, signature} of the simulation as it is
 notes               sentences
+
+``mocobot diagnose`` adds ``provenance``: versions, options and hashes of the files it was made from
+(``mocobot.provenance``).
 """
 
 from __future__ import annotations

@@ -25,6 +25,9 @@ undetermined               list of {step, direction, vector, reason}: all weak d
 recordings                 list of {name, trial, duration_s, holds, grasps, inertia, force_residual,
                            moment_residual_m}
 flags                      list of sentences
+
+``mocobot estimate`` adds ``provenance``: versions, options and hashes of the recordings (``mocobot.provenance``).
+Readers ignore it and any other key.
 """
 
 from __future__ import annotations
