@@ -11,6 +11,7 @@ MARK := .venv/.installed
 
 paper: $(MARK)
 	$(BIN)/mocobot paper --jobs $(JOBS) --out out/paper
+	$(BIN)/mocobot report out/paper
 
 test: $(MARK) lint
 	$(BIN)/pytest -n $(JOBS) --dist loadfile

@@ -1,5 +1,5 @@
-"""Imports run one way: estimator <- mocobot_sim <- discrepancy <- mocobot (the command line), and estimator <-
-mocobot_logs <- mocobot."""
+"""Imports run one way: estimator <- mocobot_sim <- discrepancy <- mocobot_report <- mocobot (the command line), and
+estimator <- mocobot_logs <- mocobot."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 SRC = Path(__file__).resolve().parents[1] / "src"
-LAYERS = ["estimator", "mocobot_sim", "discrepancy", "mocobot"]
+LAYERS = ["estimator", "mocobot_sim", "discrepancy", "mocobot_report", "mocobot"]
 ESTIMATOR_MAY_IMPORT = {"estimator", "numpy", "scipy"} | set(sys.stdlib_module_names)
 
 
@@ -44,10 +44,10 @@ def test_logs_need_the_estimator_only() -> None:
     files = source_files("mocobot_logs")
     assert len(files) > 10
     for path in files:
-        assert not imported_roots(path) & {"mocobot_sim", "discrepancy", "mocobot", "mujoco", "dm_control"}, (
-            path
-        )
-    for package in ("estimator", "mocobot_sim", "discrepancy"):
+        assert not imported_roots(path) & {
+            "mocobot_sim", "discrepancy", "mocobot_report", "mocobot", "mujoco", "dm_control"
+        }, path  # fmt: skip
+    for package in ("estimator", "mocobot_sim", "discrepancy", "mocobot_report"):
         for path in source_files(package):
             assert "mocobot_logs" not in imported_roots(path), path
 

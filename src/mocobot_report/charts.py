@@ -125,7 +125,11 @@ def log_axis(title: str, low: float, high: float, **more: Any) -> Json:
     """A logarithmic axis from below ``low`` to above ``high``, with labels that do not crowd."""
     ends = [float(np.log10(low)) - 0.15, float(np.log10(high)) + 0.15]
     decades = ends[1] - ends[0]
-    ticks: Json = {"dtick": "D2"} if decades < 1.3 else {"dtick": 1 if decades < 7 else 2}
+    if decades < 2.5:  # 1, 2, 5, 10, 20, 50 ...
+        powers = range(int(np.floor(ends[0])), int(np.ceil(ends[1])) + 1)
+        at = [m * 10.0**p for p in powers for m in (1, 2, 5) if ends[0] <= np.log10(m * 10.0**p) <= ends[1]]
+        return axis(title, type="log", range=ends, tickvals=at, ticktext=[f"{v:g}" for v in at], **more)
+    ticks: Json = {"dtick": 1 if decades < 7 else 2}
     # Plotly writes powers larger than other labels.
     style = {"tickfont": {"color": "@soft", "size": 9.5}, "exponentformat": "power", "minexponent": 3}
     return axis(title, type="log", range=ends, **style, **ticks, **more)

@@ -10,14 +10,15 @@ import numpy as np
 from discrepancy.report_gain import ERRORS
 from mocobot_report.blocks import Entry, Num, folded, paragraph, section, table, tidy, value, verdict
 from mocobot_report.book import Book
-from mocobot_report.charts import Json, Key, axis, chart, dots, layout, log_axis
+from mocobot_report.charts import Json, Key, axis, chart, dots, layout, log_axis, shared_legend
 from mocobot_report.html import Node, el
 from mocobot_report.numbers import NONE, fitting, percent, plain
 
 Values = Mapping[str, Any]
 BEFORE = Key("before", "as simulated", "before", "square")
+ERROR = Key("before", "error", "before", "square")
 AFTER = Key("after", "with the causes", "after", "circle")
-NOISE = Key("", "noise and integration error alone", "text", "dash")
+NOISE = Key("", "noise and integration error", "text", "dash")
 
 
 def gain_section(book: Book, values: Values, names: Sequence[str]) -> Node | None:
@@ -87,6 +88,7 @@ def _closed_loop(book: Book, gain: Values, names: Sequence[str], *, named: bool)
     return [
         paragraph(said),
         table("Error of the simulated response, rms over the trials", head, rows),
+        shared_legend([*([BEFORE, AFTER] if named else [ERROR]), NOISE]),
         el("div", *charts, class_="pair"),
     ]
 
@@ -100,7 +102,7 @@ def _trials_chart(
     largest = max((t["before"][key] for t in trials if t["before"] is not None), default=1.0)
     shown, scale = ("", 1.0) if channel is None else fitting(unit, largest)
     floor = 1.0 if channel is None else scale * gain["noise"][key]
-    keys = [BEFORE, AFTER] if named else [Key("before", "error", "before", "square")]
+    keys = [BEFORE, AFTER] if named else [ERROR]
     data, seen = [], [floor]
     for entry, which in zip(keys, ("before", "after"), strict=False):
         values = [None if t[which] is None else scale * t[which][key] for t in trials]
@@ -121,11 +123,11 @@ def _trials_chart(
                 {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": "y", "y0": floor, "y1": floor,
                  "line": {"color": "@text", "width": 1.2, "dash": "dash"}}
             ],
-            margin={"l": 60, "r": 12, "t": 8, "b": 36},
+            margin={"l": 60, "r": 12, "t": 8, "b": 26},
         ),
     }  # fmt: skip
     return chart(
-        book, f"Response: {title}", figure, height=240, keys=[*keys, NOISE],
+        book, f"Response: {title}", figure, height=230,
         label=f"{title} of every trial's simulated response, before and after; the means are in the table.",
     )  # fmt: skip
 

@@ -117,7 +117,7 @@ def summary_chart(book: Book, table: PaperTable) -> Node:
     }  # fmt: skip
     return chart(
         book, "Largest errors at a glance", figure, height=300, keys=legend,
-        label="Largest error of every quantity, the paper's beside ours; the numbers are in the table below.",
+        label="Largest error of every quantity, the paper's beside ours; the numbers are in the first table.",
     )  # fmt: skip
 
 

@@ -63,8 +63,7 @@ def answer(paper: Paper) -> list[Node]:
     box = verdict("plain", "Our largest errors beside the paper's")
     box.append(bullets([item for name in presets if (item := _against(summary, name)) is not None]))
     out.append(box)
-    out.append(_trust(paper))
-    return out
+    return [*out, _trust(paper), _summary(summary)]
 
 
 def _against(summary: PaperTable, preset: str) -> Node | None:
@@ -115,7 +114,7 @@ def sections(book: Book, paper: Paper) -> list[Node]:
     two, three, four, five = paper_tables(paper.scores)
     whisker = "whisker: mean + standard deviation"
     blocks = [
-        section(book, "Largest errors", summary_chart(book, summary), _summary(summary), identity="largest"),
+        section(book, "Largest errors", summary_chart(book, summary), identity="largest"),
         section(
             book, "Grasps", table_chart(book, two, "Table II: rotation error [deg]", whisker), _table(two),
             table_chart(book, three.part("%"), "Table III: position error [% of |p|]", whisker), _table(three),
