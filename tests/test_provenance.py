@@ -124,12 +124,12 @@ def test_commit_of_others_is_not_ours(checkout: Path, monkeypatch: pytest.Monkey
 
 def test_folder_lists_what_was_written(tmp_path: Path) -> None:
     (tmp_path / "estimates").mkdir()
-    paths = [tmp_path / "paper.json", tmp_path / "estimates" / "a.json"]
+    paths = [tmp_path / "paper.json", tmp_path / "estimates" / "z.json"]
     for path in paths:
         path.write_text(path.name)
     said = folder_provenance(provenance("paper", {"seed": 3}), tmp_path, paths)
     assert (said["format"], said["version"]) == ("mocobot-provenance", 1)
-    assert [entry["path"] for entry in said["written"]] == ["estimates/a.json", "paper.json"]
+    assert [entry["path"] for entry in said["written"]] == ["estimates/z.json", "paper.json"]
     assert said["written"][1]["sha256"] == hashlib.sha256(b"paper.json").hexdigest()
 
 

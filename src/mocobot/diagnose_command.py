@@ -74,7 +74,7 @@ def run(options: Diagnose) -> None:
                 values["provenance"] = made_with
                 shown = (rig, diagnosis.explanation)
                 write_diagnosis(folder, values, diagnosis, rig, TeamWords(), lambda: traces(*shown))
-        print(format_diagnosis(values))
+    print(format_diagnosis(values))  # after the folder is in place: whoever reads may close the pipe
     if options.out:
         print(f"\nWritten to {options.out}.")
 

@@ -39,22 +39,21 @@ def run(options: Diagnose) -> None:
             "each other"
         )
     tolerances = read_tolerances(options.tolerances, DEFAULTS)
-    with whole_folder(options.out) if options.out else nullcontext() as folder:
-        with stages() as (say, advance):
-            say("read")
-            log = read_emps(next(iter(options.rec)))
-            inputs = [*options.rec, *([options.tolerances] if options.tolerances else [])]
-            made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
-            rig = EmpsRig.of(log, tolerances, options.exclude)
-            diagnosis = diagnose_axis(
-                rig, closed_loop=options.closed_loop, jobs=options.jobs, say=say, simulated=advance
-            )
-            values = diagnosis_to_dict(diagnosis, rig, EmpsWords())
-            if folder is not None:
-                say("write")
-                values["provenance"] = made_with
-                shown = (rig, diagnosis.explanation)
-                write_diagnosis(folder, values, diagnosis, rig, EmpsWords(), lambda: traces(*shown))
-        print(format_diagnosis(values))
+    with whole_folder(options.out) if options.out else nullcontext() as folder, stages() as (say, advance):
+        say("read")
+        log = read_emps(next(iter(options.rec)))
+        inputs = [*options.rec, *([options.tolerances] if options.tolerances else [])]
+        made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
+        rig = EmpsRig.of(log, tolerances, options.exclude)
+        diagnosis = diagnose_axis(
+            rig, closed_loop=options.closed_loop, jobs=options.jobs, say=say, simulated=advance
+        )
+        values = diagnosis_to_dict(diagnosis, rig, EmpsWords())
+        if folder is not None:
+            say("write")
+            values["provenance"] = made_with
+            shown = (rig, diagnosis.explanation)
+            write_diagnosis(folder, values, diagnosis, rig, EmpsWords(), lambda: traces(*shown))
+    print(format_diagnosis(values))  # after the folder is in place: whoever reads may close the pipe
     if options.out:
         print(f"\nWritten to {options.out}.")
