@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,10 +35,16 @@ def low_pass(x: ArrayLike, rate_hz: float, cutoff_hz: float) -> Array:
     x = _samples(x)
     if not 0.0 < cutoff_hz < rate_hz / 2.0:
         raise InputError(f"cutoff_hz is {cutoff_hz!r}; it must lie between 0 and {rate_hz / 2.0:g} Hz")
-    sections = butter(BUTTERWORTH_ORDER, cutoff_hz, fs=rate_hz, output="sos")
+    sections = _sections(float(rate_hz), float(cutoff_hz))
     # The slowest transient dies as exp(-pi cutoff t): six periods of padding leave 1e-8 of it.
     padding = min(len(x) - 1, math.ceil(6.0 * rate_hz / cutoff_hz))
     return sosfiltfilt(sections, x, axis=0, padlen=padding)
+
+
+@cache
+def _sections(rate_hz: float, cutoff_hz: float) -> Array:
+    """The filter's second-order sections; there are few, and a diagnosis filters a thousand times."""
+    return np.asarray(butter(BUTTERWORTH_ORDER, cutoff_hz, fs=rate_hz, output="sos"), dtype=np.float64)
 
 
 def differentiate(x: ArrayLike, rate_hz: float) -> Array:
