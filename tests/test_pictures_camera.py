@@ -102,16 +102,19 @@ def test_words_are_written_where_their_points_are() -> None:
 
 def test_words_do_not_cover_each_other_nor_leave_the_picture() -> None:
     grey = np.full((200, 400, 3), 128, dtype=np.uint8)
-    labels = [Label("joint_friction", (0.0, 0.0, 0.0), colour) for colour in ((255, 0, 0), (0, 0, 255))]
-    written = with_labels(grey, labels, np.array([[395.0, 100.0], [396.0, 103.0]])).astype(int)
+    colours = ((255, 0, 0), (0, 255, 0), (0, 0, 255))
+    labels = [Label("joint_friction", (0.0, 0.0, 0.0), colour) for colour in colours]
+    written = with_labels(grey, labels, np.array([[395.0, 100.0], [396.0, 100.3], [397.0, 100.6]])).astype(
+        int
+    )
     rows = []
-    for colour in (0, 2):
+    for colour in range(3):
         others = [k for k in range(3) if k != colour]
         pure = (written[..., colour] > 180) & (written[..., others].max(axis=-1) < 80)
         rows.append(np.flatnonzero(pure.any(axis=1)))
     alone = with_labels(grey, labels[:1], np.array([[200.0, 100.0]])).astype(int)
-    assert rows[0].max() < rows[1].min(), "the upper word moved up"
+    assert rows[0].max() < rows[1].min() <= rows[1].max() < rows[2].min(), "the upper ones moved up"
     red = lambda p: ((p[..., 0] > 180) & (p[..., 1:].max(axis=-1) < 80)).sum()  # noqa: E731
     assert red(written) == pytest.approx(red(alone), rel=0.1), "none of it is cut off"
-    outside = with_labels(grey, labels, np.array([[-1.0, 3.0], [np.nan, np.nan]]))
+    outside = with_labels(grey, labels[:2], np.array([[-1.0, 3.0], [np.nan, np.nan]]))
     assert (outside == 128).all()

@@ -120,6 +120,7 @@ def test_marks_are_at_the_payloads_truth(placed_a: Placed) -> None:
             assert start == pytest.approx(site.xpos, abs=2e-5)
             along = (end - start) / np.linalg.norm(end - start)
             assert along == pytest.approx(site.xmat.reshape(3, 3)[:, k], abs=2e-5)
+    assert len(shot.marks.lines) == 3 * 72
     # The ellipsoid's three ellipses: where they cross its axes they are as far out as a solid body's of that inertia.
     ends = np.array(shot.marks.lines)[:, :3] - data.site("payload/com").xpos
     axes = data.site("payload/com").xmat.reshape(3, 3)

@@ -17,7 +17,7 @@ from mocobot_sim.pictures.marks import Label
 SIZE = 0.028
 """Height of the letters over that of the picture, with at least so many pixels:"""
 LEAST_PX = 9.0
-HALO = "white"
+HALO, HALO_SHARE = "white", 0.25
 
 
 def with_labels(
@@ -47,7 +47,7 @@ def with_labels(
         text = figure.text(
             x / width, 1.0 - y / height, label.text, color=tuple(part / 255.0 for part in label.rgb), fontsize=points,
             fontweight="bold", ha="center", va="center", parse_math=False,
-            path_effects=[withStroke(linewidth=0.25 * points, foreground=HALO)],
+            path_effects=[withStroke(linewidth=HALO_SHARE * points, foreground=HALO)],
         )  # fmt: skip
         _make_room(text, taken, canvas, width, height)
     canvas.draw()
@@ -56,8 +56,10 @@ def with_labels(
 
 def _make_room(text: Text, taken: list[Bbox], canvas: FigureCanvasAgg, width: int, height: int) -> None:
     """Move a word into the picture, and up over the words that are there."""
+    renderer = canvas.get_renderer()
+    rim = 0.5 * HALO_SHARE * float(text.get_fontsize()) * 100.0 / 72.0
     for _ in range(len(taken) + 1):
-        box = text.get_window_extent(canvas.get_renderer())
+        box = text.get_window_extent(renderer).padded(rim)
         x, y = text.get_position()
         x += (max(0.0, -box.x0) - max(0.0, box.x1 - width)) / width
         over = [other for other in taken if box.overlaps(other)]
@@ -66,4 +68,4 @@ def _make_room(text: Text, taken: list[Bbox], canvas: FigureCanvasAgg, width: in
         text.set_position((x, y))
         if not over:
             break
-    taken.append(text.get_window_extent(canvas.get_renderer()))
+    taken.append(text.get_window_extent(renderer).padded(rim))
