@@ -13,6 +13,7 @@ from mocobot_sim.base.solo import build_solo, compile_solo
 from mocobot_sim.pictures.camera import Camera
 from mocobot_sim.pictures.marks import Marks
 from mocobot_sim.pictures.render import make_folder, render
+from rendering import made
 
 SCENARIOS = Path(__file__).resolve().parents[1] / "scenarios"
 VIEW = Camera((0.0, 0.0, 0.3), 2.0, 215.0, -30.0)
@@ -33,10 +34,8 @@ def test_pictures_show_the_states_and_the_marks():
     marks = Marks()
     marks.path([[-0.5, -0.5, 0.01], [0.5, -0.5, 0.01], [0.5, 0.5, 0.01]], 0.02, (0.0, 0.8, 0.0, 1.0))
     marks.arrow([0.0, 0.0, 0.9], [0.0, 0.5, 0.9], 0.03, (0.0, 0.0, 1.0, 1.0))
-    pictures = render(model, [model.qpos0, aside, model.qpos0], VIEW, [Marks(), Marks(), marks], 320, 240)
-    if isinstance(pictures, str):
-        pytest.skip(pictures)
-    plain, moved, marked = (picture.astype(int) for picture in pictures)
+    states = [model.qpos0, aside, model.qpos0]
+    plain, moved, marked = made(render(model, states, VIEW, [Marks(), Marks(), marks], 320, 240))
     assert plain.shape == (240, 320, 3)
     assert np.abs(plain - moved).max() > 50
     for colour in (1, 2):

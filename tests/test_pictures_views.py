@@ -26,6 +26,7 @@ from mocobot_sim.replay.diagnosis import Cause
 from mocobot_sim.replay.placement import Grasps
 from mocobot_sim.scene import TeamScene
 from mocobot_sim.truth import GroundTruth
+from rendering import made
 from replay_case import BODIES, Placed, payload_body, placed_trial, robot_body, true_estimate
 
 FRICTION = Cause("joint_friction", 2, "proximal3", "It rubs.")
@@ -201,12 +202,10 @@ def test_everything_is_in_the_picture(placed_a: Placed) -> None:
 
 
 def pictures_or_skip(shots: list[Shot]) -> list[np.ndarray]:
-    made = render_shots(shots, WIDTH, HEIGHT)
-    if isinstance(made, str):
-        pytest.skip(made)
-    return [picture.astype(int) for picture in made]
+    return made(render_shots(shots, WIDTH, HEIGHT))
 
 
+@pytest.mark.slow
 def test_pictures_show_it_all_and_are_made_in_one_process(
     placed_a: Placed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -253,6 +252,7 @@ def test_marks_throw_no_shadow(placed_a: Placed) -> None:
     assert np.abs(before - again).max() < 10, "the next picture has its shadows again"
 
 
+@pytest.mark.slow
 def test_views_are_pictures_or_one_sentence(placed_a: Placed, monkeypatch: pytest.MonkeyPatch) -> None:
     recording, estimate = placed_a.recording(payload="a"), whole_estimate(placed_a)
 
@@ -265,9 +265,7 @@ def test_views_are_pictures_or_one_sentence(placed_a: Placed, monkeypatch: pytes
         ]
 
     for view in views():
-        if isinstance(view, str):
-            pytest.skip(view)
-        assert (view.shape, view.dtype) == ((100, 160, 3), np.uint8)
+        assert made(view if isinstance(view, str) else [view])[0].shape == (100, 160, 3)
     monkeypatch.setenv("MUJOCO_GL", "disabled")
     for view in views():
         assert isinstance(view, str)
