@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from html import escape
 from typing import Any
 
 import numpy as np
@@ -35,6 +36,23 @@ class Key:
     symbol: str = "line"
 
 
+def paint(name: str) -> Json:
+    """A colour of the palette; the page puts in that of its theme."""
+    return {"colour": name}
+
+
+def shared(name: str) -> Json:
+    """One of the figure's ``arrays``."""
+    return {"shared": name}
+
+
+def literal(text: str, most: int = 200) -> str:
+    """Text of others for a plot: shortened in the middle, and not read as markup."""
+    if len(text) > most:
+        text = f"{text[: most // 2]}…{text[len(text) - (most - 1) // 2 :]}"
+    return escape(text, quote=False)
+
+
 def chart(
     book: Book,
     title: str,
@@ -50,7 +68,7 @@ def chart(
     Args:
         book: gives ids.
         title: of the caption.
-        figure: ``data`` and ``layout`` of plotly, ``arrays`` that lines share as ``#name``; colours are ``@name``;
+        figure: ``data`` and ``layout`` of plotly, ``arrays`` that lines share;
             ``narrow`` changes the layout on phones, by dotted path.
         height: of the plot [px].
         label: what it shows, for those who do not see it.
@@ -98,11 +116,15 @@ def layout(**more: Any) -> Json:
         "showlegend": False,
         "paper_bgcolor": CLEAR,
         "plot_bgcolor": CLEAR,
-        "font": {"color": "@text", "size": 12},
+        "font": {"color": paint("text"), "size": 12},
         "margin": {"l": 58, "r": 14, "t": 10, "b": 44},
         "hovermode": "closest",
-        "hoverlabel": {"bgcolor": "@card", "bordercolor": "@line", "font": {"color": "@text"}},
-        "modebar": {"bgcolor": CLEAR, "color": "@soft", "activecolor": "@link"},
+        "hoverlabel": {
+            "bgcolor": paint("card"),
+            "bordercolor": paint("line"),
+            "font": {"color": paint("text")},
+        },
+        "modebar": {"bgcolor": CLEAR, "color": paint("soft"), "activecolor": paint("link")},
         "uirevision": "keep",
         **more,
     }
@@ -112,10 +134,10 @@ def axis(title: str = "", **more: Any) -> Json:
     """An axis in the page's style."""
     return {
         "title": {"text": spelled_text(title), "standoff": 8, "font": {"size": 12}},
-        "gridcolor": "@grid",
-        "linecolor": "@line",
-        "zerolinecolor": "@line",
-        "tickfont": {"color": "@soft", "size": 11},
+        "gridcolor": paint("grid"),
+        "linecolor": paint("line"),
+        "zerolinecolor": paint("line"),
+        "tickfont": {"color": paint("soft"), "size": 11},
         "automargin": True,
         **more,
     }
@@ -131,7 +153,7 @@ def log_axis(title: str, low: float, high: float, **more: Any) -> Json:
         return axis(title, type="log", range=ends, tickvals=at, ticktext=[f"{v:g}" for v in at], **more)
     ticks: Json = {"dtick": 1 if decades < 7 else 2}
     # Plotly writes powers larger than other labels.
-    style = {"tickfont": {"color": "@soft", "size": 9.5}, "exponentformat": "power", "minexponent": 3}
+    style = {"tickfont": {"color": paint("soft"), "size": 9.5}, "exponentformat": "power", "minexponent": 3}
     return axis(title, type="log", range=ends, **style, **ticks, **more)
 
 
@@ -147,15 +169,15 @@ def dots(
         "y": list(y),
         "name": key.label,
         "legendgroup": key.group,
-        "marker": {"symbol": key.symbol, "color": f"@{key.colour}", "size": size},
+        "marker": {"symbol": key.symbol, "color": paint(key.colour), "size": size},
         **more,
     }
     if text is not None:
-        trace |= {"text": list(text), "hovertemplate": "%{text}<extra></extra>"}
+        trace |= {"text": [literal(t) for t in text], "hovertemplate": "%{text}<extra></extra>"}
     if up is not None and any(up):
         trace["error_y"] = {
             "type": "data", "symmetric": False, "array": [u or 0.0 for u in up], "arrayminus": [0.0] * len(up),
-            "color": f"@{key.colour}", "thickness": 1.3, "width": 3,
+            "color": paint(key.colour), "thickness": 1.3, "width": 3,
         }  # fmt: skip
     return trace
 
@@ -173,7 +195,7 @@ def finite(values: Sequence[float] | NDArray[Any]) -> list[float | None]:
 
 def rule(axis_name: str, at: float, **more: Any) -> Json:
     """A dashed line across the plot: at a value of ``y`` (or ``y2`` ...), or of ``x``."""
-    line = {"color": "@text", "width": 1.2, "dash": "dash"}
+    line = {"color": paint("text"), "width": 1.2, "dash": "dash"}
     if axis_name.startswith("y"):
         return {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": axis_name, "y0": at, "y1": at,
                 "line": line, **more}  # fmt: skip

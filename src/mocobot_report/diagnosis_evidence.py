@@ -8,7 +8,7 @@ from typing import Any
 
 from mocobot_report.blocks import paragraph, section, spelled_text, tidy
 from mocobot_report.book import Book
-from mocobot_report.charts import Json, Key, axis, chart, dots, layout, log_axis
+from mocobot_report.charts import Json, Key, axis, chart, dots, layout, literal, log_axis, paint
 from mocobot_report.folder import Diagnosed
 from mocobot_report.html import Node, el
 from mocobot_report.numbers import percent, plain
@@ -78,9 +78,10 @@ def _along(book: Book, title: str, shares: Values, colour: str) -> Node:
     data = [
         {
             "type": "bar", "orientation": "h", "x": [100.0 * v for v in shares.values()],
-            "y": list(range(len(names)))[::-1], "marker": {"color": f"@{key.colour}"}, "width": 0.62,
+            "y": list(range(len(names)))[::-1], "marker": {"color": paint(key.colour)}, "width": 0.62,
             "text": [percent(v) for v in shares.values()], "textposition": "auto", "insidetextanchor": "end",
-            "insidetextfont": {"color": "@card"}, "outsidetextfont": {"color": "@text"}, "cliponaxis": False,
+            "insidetextfont": {"color": paint("card")}, "outsidetextfont": {"color": paint("text")},
+            "cliponaxis": False,
             "hovertemplate": "%{text}<extra></extra>",
         }
     ]  # fmt: skip
@@ -101,14 +102,14 @@ def _along(book: Book, title: str, shares: Values, colour: str) -> Node:
 def _sideways(names: Sequence[str], horizontal: Json, rule: float | None = None) -> Json:
     lines = [] if rule is None else [
         {"type": "line", "xref": "x", "x0": rule, "x1": rule, "yref": "paper", "y0": 0, "y1": 1,
-         "line": {"color": "@text", "width": 1.2, "dash": "dash"}}
+         "line": {"color": paint("text"), "width": 1.2, "dash": "dash"}}
     ]  # fmt: skip
     count = len(names)
     return layout(
         xaxis=horizontal,
         yaxis=axis(
-            tickvals=list(range(count))[::-1], ticktext=list(names), range=[-0.6, count - 0.4], zeroline=False,
-            fixedrange=True, ticks="",
+            tickvals=list(range(count))[::-1], ticktext=[literal(name, 26) for name in names], 
+            range=[-0.6, count - 0.4], zeroline=False, fixedrange=True, ticks="",
         ),
         shapes=lines,
         margin={"l": 120, "r": 14, "t": 8, "b": 44},

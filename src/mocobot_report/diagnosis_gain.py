@@ -10,7 +10,18 @@ import numpy as np
 from discrepancy.report_gain import ERRORS
 from mocobot_report.blocks import Entry, Num, folded, paragraph, section, table, tidy, value, verdict
 from mocobot_report.book import Book
-from mocobot_report.charts import Json, Key, axis, chart, dots, layout, log_axis, shared_legend
+from mocobot_report.charts import (
+    Json,
+    Key,
+    axis,
+    chart,
+    dots,
+    layout,
+    literal,
+    log_axis,
+    paint,
+    shared_legend,
+)
 from mocobot_report.html import Node, el
 from mocobot_report.numbers import NONE, fitting, percent, plain
 
@@ -121,7 +132,7 @@ def _trials_chart(
             yaxis=log_axis(f"{title} [{shown}]" if shown else title, min(positive), max(positive)),
             shapes=[
                 {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": "y", "y0": floor, "y1": floor,
-                 "line": {"color": "@text", "width": 1.2, "dash": "dash"}}
+                 "line": {"color": paint("text"), "width": 1.2, "dash": "dash"}}
             ],
             margin={"l": 60, "r": 12, "t": 8, "b": 26},
         ),
@@ -135,7 +146,7 @@ def _trials_chart(
 def _fitted(names: Sequence[str]) -> list[str]:
     """Labels that fit below a narrow plot."""
     if len(names) <= 6 and all(len(name) <= 40 // len(names) for name in names):
-        return list(names)
+        return [literal(name) for name in names]
     return [str(k + 1) for k in range(len(names))]
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from discrepancy.traces import Group, Trace, groups
 from mocobot_report.blocks import Entry, paragraph, section, table, tabs, value, verdict
 from mocobot_report.book import Book
-from mocobot_report.charts import Json, Key, axis, chart, layout, log_axis, numbers, shared_legend
+from mocobot_report.charts import Json, Key, axis, chart, layout, log_axis, numbers, paint, shared_legend
 from mocobot_report.folder import Diagnosed
 from mocobot_report.html import Node, el
 from mocobot_report.numbers import fitting
@@ -228,7 +228,7 @@ def _dependence(
             {
                 "type": "scatter", "mode": "lines" if quantity is None else "lines+markers", "x": numbers(x),
                 "y": numbers(y), "name": key.label, "legendgroup": key.group,
-                "line": {"color": f"@{key.colour}", "width": 1.6}, "marker": {"color": f"@{key.colour}", "size": 5},
+                "line": {"color": paint(key.colour), "width": 1.6}, "marker": {"color": paint(key.colour), "size": 5},
                 "hovertemplate": f"{key.label}<br>%{{x:.3g}}: %{{y:.3g}} × clean<extra></extra>",
             }
         )  # fmt: skip
@@ -244,7 +244,7 @@ def _dependence(
             yaxis=vertical,
             shapes=[
                 {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": "y", "y0": 1.0, "y1": 1.0,
-                 "line": {"color": "@text", "width": 1, "dash": "dash"}}
+                 "line": {"color": paint("text"), "width": 1, "dash": "dash"}}
             ],
             margin={"l": 52, "r": 10, "t": 8, "b": 42},
         ),

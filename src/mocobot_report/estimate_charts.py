@@ -10,7 +10,7 @@ import numpy as np
 from estimator.identifiability import FACTOR
 from estimator.payload_estimate import PayloadEstimate
 from mocobot_report.book import Book
-from mocobot_report.charts import Json, Key, axis, chart, dots, layout, log_axis
+from mocobot_report.charts import Json, Key, axis, chart, dots, layout, literal, log_axis, paint
 from mocobot_report.html import Node, el
 from mocobot_report.numbers import with_error
 from mocobot_sim.replay.body_facts import BodyFacts
@@ -95,7 +95,7 @@ def _sideways(values: list[float], errors: list[float], key: Key, k: int, rows: 
     bars = {
         "type": "data",
         "array": [2.0 * s for s in errors],
-        "color": f"@{key.colour}",
+        "color": paint(key.colour),
         "thickness": 1.4,
         "width": 3,
     }
@@ -109,7 +109,7 @@ def _true(values: list[float], rows: int) -> Json:
 
 def _figure(data: list[Json], names: list[str], title: str) -> Json:
     rows = len(names)
-    short = [name if len(name) <= 24 else name[:11] + "…" + name[-11:] for name in names]
+    short = [literal(name, 24) for name in names]
     return {
         "data": data,
         "layout": layout(
@@ -147,7 +147,7 @@ def excitation_chart(book: Book, e: PayloadEstimate) -> Node:
             text.append(f"{step.step}: signal {s:.2g} {step.unit}, noise {step.noise:.2g}")
     trace = dots([], [], key, text=text, size=9, opacity=0.85) | {"x": x, "y": y}
     line: dict[str, Any] = {"type": "line", "xref": "x", "yref": "paper", "x0": FACTOR, "x1": FACTOR, "y0": 0, "y1": 1,
-                            "line": {"color": "@text", "width": 1.2, "dash": "dash"}}  # fmt: skip
+                            "line": {"color": paint("text"), "width": 1.2, "dash": "dash"}}  # fmt: skip
     figure: Json = {
         "data": [trace],
         "layout": layout(

@@ -13,7 +13,7 @@ from estimator.payload_estimate import PayloadEstimate
 from estimator.recording import Recording
 from mocobot_report.blocks import Entry, bullets, paragraph, table, tabs, value, verdict
 from mocobot_report.book import Book
-from mocobot_report.charts import Json, Key, chart, layout, log_axis, numbers
+from mocobot_report.charts import Json, Key, chart, layout, log_axis, numbers, paint, shared
 from mocobot_report.html import Node, el
 from mocobot_report.series import Line, Panel, height, stacked, thinned
 from mocobot_report.sources import Source
@@ -149,8 +149,8 @@ def _spectrum(book: Book, one: Left) -> Node:
     shown = np.maximum(density, 1e-12)
     data: list[Json] = [
         {
-            "type": "scatter", "mode": "lines", "x": "#f", "y": numbers(shown[:, k]), "name": key.label,
-            "legendgroup": key.group, "line": {"color": f"@{key.colour}", "width": 1.4},
+            "type": "scatter", "mode": "lines", "x": shared("f"), "y": numbers(shown[:, k]), "name": key.label,
+            "legendgroup": key.group, "line": {"color": paint(key.colour), "width": 1.4},
             "hovertemplate": f"{key.label}, %{{x:.2f}} Hz: %{{y:.2g}} {one.unit}/√Hz<extra></extra>",
         }
         for k, key in enumerate(one.keys)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -19,6 +20,7 @@ from estimator.estimate_json import FORMAT as ESTIMATE
 from estimator.estimate_json import VERSION as ESTIMATE_VERSION
 from estimator.payload_estimate import PayloadEstimate
 from mocobot_sim.paper.tables import paper_tables, summary_table
+from mocobot_sim.replay.diagnosis import VERDICTS
 from mocobot_sim.replay.fact_files import read_estimate, read_json
 
 SOUGHT = (
@@ -193,8 +195,12 @@ def _diagnosis(path: Path, values: Json, other: Diagnosed | None) -> Diagnosed:
             f"{path}: is a diagnosis of version {values.get('version')!r:.40}; this mocobot reads version "
             f"{DIAGNOSIS_VERSION}"
         )
+    if values.get("verdict") not in VERDICTS:
+        raise InputError(
+            f"{path}: verdict is {values.get('verdict')!r:.40}; it must be one of {', '.join(VERDICTS)}"
+        )
     try:
-        format_diagnosis(values)  # touches every key that a report has to show
+        format_diagnosis(values)  # touches most keys that a report has to show
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
         raise InputError(f"{path}: not a complete diagnosis ({_words(error)})") from error
     file = path.parent / RESIDUALS
@@ -202,6 +208,19 @@ def _diagnosis(path: Path, values: Json, other: Diagnosed | None) -> Diagnosed:
     if traces and [trace.name for trace in traces] != list(values["recordings"]):
         raise InputError(f"{file}: is of other trials than {path.name}; diagnose again")
     return Diagnosed(path.parent, values, tuple(traces), tuple(channels))
+
+
+@contextmanager
+def complete(path: Path) -> Iterator[None]:
+    """A block that reads a file's values; where one is missing or of another kind, the file is what is wrong.
+
+    Raises:
+        InputError: a key is missing, or a value is not what it must be.
+    """
+    try:
+        yield
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
+        raise InputError(f"{path}: not complete ({_words(error)})") from error
 
 
 def _number(value: Any) -> bool:

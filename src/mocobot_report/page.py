@@ -11,7 +11,7 @@ from plotly.offline import get_plotlyjs
 
 from mocobot_report import diagnosis_part, estimate_part, palette, paper_part
 from mocobot_report.book import Book
-from mocobot_report.folder import Contents, read_folder
+from mocobot_report.folder import Contents, complete, read_folder
 from mocobot_report.html import Node, el, raw, to_bytes, variables, words
 from mocobot_report.provenance_part import provenance_part
 from mocobot_report.target import MARK, check_target, write_page
@@ -77,12 +77,15 @@ def _parts(book: Book, contents: Contents) -> list[tuple[str, str, list[Node]]]:
     """Id, heading and content of every part."""
     parts = []
     if contents.paper is not None:
-        parts.append(("paper", "The paper's experiment", paper_part.sections(book, contents.paper)))
+        with complete(contents.folder / "paper.json"):
+            parts.append(("paper", "The paper's experiment", paper_part.sections(book, contents.paper)))
     for k, estimated in enumerate(contents.estimates, start=1):
         name = "Estimate" if len(contents.estimates) == 1 else f"Estimate {estimated.path.name}"
-        parts.append((f"estimate-{k}", name, estimate_part.sections(book, estimated)))
+        with complete(estimated.path):
+            parts.append((f"estimate-{k}", name, estimate_part.sections(book, estimated)))
     if contents.diagnosis is not None:
-        parts.append(("diagnosis", "Diagnosis", diagnosis_part.sections(book, contents.diagnosis)))
+        with complete(contents.diagnosis.folder / "diagnosis.json"):
+            parts.append(("diagnosis", "Diagnosis", diagnosis_part.sections(book, contents.diagnosis)))
     return parts
 
 
@@ -93,9 +96,13 @@ def _top(contents: Contents) -> tuple[str, list[Node]]:
         answers.append((paper_part.title(contents.paper), paper_part.answer(contents.paper)))
     for estimated in contents.estimates:
         name = f": {estimated.path.name}" if len(contents.estimates) > 1 else ""
-        answers.append((f"{estimate_part.title(estimated)}{name}", estimate_part.answer(estimated)))
+        with complete(estimated.path):
+            answers.append((f"{estimate_part.title(estimated)}{name}", estimate_part.answer(estimated)))
     if contents.diagnosis is not None:
-        answers.append((diagnosis_part.title(contents.diagnosis), diagnosis_part.answer(contents.diagnosis)))
+        with complete(contents.diagnosis.folder / "diagnosis.json"):
+            answers.append(
+                (diagnosis_part.title(contents.diagnosis), diagnosis_part.answer(contents.diagnosis))
+            )
     if len(answers) == 1:
         return answers[0]
     return f"{len(answers)} results", [node for name, nodes in answers for node in (el("h2", name), *nodes)]

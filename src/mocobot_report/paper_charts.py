@@ -12,7 +12,7 @@ from estimator.payload_estimate import PayloadEstimate
 from mocobot_report import palette
 from mocobot_report.blocks import spelled_text
 from mocobot_report.book import Book
-from mocobot_report.charts import Json, Key, axis, chart, dots, layout, log_axis
+from mocobot_report.charts import Json, Key, axis, chart, dots, layout, log_axis, paint
 from mocobot_report.html import Node
 from mocobot_report.numbers import PLUS_MINUS, plain
 from mocobot_sim.paper.tables import MOMENTS, PaperTable, Row
@@ -80,7 +80,7 @@ def _bands(rows: Sequence[Row]) -> list[Json]:
         if k % 2:
             shapes.append(
                 {"type": "rect", "xref": "x", "yref": "paper", "x0": start - 0.5, "x1": end - 0.5, "y0": 0, "y1": 1,
-                 "fillcolor": "@sunk", "line": {"width": 0}, "layer": "below"}
+                 "fillcolor": paint("sunk"), "line": {"width": 0}, "layer": "below"}
             )  # fmt: skip
         start = end
     return shapes

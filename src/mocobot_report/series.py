@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mocobot_report.blocks import spelled_text
-from mocobot_report.charts import Json, Key, axis, layout, log_axis, numbers
+from mocobot_report.charts import Json, Key, axis, layout, literal, log_axis, numbers, paint, shared
 
 Array = NDArray[np.float64]
 
@@ -72,19 +72,19 @@ def stacked(panels: Sequence[Panel], x_title: str = "time [s]") -> Json:
     data, shapes, arrays = [], [], {}
     known: dict[bytes, str] = {}
 
-    def shared(values: Array) -> str:
+    def once(values: Array) -> Json:
         packed = np.ascontiguousarray(values, dtype="<f4").tobytes()
         if packed not in known:
             known[packed] = f"t{len(known)}"
             arrays[known[packed]] = numbers(values)
-        return f"#{known[packed]}"
+        return shared(known[packed])
 
     axes: Json = {}
     for k, panel in enumerate(panels):
         number = "" if k == 0 else str(k + 1)
         top = 1.0 - k * (tall + gap)
         domain = [max(0.0, top - tall), top]
-        title = f"{panel.title}<br>[{panel.unit}]" if panel.unit else panel.title
+        title = f"{literal(panel.title, 24)}<br>[{panel.unit}]" if panel.unit else literal(panel.title, 24)
         style = {"domain": domain, "anchor": "x", "zeroline": not panel.log, "nticks": 5}
         if panel.log and panel.limits is not None:
             axes[f"yaxis{number}"] = log_axis(title, *panel.limits, **(style | {"nticks": 4}))
@@ -95,30 +95,30 @@ def stacked(panels: Sequence[Panel], x_title: str = "time [s]") -> Json:
         if panel.band:
             shapes.append(
                 {"type": "rect", "xref": "paper", "x0": 0, "x1": 1, "yref": f"y{number}", "y0": -panel.band,
-                 "y1": panel.band, "fillcolor": "@band", "line": {"width": 0}, "layer": "below"}
+                 "y1": panel.band, "fillcolor": paint("band"), "line": {"width": 0}, "layer": "below"}
             )  # fmt: skip
         if panel.rule is not None:
             shapes.append(
                 {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": f"y{number}", "y0": panel.rule,
-                 "y1": panel.rule, "line": {"color": "@text", "width": 1, "dash": "dash"}}
+                 "y1": panel.rule, "line": {"color": paint("text"), "width": 1, "dash": "dash"}}
             )  # fmt: skip
         for line in panel.lines:
             trace: Json = {
                 "type": "scatter",
                 "mode": "markers" if line.points else "lines",
-                "x": shared(line.time),
+                "x": once(line.time),
                 "y": numbers(line.values),
                 "yaxis": f"y{number}",
-                "name": line.key.label,
+                "name": literal(line.key.label),
                 "legendgroup": line.key.group,
-                "hovertemplate": f"{panel.title}, {line.key.label}<br>%{{x:.2f}}: %{{y:.3g}} "
+                "hovertemplate": f"{literal(panel.title)}, {literal(line.key.label)}<br>%{{x:.2f}}: %{{y:.3g}} "
                 f"{panel.unit}<extra></extra>",
             }
             if line.points:
-                trace["marker"] = {"color": f"@{line.key.colour}", "size": 6}
+                trace["marker"] = {"color": paint(line.key.colour), "size": 6}
             else:
                 dash = {"dash": "dash"} if line.key.symbol == "dash" else {}
-                trace["line"] = {"color": f"@{line.key.colour}", "width": 1.2, **dash}
+                trace["line"] = {"color": paint(line.key.colour), "width": 1.2, **dash}
             data.append(trace)
     last = "y" if count == 1 else f"y{count}"
     return {

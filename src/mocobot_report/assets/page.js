@@ -19,14 +19,12 @@
   button.addEventListener("click", () => { chosen = dark() ? "light" : "dark"; store(chosen); setTheme(); });
   system.addEventListener("change", setTheme);
 
-  // Colours are written @name, arrays that several lines share #name.
+  // Colours are {colour: name}, arrays that several lines share {shared: name}.
   const themed = (value, style, arrays) => {
-    if (typeof value === "string") {
-      if (value[0] === "@") return style.getPropertyValue("--" + value.slice(1)).trim();
-      return value[0] === "#" && arrays && value.slice(1) in arrays ? arrays[value.slice(1)] : value;
-    }
     if (Array.isArray(value)) return value.map((item) => themed(item, style, arrays));
     if (value && typeof value === "object") {
+      if ("colour" in value) return style.getPropertyValue("--" + value.colour).trim();
+      if ("shared" in value) return arrays[value.shared];
       return Object.fromEntries(Object.entries(value).map(([key, item]) => [key, themed(item, style, arrays)]));
     }
     return value;

@@ -1,0 +1,235 @@
+"""The report in a headless Chromium: loads alone, draws, fits a phone, readable in both themes, works by keyboard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from chromium import DESKTOP, PHONE, Seen, browser_running, opened
+from mocobot_report.page import write_report
+from report_folders import NASTY, diagnosis_folder, estimate_folder, paper_folder
+
+pytestmark = pytest.mark.slow
+
+MAKE: dict[str, Callable[[Path], Path]] = {
+    "paper": paper_folder,
+    "estimate": estimate_folder,
+    "diagnosis": diagnosis_folder,
+    "axis": lambda folder: diagnosis_folder(folder, "consistent", axis=True),
+}
+CONTRAST = """() => {
+  const channel = (v) => (v /= 255) <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4;
+  const parts = (colour) => {
+    const n = colour.match(/[\\d.]+/g).map(Number);
+    return { rgb: n.slice(0, 3), alpha: n.length > 3 ? n[3] : 1 };
+  };
+  const luminance = ([r, g, b]) => 0.2126 * channel(r) + 0.7152 * channel(g) + 0.0722 * channel(b);
+  const behind = (element) => {
+    for (let at = element; at; at = at.parentElement) {
+      const { rgb, alpha } = parts(getComputedStyle(at).backgroundColor);
+      if (alpha === 1 && !(at instanceof SVGElement)) return rgb;
+    }
+    return [255, 255, 255];
+  };
+  const bad = [];
+  let count = 0;
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  while (walker.nextNode()) {
+    const element = walker.currentNode.parentElement;
+    if (!walker.currentNode.data.trim() || element.closest('script,style,noscript,.skip')) continue;
+    if (!element.getClientRects().length) continue;
+    const style = getComputedStyle(element);
+    const colour = element instanceof SVGElement ? style.fill : style.color;
+    if (colour === 'none' || element.closest('.bartext-inside')) continue;
+    const [a, b] = [luminance(parts(colour).rgb), luminance(behind(element))].sort((x, y) => y - x);
+    const ratio = (a + 0.05) / (b + 0.05);
+    count += 1;
+    if (ratio < 4.5) bad.push([walker.currentNode.data.trim().slice(0, 40), ratio.toFixed(2), colour]);
+  }
+  return { bad, count };
+}"""
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[object]:
+    with browser_running() as running:
+        yield running
+
+
+@pytest.fixture(scope="module")
+def pages(browser: object, tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("results")
+    return {kind: write_report(make(folder / kind)) for kind, make in MAKE.items()}
+
+
+@pytest.mark.parametrize("kind", MAKE)
+@pytest.mark.parametrize(("size", "scheme"), [(DESKTOP, "light"), (PHONE, "dark")])
+def test_page_is_quiet_whole_and_readable(
+    browser: object, pages: dict[str, Path], kind: str, size: tuple[int, int], scheme: str
+) -> None:
+    with opened(browser, pages[kind], size, color_scheme=scheme) as seen:
+        seen.draw_all()
+        assert seen.said == []
+        assert [url for url in seen.asked if not url.startswith(("data:", "blob:"))] == [pages[kind].as_uri()]
+        _check_plots(seen)
+        _check_markup(seen)
+        assert seen.page.locator("script").count() == 2 + seen.page.locator(".plot").count()
+        if kind != "paper":  # what a file's name or label holds is shown, not obeyed
+            assert NASTY[:30] in seen.page.evaluate("document.querySelector('main').textContent")
+        assert seen.page.evaluate("document.documentElement.scrollWidth") <= size[0]
+        assert seen.page.evaluate("document.body.scrollWidth") <= size[0]
+        contrast = seen.page.evaluate(CONTRAST)
+        assert contrast["bad"] == []
+        assert contrast["count"] > 100
+        dark = seen.page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(15, 20, 26)"
+        assert dark == (scheme == "dark")
+
+
+def _check_plots(seen: Seen) -> None:
+    """Every plot has marks in it, inside its own box, and no text of its axes is cut off."""
+    plots = seen.page.evaluate(
+        """() => [...document.querySelectorAll('.plot')].map((plot) => {
+             const box = plot.getBoundingClientRect();
+             const texts = [...plot.querySelectorAll('.xtitle, .ytitle, .ytick text, .xtick text')];
+             return {
+               name: plot.getAttribute('aria-label'),
+               marks: plot.querySelectorAll('.js-line, .point path, path.point').length,
+               drawn: plot.querySelectorAll('.point path, path.point').length
+                 + [...plot.querySelectorAll('.js-line')].filter((p) => (p.getAttribute('d') || '').length > 8).length,
+               outside: texts.filter((t) => { const b = t.getBoundingClientRect();
+                 return b.width && (b.left < box.left - 1 || b.right > box.right + 1 || b.bottom > box.bottom + 1); })
+                 .map((t) => t.textContent),
+             };
+           })"""
+    )
+    assert plots
+    for plot in plots:
+        assert plot["drawn"] > 0, plot
+        assert plot["outside"] == [], plot
+
+
+def _check_markup(seen: Seen) -> None:
+    """Landmarks, headings, names of everything, and no id twice."""
+    found = seen.page.evaluate(
+        """() => {
+             const all = (css) => [...document.querySelectorAll(css)];
+             const ids = all('[id]').map((e) => e.id);
+             const levels = all('h1,h2,h3,h4,h5,h6').map((h) => +h.tagName[1]);
+             const unnamed = (i) => !i.labels.length || !i.closest('fieldset').querySelector('legend');
+             return {
+               h1: all('h1').length, main: all('main').length, nav: all('nav[aria-label]').length,
+               lang: document.documentElement.lang,
+               twice: ids.filter((id, k) => ids.indexOf(id) !== k),
+               skipped: levels.filter((level, k) => k && level > levels[k - 1] + 1),
+               captions: all('table').filter((t) => !t.caption || !t.caption.textContent.trim()).length,
+               scopes: all('th:not([scope])').length,
+               alts: all('img').filter((i) => i.alt.length < 10).length,
+               plots: all('.plot').filter((p) => p.getAttribute('role') !== 'img' || !p.ariaLabel).length,
+               inputs: all('input').filter(unnamed).length,
+               broken: all('a[href^="#"]').filter((a) => !document.getElementById(a.hash.slice(1))).length,
+             };
+           }"""
+    )
+    assert found == {
+        "h1": 1, "main": 1, "nav": 1, "lang": "en", "twice": [], "skipped": [], "captions": 0, "scopes": 0, "alts": 0,
+        "plots": 0, "inputs": 0, "broken": 0,
+    }  # fmt: skip
+    assert seen.page.title().endswith("| mocobot report")
+
+
+def test_keyboard_reaches_everything(browser: object, pages: dict[str, Path]) -> None:
+    with opened(browser, pages["diagnosis"], PHONE, reduced_motion="reduce") as seen:
+        page = seen.page
+        page.keyboard.press("Tab")
+        assert page.evaluate("document.activeElement.className") == "skip"
+        assert page.evaluate("document.activeElement.getBoundingClientRect().top") >= 0
+        page.keyboard.press("Enter")
+        assert page.evaluate("document.activeElement.id") == "main"
+
+        page.reload()
+        visited = []
+        for _ in range(400):
+            page.keyboard.press("Tab")
+            at = page.evaluate(
+                """() => { const e = document.activeElement; if (e === document.body) return null;
+                     const s = getComputedStyle(e.closest('label') ?? e);
+                     const seen = s.outlineStyle !== 'none' && parseFloat(s.outlineWidth) >= 2;
+                     return [e.id || e.className || e.tagName, seen]; }"""
+            )
+            if at is None or (visited and at[0] == visited[0]):
+                break
+            assert at[1], f"focus on {at[0]} does not show"
+            visited.append(at[0])
+        assert visited[:2] == ["skip", "theme"]
+        kinds = page.evaluate(
+            """() => ['nav a', '.legend button', '.tabs input:checked', '.scroll[tabindex]', 'summary'].map((css) =>
+                 [...document.querySelectorAll(css)].filter((e) => e.checkVisibility()).length)"""
+        )
+        assert all(count > 0 for count in kinds)
+        assert len(visited) >= sum(kinds)
+
+
+def test_theme_legend_and_tabs_by_keyboard(browser: object, pages: dict[str, Path]) -> None:
+    with opened(browser, pages["diagnosis"], color_scheme="light") as seen:
+        page = seen.page
+        seen.draw_all()
+        page.reload()
+        page.locator("#theme").focus()
+        page.keyboard.press("Enter")
+        assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(15, 20, 26)"
+        assert page.locator("#theme").inner_text() == "Light theme"
+
+        button = page.locator(".legend button").first
+        button.scroll_into_view_if_needed()
+        plot = button.locator("xpath=ancestor::figure").locator(".plot")
+        page.wait_for_function("(p) => p.dataset.drawn", arg=plot.element_handle())
+        traces = plot.locator(".trace")
+        before = traces.count()
+        text = plot.locator(".ytick text").first
+        assert (
+            text.evaluate("(t) => getComputedStyle(t).fill") == "rgb(169, 181, 195)"
+        )  # drawn in the dark theme
+        button.focus()
+        page.keyboard.press("Space")
+        assert button.get_attribute("aria-pressed") == "false"
+        page.wait_for_function(
+            "([p, n]) => p.querySelectorAll('.trace').length < n", arg=[plot.element_handle(), before]
+        )
+
+        tabs = page.locator(".tabs").first
+        first, second = (tabs.locator("input").nth(k) for k in (0, 1))
+        panels = [page.locator(f"#{box.get_attribute('value')}") for box in (first, second)]
+        assert [panel.is_visible() for panel in panels] == [True, False]
+        first.focus()
+        page.keyboard.press("ArrowRight")
+        assert [panel.is_visible() for panel in panels] == [False, True]
+        drawn = panels[1].locator(".plot[data-drawn]").first
+        drawn.wait_for(state="attached", timeout=5000)
+        assert seen.said == []
+
+
+def test_motion_is_reduced_and_print_shows_all(browser: object, pages: dict[str, Path]) -> None:
+    with opened(browser, pages["diagnosis"], reduced_motion="reduce") as seen:
+        style = "getComputedStyle(document.documentElement).scrollBehavior"
+        assert seen.page.evaluate(style) == "auto"
+        seen.page.emulate_media(reduced_motion="no-preference")
+        assert seen.page.evaluate(style) == "smooth"
+        hidden = "[...document.querySelectorAll('[data-panel]')].filter((p) => !p.checkVisibility()).length"
+        assert seen.page.evaluate(hidden) > 0
+        seen.page.emulate_media(media="print")
+        seen.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+        assert seen.page.evaluate(hidden) == 0
+        assert not seen.page.locator("nav").is_visible()
+        seen.page.wait_for_function("[...document.querySelectorAll('.plot')].every((p) => p.dataset.drawn)")
+        seen.page.evaluate("dispatchEvent(new Event('afterprint'))")
+        seen.page.emulate_media(media="screen")
+        assert seen.page.evaluate(hidden) > 0
+
+
+def test_tables_are_there_without_scripts(browser: object, pages: dict[str, Path]) -> None:
+    with opened(browser, pages["diagnosis"], java_script_enabled=False) as seen:
+        assert "Plots need JavaScript" in seen.page.locator("noscript").inner_text()
+        assert seen.page.locator("table").first.is_visible()
+        assert seen.page.locator("[data-panel]").last.is_visible()
