@@ -5,15 +5,14 @@ from __future__ import annotations
 import io
 import os
 import sys
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
 
 import tyro
 
 from estimator.errors import InputError
-from mocobot.files import check_target, write_json
 
 
 @dataclass(frozen=True)
@@ -57,27 +56,9 @@ class Estimate:
 
     def run(self) -> None:
         """Run the command."""
-        from estimator.estimate import estimate_payload
-        from estimator.recording import Recording, read_recording
-        from estimator.report import format_estimate
-        from mocobot.progress import stages
-        from mocobot.provenance import provenance
+        from mocobot.estimate_command import run
 
-        if not self.rec:
-            raise InputError("no recording given; name at least one file")
-        check_recordings(self.rec, self.out)
-        with stages() as (say, _):
-
-            def each() -> Iterator[Recording]:
-                for path in self.rec:
-                    say(f"reading {path.name}")
-                    yield read_recording(path)
-
-            estimate = estimate_payload(each(), self.method, self.cutoff_hz, say=say)
-        if self.out:
-            made = provenance("estimate", asdict(self), self.rec)
-            write_json(self.out, estimate.to_dict() | {"provenance": made})
-        print(format_estimate(estimate))
+        run(self)
 
 
 @dataclass(frozen=True)
@@ -234,52 +215,9 @@ class Simulate:
 
     def run(self) -> None:
         """Run the command."""
-        from estimator.recording import write_recording
-        from mocobot.progress import bar
-        from mocobot_sim.extended import load_extended
-        from mocobot_sim.sensors import sensor_preset
-        from mocobot_sim.simulate import TrialRequest, simulate
-        from mocobot_sim.truth import write_truth
+        from mocobot.simulate_command import run
 
-        if self.out.suffix != ".parquet":
-            raise InputError(f"{self.out}: the file's name must end in .parquet")
-        check_target(self.out)
-        for option, value, trajectory in (
-            ("--vias", self.vias, "random"),
-            ("--duration", self.duration, "periodic"),
-        ):
-            if value is not None and self.trajectory != trajectory:
-                raise InputError(f"{option} is for a {trajectory} trajectory; this one is {self.trajectory}")
-        if self.model is not None and self.payload is not None:
-            raise InputError(
-                "--payload and --model are both given; the model has its own payload, so leave one out"
-            )
-        scene = load_extended(self.model) if self.model is not None else None
-        label = self.payload or "a" if self.model is None else os.path.basename(os.path.realpath(self.model))
-        given = {"vias": self.vias, "duration_s": self.duration}
-        request = TrialRequest(label, self.trajectory, self.seed)
-        request = replace(request, **{name: value for name, value in given.items() if value is not None})
-        with bar(None, "simulating", "sample") as advance:
-            done = simulate(request, [sensor_preset(self.preset)], progress=advance, scene=scene)
-        recording = done.recordings[self.preset]
-        metadata = replace(recording.metadata, level=self.level)
-        write_recording(replace(recording, metadata=metadata), self.out)
-        write_truth(done.truth, self.out)
-        print(f"{self.out}: {done.log.time[-1]:.1f} s of {self.trajectory} motion, {self.preset} sensors")
-
-
-def check_recordings(recordings: Sequence[Path], out: Path | None = None) -> None:
-    """Each recording once, and an output that overwrites none of them."""
-    seen: set[str] = set()
-    for path in recordings:
-        real = os.path.realpath(path)
-        if real in seen:
-            raise InputError(f"{path} is given twice, and would count twice")
-        seen.add(real)
-    if out is not None:
-        if os.path.realpath(out) in seen:
-            raise InputError(f"{out}: is one of the recordings; write the estimate to another file")
-        check_target(out)
+        run(self)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -19,6 +19,7 @@ from discrepancy.words import Words
 from estimator.errors import InputError
 from mocobot.files import write_json, write_text
 from mocobot.folders import check_folder
+from mocobot.given import check_recordings
 
 if TYPE_CHECKING:
     from mocobot.cli import Diagnose
@@ -33,8 +34,6 @@ def check_options(options: Diagnose, causes: Collection[str]) -> None:
         InputError: no recording or one twice, a number of processes, a cause that does not exist, or an output that
             would overwrite something else.
     """
-    from mocobot.cli import check_recordings
-
     if not options.rec:
         hint = "; name them before --exclude" if options.exclude else "; name at least one file"
         raise InputError(f"no recording given{hint}")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from estimator.errors import InputError
 from estimator.recording import read_recording
 from mocobot.files import check_target
+from mocobot.given import check_recordings
 from mocobot.progress import bar
 
 if TYPE_CHECKING:
@@ -69,8 +70,6 @@ def run(options: Replay) -> None:
 
 def _check(options: Replay) -> None:
     """Everything that can be refused before a recording is read."""
-    from mocobot.cli import check_recordings
-
     if not options.rec:
         raise InputError("no recording given; name at least one file")
     if options.save is not None and options.web:
