@@ -47,7 +47,7 @@ def test_measured_numbers_of_every_kind() -> None:
     assert measured(123456.0, 5200.0) == ("123500", "5200")
     assert measured(2.0, None) == ("2.000", "")
     assert measured(None, 1.0) == ("–", "")
-    assert with_error(2.0, 0.1, "kg") == "2.00\u00a0±\u00a00.10\u00a0kg"
+    assert with_error(2.0, 0.1, "kg") == "2.00 ±\u00a00.10\u00a0kg"
 
 
 def test_shares_ratios_sizes_and_probabilities() -> None:
@@ -62,6 +62,7 @@ def test_shares_ratios_sizes_and_probabilities() -> None:
     assert [size(v).replace("\u00a0", " ") for v in (12, 4300, 5_458_685)] == ["12 B", "4.3 kB", "5.5 MB"]
     assert power(-97.4) == "10⁻⁹⁷"
     assert power(-1.0) == "0.10"
+    assert power(-1e6) == "< 10⁻⁹⁹⁹"
 
 
 def test_units_fit_the_size() -> None:

@@ -24,6 +24,7 @@ def test_wheel_simulates_on_its_own(tmp_path: Path) -> None:
     code = (
         "import mocobot.cli, mocobot.diagnose_command, mocobot_sim.models as m, estimator.paper_tables as t;"
         "print(m.models_dir());"
+        "import mocobot_report.page as r; r.page_assets();"
         "import mocobot_logs.maps as l; [l.builtin_map(name) for name in l.MAPS];"
         "t.payload_truth('a'); mocobot.cli.main(['simulate', '--vias', '1', '--out', 'rec.parquet'])"
     )

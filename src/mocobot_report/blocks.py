@@ -172,8 +172,8 @@ def facts(entries: Sequence[tuple[str, Child]]) -> Node:
     return el("dl", *((el("dt", n), el("dd", v if v else NONE)) for n, v in entries), class_="facts")
 
 
-def tidy(sentence: str) -> str:
-    """A sentence of a result in the page's typography: ``+-`` and powers as signs, a capital at its start."""
+def tidy(sentence: str, *, inside: bool = False) -> str:
+    """A sentence of a result in the page's typography: ``+-`` and powers as signs, a capital unless it goes on."""
     text = sentence.replace(" +- ", f"\u00a0{PLUS_MINUS}\u00a0").replace("chi2/n", "chi²/n")
     text = re.sub(r"(?<![\w.])-(?=\d)", MINUS, text)
-    return text[:1].upper() + text[1:]
+    return text if inside else text[:1].upper() + text[1:]

@@ -132,8 +132,11 @@ def layout(**more: Any) -> Json:
 
 def axis(title: str = "", **more: Any) -> Json:
     """An axis in the page's style."""
+    named: Json = (
+        {"title": {"text": spelled_text(title), "standoff": 8, "font": {"size": 12}}} if title else {}
+    )
     return {
-        "title": {"text": spelled_text(title), "standoff": 8, "font": {"size": 12}},
+        **named,
         "gridcolor": paint("grid"),
         "linecolor": paint("line"),
         "zerolinecolor": paint("line"),

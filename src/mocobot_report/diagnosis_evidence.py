@@ -35,7 +35,7 @@ def evidence_sections(book: Book, diagnosed: Diagnosed, names: Sequence[str]) ->
         charts.append(_along(book, "Where the misfit as simulated points", nominal["along"], "before"))
     if left.get("along") and values["verdict"] != "consistent":
         charts.append(_along(book, "Where what is left points", left["along"], "after"))
-    said = paragraph(f"As simulated: {tidy(nominal['sentence'])}", kind="note")
+    said = paragraph(f"As simulated: {tidy(nominal['sentence'], inside=True)}", kind="note")
     out = [section(book, "Where the misfit sits", said, el("div", *charts, class_="pair"))] if charts else []
     return [*out, *_map(book, diagnosed)]
 
@@ -108,7 +108,7 @@ def _sideways(names: Sequence[str], horizontal: Json, rule: float | None = None)
     return layout(
         xaxis=horizontal,
         yaxis=axis(
-            tickvals=list(range(count))[::-1], ticktext=[literal(name, 26) for name in names], 
+            tickvals=list(range(count))[::-1], ticktext=[literal(name, 26) for name in names],
             range=[-0.6, count - 0.4], zeroline=False, fixedrange=True, ticks="",
         ),
         shapes=lines,

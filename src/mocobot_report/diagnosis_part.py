@@ -33,7 +33,7 @@ from mocobot_report.diagnosis_residuals import residual_sections
 from mocobot_report.diagnosis_rest import rest_sections
 from mocobot_report.folder import Diagnosed
 from mocobot_report.html import Node, el
-from mocobot_report.numbers import NONE, percent, plain, power
+from mocobot_report.numbers import NONE, fitting, percent, plain, power
 from mocobot_report.pictures import ASPECT
 from mocobot_report.sources import sources
 from mocobot_report.units import parameter, short_names
@@ -81,7 +81,10 @@ def answer(diagnosed: Diagnosed) -> list[Node]:
         "have it in the simulation?",
         kind="lede",
     )
-    box = verdict(KINDS[values["verdict"]], VERDICTS[values["verdict"]], MEANING[values["verdict"]])
+    meaning = MEANING[values["verdict"]]
+    if len(values["causes"]) == 1:
+        meaning = meaning.replace("causes explain", "cause explains").replace("causes are", "cause is")
+    box = verdict(KINDS[values["verdict"]], VERDICTS[values["verdict"]], meaning)
     if values["causes"]:
         box.append(bullets([tidy(cause["sentence"]) for cause in values["causes"]]))
     elif values["verdict"] != "consistent":
@@ -172,7 +175,11 @@ def _causes(book: Book, values: Values) -> list[Node]:
         for k, (name, entry) in enumerate(cause["parameters"].items()):
             words, unit = parameter(name)
             first = (cause["cause"], cause["place"]) if k == 0 else ("", "")
-            rows.append([*first, words, measurement(entry["value"], entry["se"]), unit])
+            scale = 1.0
+            if unit in ("s", "m", "rad"):
+                unit, scale = fitting(unit, abs(entry["value"]))
+            se = None if entry["se"] is None else scale * entry["se"]
+            rows.append([*first, words, measurement(scale * entry["value"], se), unit])
     out = [table("What is named", head, rows, groups=True)]
     head = ["cause", "place", "in sample [%]", "held out [%]", "folds better", "by chance"]
     rows = []

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 
 MINUS, PLUS_MINUS, NONE, THIN = "\u2212", "\u00b1", "\u2013", "\u00a0"
+LEAST_POWER = -999
+"""Power of ten below which a probability's size says no more."""
 SUPERSCRIPTS = str.maketrans(
     "-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
 )
@@ -39,7 +41,7 @@ def measured(value: float | None, se: float | None) -> tuple[str, str]:
 def with_error(value: float | None, se: float | None, unit: str = "") -> str:
     """``11.67196 +- 0.00019 kg`` in one text."""
     shown, error = measured(value, se)
-    text = f"{shown}{THIN}{PLUS_MINUS}{THIN}{error}" if error else shown
+    text = f"{shown} {PLUS_MINUS}{THIN}{error}" if error else shown
     return f"{text}{THIN}{unit}" if unit and shown != NONE else text
 
 
@@ -62,6 +64,8 @@ def about(value: float) -> str:
 
 def power(log10: float) -> str:
     """A probability given by its logarithm."""
+    if log10 < LEAST_POWER:
+        return f"< 10{str(LEAST_POWER).translate(SUPERSCRIPTS)}"
     return plain(10.0**log10, 2) if log10 > -4 else f"10{str(round(log10)).translate(SUPERSCRIPTS)}"
 
 
@@ -73,8 +77,9 @@ def size(count: int) -> str:
     return f"{count}{THIN}B"
 
 
-SMALL = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "N m": ("mN m", 1e3), "m/s": ("mm/s", 1e3), "V": ("mV", 1e3)}
-SMALLER = {"m": ("µm", 1e6), "rad": ("µrad", 1e6), "N m": ("µN m", 1e6), "N": ("mN", 1e3)}
+SMALL = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "N m": ("mN m", 1e3), "m/s": ("mm/s", 1e3), "V": ("mV", 1e3),
+         "s": ("ms", 1e3)}  # fmt: skip
+SMALLER = {"m": ("µm", 1e6), "rad": ("µrad", 1e6), "N m": ("µN m", 1e6), "N": ("mN", 1e3), "s": ("µs", 1e6)}
 
 
 def fitting(unit: str, largest: float) -> tuple[str, float]:

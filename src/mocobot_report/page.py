@@ -78,14 +78,16 @@ def _parts(book: Book, contents: Contents) -> list[tuple[str, str, list[Node]]]:
     parts = []
     if contents.paper is not None:
         with complete(contents.folder / "paper.json"):
-            parts.append(("paper", "The paper's experiment", paper_part.sections(book, contents.paper)))
+            parts.append(("paper", "The experiment in detail", paper_part.sections(book, contents.paper)))
     for k, estimated in enumerate(contents.estimates, start=1):
-        name = "Estimate" if len(contents.estimates) == 1 else f"Estimate {estimated.path.name}"
+        name = "The estimate in detail" if len(contents.estimates) == 1 else f"Estimate {estimated.path.name}"
         with complete(estimated.path):
             parts.append((f"estimate-{k}", name, estimate_part.sections(book, estimated)))
     if contents.diagnosis is not None:
         with complete(contents.diagnosis.folder / "diagnosis.json"):
-            parts.append(("diagnosis", "Diagnosis", diagnosis_part.sections(book, contents.diagnosis)))
+            parts.append(
+                ("diagnosis", "The diagnosis in detail", diagnosis_part.sections(book, contents.diagnosis))
+            )
     return parts
 
 
@@ -123,9 +125,15 @@ def _navigation(main: list[Node]) -> Node:
     return el("nav", el("p", "Contents", class_="contents"), el("ol", *entries), aria_label="Contents")
 
 
-def _document(title: str, main: list[Node]) -> Node:
+def page_assets() -> tuple[str, str]:
+    """Style sheet and script of the page."""
     assets = files("mocobot_report").joinpath("assets")
     style, script = (assets.joinpath(name).read_text(encoding="utf-8") for name in ("style.css", "page.js"))
+    return style, script
+
+
+def _document(title: str, main: list[Node]) -> Node:
+    style, script = page_assets()
     dark = f"color-scheme:dark;{variables(palette.DARK)}"
     colours = (
         f":root{{{variables(palette.LIGHT)}}}"

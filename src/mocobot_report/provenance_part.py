@@ -18,10 +18,10 @@ def provenance_part(book: Book, contents: Contents) -> list[Node]:
     """One section per result, and the files that this page was made from."""
     found: list[tuple[str, Any]] = []
     if contents.paper is not None:
-        found.append(("paper", contents.paper.provenance))
+        found.append(("the experiment", contents.paper.provenance))
     found += [(e.path.name, e.provenance) for e in contents.estimates]
     if contents.diagnosis is not None:
-        found.append(("diagnosis", contents.diagnosis.provenance))
+        found.append(("the diagnosis", contents.diagnosis.provenance))
     out = [section(book, f"How {name} was made", *_one(made)) for name, made in found]
     return [*out, section(book, "What this page was made from", _read(contents))]
 
