@@ -6,6 +6,7 @@ import hashlib
 import json
 import re
 import shutil
+from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from mocobot_report.html import data_block, el, raw, to_bytes
 from mocobot_report.page import write_report
 from mocobot_report.palette import DARK, LIGHT, MARKS, TEXTS, contrast
 from mocobot_report.sources import sources
-from report_folders import NASTY, diagnosis_folder, estimate_folder, paper_folder
+from report_folders import NASTY, diagnosis_folder, estimate_folder, paper_folder, payload_estimate
 
 VOID = {"meta", "link", "input", "img", "br"}
 
@@ -255,6 +256,26 @@ def test_errors_against_the_truth(pages: dict[str, Reader], folders: dict[str, P
     shown = match[1].replace("\u2212", "-").split(" × 10")
     power = int(shown[1].translate(str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789"))) if len(shown) > 1 else 0
     assert float(shown[0]) * 10.0**power == pytest.approx(error, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("missing", "said"),
+    [
+        ({"mass": None}, "The recordings do not give: mass."),
+        ({"inertia": None, "grasps": None, "recordings": ()}, "The recordings do not give: inertia, grasps."),
+        ({"flags": ("Robot 2 pulls.",)}, "Robot 2 pulls."),
+        ({}, "Nothing speaks against these numbers"),
+    ],
+)
+def test_what_is_not_known_is_said_first(
+    missing: dict, said: str, tmp_path: Path, no_pictures: pytest.MonkeyPatch
+) -> None:
+    estimate = replace(payload_estimate(), **missing)
+    (tmp_path / "est.json").write_text(json.dumps(estimate.to_dict()))
+    text = Reader(write_report(tmp_path).read_bytes()).rows()
+    answer = text.partition("The estimate in detail")[2].partition("The estimate in detail")[0]
+    assert said in answer
+    assert ("Nothing speaks against these numbers" in answer) == (missing == {})
 
 
 def test_provenance_lists_what_was_read(pages: dict[str, Reader], folders: dict[str, Path]) -> None:

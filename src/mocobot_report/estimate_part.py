@@ -110,12 +110,17 @@ def _tiles(e: PayloadEstimate) -> list[tuple[str, str, str]]:
 
 def _doubts(e: PayloadEstimate) -> Node:
     weak = [str(direction) for direction in e.undetermined]
-    if not weak and not e.flags:
+    known = {"mass": e.mass, "centre of mass": e.p_1c, "inertia": e.inertia}
+    known |= {"grasps": e.grasps} if e.robots > 1 else {}
+    missing = [name for name, found in known.items() if found is None]
+    if not weak and not e.flags and not missing:
         return verdict("good", "Nothing speaks against these numbers",
                        "The recordings determine every one of them and fit one rigid payload.")  # fmt: skip
     box = verdict("warn", "What to know before these numbers are trusted")
     if e.flags:
         box.append(bullets(list(e.flags)))
+    if missing:
+        box.append(el("p", f"The recordings do not give: {', '.join(missing)}."))
     if weak:
         box.append(el("p", "Not determined by these recordings:"))
         box.append(bullets(weak))

@@ -82,7 +82,8 @@ MARKS = ("paper", "ideal", "nominal", "uncalibrated", "before", "after", "truth"
          "r4", "r5", "r6", "focus")  # fmt: skip
 """Colours of lines and points on a card; WCAG AA asks for 3."""
 PRESETS = {"paper": "diamond", "ideal": "triangle-down", "nominal": "circle", "uncalibrated": "square"}
-"""Marker of each column of the paper's tables."""
+"""Marker of each column of the paper's tables; its colour has the same name."""
+OTHER_COLOURS, OTHER_MARKERS = ("c1", "c2"), ("triangle-up", "circle-open", "x")
 
 
 def contrast(one: str, other: str) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import groupby
+from itertools import cycle, groupby
 
 import numpy as np
 
@@ -23,8 +23,14 @@ SPREAD = 0.16
 
 
 def keys(columns: Sequence[str]) -> list[Key]:
-    """Legend of the paper's column and the presets'."""
-    return [Key(name, name, name, palette.PRESETS[name]) for name in columns]
+    """Legend of the paper's column and the presets'; presets that nobody knows yet get what is left."""
+    left = zip(cycle(palette.OTHER_COLOURS), cycle(palette.OTHER_MARKERS))
+    return [
+        Key(name, name, name, palette.PRESETS[name])
+        if name in palette.PRESETS
+        else Key(name, name, *next(left))
+        for name in columns
+    ]
 
 
 def table_chart(book: Book, table: PaperTable, title: str, note: str) -> Node:
@@ -127,7 +133,7 @@ def trial_chart(book: Book, estimates: Mapping[tuple[str, str], PayloadEstimate]
     presets = list(dict.fromkeys(preset for _, preset in estimates))
     rows = [Row(payload, name, "%", ()) for payload in payloads for name in MOMENTS]
     data, seen = [], []
-    legend = [Key(name, name, name, palette.PRESETS.get(name, "circle")) for name in presets]
+    legend = keys(presets)
     for p, key in enumerate(legend):
         x, y, text = [], [], []
         for k, payload in enumerate(payloads):
