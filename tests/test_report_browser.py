@@ -108,6 +108,14 @@ def _check_plots(seen: Seen) -> None:
     for plot in plots:
         assert plot["drawn"] > 0, plot
         assert plot["outside"] == [], plot
+    buttons = seen.page.evaluate("[...document.querySelectorAll('.modebar-btn')].map((b) => b.dataset.title)")
+    assert set(buttons) <= {
+        "Download plot",
+        "Zoom",
+        "Pan",
+        "Reset axes",
+    }  # nothing that leads out of the page
+    assert seen.page.locator('a[href^="http"]').count() == 0
 
 
 def _check_markup(seen: Seen) -> None:
@@ -211,7 +219,7 @@ def test_theme_legend_and_tabs_by_keyboard(browser: object, pages: dict[str, Pat
 
 
 def test_motion_is_reduced_and_print_shows_all(browser: object, pages: dict[str, Path]) -> None:
-    with opened(browser, pages["diagnosis"], reduced_motion="reduce") as seen:
+    with opened(browser, pages["diagnosis"], reduced_motion="reduce", color_scheme="dark") as seen:
         style = "getComputedStyle(document.documentElement).scrollBehavior"
         assert seen.page.evaluate(style) == "auto"
         seen.page.emulate_media(reduced_motion="no-preference")
@@ -223,6 +231,11 @@ def test_motion_is_reduced_and_print_shows_all(browser: object, pages: dict[str,
         assert seen.page.evaluate(hidden) == 0
         assert not seen.page.locator("nav").is_visible()
         seen.page.wait_for_function("[...document.querySelectorAll('.plot')].every((p) => p.dataset.drawn)")
+        text = "getComputedStyle(document.querySelector('.ytick text')).fill"
+        assert (
+            seen.page.evaluate("getComputedStyle(document.body).color") == "rgb(24, 32, 43)"
+        )  # dark on white paper
+        seen.page.wait_for_function(f"{text} === 'rgb(79, 91, 107)'")
         seen.page.evaluate("dispatchEvent(new Event('afterprint'))")
         seen.page.emulate_media(media="screen")
         assert seen.page.evaluate(hidden) > 0

@@ -236,12 +236,11 @@ def _rivals(values: Values) -> list[Node]:
 
 
 def _shapes(causes: Sequence[Values]) -> list[Node]:
-    entries = [
-        (
-            f"{cause['cause']} ({cause['place']})",
-            ", ".join(f"{name.replace('_', ' ')} {plain(v, 4)}" for name, v in cause["shape"].items()),
-        )
-        for cause in causes
-        if cause["shape"]
-    ]
+    """Numbers that change a cause's columns and were chosen, not fitted."""
+    entries = []
+    for cause in causes:
+        named = [(*parameter(name), number) for name, number in cause["shape"].items()]
+        said = ", ".join(f"{words} {plain(number, 4)} {unit}".rstrip() for words, unit, number in named)
+        if said:
+            entries.append((f"{cause['cause']} ({cause['place']})", said))
     return [folded("Shape parameters", facts(entries))] if entries else []

@@ -139,6 +139,7 @@ def _document(title: str, main: list[Node]) -> Node:
         f":root{{{variables(palette.LIGHT)}}}"
         f"@media (prefers-color-scheme: dark){{:root:not([data-theme=light]){{{dark}}}}}"
         f":root[data-theme=dark]{{{dark}}}"
+        f"@media print{{:root:root:root{{color-scheme:light;{variables(palette.LIGHT)}}}}}"
     )
     return el(
         "html",

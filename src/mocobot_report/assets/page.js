@@ -10,7 +10,8 @@
   const stored = () => { try { return localStorage.getItem("mocobot-theme"); } catch { return null; } };
   const store = (value) => { try { localStorage.setItem("mocobot-theme", value); } catch { /* not kept */ } };
   let chosen = stored();
-  const dark = () => (chosen ? chosen === "dark" : system.matches);
+  let printing = false;
+  const dark = () => !printing && (chosen ? chosen === "dark" : system.matches);
   const setTheme = () => {
     root.dataset.theme = dark() ? "dark" : "light";
     button.textContent = dark() ? "Light theme" : "Dark theme";
@@ -31,7 +32,7 @@
   };
   const config = {
     responsive: true, displaylogo: false, displayModeBar: !narrow.matches && "hover",
-    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d", "zoomIn2d", "zoomOut2d"],
+    modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["resetScale2d"]],  // none that sends anything anywhere
     toImageButtonOptions: { format: "svg" },
   };
   const hiddenGroups = (plot) => new Set(
@@ -87,11 +88,17 @@
     tabs.addEventListener("change", () => show(tabs));
   }
   addEventListener("beforeprint", () => {
+    printing = true;  // on white paper
+    setTheme();
     for (const panel of document.querySelectorAll("[data-panel]")) panel.hidden = false;
     for (const part of document.querySelectorAll("details")) part.open = true;
     drawAll();
   });
-  addEventListener("afterprint", () => { for (const tabs of document.querySelectorAll(".tabs")) show(tabs); });
+  addEventListener("afterprint", () => {
+    printing = false;
+    setTheme();
+    for (const tabs of document.querySelectorAll(".tabs")) show(tabs);
+  });
 
   // A table that is wider than its place can be scrolled with the keyboard.
   const reachable = () => {
