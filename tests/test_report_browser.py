@@ -226,16 +226,15 @@ def test_motion_is_reduced_and_print_shows_all(browser: object, pages: dict[str,
         assert seen.page.evaluate(style) == "smooth"
         hidden = "[...document.querySelectorAll('[data-panel]')].filter((p) => !p.checkVisibility()).length"
         assert seen.page.evaluate(hidden) > 0
-        seen.page.emulate_media(media="print")
+        # Browsers say that they will print before they look at print styles; the paper is white in the dark theme, too.
         seen.page.evaluate("dispatchEvent(new Event('beforeprint'))")
+        seen.page.wait_for_function("[...document.querySelectorAll('.plot')].every((p) => p.dataset.drawn)")
+        tick = "getComputedStyle(document.querySelector('.ytick text')).fill"
+        seen.page.wait_for_function(f"{tick} === 'rgb(79, 91, 107)'", timeout=5000)
+        seen.page.emulate_media(media="print")
         assert seen.page.evaluate(hidden) == 0
         assert not seen.page.locator("nav").is_visible()
-        seen.page.wait_for_function("[...document.querySelectorAll('.plot')].every((p) => p.dataset.drawn)")
-        text = "getComputedStyle(document.querySelector('.ytick text')).fill"
-        assert (
-            seen.page.evaluate("getComputedStyle(document.body).color") == "rgb(24, 32, 43)"
-        )  # dark on white paper
-        seen.page.wait_for_function(f"{text} === 'rgb(79, 91, 107)'")
+        assert seen.page.evaluate("getComputedStyle(document.body).color") == "rgb(24, 32, 43)"
         seen.page.evaluate("dispatchEvent(new Event('afterprint'))")
         seen.page.emulate_media(media="screen")
         assert seen.page.evaluate(hidden) > 0
