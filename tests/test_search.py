@@ -9,7 +9,7 @@ from discrepancy.diagnose import _verdict, diagnose
 from discrepancy.explanation import CLEAN
 from discrepancy.held_out import confirmed
 from discrepancy.problem import Problem
-from discrepancy.search import search
+from discrepancy.search import _idle, search
 from fake_rig import CATALOGUE, FakeRig, cause
 
 TWINS = {4: (2, 0.005)}  # cause 4 leaves the trace of cause 2, but for half a percent
@@ -387,3 +387,15 @@ def test_progress_is_told():
     assert said[0] == "columns"
     assert "simulate" in said
     assert sum(simulated) == len(rig.calls)
+
+
+def test_what_tells_nothing_beside_the_others_is_dropped():
+    """The last one named is never the idle one; of the others the one without evidence is."""
+    rig = FakeRig({2: 20.0, 5: [40.0, -30.0]})
+    problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
+    assert _idle(problem, [2, 5]) == []
+    assert _idle(problem, [5, 2]) == []
+    assert _idle(problem, [6, 5, 2]) == [0]
+    assert _idle(problem, [5, 6, 2]) == [1]
+    assert _idle(problem, [5, 2, 6]) == []
+    assert _idle(problem, [6]) == []

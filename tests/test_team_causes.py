@@ -341,12 +341,19 @@ def test_standard_errors_of_derived_parameters():
 
 def test_a_mass_swings_only_if_it_is_there_and_within_reach():
     """What a look-alike leaves over fits a pendulum of no mass far outside, or one that hardly swings."""
-    slosh, se = CAUSES["slosh"], np.array([1e-3, 1e-3, 1e-3, 1e-3])
-    assert slosh.possible(np.array([0.02, 0.01, -0.02, 0.0]), se)
-    assert not slosh.possible(np.array([1.5e-3, 0.0, 0.0, 0.0]), se)  # within two standard errors of nothing
-    assert not slosh.possible(np.array([-0.02, 0.0, 0.0, 0.0]), se)
-    assert not slosh.possible(np.array([0.02, 0.0, 0.05, 0.0]), se)  # hangs 2.5 m from the centre
-    assert slosh.possible(np.array([0.02, 0.0, 0.05, 0.0]), np.array([1e-3, 1e-3, 0.02, 1e-3]))
+    slosh = CAUSES["slosh"]
+
+    def possible(mass, moment, se=1e-3, damping=0.05):
+        errors = np.array([1e-3, 1e-3, se, 1e-3])
+        shape = {"length_m": 0.2, "damping_ratio": damping}
+        return slosh.possible(np.array([mass, 0.01, moment, 0.0]), errors, shape)
+
+    assert possible(0.02, -0.02)
+    assert not possible(1.5e-3, 0.0)  # within two standard errors of nothing
+    assert not possible(-0.02, 0.0)
+    assert not possible(0.02, 0.05)  # hangs 2.5 m from the centre
+    assert possible(0.02, 0.05, se=0.02)
+    assert not possible(0.02, -0.02, damping=0.29)
     shape = {"length_m": 0.97, "damping_ratio": 0.28}
     for _ in range(3):
         near = slosh.finer(shape)

@@ -47,12 +47,12 @@ def leaders(
     rig: Rig, problem: Problem, free: Sequence[int], evidence: Sequence[Evidence], inflation: float
 ) -> list[Leader]:
     """Significant candidates at their best, the least misfit first."""
-    significant = [e for e in evidence if _log10_p(problem, e) <= SIGNIFICANT][:LEADERS]
+    significant = [e for e in evidence if log10_p(problem, e) <= SIGNIFICANT][:LEADERS]
     found = []
     for first in significant:
         index = first.index
         best = _sharpened(rig, problem, free, index, inflation)
-        if best is None or _log10_p(best.problem, best.evidence) > SIGNIFICANT:
+        if best is None or log10_p(best.problem, best.evidence) > SIGNIFICANT:
             continue
         values, covariance = best.problem.fit([*free, index]).part(index)
         units = best.candidate.units
@@ -162,6 +162,7 @@ def with_transients(
     return best[1], best[1].fit(fit.free).evidence(inflation)
 
 
-def _log10_p(problem: Problem, evidence: Evidence) -> float:
+def log10_p(problem: Problem, evidence: Evidence) -> float:
+    """Of so much evidence by chance; that of a transient also pays for the intervals searched."""
     transient = bool(problem.candidates[evidence.index].detail)
     return evidence.log10_p + (INTERVALS_LOG10 if transient else 0.0)

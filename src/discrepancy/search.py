@@ -10,7 +10,7 @@ import numpy as np
 from discrepancy.explanation import CLEAN, Explanation, Found
 from discrepancy.fit import Fit
 from discrepancy.held_out import confirmed, held_out_gains, shares
-from discrepancy.leaders import Leader, in_best_shapes, leaders, with_transients
+from discrepancy.leaders import SIGNIFICANT, Leader, in_best_shapes, leaders, log10_p, with_transients
 from discrepancy.problem import Problem
 from discrepancy.rig import Candidate, Rig
 
@@ -86,6 +86,11 @@ def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] 
                 tuple(folds),
             )
         )
+        for place in _idle(problem, free):
+            # What was named first may have stood in for what was found since.
+            rejected.append(found.pop(place).candidate)
+            del free[place]
+            problem, fit = _refit(rig, problem, free)
     start = Explanation(
         tuple(found),
         tuple(rejected),
@@ -139,6 +144,19 @@ def _finished(rig: Rig, explanation: Explanation) -> Explanation:
     local = tuple(-fit.local(t)[: rig.local_unknowns] for t in range(len(problem.rows)))
     plain = problem.fit(fit.free, background=False).misfit
     return replace(explanation, found=tuple(results), plain=plain, shared=-shared, local=local)
+
+
+def _idle(problem: Problem, free: Sequence[int]) -> list[int]:
+    """Place of the cause that tells least beside the others, if that is too little to name it; at most one."""
+    weakest: tuple[float, int] | None = None
+    for place, index in enumerate(free[:-1]):
+        others = problem.fit([i for i in free if i != index])
+        inflation = max(1.0, others.misfit / (CLEAN * problem.samples))
+        judged = others.evidence_of(index, inflation)
+        told = 0.0 if judged is None else log10_p(problem, judged)
+        if told > SIGNIFICANT and (weakest is None or told > weakest[0]):
+            weakest = told, place
+    return [] if weakest is None else [weakest[1]]
 
 
 def _least(leader: Leader, excess: float, *, first: bool) -> float:

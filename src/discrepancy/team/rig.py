@@ -185,7 +185,8 @@ class TeamRig:
 
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         """Whether such values can be: no negative stiffness or friction, no mass that swings outside the payload."""
-        return CAUSES[candidate.cause].possible(values, np.sqrt(np.maximum(np.diag(covariance), 0.0)))
+        se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        return CAUSES[candidate.cause].possible(values, se, candidate.shape)
 
     def can_run_again(self) -> str | None:
         """Why the recordings cannot be simulated again, or None."""

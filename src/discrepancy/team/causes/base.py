@@ -83,7 +83,7 @@ class Cause(ABC):
         """Columns (n, C) of what the cause leaves open in one trial, such as the friction of a joint at rest."""
         return []
 
-    def possible(self, values: Array, se: Array) -> bool:
+    def possible(self, values: Array, se: Array, shape: Shape) -> bool:
         """Whether such values (standard errors ``se``) can be: nothing negative beyond two standard errors."""
         return all(values[k] > -2.0 * se[k] for k, n in enumerate(self.parameters) if n in self.positive)
 

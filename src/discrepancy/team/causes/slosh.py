@@ -10,6 +10,8 @@ from estimator.fusion import fuse
 
 LENGTHS_M, MOST_DAMPED = (0.04, 1.0), 0.3
 """Pendulums of 0.5 to 2.5 Hz that swing; what is slower, faster or damped more looks like drag or play."""
+SWINGS = 0.25
+"""A best fit that is damped more leans on the bound: it is something else, such as drag."""
 REACH_M = 1.5
 """From the centre of mass to where it hangs at most: a payload that three robots carry is no larger."""
 
@@ -68,10 +70,10 @@ class Slosh(Cause):
             if LENGTHS_M[0] <= x <= LENGTHS_M[1] and y <= MOST_DAMPED
         ]
 
-    def possible(self, values, se):
-        """A mass that is there, and hangs within the payload's reach."""
+    def possible(self, values, se, shape):
+        """A mass that is there, swings, and hangs within the payload's reach."""
         within = np.abs(values[1:]) <= REACH_M * max(values[0], 0.0) + 2.0 * se[1:]
-        return bool(values[0] > 2.0 * se[0] and within.all())
+        return bool(values[0] > 2.0 * se[0] and within.all() and shape["damping_ratio"] <= SWINGS)
 
     def physical(self, values, context):
         mass = values[0] if abs(values[0]) > 1e-6 else 1e-6
