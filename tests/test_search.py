@@ -269,6 +269,20 @@ def test_three_causes_at_one_robot_only_add_up():
     assert _verdict(replace(explanation, found=explanation.found[:2])) == "explained"
 
 
+def test_of_three_at_one_robot_a_transient_goes_first():
+    """Two causes at one robot are believed without the push that took what they left."""
+    rig = FakeRig({1: 30.0, 2: 30.0}, burst=(1, 0.0, 2))
+    push = rig.transients([])[0]
+    x, local, shared = rig.data[1]
+    rig.data[1] = x + rig.columns(push)[1] @ np.array([3.0, -2.0]), local, shared
+    assert sorted(names(search(rig).found)) == ["cause 1", "cause 2", "push"]
+    diagnosis = diagnose(rig, closed_loop=False)
+    assert sorted(names(diagnosis.causes)) == ["cause 1", "cause 2"]
+    assert diagnosis.verdict == "explained"
+    assert "push" in [candidate.cause for candidate in diagnosis.explanation.rejected]
+    assert any("takes what the other causes leave" in note for note in diagnosis.notes)
+
+
 def test_three_causes_at_several_robots_are_believed_if_they_are_of_three_families():
     explanation = search(FakeRig({k: 30.0 for k in (1, 2, 3)}))
     first, *others = explanation.found

@@ -88,14 +88,18 @@ def diagnose(
         simulated: called with 1 for every simulated trial.
     """
     explanation = search(rig, most, progress=say)
+    notes: list[str] = []
+    if _add_up(explanation) and any(found.candidate.detail for found in explanation.found):
+        explanation, note = _without_transients(rig, explanation)
+        notes.append(note)
     why_not = rig.can_run_again() if closed_loop else "the closed loop was left out on request"
     alternatives: list[tuple[Alternative, ...]] = [_unsimulated(found) for found in explanation.found]
     gain: Gain | None = None
-    notes: list[str] = []
     if why_not is None and explanation.found:
         if say:
             say("simulate")
-        explanation, alternatives, gain, notes = _confirm(rig, explanation, jobs, simulated)
+        explanation, alternatives, gain, said = _confirm(rig, explanation, jobs, simulated)
+        notes += said
     elif why_not is None:
         before = responses(rig, explanation.problem, [[]], jobs, simulated)[0]
         gain = Gain(before, before, len(rig.trials) > 1)
@@ -136,6 +140,21 @@ def _add_up(explanation: Explanation) -> bool:
     # Where no cause has a robot, all are at one place anyway, and only their families tell.
     placed = any(candidate.robot for candidate in explanation.problem.candidates)
     return len(explanation.found) > 2 and ((placed and len(robots) <= 1) or len(families) <= 2)
+
+
+def _without_transients(rig: Rig, explanation: Explanation) -> tuple[Explanation, str]:
+    """Two causes at one place are believed without the event that took what they left."""
+    gone = [found.candidate for found in explanation.found if found.candidate.detail]
+    both = zip(explanation.found, explanation.fit.free, strict=True)
+    kept = [(found, index) for found, index in both if not found.candidate.detail]
+    rest = replace(
+        explanation,
+        found=tuple(found for found, _ in kept),
+        rejected=(*explanation.rejected, *gone),
+    )
+    labels = ", ".join(candidate.label for candidate in gone)
+    note = f"{labels}: takes what the other causes leave at one place, so it is not named."
+    return refitted(rig, rest, [index for _, index in kept]), note
 
 
 def _without_suspects(rig: Rig, explanation: Explanation) -> tuple[Explanation, str]:
