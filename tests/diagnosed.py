@@ -16,8 +16,8 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     Provenance may be there: commands add it.
     """
     assert set(values) - {"provenance"} == {
-        "format", "version", "recordings", "verdict", "causes", "rejected", "gain", "not_simulated", "undecidable",
-        "detection_limits", "residual", "notes",
+        "format", "version", "recordings", "verdict", "causes", "evidence", "rejected", "gain", "not_simulated",
+        "undecidable", "detection_limits", "residual", "notes",
     }  # fmt: skip
     assert (values["format"], values["version"]) == ("mocobot-diagnosis", 1)
     assert values["verdict"] in VERDICTS
@@ -40,6 +40,7 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
             _check_place(rival)
             assert isinstance(rival["ambiguous"], bool)
     _check_gain(values["gain"], len(values["recordings"]), simulated=simulated)
+    _check_evidence(values["evidence"], named=bool(values["causes"]))
     for entry in values["undecidable"]:
         assert set(entry) == {"what", "why", "remedy"}
     for entry in values["detection_limits"]:
@@ -58,6 +59,17 @@ def _check_place(values: dict[str, Any]) -> None:
         assert values[key] is None or (type(values[key]) is int and values[key] >= 1)
     assert isinstance(values["cause"], str)
     assert isinstance(values["family"], str)
+
+
+def _check_evidence(evidence: dict[str, Any], *, named: bool) -> None:
+    assert set(evidence) == {"before", "after", "by_chance"}
+    assert (evidence["after"] is not None) == named
+    for entries in (evidence["before"], evidence["after"] or []):
+        for entry in entries:
+            assert set(entry) == PLACE | {"at", "gain", "log10_p"}
+            _check_place(entry)
+        gains = [entry["gain"] for entry in entries]
+        assert gains == sorted(gains, reverse=True)
 
 
 def _check_gain(gain: dict[str, Any], trials: int, *, simulated: bool) -> None:
@@ -124,6 +136,26 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
         "recordings": ["one", "two"],
         "verdict": verdict,
         "causes": [cause] if "explained" in verdict and verdict != "unexplained" else [],
+        "evidence": {
+            "before": [
+                {**place, "at": None, "gain": 400.0, "log10_p": -80.0},
+                {**rival, "at": None, "gain": 350.0, "log10_p": -70.0},
+                {
+                    "cause": "push",
+                    "family": "push",
+                    "robot": None,
+                    "joint": None,
+                    "place": "payload",
+                    "at": [2, 12.5],
+                    "gain": 3.0,
+                    "log10_p": -0.4,
+                },
+            ],
+            "after": None
+            if verdict in ("consistent", "unexplained")
+            else [{**rival, "at": None, "gain": 0.5, "log10_p": -0.3}],
+            "by_chance": 28.0,
+        },
         "rejected": [],
         "gain": {
             "held_out": {"before": before, "after": after},

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from discrepancy.residual_statistics import binned, running_rms, spectrum
 from discrepancy.traces import Trace
 from mocobot_report.numbers import about, fitting, measured, percent, plain, power, size, with_error
-from mocobot_report.residual_statistics import binned, running_rms, spectrum
 from mocobot_report.series import runs, thinned
 from mocobot_report.units import parameter, short_names
 

@@ -147,11 +147,7 @@ def _without_transients(rig: Rig, explanation: Explanation) -> tuple[Explanation
     gone = [found.candidate for found in explanation.found if found.candidate.detail]
     both = zip(explanation.found, explanation.fit.free, strict=True)
     kept = [(found, index) for found, index in both if not found.candidate.detail]
-    rest = replace(
-        explanation,
-        found=tuple(found for found, _ in kept),
-        rejected=(*explanation.rejected, *gone),
-    )
+    rest = replace(explanation, found=tuple(found for found, _ in kept))
     labels = ", ".join(candidate.label for candidate in gone)
     note = f"{labels}: takes what the other causes leave at one place, so it is not named."
     return refitted(rig, rest, [index for _, index in kept]), note

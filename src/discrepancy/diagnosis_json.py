@@ -14,6 +14,8 @@ causes              list, in the order of discovery, of
     separate                       what would tell the cause from its look-alikes
     alternatives                   list of {cause, family, robot, joint, place, evidence_gap [nats], chi2_per_n,
                                    ambiguous, separate}; chi2_per_n of its closed loop, null if not simulated
+evidence            the strongest candidates, see ``evidence_list``: {before, after, by_chance} with nothing named and
+                    with what is named (null), lists of {cause, family, robot, joint, place, at, gain, log10_p}
 rejected            significant candidates that other trials did not confirm: list of {cause, robot, joint, place}
 gain                null where the closed loop was not simulated and there is nothing to estimate, or
     held_out        {before, after}: {<channel>_nrmse, <channel>_rms, chi2_per_n}, means over trials, null if failed
@@ -47,6 +49,7 @@ from typing import Any
 import numpy as np
 
 from discrepancy.diagnose import Alternative, Diagnosis
+from discrepancy.evidence_list import evidence_list
 from discrepancy.explanation import Explanation, Found
 from discrepancy.gain import Gain, Response
 from discrepancy.rig import Candidate, Rig
@@ -93,6 +96,7 @@ def diagnosis_to_dict(
             _cause(found, alternatives, rig, words)
             for found, alternatives in zip(diagnosis.causes, diagnosis.alternatives, strict=True)
         ],
+        "evidence": evidence_list(explanation),
         "rejected": [_where(candidate) for candidate in explanation.rejected],
         "gain": gain,
         "not_simulated": diagnosis.not_simulated,

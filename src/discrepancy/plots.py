@@ -13,7 +13,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
-from discrepancy.explanation import Explanation
 from discrepancy.plots_against import against_figure
 from discrepancy.plots_evidence import closed_loop_figure, evidence_figure
 from discrepancy.traces import Group, Trace, groups
@@ -29,7 +28,6 @@ RUNNING_S = 1.0
 
 def save_plots(
     values: Mapping[str, Any],
-    explanation: Explanation,
     traces: Sequence[Trace],
     channels: Sequence[Any],
     words: Words,
@@ -39,7 +37,6 @@ def save_plots(
 
     Args:
         values: the diagnosis, as in the JSON.
-        explanation: its search.
         traces: residuals of every trial.
         channels: the rig's channels.
         words: the rig's units.
@@ -51,7 +48,7 @@ def save_plots(
     for trace, name in zip(traces, file_names([trace.name for trace in traces]), strict=True):
         paths.append(_save(_time_figure(trace, grouped, named=named), folder / f"residual_{name}.png"))
     paths.append(_save(against_figure(traces, grouped, words, named=named), folder / "residual_against.png"))
-    paths.append(_save(evidence_figure(values, explanation), folder / "evidence.png"))
+    paths.append(_save(evidence_figure(values), folder / "evidence.png"))
     loop = closed_loop_figure(values)
     if loop is not None:
         paths.append(_save(loop, folder / "closed_loop.png"))

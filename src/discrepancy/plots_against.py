@@ -4,21 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
-from numpy.typing import NDArray
-from scipy.signal import welch
 
+from discrepancy.residual_statistics import binned, spectrum
 from discrepancy.traces import Group, Trace
 from discrepancy.words import Words
 
-Array = NDArray[np.float64]
-
 BEFORE, AFTER = "#c8553d", "#2f6fd0"
-BINS = 12
-SEGMENT_S = 10.0
 SERIES = (("as simulated", "white_before", BEFORE), ("with causes and tolerances", "white_after", AFTER))
 
 
@@ -54,19 +48,11 @@ def against_figure(traces: Sequence[Trace], grouped: Sequence[Group], words: Wor
 
 def _binned(axis: Axes, traces: Sequence[Trace], group: Group, name: str) -> float:
     """Root mean square in bins of equal counts; returns the highest."""
-    x, top = np.concatenate([trace.quantities[name] for trace in traces]), 0.0
-    order = np.argsort(x, kind="stable")
-    bins = [part for part in np.array_split(order, min(BINS, len(x))) if len(part)]
+    top = 0.0
     for label, attribute, colour in SERIES:
-        square = np.concatenate(
-            [np.mean(getattr(trace, attribute)[:, list(group.columns)] ** 2, axis=1) for trace in traces]
-        )
-        heights = [float(np.sqrt(square[part].mean())) for part in bins]
-        axis.plot(
-            [float(x[part].mean()) for part in bins], heights, "o-", color=colour, label=label,
-            markersize=3.5, linewidth=1.1,
-        )  # fmt: skip
-        top = max(top, *heights)
+        x, heights = binned(traces, attribute, list(group.columns), name)
+        axis.plot(x, heights, "o-", color=colour, label=label, markersize=3.5, linewidth=1.1)
+        top = max(top, float(heights.max()))
     return top
 
 
@@ -74,21 +60,8 @@ def _spectrum(axis: Axes, traces: Sequence[Trace], group: Group) -> float:
     """Square root of the power density over that of white noise of unit variance; returns the highest."""
     top = 0.0
     for _, attribute, colour in SERIES:
-        total, weight, frequency = 0.0, 0.0, None
-        # Rows on either side of a pause follow each other here; holds are left out.
-        shortest = min((trace.moving for trace in traces if trace.moving >= 16), default=0)
-        for trace in traces:
-            if trace.moving < 16 or trace.rate_hz != traces[0].rate_hz:
-                continue
-            segment = min(round(SEGMENT_S * trace.rate_hz), shortest)
-            series = getattr(trace, attribute)[: trace.moving, list(group.columns)]
-            frequency, power = welch(series, trace.rate_hz, nperseg=segment, axis=0, detrend="constant")
-            total = total + trace.moving * power.mean(axis=1) * trace.rate_hz / 2.0
-            weight += trace.moving
-        if frequency is None:
-            continue
-        height = np.sqrt(np.asarray(total) / weight)
-        height[[0, -1]] *= np.sqrt(2.0)  # the ends are not doubled in a one-sided density
-        axis.plot(frequency, height, color=colour, linewidth=1.1)
-        top = max(top, float(height.max()))
+        found = spectrum(traces, attribute, list(group.columns))
+        if found is not None:
+            axis.plot(*found, color=colour, linewidth=1.1)
+            top = max(top, float(found[1].max()))
     return top

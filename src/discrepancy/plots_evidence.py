@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,42 +10,26 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from discrepancy.explanation import CLEAN, Explanation
-from discrepancy.fit import Evidence
+from discrepancy.evidence_list import label, relation
 from discrepancy.plots_against import AFTER, BEFORE
 from discrepancy.report_gain import SMALL_UNITS
-from discrepancy.rig import Candidate
 
 NAMED, FAMILY, OTHER = "#2f6fd0", "#8fb3e8", "#b9bfc9"
-TOP = 14
-DOUBTFUL_GAIN = 28.0
-"""Gain of chi-square that one parameter reaches by chance with a probability of about 1e-6 or 1e-7."""
 
 
-def evidence_figure(values: Mapping[str, Any], explanation: Explanation) -> Figure:
+def evidence_figure(values: Mapping[str, Any]) -> Figure:
     """Evidence of the strongest candidates: nothing named yet, and with what is named in the model."""
-    problem = explanation.problem
-    named = {problem.candidates[i].key for i in explanation.fit.free}
-    families = {problem.candidates[i].family for i in explanation.fit.free}
-    panels = [("nothing is named yet", problem.fit())]
-    if named:
-        panels.append(("the named causes are in the model", explanation.fit))
+    evidence = values["evidence"]
+    panels = [("nothing is named yet", evidence["before"])]
+    if evidence["after"] is not None:
+        panels.append(("the named causes are in the model", evidence["after"]))
     figure = Figure(figsize=(7.5 * len(panels), 5.2), layout="constrained")
     axes = figure.subplots(1, len(panels), squeeze=False)[0]
-    for axis, (title, fit) in zip(axes, panels, strict=True):
-        inflation = max(1.0, fit.misfit / (CLEAN * problem.samples))
-        strongest = sorted(fit.evidence(inflation), key=lambda e: -e.gain)[:TOP]
-        labels, colours = [], []
-        for evidence in strongest:
-            candidate = problem.candidates[evidence.index]
-            labels.append(_label(candidate))
-            colours.append(
-                NAMED if candidate.key in named else FAMILY if candidate.family in families else OTHER
-            )
-        _bars(axis, strongest, labels, colours)
+    for axis, (title, strongest) in zip(axes, panels, strict=True):
+        _bars(axis, strongest, values["causes"], evidence["by_chance"])
         axis.set_title(f"when {title}", loc="left", fontsize=10)
     handles = [axes[0].barh(np.nan, np.nan, color=c) for c in (NAMED, FAMILY, OTHER)]
-    if named:
+    if values["causes"]:
         figure.legend(
             handles, ["named", "same family", "other"], loc="outside upper right", ncols=3, frameon=False,
             fontsize=9,
@@ -55,25 +39,20 @@ def evidence_figure(values: Mapping[str, Any], explanation: Explanation) -> Figu
     return figure
 
 
-def _label(candidate: Candidate) -> str:
-    if not candidate.detail:
-        return candidate.label
-    return (
-        f"{candidate.cause} (trial {int(candidate.detail['trial']) + 1}, {candidate.detail['start_s']:.1f} s)"
-    )
-
-
-def _bars(axis: Axes, strongest: list[Evidence], labels: list[str], colours: list[str]) -> None:
-    gains = [max(evidence.gain, 1.0) for evidence in strongest]
+def _bars(
+    axis: Axes, strongest: Sequence[Mapping[str, Any]], causes: Sequence[Mapping[str, Any]], by_chance: float
+) -> None:
+    gains = [max(entry["gain"], 1.0) for entry in strongest]
     at = list(range(len(gains)))[::-1]
-    axis.barh(at, gains, color=colours)
-    axis.set_yticks(at, labels, fontsize=9)
+    colours = {"named": NAMED, "family": FAMILY, "other": OTHER}
+    axis.barh(at, gains, color=[colours[relation(entry, causes)] for entry in strongest])
+    axis.set_yticks(at, [label(entry) for entry in strongest], fontsize=9)
     axis.set_ylim(-0.7, max(len(gains), 1) - 0.3)
     axis.set_xscale("log")
-    axis.set_xlim(1.0, 3.0 * max([DOUBTFUL_GAIN, *gains]))
-    for y, gain, evidence in zip(at, gains, strongest, strict=True):
-        axis.text(1.05 * gain, y, f"{evidence.gain:.3g}", va="center", fontsize=8)
-    axis.axvline(DOUBTFUL_GAIN, color="black", linewidth=0.8, linestyle="--")
+    axis.set_xlim(1.0, 3.0 * max([by_chance, *gains]))
+    for y, gain, entry in zip(at, gains, strongest, strict=True):
+        axis.text(1.05 * gain, y, f"{entry['gain']:.3g}", va="center", fontsize=8)
+    axis.axvline(by_chance, color="black", linewidth=0.8, linestyle="--")
     axis.set_xlabel("gain of chi-square (dashed: what chance can do)")
     axis.grid(axis="x", alpha=0.25)
 

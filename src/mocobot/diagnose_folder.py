@@ -85,6 +85,6 @@ def write_diagnosis(
             values["notes"].append(f"There is no extended model: {error}.")
     residuals = traces()
     save_traces(residuals, rig.channels, folder / RESIDUALS)
-    save_plots(values, diagnosis.explanation, residuals, rig.channels, words, folder)
+    save_plots(values, residuals, rig.channels, words, folder)
     write_json(folder / JSON, values)
     write_text(folder / REPORT, format_diagnosis(values) + "\n")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from mocobot_report.blocks import paragraph, section, spelled_text, tidy
+from discrepancy.evidence_list import label, relation
+from mocobot_report.blocks import paragraph, section, tidy
 from mocobot_report.book import Book
 from mocobot_report.charts import Json, Key, axis, chart, dots, layout, literal, log_axis, paint
 from mocobot_report.folder import Diagnosed
@@ -18,6 +18,12 @@ BEFORE = Key("before", "as simulated", "before", "square")
 AFTER = Key("after", "with causes and tolerances", "after", "circle")
 TOLERATED = Key("after", "with tolerances", "after", "circle")
 CLEAN = Key("", "clean data", "text", "dash")
+CHANCE = Key("", "what chance can do", "text", "dash")
+RELATIONS = (
+    Key("named", "named", "before", "square"),
+    Key("family", "same family", "after", "circle"),
+    Key("other", "other", "paper", "diamond"),
+)
 
 
 def evidence_sections(book: Book, diagnosed: Diagnosed, names: Sequence[str]) -> list[Node]:
@@ -37,7 +43,7 @@ def evidence_sections(book: Book, diagnosed: Diagnosed, names: Sequence[str]) ->
         charts.append(_along(book, "Where what is left points", left["along"], "after"))
     said = paragraph(f"As simulated: {tidy(nominal['sentence'], inside=True)}", kind="note")
     out = [section(book, "Where the misfit sits", said, el("div", *charts, class_="pair"))] if charts else []
-    return [*out, *_map(book, diagnosed)]
+    return [*out, *_map(book, values)]
 
 
 def _misfit(
@@ -99,7 +105,10 @@ def _along(book: Book, title: str, shares: Values, colour: str) -> Node:
     )  # fmt: skip
 
 
-def _sideways(names: Sequence[str], horizontal: Json, rule: float | None = None) -> Json:
+def _sideways(
+    names: Sequence[str], horizontal: Json, rule: float | None = None, *, left: int = 120, most: int = 26
+) -> Json:
+    """Layout of one row per name; ``left`` pixels hold names of up to ``most`` letters."""
     lines = [] if rule is None else [
         {"type": "line", "xref": "x", "x0": rule, "x1": rule, "yref": "paper", "y0": 0, "y1": 1,
          "line": {"color": paint("text"), "width": 1.2, "dash": "dash"}}
@@ -108,34 +117,64 @@ def _sideways(names: Sequence[str], horizontal: Json, rule: float | None = None)
     return layout(
         xaxis=horizontal,
         yaxis=axis(
-            tickvals=list(range(count))[::-1], ticktext=[literal(name, 26) for name in names],
+            tickvals=list(range(count))[::-1], ticktext=[literal(name, most) for name in names],
             range=[-0.6, count - 0.4], zeroline=False, fixedrange=True, ticks="",
         ),
         shapes=lines,
-        margin={"l": 120, "r": 14, "t": 8, "b": 44},
+        margin={"l": left, "r": 14, "t": 8, "b": 44},
     )  # fmt: skip
 
 
-def _map(book: Book, diagnosed: Diagnosed) -> list[Node]:
-    """The evidence for the strongest candidates, as the diagnosis drew it."""
-    path = diagnosed.folder / "evidence.png"
-    try:
-        drawn = path.read_bytes()
-    except OSError:
+def _map(book: Book, values: Values) -> list[Node]:
+    """The evidence for the strongest candidates, before and after what is named is in the model."""
+    evidence = values.get("evidence")
+    if not isinstance(evidence, Mapping):  # a diagnosis of an earlier version
         return []
-    if not drawn.startswith(b"\x89PNG"):
-        return []
-    source = "data:image/png;base64," + base64.b64encode(drawn).decode("ascii")
-    alt = (
-        "Bar charts of the strongest candidates: gain of chi-square of each cause at its place, "
-        "before and after what is "
-        "named is in the model. Names and numbers of close rivals are in the table of alternatives."
+    panels = [("Nothing is named yet", evidence["before"])]
+    if evidence["after"] is not None:
+        panels.append(("What is named is in the model", evidence["after"]))
+    charts = [
+        _strongest(book, title, entries, values["causes"], evidence["by_chance"])
+        for title, entries in panels
+        if entries
+    ]
+    said = paragraph(
+        "How much chi-square falls if a cause leaves its tolerance, for the strongest candidates. Chance can do what "
+        "is left of the dashed line.",
+        kind="note",
     )
-    figure = el(
-        "figure",
-        el("figcaption", el("b", spelled_text("Evidence for the strongest candidates")),
-           "how much chi-square falls if the cause leaves its tolerance; dashed: what chance can do"),
-        el("img", src=source, alt=alt, loading="lazy"),
-        class_="picture",
+    return [section(book, "Evidence", said, el("div", *charts, class_="pair"))] if charts else []
+
+
+def _strongest(
+    book: Book, title: str, entries: Sequence[Values], causes: Sequence[Values], by_chance: float
+) -> Node:
+    names = [label(entry) for entry in entries]
+    data, keys = [], []
+    for key in RELATIONS if causes else RELATIONS[-1:]:
+        rows = [k for k, entry in enumerate(entries) if not causes or relation(entry, causes) == key.group]
+        if not rows:
+            continue
+        keys.append(key)
+        text = [
+            f"{names[k]}: gain {plain(entries[k]['gain'])}, by chance 10^{entries[k]['log10_p']:.0f}"
+            for k in rows
+        ]
+        trace = dots([], [], key, text=text)
+        data.append(
+            trace
+            | {"x": [max(entries[k]["gain"], 1.0) for k in rows], "y": [len(names) - 1 - k for k in rows]}
+        )
+    seen = [by_chance, 1.0, *(entry["gain"] for entry in entries)]
+    figure: Json = {
+        "data": data,
+        "layout": _sideways(
+            names, log_axis("gain of chi-square", 1.0, max(seen)), rule=by_chance, left=190, most=40
+        ),
+        "narrow": {"yaxis.tickfont.size": 9, "margin.l": 155},
+    }
+    return chart(
+        book, title, figure, height=24 * len(names) + 76, keys=[*keys, CHANCE] if causes else [CHANCE],
+        label=f"{title}: gain of chi-square of the strongest candidates, "
+        + ", ".join(f"{name} {plain(entry['gain'])}" for name, entry in zip(names, entries, strict=True)),
     )  # fmt: skip
-    return [section(book, "Evidence", figure)]

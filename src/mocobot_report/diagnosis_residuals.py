@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.residual_statistics import binned, running_rms, spectrum
 from discrepancy.traces import Group, Trace, groups
 from mocobot_report.blocks import Entry, paragraph, section, table, tabs, value, verdict
 from mocobot_report.book import Book
@@ -14,7 +15,6 @@ from mocobot_report.charts import Json, Key, axis, chart, layout, log_axis, numb
 from mocobot_report.folder import Diagnosed
 from mocobot_report.html import Node, el
 from mocobot_report.numbers import fitting
-from mocobot_report.residual_statistics import binned, running_rms, spectrum
 from mocobot_report.series import Line, Panel, height, runs, stacked, thinned
 from mocobot_report.units import QUANTITIES
 
@@ -160,23 +160,24 @@ def _multiples(
     )  # fmt: skip
 
 
+def _roots(traces: Sequence[Trace], column: int) -> dict[str, float]:
+    """Rms of one channel over all trials: as it is and whitened, before and after."""
+    names = ("before", "after", "white_before", "white_after")
+    together = {name: np.concatenate([getattr(t, name)[:, column] for t in traces]) for name in names}
+    return {name: float(np.sqrt(np.mean(values**2))) for name, values in together.items()}
+
+
 def _rms(diagnosed: Diagnosed, grouped: Sequence[Group], *, named: bool) -> Node:
     """Physical and whitened rms of every channel, over all trials."""
     rows: list[list[Entry]] = []
     for group in grouped:
-        pairs = zip(group.columns, group.components, strict=True)
-        for k, (column, component) in enumerate(pairs):
-            together = {
-                name: np.concatenate([getattr(trace, name)[:, column] for trace in diagnosed.traces])
-                for name in ("before", "after", "white_before", "white_after")
-            }
-            root = {name: float(np.sqrt(np.mean(values**2))) for name, values in together.items()}
-            unit, scale = fitting(group.unit, root["before"])
+        roots = [_roots(diagnosed.traces, column) for column in group.columns]
+        unit, scale = fitting(group.unit, max(root["before"] for root in roots))
+        for k, (root, component) in enumerate(zip(roots, group.components, strict=True)):
             physical = [scale * root["before"], scale * root["after"]][: 1 + named]
-            component = component if len(group.columns) > 1 else ""
             rows.append(
-                [group.name if k == 0 else "", component, unit, *(value(v) for v in physical),
-                 value(root["white_before"]), value(root["white_after"])]
+                [group.name if k == 0 else "", component if len(roots) > 1 else "", unit,
+                 *(value(v) for v in physical), value(root["white_before"]), value(root["white_after"])]
             )  # fmt: skip
     head = ["channel", "", "unit", *(["before", "after"] if named else ["rms"])]
     head += ["before [× clean]", ("after" if named else "within tolerances") + " [× clean]"]
