@@ -45,7 +45,7 @@ def _factor(result: Result) -> float:
 def _alarms(parts: Mapping[str, Sequence[Result]]) -> str:
     rows = []
     for part, preset in product(("clean", "tolerance"), ("nominal", "ideal")):
-        if runs := [r for r in parts.get(part, []) if r["key"].endswith("-ideal") is (preset == "ideal")]:
+        if runs := [r for r in parts.get(part, []) if ("-ideal-" in r["key"]) is (preset == "ideal")]:
             named = [r["verdict"]["found"] for r in runs]
             alarms = sum(bool(found) for found in named)
             low, high = interval(alarms, len(runs))
