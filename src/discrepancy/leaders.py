@@ -93,35 +93,30 @@ def _sharpened(
 def _best_with_unknowns(
     rig: Rig, problem: Problem, free: Sequence[int], index: int, inflation: float
 ) -> Leader | None:
-    """The same for a candidate that leaves something open in every trial, which has its price."""
-    start, best = problem.candidates[index], None
+    """The same for a candidate that leaves something open in every trial, such as friction at rest.
+
+    What it leaves open stays in the model, but it is ranked without the price of that where the price is too high:
+    friction that is all viscous is nothing at rest, and a hundred open knots would cost more than it explains.
+    """
+    start = problem.candidates[index]
+    best: Leader | None = None
     for shape in (start, *rig.refinements(start)):
-        best = _better(rig, problem, free, index, shape, best, inflation)
+        changed = problem
+        if shape is not start:
+            changed = problem.with_columns(index, shape, rig.columns(shape))
+        unknowns = rig.unknowns(shape)
+        opened = changed.with_unknowns(unknowns)
+        judged = opened.fit(free).evidence_of(index, inflation)
+        if judged is None:
+            continue
+        price = COMPLEXITY * np.log(problem.samples)
+        misfit = price * judged.parameters + min(
+            opened.fit([*free, index]).misfit + price * sum(u.shape[2] for u in unknowns),
+            changed.fit([*free, index]).misfit,
+        )
+        if best is None or misfit < best.misfit:
+            best = Leader(judged, opened, misfit)
     return best
-
-
-def _better(
-    rig: Rig,
-    problem: Problem,
-    free: Sequence[int],
-    index: int,
-    shape: Candidate,
-    best: Leader | None,
-    inflation: float,
-) -> Leader | None:
-    """The better of a candidate with a given shape and the best so far."""
-    changed = problem
-    if shape is not problem.candidates[index]:
-        changed = problem.with_columns(index, shape, rig.columns(shape))
-    unknowns = rig.unknowns(shape)
-    changed = changed.with_unknowns(unknowns)
-    judged = changed.fit(free).evidence_of(index, inflation)
-    if judged is None:
-        return best
-    count = judged.parameters + sum(u.shape[2] for u in unknowns)
-    penalty = COMPLEXITY * np.log(problem.samples) * count
-    misfit = changed.fit([*free, index]).misfit + penalty
-    return Leader(judged, changed, misfit) if best is None or misfit < best.misfit else best
 
 
 def in_best_shapes(rig: Rig, problem: Problem, fit: Fit) -> Problem:

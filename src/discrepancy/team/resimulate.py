@@ -53,7 +53,8 @@ def team_of(
 def _mounts(bases: Bases, effects: Sequence[Effect]) -> Array:
     """Where the robots stand on the floor, shape (N, 3), so that tilts leave the origins of {b} where they are.
 
-    The bases are known in {b1}, whose axes tilt with robot 1; the simulated tilt turns a base about its mount.
+    With a tilt in the model the bases are known in {b1} as it would be level: what robot 1's tilt does to all others
+    is in its column. The simulated tilt turns a base about its mount.
     """
     tilt = np.zeros((len(bases.p), 3))
     for effect in effects:
@@ -61,7 +62,7 @@ def _mounts(bases: Bases, effects: Sequence[Effect]) -> Array:
             tilt[effect.robot - 1, :2] += effect.roll_rad, effect.pitch_rad
     height = np.array([0.0, 0.0, base_height_m()])
     swing = Rotation.from_rotvec(tilt).apply(np.tile(height, (len(tilt), 1))) - height
-    return Rotation.from_rotvec(tilt[0]).apply(bases.p) - np.einsum("nij,nj->ni", bases.R, swing)
+    return bases.p - np.einsum("nij,nj->ni", bases.R, swing)
 
 
 def physical_inertia(inertia: Array) -> Array:
