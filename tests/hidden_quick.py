@@ -28,5 +28,5 @@ generated = cache(generate)
 def blind(request: HiddenSet, excluded: tuple[str, ...] = ()) -> tuple[dict[str, Any], dict[str, Any]]:
     """The verdict, and the truth that is opened after it."""
     recordings, sealed = generated(request)
-    verdict = verdict_on(recordings, excluded)
+    verdict = verdict_on(recordings, excluded, "undecided")
     return verdict, sealed.open(verdict)

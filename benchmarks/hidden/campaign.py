@@ -44,7 +44,7 @@ def run_task(task: Task, folder: Path) -> dict[str, Any]:
     result = {"part": task.part, "key": task.request.key, "engine": engine(), "error": None}
     try:
         recordings, sealed = recordings_of(task.request, folder / "sets")
-        verdict = verdict_on(recordings, task.excluded, closed_loop=not task.excluded)
+        verdict = verdict_on(recordings, task.excluded)
         return result | {"verdict": verdict, "truth": sealed.open(verdict)}
     except TrialError as error:
         return result | {"error": f"not simulated: {error}"}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 from discrepancy.diagnose import Alternative, Diagnosis, diagnose
 from discrepancy.explanation import Found
@@ -13,22 +13,24 @@ from discrepancy.team.tolerances import read_tolerances
 from estimator.estimate import estimate_payload
 from estimator.recording import Recording
 
+Loop = Literal["always", "undecided", "never"]
+
 
 def verdict_on(
-    recordings: Sequence[Recording], excluded: Sequence[str] = (), *, closed_loop: bool = True
+    recordings: Sequence[Recording], excluded: Sequence[str] = (), closed_loop: Loop = "always"
 ) -> dict[str, Any]:
     """What the diagnosis finds.
 
     Args:
         recordings: the trials.
         excluded: causes left out of its catalogue.
-        closed_loop: whether to simulate the closed loop where the rows leave two causes about equally likely;
-            elsewhere it is left out to save time.
+        closed_loop: when to simulate the recorded commands again; ``undecided`` is where the rows leave two causes
+            about equally likely, which saves time.
     """
     start = time.perf_counter()
     rig = TeamRig.of(recordings, estimate_payload(recordings), read_tolerances(None), excluded)
-    diagnosis = diagnose(rig, closed_loop=False)
-    if closed_loop and _undecided(diagnosis):
+    diagnosis = diagnose(rig, closed_loop=closed_loop == "always")
+    if closed_loop == "undecided" and _undecided(diagnosis):
         diagnosis = diagnose(rig)
     explanation = diagnosis.explanation
     return {
