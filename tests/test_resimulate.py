@@ -7,6 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.team.residual import Bases, pose_error
 from discrepancy.team.resimulate import team_of
+from estimator.principal import inertia_matrix
 from mocobot_sim.effects import make_effect
 from team_case import true_bases, true_shared
 
@@ -43,3 +44,24 @@ def test_tilted_bases_stand_where_the_rows_have_them(robot):
         tilted.R[robot - 1] = bases.R[robot - 1] @ turn
     left = pose_error(R_bi[None], p_bi[None], shared, tilted)
     np.testing.assert_allclose(left, 0.0, atol=1e-9)
+
+
+def test_a_swinging_mass_is_not_simulated_twice():
+    """Payload and pendulum, its bob at the pivot, are together what the rows' inertial parameters say."""
+    shared, at, bob = true_shared(), np.array([0.3, 0.4, -0.05]), 0.25
+    point = dict(zip(("point_x_m", "point_y_m", "point_z_m"), at.tolist(), strict=True))
+    effect = make_effect("slosh", {"mass_kg": bob, "length_m": 0.2, "damping_ratio": 0.05, **point})
+    model = team_of(shared, true_bases(), [effect]).compile()
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "omnid1/payload/payload")
+    swinging = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "omnid1/payload/slosh")
+    mass, com = model.body_mass[body], model.body_ipos[body]
+    R = Rotation.from_quat(model.body_iquat[body], scalar_first=True).as_matrix()
+    assert model.body_mass[swinging] == pytest.approx(bob)
+    np.testing.assert_allclose(model.body_pos[swinging], at, atol=1e-12)
+    about_1 = R @ np.diag(model.body_inertia[body]) @ R.T + mass * (
+        com @ com * np.eye(3) - np.outer(com, com)
+    )
+    together = about_1 + bob * (at @ at * np.eye(3) - np.outer(at, at))
+    assert mass + bob == pytest.approx(shared.pi[0])
+    np.testing.assert_allclose(mass * com + bob * at, shared.pi[1:4], atol=1e-9)
+    np.testing.assert_allclose(together, inertia_matrix(shared.pi[4:]), atol=1e-6)

@@ -11,11 +11,12 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from discrepancy.team.residual import Bases, Shared
 from estimator.errors import InputError
-from estimator.principal import inertia_matrix
+from estimator.principal import inertia_matrix, inertia_parameters
 from estimator.recording import Recording
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.base_tilt import BaseTilt
 from mocobot_sim.effects.catalogue import apply_effects
+from mocobot_sim.effects.slosh import Slosh
 from mocobot_sim.models import base_height_m
 from mocobot_sim.payload_mjcf import payload_mjcf
 from mocobot_sim.rerun import predicted, rerun
@@ -40,14 +41,24 @@ def team_of(
         effects: what is off.
         initial: posture near which trials start, (phi, theta), (N, 3) each.
     """
-    grasps = shared.grasps
-    mass, p_1c = float(shared.pi[0]), shared.pi[1:4] / shared.pi[0]
-    about_c = inertia_matrix(shared.pi[4:]) - mass * (p_1c @ p_1c * np.eye(3) - np.outer(p_1c, p_1c))
+    grasps, pi = shared.grasps, _without_swinging(shared.pi, effects)
+    mass, p_1c = float(pi[0]), pi[1:4] / pi[0]
+    about_c = inertia_matrix(pi[4:]) - mass * (p_1c @ p_1c * np.eye(3) - np.outer(p_1c, p_1c))
     X_1i = RigidTransform.from_components(grasps.p_1i, Rotation.from_matrix(grasps.R_1i))
     payload = payload_mjcf(mass, p_1c, physical_inertia(about_c), X_1i)
     mounts = RigidTransform.from_components(_mounts(bases, effects), Rotation.from_matrix(bases.R))
     scene = build_team(payload, mounts=mounts, initial=initial, timestep_s=TIMESTEP_S)
     return apply_effects(scene, effects)
+
+
+def _without_swinging(pi: Array, effects: Sequence[Effect]) -> Array:
+    """Inertial parameters of the payload alone, shape (10,): the rows have a swinging mass in them, at its pivot."""
+    for effect in effects:
+        if isinstance(effect, Slosh):
+            at = np.array([effect.point_x_m, effect.point_y_m, effect.point_z_m])
+            about_1 = inertia_parameters(at @ at * np.eye(3) - np.outer(at, at))
+            pi = pi - effect.mass_kg * np.concatenate([[1.0], at, about_1])
+    return pi
 
 
 def _mounts(bases: Bases, effects: Sequence[Effect]) -> Array:
