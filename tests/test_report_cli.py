@@ -8,30 +8,16 @@ from pathlib import Path
 
 import pytest
 
-from mocobot.cli import main
+import command
 from report_folders import diagnosis_folder, estimate_folder, paper_folder
 
 
 def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> tuple[int, str, str]:
-    """Exit code, standard output and standard error."""
-    try:
-        main(["report", *map(str, arguments)])
-        code = 0
-    except SystemExit as stop:
-        code = int(stop.code or 0)
-    out, err = capsys.readouterr()
-    return code, out, err.removesuffix("\n")
+    return command.run(capsys, "report", *arguments)
 
 
 def refused(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    """The one sentence of a command that must exit with 2 and write nothing."""
-    code, out, err = run(capsys, *arguments)
-    assert code == 2, (out, err)
-    assert out == ""
-    assert err.startswith("mocobot: ")
-    assert "\n" not in err
-    assert "Traceback" not in err
-    return err
+    return command.refused(capsys, "report", *arguments)
 
 
 @pytest.fixture

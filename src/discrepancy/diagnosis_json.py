@@ -49,10 +49,10 @@ from typing import Any
 import numpy as np
 
 from discrepancy.diagnose import Alternative, Diagnosis
-from discrepancy.evidence_list import evidence_list
+from discrepancy.evidence_list import evidence_list, place_of
 from discrepancy.explanation import Explanation, Found
 from discrepancy.gain import Gain, Response
-from discrepancy.rig import Candidate, Rig
+from discrepancy.rig import Rig
 from discrepancy.sensitivity import blind_spots, detection_limits
 from discrepancy.signature import signature
 from discrepancy.words import Words
@@ -97,7 +97,7 @@ def diagnosis_to_dict(
             for found, alternatives in zip(diagnosis.causes, diagnosis.alternatives, strict=True)
         ],
         "evidence": evidence_list(explanation),
-        "rejected": [_where(candidate) for candidate in explanation.rejected],
+        "rejected": [place_of(candidate) for candidate in explanation.rejected],
         "gain": gain,
         "not_simulated": diagnosis.not_simulated,
         "undecidable": [*rig.undecidable(), *blind_spots(explanation)],
@@ -129,7 +129,7 @@ def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: W
     candidate = found.candidate
     values, se = rig.effect_parameters(candidate, found.values, found.covariance)
     return {
-        **_where(candidate),
+        **place_of(candidate),
         "sentence": words.describe(candidate, values, se),
         "parameters": {
             name: {"value": float(value), "se": _finite(se.get(name))} for name, value in values.items()
@@ -141,7 +141,7 @@ def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: W
         "separate": words.separate(candidate.cause),
         "alternatives": [
             {
-                **_where(rival.candidate),
+                **place_of(rival.candidate),
                 "evidence_gap": float(rival.evidence_gap),
                 "chi2_per_n": _finite(rival.chi2_per_n),
                 "ambiguous": bool(rival.ambiguous),
@@ -149,16 +149,6 @@ def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: W
             }
             for rival in alternatives
         ],
-    }
-
-
-def _where(candidate: Candidate) -> dict[str, Any]:
-    return {
-        "cause": candidate.cause,
-        "family": candidate.family,
-        "robot": candidate.robot,
-        "joint": candidate.joint,
-        "place": candidate.place,
     }
 
 

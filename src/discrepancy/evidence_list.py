@@ -34,21 +34,31 @@ def _strongest(explanation: Explanation, fit: Fit) -> list[dict[str, Any]]:
     inflation = max(1.0, fit.misfit / (CLEAN * problem.samples))
     strongest = sorted(fit.evidence(inflation), key=lambda e: -e.gain)[:MOST]
     return [
-        _place(problem.candidates[e.index]) | {"gain": float(e.gain), "log10_p": max(float(e.log10_p), -1e6)}
+        place_of(problem.candidates[e.index])
+        | {
+            "at": _when(problem.candidates[e.index]),
+            "gain": float(e.gain),
+            "log10_p": max(float(e.log10_p), -1e6),
+        }
         for e in strongest
     ]
 
 
-def _place(candidate: Candidate) -> dict[str, Any]:
-    detail = candidate.detail
+def place_of(candidate: Candidate) -> dict[str, Any]:
+    """Cause, family and place of a candidate, as in every part of the JSON."""
     return {
         "cause": candidate.cause,
         "family": candidate.family,
         "robot": candidate.robot,
         "joint": candidate.joint,
         "place": candidate.place,
-        "at": [int(detail["trial"]) + 1, float(detail["start_s"])] if detail else None,
     }
+
+
+def _when(candidate: Candidate) -> list[float] | None:
+    """Trial (from 1) and start [s] of an event."""
+    detail = candidate.detail
+    return [int(detail["trial"]) + 1, float(detail["start_s"])] if detail else None
 
 
 def label(entry: Mapping[str, Any]) -> str:
