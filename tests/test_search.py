@@ -412,3 +412,17 @@ def test_what_tells_nothing_beside_the_others_is_dropped():
     assert _idle(problem, [5, 6, 2]) == [1]
     assert _idle(problem, [5, 2, 6]) == []
     assert _idle(problem, [6]) == []
+
+
+def test_what_is_left_open_at_rest_is_not_charged_where_it_tells_nothing():
+    """A second cause with sixty open columns a trial, none of which is needed: they cost more than it explains."""
+
+    class OpenRig(FakeRig):
+        def unknowns(self, candidate):
+            count = 60 if candidate.cause == "cause 2" else 0
+            rng = np.random.default_rng(11)
+            return [rng.standard_normal((120, 4, count)) for _ in self.trials]
+
+    catalogue = tuple(cause(f"cause {k}", tolerance=0.1) for k in range(8))
+    explanation = search(OpenRig({2: 25.0, 5: 400.0}, catalogue=catalogue))
+    assert names(explanation.found) == ["cause 5", "cause 2"]
