@@ -426,3 +426,17 @@ def test_what_is_left_open_at_rest_is_not_charged_where_it_tells_nothing():
     catalogue = tuple(cause(f"cause {k}", tolerance=0.1) for k in range(8))
     explanation = search(OpenRig({2: 25.0, 5: 400.0}, catalogue=catalogue))
     assert names(explanation.found) == ["cause 5", "cause 2"]
+
+
+def test_three_transients_are_not_dropped_into_silence():
+    """Only one among lasting causes goes; three events stay a verdict of their own, never ``consistent``."""
+    three = [replace(c, detail={"trial": float(k)}) for k, c in enumerate(CATALOGUE[1:4])]
+    rig = FakeRig({k: 30.0 for k in (1, 2, 3)})
+    explanation = search(rig)
+    assert len(explanation.found) == 3
+    found = tuple(replace(f, candidate=c) for f, c in zip(explanation.found, three, strict=True))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("discrepancy.diagnose.search", lambda *_, **__: replace(explanation, found=found))
+        diagnosis = diagnose(rig, closed_loop=False)
+    assert diagnosis.verdict == "unexplained"
+    assert not any("takes what the other causes leave" in note for note in diagnosis.notes)

@@ -89,8 +89,8 @@ def diagnose(
     """
     explanation = search(rig, most, progress=say)
     notes: list[str] = []
-    if _add_up(explanation) and any(found.candidate.detail for found in explanation.found):
-        explanation, note = _without_transients(rig, explanation)
+    if _add_up(explanation) and sum(bool(found.candidate.detail) for found in explanation.found) == 1:
+        explanation, note = _without_transient(rig, explanation)
         notes.append(note)
     why_not = rig.can_run_again() if closed_loop else "the closed loop was left out on request"
     alternatives: list[tuple[Alternative, ...]] = [_unsimulated(found) for found in explanation.found]
@@ -142,7 +142,7 @@ def _add_up(explanation: Explanation) -> bool:
     return len(explanation.found) > 2 and ((placed and len(robots) <= 1) or len(families) <= 2)
 
 
-def _without_transients(rig: Rig, explanation: Explanation) -> tuple[Explanation, str]:
+def _without_transient(rig: Rig, explanation: Explanation) -> tuple[Explanation, str]:
     """Two causes at one place are believed without the event that took what they left."""
     gone = [found.candidate for found in explanation.found if found.candidate.detail]
     both = zip(explanation.found, explanation.fit.free, strict=True)
