@@ -10,6 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
+from discrepancy.team.linear import linearise
+from discrepancy.team.residual import balance
 from estimator.arm_dynamics import arm_torque
 from estimator.delta import forward_kinematics, inverse_kinematics, jacobian, leg_geometry
 from recorded_team import COM, GRASPS, HOME, STEP_S, as_matrix, derivatives
@@ -198,14 +200,17 @@ def test_weight_of_the_arm_is_that_of_the_estimator(case):
     np.testing.assert_allclose(own_torque(phi, (0, 0, 1)), arm_torque(phi, still, still, DESIGN), atol=1e-7)
 
 
-def check_pose(case, signals, column, values, tolerance=0.01, wrench=0.02):
+def check_pose(case, signals, column, values, tolerance=0.01, balance_tolerance=0.03):
     changed = residual_of(case, signals) - case.linear.residual
-    got = (column @ np.asarray(values)).copy()
+    got = column @ np.asarray(values)
     assert np.abs(changed[:, :12]).max() > 1e-6
     assert_close(got[:, :12], changed[:, :12], tolerance)
-    # Moved joints carry their load at another angle, which the poses already tell; the balance stays closed.
-    assert np.abs(got[:, 12:]).max() == 0.0
-    assert np.abs(changed[:, 12:]).max() < wrench
+    # The payload's motion is taken from all wrists, so it is a little wrong. The joints carry their load at another
+    # angle, but that the poses tell.
+    data = linearise(signals, case.shared, case.bases, DESIGN, case.reduction, full=False).data
+    data = replace(data, wrench=case.linear.data.wrench)
+    moved = case.reduction(balance(data, case.shared)[0]) - case.linear.residual[:, 12:]
+    np.testing.assert_allclose(got[:, 12:], moved, atol=balance_tolerance * np.abs(moved).max() + 1e-7)
 
 
 @pytest.mark.parametrize("robot", [0, 1, 2])
@@ -236,10 +241,10 @@ def test_grasp_flex(case, robot):
 def test_grasp_play(case, robot):
     play = 2e-5
     f = force_of(case, robot)[0]
-    lead = Rotation.from_euler("ZYX", case.signals.theta[:, robot]).apply(play * np.tanh(f / 0.1))
+    lead = Rotation.from_euler("ZYX", case.signals.theta[:, robot]).apply(play * np.clip(f / 0.4, -1.0, 1.0))
     signals = adapted(case, robot, lead)
-    column = CAUSES["grasp_play"].columns(case.linear, robot, 0, {"force_N": 0.1})
-    check_pose(case, signals, column, [play], 0.02, 0.05)  # it jumps now and then
+    column = CAUSES["grasp_play"].columns(case.linear, robot, 0, {"force_N": 0.4})
+    check_pose(case, signals, column, [play], 0.02)
 
 
 @pytest.mark.parametrize("robot", [0, 1, 2])

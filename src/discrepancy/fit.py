@@ -161,18 +161,28 @@ class Fit:
 
         The same as that of ``Problem.with_columns``, without changing the problem.
         """
-        problem, units = self.problem, self.problem.candidates[index].units
-        information = np.zeros((len(units), len(units)))
-        edge = np.zeros((self.gram.shape[0], len(units)))
-        for rows, local, new in zip(problem.rows, problem.local, columns, strict=True):
+        units = self.problem.candidates[index].units
+        information, score = self._told_by([new * units for new in columns])
+        return self._judged(index, information, score, inflation, tolerant=self._tolerant(index))
+
+    def fall_with(self, columns: Sequence[Array]) -> float:
+        """How much chi-square falls with further columns, shape (n, C, k) per trial, whose values are free."""
+        information, score = self._told_by(columns)
+        eigenvalues, vectors = np.linalg.eigh(information)
+        keep = eigenvalues > LEAST_INFORMATION
+        return float(np.sum((vectors[:, keep].T @ score) ** 2 / eigenvalues[keep]))
+
+    def _told_by(self, columns: Sequence[Array]) -> tuple[Array, Array]:
+        """Information about the values of further columns given all in the model, and their score vector."""
+        k = columns[0].shape[2]
+        information, edge = np.zeros((k, k)), np.zeros((self.gram.shape[0], k))
+        for rows, explicable, new in zip(self.problem.rows, self.problem.explicable, columns, strict=True):
             if new.any():  # a transient is in one trial only
-                own = project(new * units, local)
+                own = project(new, explicable)
                 information += gram_of(own, own)
                 edge += gram_of(rows, own)
         cross = edge[self.used].T
-        information -= cross @ self.covariance @ cross.T
-        score = edge[-1] - cross @ self.solution
-        return self._judged(index, information, score, inflation, tolerant=self._tolerant(index))
+        return information - cross @ self.covariance @ cross.T, edge[-1] - cross @ self.solution
 
     def _judged(
         self, index: int, information: Array, score: Array, inflation: float, *, tolerant: bool

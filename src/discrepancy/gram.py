@@ -13,11 +13,18 @@ def gram_of(a: Array, b: Array) -> Array:
     return a.reshape(-1, a.shape[2]).T @ b.reshape(-1, b.shape[2])
 
 
-def project(x: Array, onto: Array) -> Array:
-    """Take the columns ``onto`` out of x; shapes (n, C, k), (n, C, l)."""
-    if onto.shape[2] == 0:
+def orthonormal(columns: Array) -> Array:
+    """Orthonormal columns that span the same, shape (n, C, l) -> (n, C, rank)."""
+    if columns.shape[2] == 0:
+        return columns
+    u, d, _ = np.linalg.svd(columns.reshape(-1, columns.shape[2]), full_matrices=False)
+    kept = u[:, d > 1e-10 * d[0]]
+    return np.ascontiguousarray(kept).reshape(*columns.shape[:2], -1)
+
+
+def project(x: Array, off: Array) -> Array:
+    """Take the orthonormal columns ``off`` out of x; shapes (n, C, k), (n, C, l)."""
+    if off.shape[2] == 0:
         return x
-    u, d, _ = np.linalg.svd(onto.reshape(-1, onto.shape[2]), full_matrices=False)
-    q = u[:, d > 1e-10 * d[0]]
-    flat = x.reshape(-1, x.shape[2])
-    return (flat - q @ (q.T @ flat)).reshape(x.shape)
+    q, flat = off.reshape(-1, off.shape[2]), x.reshape(-1, x.shape[2])
+    return np.asarray(flat - q @ (q.T @ flat)).reshape(x.shape)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.fit import Fit
-from discrepancy.gram import gram_of, project
+from discrepancy.gram import gram_of, orthonormal, project
 from discrepancy.rig import Candidate, Rows
 
 Array = NDArray[np.float64]
@@ -26,6 +26,7 @@ class Problem:
         raw: rows per trial, shape (n, C, columns).
         rows: the same without what the trial's own unknowns can explain.
         local: columns of the trial's own unknowns, shape (n, C, l).
+        explicable: orthonormal columns that span the same.
         grams: Gram matrices of ``rows``, shape (trials, columns, columns).
         shared: number of shared unknowns.
         spans: columns of every candidate.
@@ -36,6 +37,7 @@ class Problem:
     raw: tuple[Array, ...]
     rows: tuple[Array, ...]
     local: tuple[Array, ...]
+    explicable: tuple[Array, ...]
     grams: Array
     shared: int
     spans: tuple[slice, ...]
@@ -60,11 +62,13 @@ class Problem:
             spans.append(slice(at, at + len(candidate.parameters)))
             at += len(candidate.parameters)
         tolerant = np.array([p.tolerance > 0 for c in candidates for p in c.parameters], dtype=bool)
-        rows = [project(x, own) for x, own in zip(raw, local, strict=True)]
+        explicable = tuple(orthonormal(own) for own in local)
+        rows = [project(x, own) for x, own in zip(raw, explicable, strict=True)]
         grams = np.array([gram_of(r, r) for r in rows])
         return cls(
-            tuple(candidates), tuple(raw), tuple(rows), tuple(local), grams, shared, tuple(spans), tolerant
-        )
+            tuple(candidates), tuple(raw), tuple(rows), tuple(local), explicable, grams, shared, tuple(spans),
+            tolerant,
+        )  # fmt: skip
 
     @property
     def samples(self) -> int:
@@ -95,12 +99,13 @@ class Problem:
             at = slice(start, start + new.shape[2])
             raw.append(self.raw[t].copy())
             rows.append(self.rows[t].copy())
-            raw[t][..., at], rows[t][..., at] = new, project(new, self.local[t])
+            raw[t][..., at], rows[t][..., at] = new, project(new, self.explicable[t])
             edge = gram_of(rows[t], rows[t][..., at])
             grams[t][:, at], grams[t][at] = edge, edge.T
         return Problem(
-            candidates, tuple(raw), tuple(rows), self.local, grams, self.shared, self.spans, self.tolerant
-        )
+            candidates, tuple(raw), tuple(rows), self.local, self.explicable, grams, self.shared, self.spans,
+            self.tolerant,
+        )  # fmt: skip
 
     def with_unknowns(self, unknowns: Sequence[Array]) -> Problem:
         """The problem with further unknowns of every trial, shape (n, C, k) each."""
@@ -114,7 +119,7 @@ class Problem:
         raw, rows, grams = [], [], []
         for t, new in enumerate(columns):
             scaled = new * candidate.units
-            own = project(scaled, self.local[t])
+            own = project(scaled, self.explicable[t])
             raw.append(np.concatenate([self.raw[t][..., :-1], scaled, self.raw[t][..., -1:]], axis=2))
             rows.append(np.concatenate([self.rows[t][..., :-1], own, self.rows[t][..., -1:]], axis=2))
             edge, corner = gram_of(self.rows[t], own), gram_of(own, own)
@@ -132,8 +137,8 @@ class Problem:
         span = slice(start, start + len(candidate.parameters))
         tolerant = np.append(self.tolerant, [p.tolerance > 0 for p in candidate.parameters]).astype(bool)
         return Problem(
-            (*self.candidates, candidate), tuple(raw), tuple(rows), self.local, np.array(grams), self.shared,
-            (*self.spans, span), tolerant,
+            (*self.candidates, candidate), tuple(raw), tuple(rows), self.local, self.explicable, np.array(grams),
+            self.shared, (*self.spans, span), tolerant,
         )  # fmt: skip
 
     def fit(

@@ -154,6 +154,10 @@ class Rig(Protocol):
         """Causes that act for a while in one trial only, where the whitened residuals (n, C) are worst."""
         ...
 
+    def imitators(self, candidate: Candidate) -> list[list[Array]]:
+        """Whitened columns of errors of single sensors that last as long as a transient, one array per trial each."""
+        ...
+
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The same candidate with other shapes, to choose the best from; ``finer`` ones around its own."""
         ...

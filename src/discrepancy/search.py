@@ -10,12 +10,12 @@ import numpy as np
 from discrepancy.explanation import CLEAN, Explanation, Found
 from discrepancy.fit import Fit
 from discrepancy.held_out import confirmed, held_out_gains, shares
-from discrepancy.leaders import SIGNIFICANT, Leader, in_best_shapes, leaders, log10_p, with_transients
+from discrepancy.imitation import imitated
+from discrepancy.leaders import SIGNIFICANT, in_best_shapes, leaders, log10_p, with_transients
 from discrepancy.problem import Problem
 from discrepancy.rig import Candidate, Rig
+from discrepancy.worth import worth_naming
 
-NEXT_SHARE = 0.25
-"""A further cause has to take away this share of what the ones before it left."""
 MOST_CAUSES = 3
 ENOUGH = 0.8
 """Share of the misfit that causes must explain on held-out trials, or the verdict is not ``explained``."""
@@ -51,15 +51,14 @@ def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] 
         barred = {c.key for c in rejected}
         evidence = [e for e in evidence if wider.candidates[e.index].key not in barred]
         ranked = leaders(rig, wider, free, evidence, inflation)
-        excess = max(fit.misfit - CLEAN * problem.samples, 0.0)
-        ranked = [k for k in ranked if fit.misfit - k.misfit >= _least(k, excess, first=not found)]
+        ranked = [k for k in ranked if worth_naming(rig, fit, k, first=not found)]
         if not ranked:
             break
         best = ranked[0]
         candidate = best.candidate
         say(f"refit {candidate.label}")
         folds = held_out_gains(best.problem, free, best.evidence.index, candidate)
-        if not confirmed(folds):
+        if not confirmed(folds) or imitated(rig, best, free):
             rejected.append(candidate)
             if len(rejected) > MOST_REJECTED:
                 break
@@ -157,13 +156,6 @@ def _idle(problem: Problem, free: Sequence[int]) -> list[int]:
         if told > SIGNIFICANT and (weakest is None or told > weakest[0]):
             weakest = told, place
     return [] if weakest is None else [weakest[1]]
-
-
-def _least(leader: Leader, excess: float, *, first: bool) -> float:
-    """Least improvement of chi-square that is worth a cause: a share of what is left, if much is left."""
-    if first and not leader.candidate.detail:
-        return -np.inf
-    return NEXT_SHARE * excess
 
 
 def _refit(rig: Rig, problem: Problem, free: Sequence[int], rounds: int = 3) -> tuple[Problem, Fit]:

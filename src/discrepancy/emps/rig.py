@@ -197,6 +197,10 @@ class EmpsRig:
             out += [push(t, start, duration, tolerance) for start, duration in worst_intervals(time, z[:, 0])]
         return out
 
+    def imitators(self, candidate: Candidate) -> list[list[Array]]:
+        """None: there is one force channel, and what a sensor adds to it for a while is a push."""
+        return []
+
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a push with its interval moved."""
         if candidate.detail:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,7 +126,34 @@ class TrialLinear:
             for at, x in ((6 * (i - 1), rotation), (6 * (i - 1) + 3, displacement)):
                 if x is not None:
                     total[:, at : at + 3] += sign * x
+        if displacement is not None:
+            total[:, -6:] = self._of_wrong_motion(robot, -displacement @ self.bases.R[robot])
         return self.reduction(total)
+
+    def _of_wrong_motion(self, robot: int, wrist: Array) -> Array:
+        """Wrench balance, shape (Q, 6), of a wrist that does not move with the payload: by ``wrist`` [m], in {b_i}."""
+        rates = np.concatenate(with_rates(wrist, self.signals.rate_hz)[1:], axis=1)
+        return np.asarray((self._by_wrist[robot] @ rates[..., None])[..., 0])
+
+    @cached_property
+    def _by_wrist(self) -> Array:
+        """Derivative of the balance by velocity and acceleration of a wrist in {b_i}, shape (N, Q, 6, 6).
+
+        Only by the payload's motion, which is taken from all wrists; the arm really moves so.
+        """
+        samples, G = len(self.s), fusion_matrix(self.shared.grasps)
+        motion = self.data.twist.reshape(samples, -1) @ G.T
+        out = np.zeros((self.robots, samples, 6, 6))
+        for i in range(self.robots):
+            at = slice(6 * i + 3, 6 * i + 6)
+            omega = self.data.twist[:, i, :3]
+            for k in range(3):
+                along = self.data.R_bi[:, i, k]  # unit vector k of {b_i}, in {i}
+                none, turned = np.zeros_like(along), -np.cross(omega, along)
+                for column, (v, v_dot) in ((k, (along, turned)), (3 + k, (none, along))):
+                    needed = _needed(motion, v @ G[:, at].T, v_dot @ G[:, at].T, none, self.shared, self.data)
+                    out[i, :, :, column] = -np.concatenate(needed, axis=1)
+        return out
 
 
 def linearise(
@@ -182,10 +210,9 @@ def _by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, design:
     s = s[knots]
     data = _thinned(data, knots)
     Q, N = s.shape[:2]
-    grasps, pi = shared.grasps, shared.pi
+    grasps = shared.grasps
     motion = fuse(data, grasps)
-    omega, v = motion.omega, data.twist.reshape(Q, -1) @ fusion_matrix(grasps)[3:].T
-    mass, mass_c, inertia = pi[0], pi[1:4], inertia_matrix(pi[4:])
+    fused = data.twist.reshape(Q, -1) @ fusion_matrix(grasps).T
     J = np.zeros((N, Q, 6 * N, SIGNALS))
     for i in range(N):
         G = fusion_matrix(grasps)[:, 6 * i : 6 * i + 6]
@@ -208,24 +235,38 @@ def _by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, design:
                 elif i == j:
                     J[i, :, at : at + 3, k] = turn @ bases.R[j].T
                     J[i, :, at + 3 : at + 6, k] = dh @ bases.R[j].T
-            twist, twist_dot = dV @ G.T, dV_dot @ G.T
-            d_omega, d_alpha = twist[:, :3], twist_dot[:, :3]
             d_up = dR[:, 2] @ R_1i.T / N
             d_up -= np.sum(d_up * motion.up, axis=1, keepdims=True) * motion.up
-            d_accel = twist_dot[:, 3:] + np.cross(d_omega, v) + np.cross(omega, twist[:, 3:])
-            d_G = d_accel + data.gravity_mps2 * d_up
+            needed = _needed(fused, dV @ G.T, dV_dot @ G.T, d_up, shared, data)
             d_force, d_moment = dF[:, 3:] @ R_1i.T, dF[:, :3] @ R_1i.T
             d_moment = d_moment + np.cross(p_1i, d_force)
-            d_force = d_force - mass * d_G - np.cross(d_alpha, mass_c)
-            d_force -= np.cross(d_omega, np.cross(omega, mass_c)) + np.cross(omega, np.cross(d_omega, mass_c))
-            d_moment -= np.cross(mass_c, d_G) + d_alpha @ inertia
-            d_moment -= np.cross(d_omega, omega @ inertia) + np.cross(omega, d_omega @ inertia)
-            J[i, :, -6:-3, k], J[i, :, -3:, k] = d_force, d_moment
+            J[i, :, -6:-3, k], J[i, :, -3:, k] = d_force - needed[0], d_moment - needed[1]
     # It varies as slowly as the motion: a straight line between its values is good to 1e-3.
     at = np.minimum(np.arange(samples) / every, Q - 1.0)
     low = np.minimum(at.astype(int), max(Q - 2, 0))
     weight = (at - low)[None, :, None, None]
     return J[:, low] * (1.0 - weight) + J[:, np.minimum(low + 1, Q - 1)] * weight
+
+
+def _needed(
+    motion: Array, twist: Array, twist_dot: Array, up: Array, shared: Shared, data: GraspData
+) -> tuple[Array, Array]:
+    """Force and moment that a change of the payload's motion asks for, in {1}, shape (Q, 3) each.
+
+    Args:
+        motion: its twist, shape (Q, 6).
+        twist, twist_dot, up: changes of its twist, of that one's rate, and of the vertical.
+        shared: its inertia.
+        data: for gravity.
+    """
+    mass, mass_c, inertia = shared.pi[0], shared.pi[1:4], inertia_matrix(shared.pi[4:])
+    omega, v = motion[:, :3], motion[:, 3:]
+    d_omega, d_alpha = twist[:, :3], twist_dot[:, :3]
+    accel = twist_dot[:, 3:] + np.cross(d_omega, v) + np.cross(omega, twist[:, 3:]) + data.gravity_mps2 * up
+    force = mass * accel + np.cross(d_alpha, mass_c)
+    force += np.cross(d_omega, np.cross(omega, mass_c)) + np.cross(omega, np.cross(d_omega, mass_c))
+    moment = np.cross(mass_c, accel) + d_alpha @ inertia
+    return force, moment + np.cross(d_omega, omega @ inertia) + np.cross(omega, d_omega @ inertia)
 
 
 def _thinned(data: GraspData, rows: NDArray[np.intp]) -> GraspData:

@@ -19,6 +19,7 @@ from discrepancy.team.candidates import every_candidate, nearby_pushes, other_sh
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.dependence import directions_of, quantities_of
+from discrepancy.team.imitators import wrong_torques
 from discrepancy.team.linear import TrialLinear, start_bases
 from discrepancy.team.noise import Noise
 from discrepancy.team.reduction import Reduction
@@ -296,6 +297,10 @@ class TeamRig:
             return []
         reductions = [linear.reduction for linear in self.linear]
         return worst_pushes(reductions, remaining, self.tolerances.get("push", {}))
+
+    def imitators(self, candidate: Candidate) -> list[list[Array]]:
+        """One joint's torque wrong by a constant for as long as a push lasts, every joint in turn."""
+        return wrong_torques(self.linear, self.whitening, candidate)
 
     def quantities(self, trial: int) -> dict[str, Array]:
         """Speed of the payload [m/s], its distance from where it started [m], load [N m]: shape (n,) each."""

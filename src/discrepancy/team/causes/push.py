@@ -2,7 +2,14 @@
 
 import numpy as np
 
-from discrepancy.team.causes.base import Cause, stack
+from discrepancy.team.causes.base import Array, Cause, Shape, stack
+from discrepancy.team.linear import TrialLinear
+
+
+def during(trial: TrialLinear, shape: Shape) -> Array:
+    """1 during the interval of a shape, else 0, shape (Q,)."""
+    time = trial.signals.time
+    return ((time >= shape["start_s"]) & (time < shape["start_s"] + shape["duration_s"])).astype(float)
 
 
 class Push(Cause):
@@ -15,9 +22,8 @@ class Push(Cause):
     separate = "Another trial: a push does not repeat."
 
     def columns(self, trial, robot, joint, shape):
-        time = trial.signals.time
-        window = ((time >= shape["start_s"]) & (time < shape["start_s"] + shape["duration_s"])).astype(float)
-        none = np.zeros((len(time), 3))
+        window = during(trial, shape)
+        none = np.zeros((len(window), 3))
         columns = []
         for axis in np.eye(3):
             force = np.einsum("qji,j->qi", trial.data.R_bi[:, 0], axis) * window[:, None]

@@ -1,0 +1,45 @@
+"""Does a candidate take away enough to be worth naming?"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.explanation import CLEAN
+from discrepancy.fit import Fit
+from discrepancy.leaders import Leader
+from discrepancy.rig import Rig
+
+NEXT_SHARE = 0.25
+"""A further cause has to take away this share of what the ones before it left."""
+
+
+def worth_naming(rig: Rig, fit: Fit, leader: Leader, *, first: bool) -> bool:
+    """Whether a candidate takes away enough of what is left, if much is left.
+
+    Of a further cause only the channels count that it mostly acts on: what a loose grasp leaves in the poses says
+    nothing against a torque's zero.
+    """
+    transient = bool(leader.candidate.detail)
+    if first and not transient:
+        return True
+    excess = max(fit.misfit - CLEAN * fit.problem.samples, 0.0)
+    if not first:
+        excess = min(excess, _excess(fit, _channels_of(rig, fit, leader)))
+    return fit.misfit - leader.misfit >= NEXT_SHARE * excess
+
+
+def _channels_of(rig: Rig, fit: Fit, leader: Leader) -> NDArray[np.bool_]:
+    """Channels of the kind that a candidate mostly acts on, shape (C,)."""
+    index = leader.evidence.index
+    values = leader.problem.fit([*fit.free, index]).part(index)[0]
+    span = leader.problem.spans[index]
+    energy = sum(np.sum((rows[..., span] @ values) ** 2, axis=0) for rows in leader.problem.rows)
+    kinds = np.array([channel.kind for channel in rig.channels])
+    return np.asarray(kinds == max(sorted(set(kinds)), key=lambda kind: float(np.sum(energy[kinds == kind]))))
+
+
+def _excess(fit: Fit, channels: NDArray[np.bool_]) -> float:
+    """What a fit leaves in some channels above clean data."""
+    left = [fit.remaining(t)[:, channels] for t in range(len(fit.problem.rows))]
+    return max(sum(float(np.sum(x**2)) - CLEAN * x.size for x in left), 0.0)
