@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hidden.limits import LIMITS
+from hidden.limits import LIMITS, pendulum_limit_kg
 from hidden.schedule import moving_intervals
 from mocobot_sim.effects import EFFECTS, Effect, make_effect
 from mocobot_sim.models import omnid_design
@@ -90,7 +90,7 @@ def _push(factor: float, ground: Ground, rng: np.random.Generator) -> dict[str, 
 
 def _slosh(factor: float, ground: Ground, rng: np.random.Generator) -> dict[str, float]:
     shape = {"length_m": rng.uniform(0.08, 0.5), "damping_ratio": 0.05}
-    mass = {"mass_kg": factor * LIMITS["slosh"]["mass_kg"]}
+    mass = {"mass_kg": factor * pendulum_limit_kg(shape["length_m"])}
     return mass | shape | _vector("point", "m", _near(ground.p_1c, rng))
 
 

@@ -1,7 +1,8 @@
-"""Measure the table in ``hidden.limits``."""
+"""Measure the tables in ``hidden.limits``."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,15 +14,15 @@ from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import DEFAULTS, read_tolerances
 from estimator.estimate import estimate_payload
 from hidden.generator import PAYLOADS, HiddenSet, generate
-from hidden.limits import GAIN, PUSH_S
+from hidden.limits import GAIN, PENDULUM_LENGTHS_M, PUSH_S
 
 
-def measure_limits(jobs: int) -> dict[str, dict[str, float]]:
-    """Median over places and payloads of every parameter's detection limit, by cause."""
+def measure_limits(jobs: int) -> tuple[dict[str, dict[str, float]], dict[float, float]]:
+    """Median over places and payloads of every parameter's detection limit, by cause; a pendulum's [kg] by length."""
     found: dict[str, list[list[float]]] = {}
     names: dict[str, tuple[str, ...]] = {}
     runs: Any = Parallel(jobs)(delayed(_limits)(payload) for payload in PAYLOADS)
-    for limits in runs:
+    for limits, _ in runs:
         for cause, parameters, values in limits:
             names[cause] = parameters
             found.setdefault(cause, []).append(values)
@@ -29,10 +30,11 @@ def measure_limits(jobs: int) -> dict[str, dict[str, float]]:
     for cause, values in found.items():
         medians = np.median(values, axis=0)
         table[cause] = {name: float(f"{m:.2g}") for name, m in zip(names[cause], medians, strict=True)}
-    return table
+    masses = np.median([by_length for _, by_length in runs], axis=0)
+    return table, {length: float(f"{m:.2g}") for length, m in zip(PENDULUM_LENGTHS_M, masses, strict=True)}
 
 
-def _limits(payload: str) -> list[tuple[str, tuple[str, ...], list[float]]]:
+def _limits(payload: str) -> tuple[list[tuple[str, tuple[str, ...], list[float]]], list[float]]:
     recordings, _ = generate(HiddenSet("clean", 0, payload=payload))
     rig = TeamRig.of(recordings, estimate_payload(recordings), read_tolerances(None))
     candidates = rig.candidates()
@@ -41,8 +43,20 @@ def _limits(payload: str) -> list[tuple[str, tuple[str, ...], list[float]]]:
         for trial in range(3)
         for start in np.arange(5.0, 35.0, 5.0)
     ]
-    fit = Problem.of(rig.rows(candidates), candidates).fit()
-    return [
+    problem = Problem.of(rig.rows(candidates), candidates)
+    limits = [
         (candidate.cause, tuple(p.name for p in candidate.parameters), values.tolist())
-        for candidate, values in zip(candidates, fit.limits(GAIN), strict=True)
+        for candidate, values in zip(candidates, problem.fit().limits(GAIN), strict=True)
     ]
+    return limits, _pendulum(rig, problem)
+
+
+def _pendulum(rig: TeamRig, problem: Problem) -> list[float]:
+    index = next(k for k, candidate in enumerate(problem.candidates) if candidate.cause == "slosh")
+    masses = []
+    for length in PENDULUM_LENGTHS_M:
+        shape = {"length_m": length, "damping_ratio": 0.05}
+        candidate = replace(problem.candidates[index], shape=shape)
+        other = problem.with_columns(index, candidate, rig.columns(candidate))
+        masses.append(float(other.fit().limits(GAIN)[index][0]))
+    return masses
