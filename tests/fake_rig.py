@@ -31,6 +31,7 @@ class FakeRig:
         loop: chi2_per_n of a closed loop from the names of its causes; None if there is none.
         seed: of all that is random.
         own: true values of every trial's own unknowns.
+        kinds: of the channels.
         calls: simulations asked for: trial, names of the causes, their values.
     """
 
@@ -44,6 +45,7 @@ class FakeRig:
     seed: int = 3
     calls: list = field(default_factory=list)
     local_unknowns: int = 2
+    kinds: tuple = ("made up",) * CHANNELS
 
     def __post_init__(self):
         rng = np.random.default_rng(self.seed)
@@ -72,7 +74,7 @@ class FakeRig:
 
     @property
     def channels(self):
-        return [Channel(f"channel {k}", "made up", None, "m") for k in range(CHANNELS)]
+        return [Channel(f"channel {k}", kind, None, "m") for k, kind in enumerate(self.kinds)]
 
     def candidates(self):
         return list(self.catalogue)
@@ -118,6 +120,9 @@ class FakeRig:
             return []
         detail = {"trial": self.burst[0], "start_s": 3.2, "duration_s": 4.0}
         return [cause("push", None, 0.0, self.burst[2], "push", detail)]
+
+    def imitators(self, candidate):
+        return []
 
     def refinements(self, candidate, *, finer=False):
         return []

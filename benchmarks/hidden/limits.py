@@ -1,7 +1,7 @@
 """Detection limits: the size of each parameter alone that raises a cause's evidence by 38 (chi-square).
 
 Median over the places of the shipped payloads, nominal sensors, the trials of ``hidden.schedule``; a push lasts 1 s, a
-pendulum is 0.2 m long unless said otherwise. ``python benchmarks/hidden_effects.py --limits`` measures the tables again.
+pendulum is 0.2 m long unless said otherwise. ``python benchmarks/hidden_effects.py --limits`` measures all again.
 """
 
 import numpy as np
