@@ -121,6 +121,9 @@ class FakeRig:
         detail = {"trial": self.burst[0], "start_s": 3.2, "duration_s": 4.0}
         return [cause("push", None, 0.0, self.burst[2], "push", detail)]
 
+    def steps(self, candidate):
+        return []
+
     def imitators(self, candidate):
         return []
 

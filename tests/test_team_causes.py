@@ -337,6 +337,12 @@ def test_standard_errors_of_derived_parameters():
     )
     assert np.isnan(se["length_m"])
     assert se["mass_kg"] == pytest.approx(0.01)
+    of_shape = np.diag([1e-4, 1e-4, 1e-4, 1e-4, 4e-6, 9e-6])
+    context = Context(np.zeros(3), 0.4, {"length_m": 0.2, "damping_ratio": 0.05}, None)
+    _, se = CAUSES["slosh"].report(np.array([0.3, 0.0, 0.0, 0.0]), of_shape, context)
+    assert se["length_m"] == pytest.approx(2e-3)
+    assert se["damping_ratio"] == pytest.approx(3e-3)
+    assert se["mass_kg"] == pytest.approx(0.01)
 
 
 def test_a_mass_swings_only_if_it_is_there_and_within_reach():

@@ -24,7 +24,8 @@ class Found:
 
     Attributes:
         candidate: what and where, with its best shape.
-        values, covariance: its parameters and their covariance, in their own units.
+        values: its parameters, in their own units, shape (k,).
+        covariance: of the values and of what is determined of its shape (see ``best_shape``), in their own units.
         evidence: when it was chosen.
         rivals: other candidates then, best first, with the gap of their score [nats].
         in_sample, held_out: share of the nominal model's misfit that it removes (see ``held_out.shares``).

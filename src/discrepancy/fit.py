@@ -172,6 +172,13 @@ class Fit:
         keep = eigenvalues > LEAST_INFORMATION
         return float(np.sum((vectors[:, keep].T @ score) ** 2 / eigenvalues[keep]))
 
+    def solution_with(self, columns: Sequence[Array]) -> tuple[Array, Array]:
+        """Values (k,) and covariance (k, k) of further columns, shape (n, C, k) per trial, beside all in the model."""
+        information, score = self._told_by(columns)
+        scale = 1.0 / np.sqrt(np.diag(information))
+        covariance = np.linalg.inv(information * np.outer(scale, scale)) * np.outer(scale, scale)
+        return covariance @ score, covariance
+
     def _told_by(self, columns: Sequence[Array]) -> tuple[Array, Array]:
         """Information about the values of further columns given all in the model, and their score vector."""
         k = columns[0].shape[2]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.best_shape import nearest_shape
 from discrepancy.fit import COMPLEXITY, Evidence, Fit
 from discrepancy.problem import Problem
 from discrepancy.rig import Candidate, Rig
@@ -21,6 +22,10 @@ INTERVALS_LOG10 = 3.0
 LEADERS = 8
 FINER_ROUNDS = 4
 """How often a shape is sharpened around the best so far."""
+POLISH_ROUNDS = 3
+
+Shaped = tuple[Evidence, Candidate, list[Array]]
+"""A candidate in one shape: its evidence and its columns."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +75,7 @@ def _sharpened(
         return _best_with_unknowns(rig, problem, free, index, inflation)
     # What it would add to a model without it: no need to build the problem anew for every shape.
     without = problem.fit(free, fixed=(index, np.zeros(len(start.parameters))))
-    best: tuple[Evidence, Candidate, list[Array]] | None = None
+    best: Shaped | None = None
     shapes = [start, *rig.refinements(start)]
     for _ in range(FINER_ROUNDS + 1):
         last = best
@@ -84,10 +89,24 @@ def _sharpened(
         shapes = rig.refinements(best[1], finer=True)
     if best is None:
         return None
+    best = _polished(rig, without, best, inflation)
     evidence, shape, columns = best
     changed = problem if shape is start else problem.with_columns(index, shape, columns)
     penalty = COMPLEXITY * np.log(problem.samples) * evidence.parameters
     return Leader(evidence, changed, without.misfit - evidence.fall + penalty)
+
+
+def _polished(rig: Rig, without: Fit, best: Shaped, inflation: float) -> Shaped:
+    """The best of a grid of shapes, moved to where the data want it."""
+    for _ in range(POLISH_ROUNDS if rig.steps(best[1]) else 0):
+        evidence, shape, _ = best
+        nearer = nearest_shape(rig, without, shape, evidence.values * shape.units)
+        columns = rig.columns(nearer)
+        judged = without.evidence_with(evidence.index, columns, inflation)
+        if judged is None or judged.fall <= evidence.fall:
+            break
+        best = judged, nearer, columns
+    return best
 
 
 def _best_with_unknowns(

@@ -162,6 +162,10 @@ class Rig(Protocol):
         """The same candidate with other shapes, to choose the best from; ``finer`` ones around its own."""
         ...
 
+    def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
+        """For every number of its shape that the data determine: a little less, a little more, and the difference."""
+        ...
+
     def can_run_again(self) -> str | None:
         """Why the recordings cannot be simulated again, or None."""
         ...

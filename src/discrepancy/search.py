@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from discrepancy.best_shape import covariance_with_shape
 from discrepancy.explanation import CLEAN, Explanation, Found
 from discrepancy.fit import Fit
 from discrepancy.held_out import confirmed, held_out_gains, shares
@@ -136,9 +137,8 @@ def _finished(rig: Rig, explanation: Explanation) -> Explanation:
     fit, problem = explanation.fit, explanation.problem
     results = []
     for index, item in zip(fit.free, explanation.found, strict=True):
-        values, covariance = fit.part(index)
-        units = problem.candidates[index].units
-        results.append(replace(item, values=values * units, covariance=covariance * np.outer(units, units)))
+        values = fit.part(index)[0] * problem.candidates[index].units
+        results.append(replace(item, values=values, covariance=covariance_with_shape(rig, fit, index)))
     shared = fit.coefficients[: problem.shared]
     local = tuple(-fit.local(t)[: rig.local_unknowns] for t in range(len(problem.rows)))
     plain = problem.fit(fit.free, background=False).misfit

@@ -213,6 +213,10 @@ class EmpsRig:
         shapes = cause.finer(candidate.shape) if finer else cause.shapes(self.hints)
         return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
 
+    def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
+        """None: shapes are chosen from a grid."""
+        return []
+
     def can_run_again(self) -> str | None:
         """Nothing stands against it: every recording has its reference and the loop's gains."""
         return None

@@ -59,6 +59,18 @@ def other_shapes(candidate: Candidate, *, finer: bool) -> list[Candidate]:
     return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
 
 
+def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
+    """The candidate with each number of its shape that the data determine changed both ways, and by how much."""
+    steps = []
+    for name, share in CAUSES[candidate.cause].determined.items():
+        number = candidate.shape[name]
+        less, more = (
+            replace(candidate, shape={**candidate.shape, name: x * number}) for x in (1 - share, 1 + share)
+        )
+        steps.append((less, more, 2.0 * share * number))
+    return steps
+
+
 def nearby_pushes(candidate: Candidate, tolerance: Tolerances) -> list[Candidate]:
     """A push with its interval moved."""
     near = intervals_near(candidate.shape["start_s"], candidate.shape["duration_s"])

@@ -15,7 +15,13 @@ from numpy.typing import NDArray
 from discrepancy.explanation import Explanation
 from discrepancy.rig import Candidate, Channel, Rows
 from discrepancy.team.adjust import with_adjusted_torques
-from discrepancy.team.candidates import every_candidate, nearby_pushes, other_shapes, worst_pushes
+from discrepancy.team.candidates import (
+    every_candidate,
+    nearby_pushes,
+    other_shapes,
+    shape_steps,
+    worst_pushes,
+)
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.dependence import directions_of, quantities_of
@@ -301,6 +307,10 @@ class TeamRig:
     def imitators(self, candidate: Candidate) -> list[list[Array]]:
         """One joint's torque wrong by a constant for as long as a push lasts, every joint in turn."""
         return wrong_torques(self.linear, self.whitening, candidate)
+
+    def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
+        """The candidate with each number of its shape that the data determine changed both ways, and by how much."""
+        return shape_steps(candidate)
 
     def quantities(self, trial: int) -> dict[str, Array]:
         """Speed of the payload [m/s], its distance from where it started [m], load [N m]: shape (n,) each."""

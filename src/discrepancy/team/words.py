@@ -115,7 +115,7 @@ SENTENCES: dict[str, Callable[[_Numbers], str]] = {
     ),
     "slosh": lambda n: (
         f"a mass of {n('mass_kg', 'kg', signed=True)} swings in the payload on {n('length_m', 'm')} below "
-        f"{n.vector('point', 'm', 'm')} in {{1}} (damping ratio {n.values['damping_ratio']:.2g})"
+        f"{n.vector('point', 'm', 'm')} in {{1}} (damping ratio {n('damping_ratio', '')})"
     ),
 }
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -45,6 +45,7 @@ class Cause(ABC):
         per: ``joint``, ``robot`` or ``payload``: where it can sit.
         joints: those that it can sit at, from 1.
         shapes: alternatives of what changes the columns themselves; the first is the catalogue's.
+        determined: numbers of the shape that the data determine, with the share by which to change them for slopes.
         positive: parameters that cannot be negative.
         separate: what experiment would tell it from its look-alikes.
     """
@@ -56,6 +57,7 @@ class Cause(ABC):
     per: ClassVar[Literal["joint", "robot", "payload"]] = "joint"
     joints: ClassVar[tuple[int, ...]] = (1, 2, 3)
     shapes: ClassVar[tuple[Shape, ...]] = ({},)
+    determined: ClassVar[Mapping[str, float]] = {}
     positive: ClassVar[tuple[str, ...]] = ()
     separate: ClassVar[str] = ""
 
@@ -94,7 +96,13 @@ class Cause(ABC):
     def report(
         self, values: Array, covariance: Array, context: Context
     ) -> tuple[dict[str, float], dict[str, float]]:
-        """The effect's parameters and their standard errors; those of a chosen shape have none (NaN)."""
+        """The effect's parameters and their standard errors; a shape that was chosen, not determined, has none (NaN).
+
+        Args:
+            values: the columns', shape (k,).
+            covariance: of the values, then of what is determined of the shape, shape (k + s, k + s) or (k, k).
+            context: what else the parameters depend on.
+        """
         physical = self.physical(values, context)
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         squares = {name: 0.0 for name in physical}
@@ -103,13 +111,17 @@ class Cause(ABC):
             step = np.sqrt(max(variance, 0.0)) * direction
             if not np.any(np.abs(step) > 1e-12 * se.max(initial=0.0)):
                 continue
-            ahead, behind = (
-                self.physical(values + 0.1 * step, context),
-                self.physical(values - 0.1 * step, context),
-            )
+            ahead, behind = (self._moved(values, context, x * step) for x in (0.1, -0.1))
             for name in physical:
                 squares[name] += ((ahead[name] - behind[name]) / 0.2) ** 2
         return physical, {name: float(np.sqrt(v)) if v else float("nan") for name, v in squares.items()}
+
+    def _moved(self, values: Array, context: Context, step: Array) -> dict[str, float]:
+        """The effect's parameters a step away, in values and shape."""
+        k = len(values)
+        further = dict(zip(self.determined, step[k:], strict=False))
+        shape = {name: x + further.get(name, 0.0) for name, x in context.shape.items()}
+        return self.physical(values + step[:k], replace(context, shape=shape))
 
 
 def one_joint(values: Array, joint: int) -> Array:

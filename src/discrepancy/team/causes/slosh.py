@@ -1,6 +1,6 @@
 """A mass that swings in the payload."""
 
-from typing import cast
+from typing import ClassVar, cast
 
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
@@ -33,6 +33,7 @@ class Slosh(Cause):
         for length in (0.2, 0.05, 0.065, 0.085, 0.11, 0.145, 0.27, 0.37, 0.5, 0.7)
         for damping in (0.05, 0.15)
     )
+    determined: ClassVar = {"length_m": 0.02, "damping_ratio": 0.1}
     separate = "Motion near the pendulum's own frequency."
 
     def columns(self, trial, robot, joint, shape):
