@@ -371,8 +371,16 @@ def test_cause_that_worsens_the_response_is_dropped():
     assert diagnosis.causes == ()
     assert diagnosis.alternatives == ()
     assert diagnosis.verdict == "unexplained"
-    assert any("makes the response" in note for note in diagnosis.notes)
+    assert any("makes the response to the commands worse (chi2/n 2 to 8)" in note for note in diagnosis.notes)
     assert diagnosis.gain.after == diagnosis.gain.before
+
+
+def test_cause_that_cannot_be_simulated_is_dropped():
+    diagnosis = diagnose(FakeRig({2: 25.0}, loop=lambda c, t: None if c else 9.0))
+    assert diagnosis.causes == ()
+    assert diagnosis.notes == (
+        "cause 2 (robot 1): with it the recorded commands cannot be simulated, so it is not named.",
+    )
 
 
 def test_every_trial_is_simulated_with_what_the_others_say():

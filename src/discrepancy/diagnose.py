@@ -202,10 +202,7 @@ def _confirm(
     idle = none > VISIBLE and ours > none * (1.0 - LEAST_SHARE)
     if ours > none * (1.0 + MARGIN) or idle:
         dropped = ", ".join(found.candidate.label for found in explanation.found)
-        effect = "hardly improves the response" if ours < none else "makes the response worse"
-        notes.append(
-            f"{dropped}: {effect} to the commands (chi2/n {none:.3g} to {ours:.3g}), so it is not named."
-        )
+        notes.append(f"{dropped}: {_in_closed_loop(none, ours)}, so it is not named.")
         after, chosen = before, []
         explanation = refitted(rig, explanation, [])
     tried = {(p, c.key): mean_chi2(r) for (p, c, _), r in zip(trials, others, strict=True)}
@@ -219,6 +216,18 @@ def _confirm(
             listed.append(Alternative(rival, gap, value, gap < CLOSE_NATS / 4 and not apart))
         alternatives.append(tuple(listed))
     return explanation, alternatives, Gain(before, after, len(rig.trials) > 1), notes
+
+
+def _in_closed_loop(before: float, after: float) -> str:
+    """What named causes do to the response, by its chi-square without and with them."""
+    if not np.isfinite(after):
+        return "with it the recorded commands cannot be simulated"
+    effect = (
+        "hardly improves the response to the commands"
+        if after < before
+        else ("makes the response to the commands worse")
+    )
+    return f"{effect} (chi2/n {before:.3g} to {after:.3g})"
 
 
 def _wins(rival: Sequence[Response | None], named: Sequence[Response | None]) -> bool:
