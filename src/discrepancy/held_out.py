@@ -15,14 +15,20 @@ SHORT_ROWS = 24
 INSIDE = 0.1
 """Rows that a transient reaches at all: taking out a trial's own unknowns spreads a trace of it everywhere."""
 FOLDS = 0.75
-"""Share of the trials on which a cause must help when it was fitted to the others."""
+"""Share of the trials with something to say that a cause must help when it was fitted to the others."""
+NOTHING = 2.0
+"""A trial in which chi-square rises by less says nothing: it does not move or load what the cause needs to show."""
+SUPPORTING = 2
+"""Trials that a cause must help at least."""
 
 
 def confirmed(folds: Sequence[float]) -> bool:
     """Whether the gains on what was left out speak for a cause; nothing left out says nothing against it."""
     if len(folds) < 2:
         return True
-    return sum(gain > 0 for gain in folds) >= FOLDS * len(folds) and sum(folds) > 0
+    supporting, against = sum(gain > 0 for gain in folds), sum(gain < -NOTHING for gain in folds)
+    enough = supporting >= SUPPORTING and supporting >= FOLDS * (supporting + against)
+    return enough and sum(folds) > 0
 
 
 def held_out_gains(problem: Problem, free: Sequence[int], index: int, candidate: Candidate) -> list[float]:
