@@ -34,7 +34,8 @@ def _channels_of(rig: Rig, fit: Fit, leader: Leader) -> NDArray[np.bool_]:
     index = leader.evidence.index
     values = leader.problem.fit([*fit.free, index]).part(index)[0]
     span = leader.problem.spans[index]
-    energy = sum(np.sum((rows[..., span] @ values) ** 2, axis=0) for rows in leader.problem.rows)
+    traces = [rows[..., span] @ values for rows in leader.problem.rows]
+    energy = np.sum([np.sum(x**2, axis=0) for x in traces], axis=0)
     kinds = np.array([channel.kind for channel in rig.channels])
     return np.asarray(kinds == max(sorted(set(kinds)), key=lambda kind: float(np.sum(energy[kinds == kind]))))
 
