@@ -260,7 +260,8 @@ def test_base_compliance(case, robot):
     on_base = -(force_of(case, robot)[1] + rate_of(rate_of(moved))) * [1.0, 1.0, 0.0]
     signals = adapted(case, robot, -c * on_base)
     column = CAUSES["base_compliance"].columns(case.linear, robot, 0, {})
-    check_pose(case, signals, column, [c], 0.03)
+    # Twice differentiated, what the two know differently of the arm's own acceleration counts for more.
+    check_pose(case, signals, column, [c], 0.03, 0.12)
 
 
 @pytest.mark.parametrize("robot", [0, 1, 2])
