@@ -17,6 +17,9 @@ def cause(name, robot=1, tolerance=1.0, parameters=1, family="made up", detail=N
 CATALOGUE = tuple(cause(f"cause {k}", parameters=2 if k == 5 else 1) for k in range(8))
 
 
+TWINS = {4: (2, 0.005)}  # cause 4 leaves the trace of cause 2, but for half a percent
+
+
 @dataclass
 class FakeRig:
     """Data are noise + unknowns + causes in place, all linear.
@@ -159,3 +162,7 @@ class FakeRig:
 
     def undecidable(self):
         return []
+
+
+def names(found):
+    return [f.candidate.cause for f in found]
