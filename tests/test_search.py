@@ -53,12 +53,12 @@ def test_one_cause_is_found_with_its_value(seed):
         ([], True),
         ([-5.0], True),
         ([3.0, 1.0, 2.0, -1.0], True),
-        ([3.0, 9.0, -3.0, -3.0], False),  # two of four
-        ([3.0, 9.0, -1.0, -1.9], True),  # two of two: the others do not show it
+        ([3.0, 9.0, -3.0, -3.0], False),  # half as much harm as help
+        ([3.0, 9.0, -1.0, -1.9], True),  # two hardly show it
         ([9.0, -1.0, -1.0, -1.0], False),  # one alone
-        ([9.0, 8.0, 7.0, -3.0], True),  # three of four
+        ([7.0, 49.0, -4.0, -0.1], True),
         ([1.0, 1.0, 1.0, -4.0], False),  # worse in all
-        ([9.0, 1.0, -3.0], False),  # two of three
+        ([0.0, 0.0, 0.0], False),
     ],
 )
 def test_trials_that_confirm(folds, expected):

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
+from discrepancy.leaders import Leader
+from discrepancy.problem import Problem
 from discrepancy.search import search
+from discrepancy.worth import is_another
 from fake_rig import CATALOGUE, CHANNELS, ROWS, FakeRig, cause
 
 POSES, FORCES = slice(0, 2), slice(2, 4)
@@ -39,3 +42,15 @@ def test_only_channels_that_a_further_cause_acts_on_count(kinds, foreign_in, exp
     assert [f.candidate.cause for f in found] == expected
     if len(found) > 1:
         assert found[1].values[0] == pytest.approx(2.0, abs=0.4)
+
+
+@pytest.mark.parametrize(("other", "apart", "expected"), [(4, 0.02, False), (4, 0.5, True), (5, None, True)])
+def test_what_makes_a_named_cause_unknown_is_no_other(other, apart, expected):
+    """Columns that differ by 2 % of their length leave an error 50 times as large, by 50 % one of 2 or so."""
+    rig = FakeRig({2: 25.0}, twins={} if apart is None else {other: (2, apart)})
+    problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
+    fit = problem.fit([2])
+    evidence = fit.evidence_of(other)
+    assert is_another(fit, Leader(evidence, problem, 0.0)) is expected
+    nothing_named = problem.fit()
+    assert is_another(nothing_named, Leader(evidence, problem, 0.0))

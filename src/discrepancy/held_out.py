@@ -14,21 +14,18 @@ SHORT_ROWS = 24
 """A transient of fewer rows (2 s) cannot be split and tested on its own; its evidence has to do."""
 INSIDE = 0.1
 """Rows that a transient reaches at all: taking out a trial's own unknowns spreads a trace of it everywhere."""
-FOLDS = 0.75
-"""Share of the trials with something to say that a cause must help when it was fitted to the others."""
-NOTHING = 2.0
-"""A trial in which chi-square rises by less says nothing: it does not move or load what the cause needs to show."""
 SUPPORTING = 2
-"""Trials that a cause must help at least."""
+"""Trials that a cause must help at least, when it was fitted to the others."""
+AGAINST = 1.0 / 3.0
+"""What it harms in some trials, over what it helps in the others, at most. One that does not show it hardly counts."""
 
 
 def confirmed(folds: Sequence[float]) -> bool:
     """Whether the gains on what was left out speak for a cause; nothing left out says nothing against it."""
     if len(folds) < 2:
         return True
-    supporting, against = sum(gain > 0 for gain in folds), sum(gain < -NOTHING for gain in folds)
-    enough = supporting >= SUPPORTING and supporting >= FOLDS * (supporting + against)
-    return enough and sum(folds) > 0
+    helped, harmed = sum(g for g in folds if g > 0), -sum(g for g in folds if g < 0)
+    return sum(gain > 0 for gain in folds) >= SUPPORTING and harmed <= AGAINST * helped
 
 
 def held_out_gains(problem: Problem, free: Sequence[int], index: int, candidate: Candidate) -> list[float]:

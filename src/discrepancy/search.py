@@ -15,7 +15,7 @@ from discrepancy.imitation import imitated
 from discrepancy.leaders import SIGNIFICANT, in_best_shapes, leaders, log10_p, with_transients
 from discrepancy.problem import Problem
 from discrepancy.rig import Candidate, Rig
-from discrepancy.worth import worth_naming
+from discrepancy.worth import is_another, worth_naming
 
 MOST_CAUSES = 3
 ENOUGH = 0.8
@@ -52,7 +52,7 @@ def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] 
         barred = {c.key for c in rejected}
         evidence = [e for e in evidence if wider.candidates[e.index].key not in barred]
         ranked = leaders(rig, wider, free, evidence, inflation)
-        ranked = [k for k in ranked if worth_naming(rig, fit, k, first=not found)]
+        ranked = [k for k in ranked if worth_naming(rig, fit, k, first=not found) and is_another(fit, k)]
         if not ranked:
             break
         best = ranked[0]

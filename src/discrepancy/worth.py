@@ -12,6 +12,8 @@ from discrepancy.rig import Rig
 
 NEXT_SHARE = 0.25
 """A further cause has to take away this share of what the ones before it left."""
+LOOK_ALIKE = 10.0
+"""Growth of a named cause's standard error beside a further one, from which the two are one and the same."""
 
 
 def worth_naming(rig: Rig, fit: Fit, leader: Leader, *, first: bool) -> bool:
@@ -27,6 +29,16 @@ def worth_naming(rig: Rig, fit: Fit, leader: Leader, *, first: bool) -> bool:
     if not first:
         excess = min(excess, _excess(fit, _channels_of(rig, fit, leader)))
     return fit.misfit - leader.misfit >= NEXT_SHARE * excess
+
+
+def is_another(fit: Fit, leader: Leader) -> bool:
+    """Whether a candidate is told apart from each cause that is named already.
+
+    Friction about one of two parallel axes is divided among both at will: the second makes the first unknown.
+    """
+    both = leader.problem.fit([*fit.free, leader.evidence.index])
+    alone = leader.problem.fit(fit.free)
+    return all(np.all(np.diag(both.part(i)[1]) < LOOK_ALIKE**2 * np.diag(alone.part(i)[1])) for i in fit.free)
 
 
 def _channels_of(rig: Rig, fit: Fit, leader: Leader) -> NDArray[np.bool_]:
