@@ -46,7 +46,7 @@ def test_only_channels_that_a_further_cause_acts_on_count(kinds, foreign_in, exp
 
 @pytest.mark.parametrize(("other", "apart", "expected"), [(4, 0.005, False), (4, 0.5, True), (5, None, True)])
 def test_what_makes_a_named_cause_unknown_is_no_other(other, apart, expected):
-    """Columns alike to half a percent divide a value at will; as long as one is within its tolerance, the other is known."""
+    """Columns alike to half a percent divide a value at will; with one within its tolerance the other is known."""
     rig = FakeRig({2: 25.0}, twins={} if apart is None else {other: (2, apart)})
     problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
     fit = problem.fit([2])
