@@ -125,6 +125,15 @@ def test_score(items, right, extras):
     assert one.error == (pytest.approx(0.25) if one.place else None)
 
 
+def test_score_in_standard_errors():
+    item = found() | {"standard_errors": {"bias_Nm": 0.005, "other": 1.0}}
+    assert score({"found": [item]}, TRUTH)[0][0].deviations == pytest.approx((-4.0,))
+    unknown = found() | {"standard_errors": {"bias_Nm": float("nan")}}
+    assert score({"found": [unknown]}, TRUTH)[0][0].deviations == ()
+    misplaced = found(joint=3) | {"standard_errors": {"bias_Nm": 0.005}}
+    assert score({"found": [misplaced]}, TRUTH)[0][0].deviations == ()
+
+
 def imports(package) -> dict[str, set[str]]:
     """Modules imported by every module of a package."""
     out = {}

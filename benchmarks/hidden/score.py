@@ -32,6 +32,8 @@ class Score:
         place: whether the place is right; False where the cause is wrong.
         error: parameters, estimate minus truth over truth (norms in units of the detection limits); None where the
             cause or its place is wrong.
+        deviations: estimate minus truth over the standard error of every parameter that has one; empty where the
+            cause or its place is wrong.
     """
 
     named: str | None
@@ -40,6 +42,7 @@ class Score:
     ambiguous: bool
     place: bool
     error: float | None
+    deviations: tuple[float, ...] = ()
 
 
 def score(verdict: Mapping[str, Any], truth: Mapping[str, Any]) -> tuple[list[Score], list[str]]:
@@ -77,8 +80,12 @@ def _score(item: Item | None, effect: Item, truth: Item) -> Score:
         rival["cause"] == effect["cause"] and _here(rival) == _here(effect) for rival in beside
     )
     place = ambiguous or (member and _same_place(item, effect, truth))
-    error = _error(item, effect) if member and place else None
-    return Score(item["cause"], _family(item) == _family(effect), member, ambiguous, place, error)
+    right = member and place
+    error = _error(item, effect) if right else None
+    family = _family(item) == _family(effect)
+    return Score(
+        item["cause"], family, member, ambiguous, place, error, _deviations(item, effect) if right else ()
+    )
 
 
 def _family(item: Item) -> str:
@@ -106,6 +113,16 @@ def _here(item: Item) -> tuple[int | None, int | None]:
 def _error(item: Item, effect: Item) -> float:
     estimate, true = (_vector(effect["cause"], x["parameters"]) for x in (item, effect))
     return float(np.linalg.norm(estimate - true) / np.linalg.norm(true))
+
+
+def _deviations(item: Item, effect: Item) -> tuple[float, ...]:
+    """Of every parameter with a standard error; where a push acts along its line cannot be told."""
+    out = []
+    for name, se in item.get("standard_errors", {}).items():
+        told = name in effect["parameters"] and not (effect["cause"] == "push" and name.startswith("point"))
+        if told and np.isfinite(se) and se > 0:
+            out.append((item["parameters"][name] - effect["parameters"][name]) / se)
+    return tuple(out)
 
 
 def _vector(cause: str, parameters: Mapping[str, float]) -> Array:

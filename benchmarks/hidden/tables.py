@@ -74,13 +74,24 @@ def _singles(title: str, runs: Sequence[Result]) -> str:
     if not rows:
         return ""
     rows.append(["**all**", *_row("", [pair for pairs in by_cause.values() for pair in pairs])])
-    header = ["hidden", "sets", "family", "member", "ambiguous", "place", "error median", "worst"]
+    header = [
+        "hidden",
+        "sets",
+        "family",
+        "member",
+        "ambiguous",
+        "place",
+        "error median",
+        "worst",
+        "rms over se",
+    ]
     return _markdown(title, [*header, "missed", "named instead", "besides"], rows)
 
 
 def _row(cause: str, pairs: Sequence[tuple[Score, list[str]]]) -> list[Any]:
     scores = [one for one, _ in pairs]
     errors = [100 * s.error for s in scores if s.error is not None]
+    deviations = [z for s in scores for z in s.deviations]
     instead = Counter(s.named for s in scores if s.named and not s.member)
     besides = Counter(extra for _, extras in pairs for extra in extras)
     return [
@@ -91,6 +102,7 @@ def _row(cause: str, pairs: Sequence[tuple[Score, list[str]]]) -> list[Any]:
         sum(s.place for s in scores),
         f"{np.median(errors):.1f} %" if errors else "-",
         f"{max(errors):.1f} %" if errors else "-",
+        f"{np.sqrt(np.mean(np.square(deviations))):.1f}" if deviations else "-",
         sum(s.named is None for s in scores),
         _counts(instead) if cause else sum(instead.values()),
         _counts(besides) if cause else sum(besides.values()),
