@@ -9,7 +9,7 @@ from discrepancy.diagnose import diagnose
 from discrepancy.explanation import CLEAN
 from discrepancy.held_out import confirmed
 from discrepancy.problem import Problem
-from discrepancy.search import _idle, search
+from discrepancy.search import _idle, refitted, search, without_idle
 from fake_rig import CATALOGUE, TWINS, FakeRig, cause, names
 
 
@@ -225,12 +225,27 @@ def test_what_tells_nothing_beside_the_others_is_dropped():
     """The last one named is never the idle one; of the others the one without evidence is."""
     rig = FakeRig({2: 20.0, 5: [40.0, -30.0]})
     problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
-    assert _idle(problem, [2, 5]) == []
-    assert _idle(problem, [5, 2]) == []
-    assert _idle(problem, [6, 5, 2]) == [0]
-    assert _idle(problem, [5, 6, 2]) == [1]
-    assert _idle(problem, [5, 2, 6]) == []
-    assert _idle(problem, [6]) == []
+    assert _idle(problem, [2, 5], range(1)) == []
+    assert _idle(problem, [5, 2], range(1)) == []
+    assert _idle(problem, [6, 5, 2], range(2)) == [0]
+    assert _idle(problem, [5, 6, 2], range(2)) == [1]
+    assert _idle(problem, [5, 2, 6], range(2)) == []
+    assert _idle(problem, [5, 2, 6], range(3)) == [2]
+
+
+def test_what_a_replaced_cause_left_goes_with_it():
+    """Cause 6 is not there; once the right one stands beside it, nothing speaks for it."""
+    rig = FakeRig({2: 20.0, 5: [40.0, -30.0]})
+    explanation = search(rig)
+    assert names(explanation.found) == ["cause 5", "cause 2"]
+    three = replace(explanation, found=(explanation.found[0], *explanation.found))
+    rest, places = without_idle(rig, refitted(rig, three, [6, 5, 2]))
+    assert places == [1, 2]
+    assert names(rest.found) == ["cause 5", "cause 2"]
+    assert rest.fit.free == (5, 2)
+    assert rest.after == pytest.approx(explanation.after, rel=1e-6)
+    np.testing.assert_allclose(rest.found[1].values, explanation.found[1].values, rtol=1e-3)
+    assert without_idle(rig, explanation) == (explanation, [0, 1])
 
 
 def test_what_is_left_open_at_rest_is_not_charged_where_it_tells_nothing():

@@ -11,7 +11,7 @@ import numpy as np
 from discrepancy.explanation import Explanation, Found
 from discrepancy.gain import Gain, Response, mean_chi2, responses
 from discrepancy.rig import Candidate, Rig
-from discrepancy.search import ENOUGH, MOST_CAUSES, refitted, search
+from discrepancy.search import ENOUGH, MOST_CAUSES, refitted, search, without_idle
 
 Verdict = Literal["consistent", "explained", "partly_explained", "unexplained"]
 
@@ -196,8 +196,12 @@ def _confirm(
                 f"better (chi2/n {value:.3g} against {best:.3g})."
             )
             chosen, best, after = hypothesis, value, result
+    kept = list(range(len(free)))
     if chosen is not free:
         explanation = refitted(rig, replace(explanation, problem=problem), chosen)
+        explanation, kept = without_idle(rig, explanation)
+        if len(kept) < len(free):
+            after = responses(rig, explanation.problem, [explanation.fit.free], jobs, simulated)[0]
     none, ours = mean_chi2(before), mean_chi2(after)
     idle = none > VISIBLE and ours > none * (1.0 - LEAST_SHARE)
     if ours > none * (1.0 + MARGIN) or idle:
@@ -208,7 +212,7 @@ def _confirm(
     tried = {(p, c.key): mean_chi2(r) for (p, c, _), r in zip(trials, others, strict=True)}
     tried |= {(p, c): mean_chi2(results[1]) for p, c in enumerate(first)}
     alternatives = []
-    for place, found in enumerate(explanation.found):
+    for place, found in zip(kept, explanation.found, strict=False):
         listed = []
         for rival, gap in found.rivals:
             value = tried.get((place, rival.key))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -86,7 +86,7 @@ def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] 
                 tuple(folds),
             )
         )
-        for place in _idle(problem, free):
+        for place in _idle(problem, free, range(len(free) - 1)):
             # What was named first may have stood in for what was found since.
             rejected.append(found.pop(place).candidate)
             del free[place]
@@ -145,10 +145,27 @@ def _finished(rig: Rig, explanation: Explanation) -> Explanation:
     return replace(explanation, found=tuple(results), plain=plain, shared=-shared, local=local)
 
 
-def _idle(problem: Problem, free: Sequence[int]) -> list[int]:
-    """Place of the cause that tells least beside the others, if that is too little to name it; at most one."""
+def without_idle(rig: Rig, explanation: Explanation) -> tuple[Explanation, list[int]]:
+    """Drop causes that tell nothing beside the others, such as what was left by a cause that has been replaced since.
+
+    Returns:
+        The explanation by the rest, and their places in the old one.
+    """
+    places = list(range(len(explanation.found)))
+    while idle := _idle(explanation.problem, explanation.fit.free, range(len(explanation.fit.free))):
+        left = [k for k in range(len(explanation.found)) if k not in idle]
+        free = [explanation.fit.free[k] for k in left]
+        places = [places[k] for k in left]
+        rest = replace(explanation, found=tuple(explanation.found[k] for k in left))
+        explanation = refitted(rig, rest, free)
+    return explanation, places
+
+
+def _idle(problem: Problem, free: Sequence[int], places: Iterable[int]) -> list[int]:
+    """Of the causes at some places the one that tells least beside all others, if that is too little to name it."""
     weakest: tuple[float, int] | None = None
-    for place, index in enumerate(free[:-1]):
+    for place in places:
+        index = free[place]
         others = problem.fit([i for i in free if i != index])
         inflation = max(1.0, others.misfit / (CLEAN * problem.samples))
         judged = others.evidence_of(index, inflation)
