@@ -74,3 +74,15 @@ def test_solution_with_further_columns_is_that_of_the_extended_problem():
     got = problem.fit([2]).solution_with(columns)
     np.testing.assert_allclose(got[0], expected[0], rtol=1e-8)
     np.testing.assert_allclose(got[1], expected[1], rtol=1e-8)
+
+
+def test_column_that_tells_nothing_gets_nothing():
+    """No division by nought, and the others as without it."""
+    rig = FakeRig({2: 25.0})
+    fit = Problem.of(rig.rows(rig.candidates()), rig.candidates()).fit([2])
+    rng = np.random.default_rng(4)
+    columns = [rng.standard_normal((ROWS, CHANNELS, 1)) for _ in rig.trials]
+    empty = [np.concatenate([c, np.zeros_like(c)], axis=2) for c in columns]
+    values, covariance = fit.solution_with(empty)
+    np.testing.assert_allclose(values, [fit.solution_with(columns)[0][0], 0.0], rtol=1e-9)
+    np.testing.assert_array_equal(covariance[1], 0.0)

@@ -1,12 +1,14 @@
 """Named causes and their rivals in a closed loop that is made up: who stays, who goes, who is ambiguous."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from discrepancy.diagnose import diagnose
+from discrepancy.diagnose import _confirm, diagnose
 from discrepancy.problem import Problem
-from discrepancy.search import search
-from fake_rig import TWINS, FakeRig, names
+from discrepancy.search import refitted, search
+from fake_rig import CATALOGUE, TWINS, FakeRig, names
 
 
 def test_clean_data_are_simulated_once():
@@ -98,3 +100,20 @@ def test_every_trial_is_simulated_with_what_the_others_say():
         problem = Problem.of(rest.rows(rest.candidates()), rest.candidates())
         assert value == pytest.approx(problem.fit([2], background=False).part(2)[0][0], rel=1e-9)
         assert value == pytest.approx(whole, rel=0.1)
+
+
+def test_what_a_replaced_cause_left_goes_with_it():
+    """The rival responds better; beside it nothing speaks for the second cause, which is not named any more."""
+    (found,) = search(FakeRig({2: 25.0}, twins=TWINS)).found
+    other = found.rivals[0][0]
+    rig = FakeRig({2: 25.0}, twins=TWINS, loop=lambda c, t: 1.1 if other.cause in c else 9.0)
+    second = replace(found, candidate=CATALOGUE[6], rivals=())
+    explanation = search(rig)
+    both = replace(explanation, found=(found, second))
+    both = refitted(rig, both, [explanation.fit.free[0], 6])
+    rest, alternatives, gain, notes = _confirm(rig, both, 1, None)
+    assert names(rest.found) == [other.cause]
+    assert [a.candidate.cause for (a,) in alternatives] == [found.candidate.cause]
+    assert [r.chi2_per_n for r in gain.after] == pytest.approx([1.1] * 4)
+    assert notes[1] == "cause 6 (robot 1): tells nothing any more beside that, so it is not named."
+    assert rig.calls[-1][1] == (other.cause,)  # simulated again without it

@@ -199,8 +199,11 @@ def _confirm(
     kept = list(range(len(free)))
     if chosen is not free:
         explanation = refitted(rig, replace(explanation, problem=problem), chosen)
+        labels = [found.candidate.label for found in explanation.found]
         explanation, kept = without_idle(rig, explanation)
         if len(kept) < len(free):
+            gone = ", ".join(label for place, label in enumerate(labels) if place not in kept)
+            notes.append(f"{gone}: tells nothing any more beside that, so it is not named.")
             after = responses(rig, explanation.problem, [explanation.fit.free], jobs, simulated)[0]
     none, ours = mean_chi2(before), mean_chi2(after)
     idle = none > VISIBLE and ours > none * (1.0 - LEAST_SHARE)
@@ -226,11 +229,10 @@ def _in_closed_loop(before: float, after: float) -> str:
     """What named causes do to the response, by its chi-square without and with them."""
     if not np.isfinite(after):
         return "with it the recorded commands cannot be simulated"
-    effect = (
-        "hardly improves the response to the commands"
-        if after < before
-        else ("makes the response to the commands worse")
-    )
+    if after < before:
+        effect = "hardly improves the response to the commands"
+    else:
+        effect = "makes the response to the commands worse"
     return f"{effect} (chi2/n {before:.3g} to {after:.3g})"
 
 

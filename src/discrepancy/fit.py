@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from discrepancy.gram import gram_of, project
+from discrepancy.gram import flat_inverse, gram_of, project
 
 if TYPE_CHECKING:
     from discrepancy.problem import Problem
@@ -91,11 +91,7 @@ class Fit:
             used[problem.spans[index]] = True
         at = np.flatnonzero(used)
         H = gram[np.ix_(at, at)] + np.diag(prior[at])
-        scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
-        # A pseudo-inverse where the data leave a flat direction without a prior.
-        values, vectors = np.linalg.eigh(H * np.outer(scale, scale))
-        inverse = np.where(values > 1e-11 * values[-1:], 1.0 / np.maximum(values, 1e-300), 0.0)
-        covariance = (vectors * inverse) @ vectors.T * np.outer(scale, scale)
+        covariance = flat_inverse(H)
         b = gram[at, columns]
         solution = covariance @ b
         return cls(problem, free, at, solution, covariance, float(gram[-1, -1] - b @ solution), gram)
@@ -175,8 +171,7 @@ class Fit:
     def solution_with(self, columns: Sequence[Array]) -> tuple[Array, Array]:
         """Values (k,) and covariance (k, k) of further columns, shape (n, C, k) per trial, beside all in the model."""
         information, score = self._told_by(columns)
-        scale = 1.0 / np.sqrt(np.diag(information))
-        covariance = np.linalg.inv(information * np.outer(scale, scale)) * np.outer(scale, scale)
+        covariance = flat_inverse(information)
         return covariance @ score, covariance
 
     def _told_by(self, columns: Sequence[Array]) -> tuple[Array, Array]:

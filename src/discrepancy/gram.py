@@ -28,3 +28,11 @@ def project(x: Array, off: Array) -> Array:
         return x
     q, flat = off.reshape(-1, off.shape[2]), x.reshape(-1, x.shape[2])
     return np.asarray(flat - q @ (q.T @ flat)).reshape(x.shape)
+
+
+def flat_inverse(H: Array) -> Array:
+    """Inverse of a symmetric matrix (k, k), unit scales removed; directions that it leaves flat get nought."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
+    values, vectors = np.linalg.eigh(H * np.outer(scale, scale))
+    inverse = np.where(values > 1e-11 * values[-1:], 1.0 / np.maximum(values, 1e-300), 0.0)
+    return np.asarray((vectors * inverse) @ vectors.T * np.outer(scale, scale))
