@@ -22,11 +22,11 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.recording import Recording, write_recording
-from estimator.recording_metadata import RecordingMetadata
-from mocobot_logs.bag_read import open_bag
-from mocobot_logs.bag_write import write_bag
-from mocobot_sim.models import omnid_design
+from estimator.recording.metadata import RecordingMetadata
+from estimator.recording.model import Recording, write_recording
+from mocobot_logs.bag.read import open_bag
+from mocobot_logs.bag.write import write_bag
+from mocobot_sim.scene.models import omnid_design
 
 SUFFIX = {"mcap": ".mcap", "sqlite3": ".db3"}
 

@@ -13,21 +13,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from estimator.clock_fit import Rates
-from estimator.clocks import ClockEstimate, recorded_clocks
+from estimator.clocks.fit import Rates
+from estimator.clocks.offsets import ClockEstimate, recorded_clocks
 from estimator.errors import InputError
-from estimator.estimate import estimate_payload
-from estimator.recording import Recording
-from estimator.scoring import rotation_error_deg
+from estimator.estimate.payload import estimate_payload
+from estimator.recording.model import Recording
 from mocobot_logs.log import CHANNELS, Level, Samples
 from mocobot_logs.one_clock import ClockReport, to_recording
-from mocobot_logs.resample import resample
-from mocobot_sim.scene import build_team
-from mocobot_sim.sensed import SensedLog
-from mocobot_sim.sensors import PRESETS, measure
-from mocobot_sim.trajectories import random_vias
-from mocobot_sim.trial import TrialLog, run_trial
-from mocobot_sim.truth import GroundTruth
+from mocobot_logs.resample.resample import resample
+from mocobot_sim.paper.scoring import rotation_error_deg
+from mocobot_sim.scene.scene import build_team
+from mocobot_sim.trial.sensed import SensedLog
+from mocobot_sim.trial.sensors import PRESETS, measure
+from mocobot_sim.trial.trajectories import random_vias
+from mocobot_sim.trial.trial import TrialLog, run_trial
+from mocobot_sim.trial.truth import GroundTruth
 
 SKEWED = 1  # robot 2
 CASES = ((0.0, 0.0), (1e-3, 0.0), (5e-3, 0.0), (20e-3, 0.0), (0.0, 50e-6), (5e-3, 50e-6))

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from discrepancy.block_errors import block_covariance, part_of
 from discrepancy.emps.diagnosis import diagnose_axis
-from discrepancy.emps.reader import read_emps
+from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.rig import EmpsRig
-from discrepancy.fit import Fit
+from discrepancy.least_squares.block_errors import block_covariance, part_of
+from discrepancy.least_squares.fit import Fit
 from emps_data import DATA, PULSES, needed_folder
 
 DRAWS = 2000

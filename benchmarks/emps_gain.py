@@ -12,7 +12,7 @@ import numpy as np
 
 from discrepancy.emps.catalogue import DEFAULTS, candidate_of
 from discrepancy.emps.diagnosis import diagnose_axis
-from discrepancy.emps.reader import read_emps
+from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.staircase import Active, errors, format_staircase, staircase
 from emps_data import DATA, PULSES, needed_folder

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 from scipy.io import loadmat
 
-from discrepancy.diagnose import Diagnosis
 from discrepancy.emps.diagnosis import also_fitted, diagnose_axis
-from discrepancy.emps.plant import PulseTrain
 from discrepancy.emps.pulse_search import rectangle
-from discrepancy.emps.reader import read_emps
+from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.rig import EmpsRig
+from discrepancy.engine.diagnose import Diagnosis
 from emps_data import DATA, PULSES, needed_folder
+from mocobot_sim.emps.plant import PulseTrain
 
 
 def found_pulses(

@@ -16,17 +16,17 @@ import mujoco
 import numpy as np
 from mujoco import sysid
 
-from discrepancy.block_errors import block_covariance, part_of
-from discrepancy.emps.axis_mjcf import CARRIAGE, JOINT, axis_spec
 from discrepancy.emps.catalogue import DEFAULTS, candidate_of
 from discrepancy.emps.diagnosis import block_rows
-from discrepancy.emps.plant import Plant
-from discrepancy.emps.reader import read_emps
+from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.staircase import Active, errors
-from discrepancy.problem import Problem
+from discrepancy.least_squares.block_errors import block_covariance, part_of
+from discrepancy.least_squares.problem import Problem
 from emps_data import DATA, PULSES, needed_folder
 from emps_gain import plain_fit
+from mocobot_sim.emps.mjcf import CARRIAGE, JOINT, axis_spec
+from mocobot_sim.emps.plant import Plant
 
 NAMES = ("mass", "coulomb_friction", "viscous_friction", "asymmetric_viscous")
 LAG_S = 1e-3

@@ -16,19 +16,19 @@ from typing import Any
 import tyro
 from tqdm import tqdm
 
-from discrepancy.diagnose import diagnose
-from discrepancy.diagnosis_json import diagnosis_to_dict
+from discrepancy.engine.diagnose import diagnose
+from discrepancy.result.json import diagnosis_to_dict
 from discrepancy.team.estimates import errors, estimates
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.words import TeamWords
-from estimator.estimate import estimate_payload
+from estimator.estimate.payload import estimate_payload
 from hidden.campaign import engine
 from hidden.gain_table import gain_table
 from hidden.generator import HiddenSet
 from hidden.store import append_result, read_results, recordings_of
-from mocobot_sim.scene import build_team
-from mocobot_sim.truth import GroundTruth
+from mocobot_sim.scene.scene import build_team
+from mocobot_sim.trial.truth import GroundTruth
 
 TEN = (
     "phi_zero",

@@ -11,12 +11,12 @@ import tempfile
 import time
 from pathlib import Path
 
-from estimator.estimate import estimate_payload
-from estimator.recording import Recording, read_recording
-from mocobot_sim.replay.outputs import save_replay
-from mocobot_sim.replay.replay_trial import replay_trial
-from mocobot_sim.sensors import sensor_preset
-from mocobot_sim.simulate import TrialRequest, simulate
+from estimator.estimate.payload import estimate_payload
+from estimator.recording.model import Recording, read_recording
+from mocobot_sim.trial.sensors import sensor_preset
+from mocobot_sim.trial.simulate import TrialRequest, simulate
+from mocobot_view.replay.outputs import save_replay
+from mocobot_view.replay.replay_trial import replay_trial
 
 RUNS = 5
 

@@ -11,11 +11,11 @@ import time
 import mujoco
 import numpy as np
 
-from mocobot_sim.assemble import assemble_at_home
-from mocobot_sim.scene import build_team
-from mocobot_sim.team_index import TeamIndex
-from mocobot_sim.trajectories import random_vias
-from mocobot_sim.trial import run_trial
+from mocobot_sim.scene.scene import build_team
+from mocobot_sim.scene.team_index import TeamIndex
+from mocobot_sim.trial.assemble import assemble_at_home
+from mocobot_sim.trial.trajectories import random_vias
+from mocobot_sim.trial.trial import run_trial
 
 
 def seconds_per_step_bare(payload: str, seconds: int = 10) -> float:

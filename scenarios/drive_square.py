@@ -19,10 +19,10 @@ from mocobot_sim.base.mecanum import MecanumKinematics
 from mocobot_sim.base.motion import Leg, PlanarMotion, plan
 from mocobot_sim.base.snapshots import Snapshots
 from mocobot_sim.base.solo import build_solo, compile_solo, drive_solo
-from mocobot_sim.pictures.camera import Camera
-from mocobot_sim.pictures.marks import Marks
-from mocobot_sim.pictures.render import make_folder, render
-from mocobot_sim.trajectories import RATE_HZ
+from mocobot_sim.trial.trajectories import RATE_HZ
+from mocobot_view.pictures.camera import Camera
+from mocobot_view.pictures.marks import Marks
+from mocobot_view.pictures.render import make_folder, render
 
 SIDE_M = 0.8
 HURRY_S = 0.9  # a side: asks for 5.7 m/s^2, and the rollers' grip ends at 4.9

@@ -12,13 +12,13 @@ import os
 import sys
 from pathlib import Path
 
-from discrepancy.diagnosis_json import diagnosis_to_dict
 from discrepancy.emps.diagnosis import diagnose_axis
-from discrepancy.emps.reader import read_emps
+from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.staircase import format_staircase, staircase
 from discrepancy.emps.words import EmpsWords
-from discrepancy.report import format_diagnosis
+from discrepancy.result.json import diagnosis_to_dict
+from discrepancy.result.text import format_diagnosis
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data" / "emps"
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.estimate import estimate_payload
-from mocobot_sim.sensors import sensor_preset
-from mocobot_sim.simulate import TrialRequest, simulate
+from estimator.estimate.payload import estimate_payload
+from mocobot_sim.trial.sensors import sensor_preset
+from mocobot_sim.trial.simulate import TrialRequest, simulate
 
 ROBOTS, RADIUS_M, MASS_KG = 5, 0.9, 20.0
 

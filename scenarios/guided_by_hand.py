@@ -20,24 +20,24 @@ from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
 from estimator.errors import InputError
-from estimator.estimate import estimate_payload
-from estimator.payload_estimate import PayloadEstimate
+from estimator.estimate.payload import estimate_payload
+from estimator.estimate.result import PayloadEstimate
 from mocobot_sim.base.drive import DriveLog
 from mocobot_sim.base.follow import FollowingDrive
 from mocobot_sim.base.snapshots import Snapshots
-from mocobot_sim.control import ControlGains
+from mocobot_sim.control.control import ControlGains
 from mocobot_sim.guided.float_arms import FLOAT_GAINS, FloatArms
 from mocobot_sim.guided.hand import Grip, GuidingHand, HandLog, Move
 from mocobot_sim.guided.weight import Payload
-from mocobot_sim.pictures.camera import Camera
-from mocobot_sim.pictures.marks import Marks
-from mocobot_sim.pictures.render import make_folder, render
-from mocobot_sim.scene import TeamScene, build_team
-from mocobot_sim.sensors import sensor_preset
-from mocobot_sim.simulate import TrialRequest, draw_units, simulate
-from mocobot_sim.trajectories import RATE_HZ, Trajectory
-from mocobot_sim.trial import run_trial
-from mocobot_sim.truth import GroundTruth
+from mocobot_sim.scene.scene import TeamScene, build_team
+from mocobot_sim.trial.sensors import sensor_preset
+from mocobot_sim.trial.simulate import TrialRequest, draw_units, simulate
+from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
+from mocobot_sim.trial.trial import run_trial
+from mocobot_sim.trial.truth import GroundTruth
+from mocobot_view.pictures.camera import Camera
+from mocobot_view.pictures.marks import Marks
+from mocobot_view.pictures.render import make_folder, render
 
 BEGIN_S = 3.0
 # Out of the way to one side, up and tilted, hold, and back.

@@ -7,19 +7,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from discrepancy.diagnose import diagnose
-from discrepancy.diagnosis_json import diagnosis_to_dict
-from discrepancy.report import format_diagnosis
+from discrepancy.engine.diagnose import diagnose
+from discrepancy.result.json import diagnosis_to_dict
+from discrepancy.result.text import format_diagnosis
 from discrepancy.team.estimates import estimates
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.words import TeamWords
-from estimator.estimate import estimate_payload
+from estimator.estimate.payload import estimate_payload
 from mocobot_sim.effects import apply_effects, make_effect
-from mocobot_sim.scene import build_team
-from mocobot_sim.sensors import measure, sensor_preset
-from mocobot_sim.trajectories import random_vias, sphere_motion
-from mocobot_sim.trial import run_trial
+from mocobot_sim.scene.scene import build_team
+from mocobot_sim.trial.sensors import measure, sensor_preset
+from mocobot_sim.trial.trajectories import random_vias, sphere_motion
+from mocobot_sim.trial.trial import run_trial
 
 
 def main() -> None:

@@ -8,13 +8,13 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from estimator.estimate import estimate_payload
-from mocobot_sim.replay.body_facts import BodyFacts
-from mocobot_sim.replay.outputs import save_replay
-from mocobot_sim.replay.placement import Grasps
-from mocobot_sim.replay.replay_trial import replay_trial
-from mocobot_sim.sensors import sensor_preset
-from mocobot_sim.simulate import TrialRequest, simulate
+from estimator.estimate.payload import estimate_payload
+from mocobot_sim.trial.sensors import sensor_preset
+from mocobot_sim.trial.simulate import TrialRequest, simulate
+from mocobot_view.facts.body_facts import BodyFacts
+from mocobot_view.facts.placement import Grasps
+from mocobot_view.replay.outputs import save_replay
+from mocobot_view.replay.replay_trial import replay_trial
 
 
 def main(target: Path) -> None:

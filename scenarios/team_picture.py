@@ -8,7 +8,7 @@ from pathlib import Path
 from matplotlib.image import imsave
 
 from estimator.errors import InputError
-from mocobot_sim.pictures.views import team_view
+from mocobot_view.pictures.views import team_view
 
 
 def main(payload: str, picture: Path) -> None:

@@ -5,10 +5,10 @@ python scenarios/unknown_payload.py
 
 from __future__ import annotations
 
-from estimator.estimate import estimate_payload
-from estimator.report import format_estimate
-from mocobot_sim.sensors import sensor_preset
-from mocobot_sim.simulate import TrialRequest, simulate
+from estimator.estimate.payload import estimate_payload
+from estimator.estimate.text import format_estimate
+from mocobot_sim.trial.sensors import sensor_preset
+from mocobot_sim.trial.simulate import TrialRequest, simulate
 
 
 def main() -> None:

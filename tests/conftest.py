@@ -13,13 +13,13 @@ import pyarrow.parquet as pq
 import pytest
 
 from diagnose_run import BIAS_NM, Edit
-from estimator.recording import write_recording
+from estimator.recording.model import write_recording
 from mocobot_sim.effects import apply_effects, make_effect
-from mocobot_sim.scene import TeamScene, build_team
-from mocobot_sim.sensors import PRESETS, measure
-from mocobot_sim.trajectories import random_vias, sphere_motion
-from mocobot_sim.trial import TrialLog, run_trial
-from mocobot_sim.truth import GroundTruth, write_truth
+from mocobot_sim.scene.scene import TeamScene, build_team
+from mocobot_sim.trial.sensors import PRESETS, measure
+from mocobot_sim.trial.trajectories import random_vias, sphere_motion
+from mocobot_sim.trial.trial import TrialLog, run_trial
+from mocobot_sim.trial.truth import GroundTruth, write_truth
 from payload_mjcf import TEAMS
 
 

@@ -11,11 +11,11 @@ import pyarrow as pa
 import pyarrow.csv as pcsv
 import pyarrow.parquet as pq
 
-from estimator.design import load_design
-from estimator.recording import Recording, write_recording
-from estimator.recording_metadata import RecordingMetadata
-from mocobot_logs.bag_write import write_bag
-from mocobot_logs.maps import MAPS, builtin_map_text
+from estimator.arm.design import load_design
+from estimator.recording.metadata import RecordingMetadata
+from estimator.recording.model import Recording, write_recording
+from mocobot_logs.bag.write import write_bag
+from mocobot_logs.map.files import MAPS, builtin_map_text
 
 DESIGN = Path(__file__).parents[2] / "models" / "omnid" / "design.toml"
 FORMATS = (

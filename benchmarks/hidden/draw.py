@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from hidden.limits import LIMITS, pendulum_limit_kg
 from hidden.schedule import moving_intervals
 from mocobot_sim.effects import EFFECTS, Effect, make_effect
-from mocobot_sim.models import omnid_design
-from mocobot_sim.scene import TeamScene
-from mocobot_sim.trajectories import Trajectory
-from mocobot_sim.truth import GroundTruth
+from mocobot_sim.scene.models import omnid_design
+from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.trial.trajectories import Trajectory
+from mocobot_sim.trial.truth import GroundTruth
 
 Array = NDArray[np.float64]
 

@@ -9,15 +9,15 @@ from typing import Any, Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from estimator.recording import Recording
+from estimator.recording.model import Recording
 from hidden.background import draw_background
 from hidden.draw import Ground, draw_effect
 from hidden.schedule import Schedule
 from hidden.sealed import Sealed
 from mocobot_sim.effects import Effect, apply_effects, effect_to_dict
-from mocobot_sim.scene import TeamScene, build_team
-from mocobot_sim.sensors import measure, sensor_preset
-from mocobot_sim.trial import run_trial
+from mocobot_sim.scene.scene import TeamScene, build_team
+from mocobot_sim.trial.sensors import measure, sensor_preset
+from mocobot_sim.trial.trial import run_trial
 
 PAYLOADS = "abcd"
 TIMESTEP_S = 5e-4

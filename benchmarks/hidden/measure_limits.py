@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed
 
-from discrepancy.problem import Problem
+from discrepancy.least_squares.problem import Problem
 from discrepancy.team.pushes import push
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import DEFAULTS, read_tolerances
-from estimator.estimate import estimate_payload
+from estimator.estimate.payload import estimate_payload
 from hidden.generator import PAYLOADS, HiddenSet, generate
 from hidden.limits import GAIN, PENDULUM_LENGTHS_M, PUSH_S
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mocobot_sim.scene import TeamScene
-from mocobot_sim.trajectories import (
+from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.trial.trajectories import (
     SETTLE_S,
     Trajectory,
     random_vias,

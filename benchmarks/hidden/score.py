@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from discrepancy.team.causes import CAUSES
 from hidden.limits import LIMITS
-from mocobot_sim.models import omnid_design
+from mocobot_sim.scene.models import omnid_design
 
 Array = NDArray[np.float64]
 

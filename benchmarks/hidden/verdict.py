@@ -6,12 +6,12 @@ import time
 from collections.abc import Sequence
 from typing import Any, Literal
 
-from discrepancy.diagnose import Alternative, Diagnosis, diagnose
-from discrepancy.explanation import Found
+from discrepancy.engine.diagnose import Alternative, Diagnosis, diagnose
+from discrepancy.engine.explanation import Found
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
-from estimator.estimate import estimate_payload
-from estimator.recording import Recording
+from estimator.estimate.payload import estimate_payload
+from estimator.recording.model import Recording
 
 Loop = Literal["always", "undecided", "never"]
 

@@ -36,7 +36,7 @@ class Paper:
 
     def run(self) -> None:
         """Run the command."""
-        from mocobot.paper_command import run
+        from mocobot.commands.paper import run
 
         run(self)
 
@@ -56,7 +56,7 @@ class Estimate:
 
     def run(self) -> None:
         """Run the command."""
-        from mocobot.estimate_command import run
+        from mocobot.commands.estimate import run
 
         run(self)
 
@@ -84,9 +84,9 @@ class Diagnose:
     def run(self) -> None:
         """Run the command."""
         if self.rig == "emps":
-            from mocobot.diagnose_emps import run
+            from mocobot.commands.diagnose_emps import run
         else:
-            from mocobot.diagnose_command import run
+            from mocobot.commands.diagnose import run
 
         run(self)
 
@@ -120,7 +120,7 @@ class Convert:
 
     def run(self) -> None:
         """Run the command."""
-        from mocobot.convert_command import run
+        from mocobot.commands.convert import run
 
         run(self)
 
@@ -146,7 +146,7 @@ class Replay:
 
     def run(self) -> None:
         """Run the command."""
-        from mocobot.replay_command import run
+        from mocobot.commands.replay import run
 
         run(self)
 
@@ -168,7 +168,7 @@ class Inspect:
 
     def run(self) -> None:
         """Run the command."""
-        from mocobot.inspect_command import run
+        from mocobot.commands.inspect import run
 
         run(self)
 
@@ -184,7 +184,7 @@ class Report:
 
     def run(self) -> None:
         """Run the command."""
-        from mocobot.report_command import run
+        from mocobot.commands.report import run
 
         run(self)
 
@@ -215,7 +215,7 @@ class Simulate:
 
     def run(self) -> None:
         """Run the command."""
-        from mocobot.simulate_command import run
+        from mocobot.commands.simulate import run
 
         run(self)
 
@@ -239,7 +239,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _run(arguments: Sequence[str] | None) -> None:
     try:
-        from mocobot_sim.trial import TrialError
+        from mocobot_sim.trial.trial import TrialError
     except (AttributeError, ImportError, RuntimeError) as error:
         renderer = os.environ.get("MUJOCO_GL")
         if not renderer:

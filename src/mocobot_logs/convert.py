@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from estimator.checks import check_recording
-from estimator.design import OmnidDesign
+from estimator.arm.design import OmnidDesign
 from estimator.errors import InputError
-from estimator.recording import Recording, write_recording
-from mocobot_logs.bag_write import write_bag
+from estimator.recording.checks import check_recording
+from estimator.recording.model import Recording, write_recording
+from mocobot_logs.bag.write import write_bag
 from mocobot_logs.log import Level, LogSource
 from mocobot_logs.one_clock import ClockReport, to_recording
-from mocobot_logs.resample import MAX_GAP_S, RATE_HZ, resample
-from mocobot_logs.resample_report import StreamReport
-from mocobot_logs.table_write import write_csv, write_npz
+from mocobot_logs.resample.report import StreamReport
+from mocobot_logs.resample.resample import MAX_GAP_S, RATE_HZ, resample
+from mocobot_logs.table.write import write_csv, write_npz
 
 Kind = Literal["parquet", "csv", "npz", "mcap", "sqlite3", "folder"]
 SUFFIXES: dict[str, Kind] = {

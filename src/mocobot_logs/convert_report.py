@@ -7,9 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.clocks import ClockEstimate
+from estimator.clocks.offsets import ClockEstimate
 from mocobot_logs.convert import Converted
-from mocobot_logs.resample_report import StreamReport
+from mocobot_logs.resample.report import StreamReport
 
 SURE = 4.0
 """Standard errors beyond which a difference of clocks is pointed out ..."""

@@ -14,7 +14,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.recording_metadata import RecordingMetadata
+from estimator.recording.metadata import RecordingMetadata
 
 Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]

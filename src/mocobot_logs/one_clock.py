@@ -14,15 +14,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
-from estimator.clocks import ClockEstimate, estimate_clocks
-from estimator.design import OmnidDesign
+from estimator.arm.design import OmnidDesign
+from estimator.arm.wrist_level import joints_of, wrist_fault
+from estimator.clocks.offsets import ClockEstimate, estimate_clocks
 from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES
-from estimator.recording import Recording
-from estimator.recording_metadata import RecordingMetadata
-from estimator.wrist_level import joints_of, wrist_fault
+from estimator.recording.metadata import RecordingMetadata
+from estimator.recording.model import Recording
 from mocobot_logs.log import CHANNELS, REF, THETA, Array
-from mocobot_logs.resample import Resampled
+from mocobot_logs.resample.resample import Resampled
 
 EARLY_S = 1.0
 """A robot's log that ends so much before another's is broken off."""

@@ -6,17 +6,17 @@ from dataclasses import replace
 from pathlib import Path
 
 from estimator.errors import InputError
-from estimator.recording import METADATA_KEY
-from estimator.recording_metadata import RecordingMetadata
+from estimator.recording.metadata import RecordingMetadata
+from estimator.recording.model import METADATA_KEY
 from mocobot_logs.faults import detail_of
 from mocobot_logs.log import LogSource
-from mocobot_logs.map_parse import MAX_ROBOTS
-from mocobot_logs.maps import LogMap, builtin_map
-from mocobot_logs.table_csv import CsvTable
-from mocobot_logs.table_lerobot import LeRobotTable, dataset_root
-from mocobot_logs.table_npz import NpzTable
-from mocobot_logs.table_parquet import ParquetTable, opened
-from mocobot_logs.tables import Table, TableSource
+from mocobot_logs.map.files import LogMap, builtin_map
+from mocobot_logs.map.parse import MAX_ROBOTS
+from mocobot_logs.table.csv import CsvTable
+from mocobot_logs.table.lerobot import LeRobotTable, dataset_root
+from mocobot_logs.table.npz import NpzTable
+from mocobot_logs.table.parquet import ParquetTable, opened
+from mocobot_logs.table.table import Table, TableSource
 
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt")
 FORMATS = (
@@ -41,7 +41,7 @@ def open_log(path: Path | str, log_map: LogMap | None = None, episode: int | Non
     if episode is not None and kind != "lerobot":
         raise InputError(f"{path}: is not a LeRobot dataset, so it has no episode {episode}")
     if kind == "bag":
-        from mocobot_logs.bag_read import open_bag
+        from mocobot_logs.bag.read import open_bag
 
         return open_bag(path, log_map)
     table = _table(path, kind, log_map, episode)
@@ -86,7 +86,7 @@ def _kind(path: Path) -> str:
 
 
 def _is_bag(path: Path) -> bool:
-    from mocobot_logs.bag_read import is_bag
+    from mocobot_logs.bag.read import is_bag
 
     return is_bag(path)
 

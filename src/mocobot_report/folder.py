@@ -8,20 +8,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from discrepancy.diagnosis_json import FORMAT as DIAGNOSIS
-from discrepancy.diagnosis_json import VERSION as DIAGNOSIS_VERSION
-from discrepancy.report import format_diagnosis
+from discrepancy.result.json import FORMAT as DIAGNOSIS
+from discrepancy.result.json import VERSION as DIAGNOSIS_VERSION
+from discrepancy.result.text import format_diagnosis
+from discrepancy.result.traces import Trace
+from discrepancy.result.traces_file import NAME as RESIDUALS
+from discrepancy.result.traces_file import load_traces
 from discrepancy.rig import Channel
-from discrepancy.traces import Trace
-from discrepancy.traces_file import NAME as RESIDUALS
-from discrepancy.traces_file import load_traces
 from estimator.errors import InputError
-from estimator.estimate_json import FORMAT as ESTIMATE
-from estimator.estimate_json import VERSION as ESTIMATE_VERSION
-from estimator.payload_estimate import PayloadEstimate
+from estimator.estimate.json import FORMAT as ESTIMATE
+from estimator.estimate.json import VERSION as ESTIMATE_VERSION
+from estimator.estimate.result import PayloadEstimate
 from mocobot_sim.paper.tables import paper_tables, summary_table
-from mocobot_sim.replay.diagnosis import VERDICTS
-from mocobot_sim.replay.fact_files import read_estimate, read_json
+from mocobot_view.facts.diagnosis import VERDICTS
+from mocobot_view.facts.fact_files import read_estimate, read_json
 
 SOUGHT = (
     "paper.json of `mocobot paper --out`, diagnosis.json of `mocobot diagnose --out`, or JSON files of "
@@ -64,7 +64,7 @@ class Diagnosed:
 
     Attributes:
         folder: where.
-        values: the diagnosis as ``discrepancy.diagnosis_json`` documents it.
+        values: the diagnosis as ``discrepancy.result.json`` documents it.
         traces: residuals of every trial; empty where the folder has none.
         channels: of the residuals.
     """

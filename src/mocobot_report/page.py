@@ -9,10 +9,13 @@ from pathlib import Path
 
 from plotly.offline import get_plotlyjs
 
-from mocobot_report import diagnosis_part, estimate_part, palette, paper_part
-from mocobot_report.book import Book
+from mocobot_report.blocks import palette
+from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.html import Node, el, raw, to_bytes, variables, words
+from mocobot_report.diagnosis import part as diagnosis_part
+from mocobot_report.estimate import part as estimate_part
 from mocobot_report.folder import Contents, complete, read_folder
-from mocobot_report.html import Node, el, raw, to_bytes, variables, words
+from mocobot_report.paper import part as paper_part
 from mocobot_report.provenance_part import provenance_part
 from mocobot_report.target import MARK, check_target, write_page
 

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from typing import Any
 
 from estimator.errors import InputError
-from mocobot_report.blocks import Entry, Num, facts, folded, paragraph, section, table
-from mocobot_report.book import Book
+from mocobot_report.blocks.blocks import Entry, Num, facts, folded, paragraph, section, table
+from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.html import Node, el
+from mocobot_report.blocks.numbers import size
 from mocobot_report.folder import Contents
-from mocobot_report.html import Node, el
-from mocobot_report.numbers import size
 
 
 def provenance_part(book: Book, contents: Contents) -> list[Node]:

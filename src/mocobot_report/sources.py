@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from estimator.errors import InputError
-from estimator.recording import Recording, read_recording
+from estimator.recording.model import Recording, read_recording
 
 SUFFIX = ".parquet"
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
-from discrepancy.emps.signals import Signals
+from discrepancy.emps.recording.signals import Signals
 
 Array = NDArray[np.float64]
 

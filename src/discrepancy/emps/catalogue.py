@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.causes.base import Hints
 from discrepancy.emps.noise import dither
+from discrepancy.emps.recording.signals import Signals
 from discrepancy.emps.reduction import Reduction
-from discrepancy.emps.signals import Signals
+from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Parameter
-from discrepancy.whitening import Whitening
 
 Array = NDArray[np.float64]
 Tolerances = Mapping[str, Mapping[str, float]]

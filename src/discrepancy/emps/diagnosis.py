@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from discrepancy.block_errors import block_covariance, part_of, with_block_errors
-from discrepancy.diagnose import Diagnosis, diagnose
+from discrepancy.causes.words import number
 from discrepancy.emps.rig import EmpsRig
-from discrepancy.explanation import Explanation
-from discrepancy.words import number
+from discrepancy.engine.diagnose import Diagnosis, diagnose
+from discrepancy.engine.explanation import Explanation
+from discrepancy.least_squares.block_errors import block_covariance, part_of, with_block_errors
 
 MOST_CAUSES = 10
 """The nominal axis is a bare mass: mass, friction of several kinds and the loop's details are all left out of it."""

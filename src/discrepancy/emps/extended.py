@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.emps.axis_mjcf import LACKS, axis_spec
-from discrepancy.emps.plant import ForcePush, Plant, PulseTrain, Ripple
 from discrepancy.rig import Candidate
 from estimator.errors import InputError
+from mocobot_sim.emps.mjcf import LACKS, axis_spec
+from mocobot_sim.emps.plant import ForcePush, Plant, PulseTrain, Ripple
 
 Array = NDArray[np.float64]
 
@@ -97,6 +97,6 @@ The EMPS axis in MuJoCo with these causes built in:
 With the digital loop and all causes:
 
     from discrepancy.emps.extended import load_plant
-    from discrepancy.emps.loop import Start, run
+    from mocobot_sim.emps.loop import Start, run
     position, voltage = run(load_plant("."), time, reference, Start(x0, v0, velocities, voltages))
 """

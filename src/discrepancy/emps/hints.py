@@ -8,10 +8,10 @@ from scipy.signal import lombscargle
 
 from discrepancy.emps.causes.base import SHORTEST_RIPPLE_M, Hints
 from discrepancy.emps.causes.sliding import direction
-from discrepancy.emps.plant import PulseTrain
 from discrepancy.emps.pulse_search import pulse_train, rectangle
+from discrepancy.emps.recording.signals import Signals, smooth
 from discrepancy.emps.reduction import Reduction
-from discrepancy.emps.signals import Signals, smooth
+from mocobot_sim.emps.plant import PulseTrain
 
 Array = NDArray[np.float64]
 

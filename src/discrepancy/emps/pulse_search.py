@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.emps.plant import PulseTrain
+from mocobot_sim.emps.plant import PulseTrain
 
 Array = NDArray[np.float64]
 

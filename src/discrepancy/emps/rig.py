@@ -11,25 +11,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.emps.axis_log import AxisLog
 from discrepancy.emps.blocks import blocks, period_of
 from discrepancy.emps.catalogue import DEFAULTS, Tolerances, candidate_of, hidden_by_rounding, remainder
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.causes.base import Hints
+from discrepancy.emps.closed_loop import errors_of_rerun, plant_of, start_of
 from discrepancy.emps.extended import write_extended
 from discrepancy.emps.hints import hints_of
 from discrepancy.emps.noise import Noise, from_remainder, from_repeats, repeated
-from discrepancy.emps.plant import Plant
-from discrepancy.emps.preflight import checked
 from discrepancy.emps.pushes import intervals_near, push, worst_intervals
+from discrepancy.emps.recording.axis_log import AxisLog
+from discrepancy.emps.recording.preflight import checked
+from discrepancy.emps.recording.signals import Signals
 from discrepancy.emps.reduction import Reduction
-from discrepancy.emps.resimulate import errors_of_rerun, plant_of, start_of
-from discrepancy.emps.signals import Signals
 from discrepancy.emps.undecidable import statements
-from discrepancy.explanation import Explanation
+from discrepancy.engine.explanation import Explanation
+from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rows
-from discrepancy.whitening import Whitening
 from estimator.errors import InputError
+from mocobot_sim.emps.plant import Plant
 
 Array = NDArray[np.float64]
 

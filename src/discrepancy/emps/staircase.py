@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.emps.rig import EmpsRig
-from discrepancy.explanation import Explanation
+from discrepancy.engine.explanation import Explanation
 from discrepancy.rig import Candidate
 
 Array = NDArray[np.float64]

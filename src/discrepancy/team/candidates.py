@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from discrepancy.rig import Candidate, Parameter
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Cause
+from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.pushes import intervals_near, push, worst_intervals
-from discrepancy.team.reduction import Reduction
 from discrepancy.team.tolerances import DEFAULTS
 
 Array = NDArray[np.float64]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.team.linear import TrialLinear
-from discrepancy.whitening import Whitening
+from discrepancy.least_squares.whitening import Whitening
+from discrepancy.team.linear.trial_linear import TrialLinear
 
 Array = NDArray[np.float64]
 

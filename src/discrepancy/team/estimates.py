@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.explanation import Explanation
-from discrepancy.team.residual import Shared
+from discrepancy.engine.explanation import Explanation
+from discrepancy.team.linear.residual import Shared
 from discrepancy.team.rig import TeamRig
 from estimator import so3
-from estimator.principal import inertia_matrix
+from estimator.estimate.principal import inertia_matrix
 
 Array = NDArray[np.float64]
 Estimate = dict[str, Any]

@@ -12,9 +12,9 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from discrepancy.explanation import Explanation
+from discrepancy.engine.explanation import Explanation
+from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rows
-from discrepancy.team.adjust import with_adjusted_torques
 from discrepancy.team.candidates import (
     every_candidate,
     nearby_pushes,
@@ -24,23 +24,23 @@ from discrepancy.team.candidates import (
 )
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
+from discrepancy.team.closed_loop import errors_of_rerun, team_of
 from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.imitators import wrong_torques
-from discrepancy.team.linear import TrialLinear, start_bases
-from discrepancy.team.noise import Noise
-from discrepancy.team.reduction import Reduction
-from discrepancy.team.resimulate import errors_of_rerun, team_of
-from discrepancy.team.signals import Signals
-from discrepancy.team.start import exact_residual, gauss_newton, linearised, start_shared
+from discrepancy.team.linear.adjust import with_adjusted_torques
+from discrepancy.team.linear.noise import Noise
+from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.start import exact_residual, gauss_newton, linearised, start_shared
+from discrepancy.team.linear.trial_linear import TrialLinear, start_bases
 from discrepancy.team.undecidable import statements
-from discrepancy.whitening import Whitening
 from estimator.errors import InputError
-from estimator.payload_estimate import PayloadEstimate
-from estimator.recording import Recording
+from estimator.estimate.result import PayloadEstimate
+from estimator.recording.model import Recording
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.catalogue import make_effect
-from mocobot_sim.extended import write_extended
-from mocobot_sim.models import omnid_design
+from mocobot_sim.extended.extended import write_extended
+from mocobot_sim.scene.models import omnid_design
 
 Array = NDArray[np.float64]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from discrepancy import tolerances_file
+from discrepancy.causes import tolerances_file
 
 # Standard deviation, and a typical size where the tolerance is zero. Assumed, like the robot's masses: a calibrated
 # unit with 16-bit encoders; a lab replaces them by its own (--tolerances).
@@ -33,7 +33,7 @@ DEFAULTS: dict[str, dict[str, float]] = {
 
 
 def read_tolerances(path: Path | None) -> dict[str, dict[str, float]]:
-    """The defaults, with what a TOML file changes; see ``discrepancy.tolerances_file``.
+    """The defaults, with what a TOML file changes; see ``discrepancy.causes.tolerances_file``.
 
     Raises:
         InputError: the file cannot be read, or names something unknown, or a value is not a number of at least 0.

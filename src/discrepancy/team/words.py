@@ -8,9 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from discrepancy.causes.words import number
 from discrepancy.rig import Candidate
 from discrepancy.team.causes import CAUSES
-from discrepancy.words import number
 
 GIMBAL_AXES = {1: "z (first)", 2: "y (middle)", 3: "x (last)"}
 GIMBAL_CAUSES = ("theta_zero", "gimbal_friction")

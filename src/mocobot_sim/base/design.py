@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.errors import InputError
-from mocobot_sim.models import models_dir
+from mocobot_sim.scene.models import models_dir
 
 Array = NDArray[np.float64]
 

@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.errors import InputError
-from mocobot_sim.actors import Stage
 from mocobot_sim.base.contact import WheelContacts
 from mocobot_sim.base.design import BaseDesign, base_design
 from mocobot_sim.base.drive_kernel import update_drives
 from mocobot_sim.base.index import BaseIndex
 from mocobot_sim.base.mecanum import MecanumKinematics
 from mocobot_sim.base.motion import PlanarMotion
+from mocobot_sim.trial.actors import Stage
 
 Array = NDArray[np.float64]
 

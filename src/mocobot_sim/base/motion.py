@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimator.errors import InputError
 from mocobot_sim.base.planar import compose, relative
-from mocobot_sim.trajectories import LONGEST_S, minimum_jerk
+from mocobot_sim.trial.trajectories import LONGEST_S, minimum_jerk
 
 Array = NDArray[np.float64]
 

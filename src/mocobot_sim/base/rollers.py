@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimator.errors import InputError
 from mocobot_sim.base.design import HAND, WHEELS, BaseDesign
-from mocobot_sim.pymjcf import mjcf
+from mocobot_sim.scene.pymjcf import mjcf
 
 Array = NDArray[np.float64]
 

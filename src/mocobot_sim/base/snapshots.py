@@ -8,7 +8,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from mocobot_sim.actors import Stage
+from mocobot_sim.trial.actors import Stage
 
 Array = NDArray[np.float64]
 

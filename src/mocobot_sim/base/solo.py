@@ -8,10 +8,10 @@ from mocobot_sim.base.design import WHEELS, BaseDesign, base_design
 from mocobot_sim.base.drive import BaseDrive, DriveLog
 from mocobot_sim.base.rollers import release, rough_floor
 from mocobot_sim.base.snapshots import Snapshots
-from mocobot_sim.models import models_dir
-from mocobot_sim.pymjcf import mjcf
-from mocobot_sim.scene import TIMESTEP_S
-from mocobot_sim.trajectories import RATE_HZ
+from mocobot_sim.scene.models import models_dir
+from mocobot_sim.scene.pymjcf import mjcf
+from mocobot_sim.scene.scene import TIMESTEP_S
+from mocobot_sim.trial.trajectories import RATE_HZ
 
 
 def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S) -> mjcf.RootElement:

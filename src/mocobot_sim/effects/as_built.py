@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from mocobot_sim.as_built import AsBuilt
-from mocobot_sim.models import omnid_design
-from mocobot_sim.scene import TeamScene
+from mocobot_sim.scene.as_built import AsBuilt
+from mocobot_sim.scene.models import omnid_design
+from mocobot_sim.scene.scene import TeamScene
 
 
 def add_to_unit(scene: TeamScene, robot: int, joint: int, **additions: float) -> TeamScene:

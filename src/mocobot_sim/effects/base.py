@@ -9,8 +9,8 @@ from dataclasses import dataclass, fields
 from typing import ClassVar
 
 from estimator.errors import InputError
-from mocobot_sim.scene import TeamScene
-from mocobot_sim.soft import tuned
+from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.scene.soft import tuned
 
 PLACE = ("robot", "joint")
 JOINTS = 3

@@ -8,14 +8,14 @@ from typing import ClassVar
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.slides import SPRUNG_ARMATURE_KG, add_springs, base_slides
 from mocobot_sim.effects.solver import precise
-from mocobot_sim.scene import TeamScene
+from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)
 class BaseCompliance(Effect):
     """A base on horizontal springs of ``compliance_m_per_N``, the same in x and y [m/N].
 
-    Two slides under the chassis, held by soft ``joint`` equalities (see ``mocobot_sim.soft``), critically damped.
+    Two slides under the chassis, held by soft ``joint`` equalities (see ``mocobot_sim.scene.soft``), critically damped.
     """
 
     cause = "base_compliance"

@@ -8,7 +8,7 @@ from typing import ClassVar
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.slides import base_slides
 from mocobot_sim.effects.solver import precise
-from mocobot_sim.scene import TeamScene
+from mocobot_sim.scene.scene import TeamScene
 
 # So heavy that the arm's forces move it by less than 1e-9 m/s, and at its velocity within some 10 ms.
 ARMATURE_KG = 1e9

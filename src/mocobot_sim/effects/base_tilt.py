@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.slides import level_slides
-from mocobot_sim.scene import TeamScene
+from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)

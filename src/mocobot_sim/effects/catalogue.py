@@ -29,7 +29,7 @@ from mocobot_sim.effects.tether import Tether
 from mocobot_sim.effects.theta_zero import ThetaZero
 from mocobot_sim.effects.torque_lag import TorqueLag
 from mocobot_sim.effects.torque_skew import TorqueSkew
-from mocobot_sim.scene import TeamScene
+from mocobot_sim.scene.scene import TeamScene
 
 EFFECTS: dict[str, type[Effect]] = {
     kind.cause: kind

@@ -8,9 +8,9 @@ from typing import ClassVar
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.friction import STICK
 from mocobot_sim.effects.solver import precise
-from mocobot_sim.scene import TeamScene
-from mocobot_sim.soft import SoftRow
-from mocobot_sim.team_index import GIMBAL_AXES
+from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.scene.soft import SoftRow
+from mocobot_sim.scene.team_index import GIMBAL_AXES
 
 # The gimbal is light, so one row would creep (see ``friction``): stiction would fade within ten seconds. Rows side by
 # side share the torque, and creep by as much less.
@@ -22,7 +22,7 @@ class GimbalFriction(Effect):
     """Coulomb [N m] and viscous [N m s/rad] friction of one gimbal joint (joints 1, 2, 3 are z, y, x).
 
     ``frictionloss`` of ``PARALLEL`` fixed tendons along the joint, and a soft ``joint`` equality (see
-    ``mocobot_sim.soft``) as its damper: damping of the joint itself would pull the welds open.
+    ``mocobot_sim.scene.soft``) as its damper: damping of the joint itself would pull the welds open.
     """
 
     cause = "gimbal_friction"

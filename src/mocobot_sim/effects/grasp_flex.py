@@ -8,7 +8,7 @@ from typing import ClassVar
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.slides import SPRUNG_ARMATURE_KG, add_slides, add_springs, grasp_body, widened
 from mocobot_sim.effects.solver import precise
-from mocobot_sim.scene import TeamScene
+from mocobot_sim.scene.scene import TeamScene
 
 # More than any grasp carries: how far a sound grasp may give way.
 LARGEST_FORCE_N = 400.0
@@ -19,7 +19,7 @@ class GraspFlex(Effect):
     """Translational springs of ``compliance_m_per_N`` between flange and payload, the same in all directions [m/N].
 
     Three slides, on the payload (robot 1) or on a pad between flange and weld (the others), held by soft ``joint``
-    equalities (see ``mocobot_sim.soft``), critically damped. The grasp cannot turn.
+    equalities (see ``mocobot_sim.scene.soft``), critically damped. The grasp cannot turn.
     """
 
     cause = "grasp_flex"

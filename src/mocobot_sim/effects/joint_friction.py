@@ -8,8 +8,8 @@ from typing import ClassVar
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.friction import STICK
 from mocobot_sim.effects.solver import precise
-from mocobot_sim.scene import TeamScene
-from mocobot_sim.soft import SoftRow
+from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.scene.soft import SoftRow
 
 
 @dataclass(frozen=True)
@@ -17,7 +17,7 @@ class JointFriction(Effect):
     """Coulomb [N m] and viscous [N m s/rad] friction between a driven link and the chassis, past its spring.
 
     A fixed tendon of motor plus spring (so its length is phi) with ``frictionloss``, and a soft ``tendon`` equality
-    (see ``mocobot_sim.soft``) as its damper. The sensor does not feel it.
+    (see ``mocobot_sim.scene.soft``) as its damper. The sensor does not feel it.
     """
 
     cause = "joint_friction"

@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 
 from mocobot_sim.effects.base import Effect
-from mocobot_sim.scene import TeamScene
+from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from typing import ClassVar
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.friction import STICK
 from mocobot_sim.effects.solver import precise
-from mocobot_sim.scene import TeamScene
+from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from mocobot_sim.effects.as_built import add_to_unit, linear_stiffness, set_linear_stiffness
 from mocobot_sim.effects.base import Effect
-from mocobot_sim.scene import TeamScene
+from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mocobot_sim.scene import TeamScene
-from mocobot_sim.soft import SoftRow
+from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.scene.soft import SoftRow
 
 AXES = {"x": [1.0, 0.0, 0.0], "y": [0.0, 1.0, 0.0], "z": [0.0, 0.0, 1.0]}
 # Taken from the flange, so that the gimbal's mass and inertia stay what they are.

@@ -8,8 +8,8 @@ from typing import ClassVar
 import numpy as np
 
 from mocobot_sim.effects.base import Effect
-from mocobot_sim.models import omnid_design
-from mocobot_sim.scene import TeamScene
+from mocobot_sim.scene.models import omnid_design
+from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from mocobot_sim.scene import TeamScene
+from mocobot_sim.scene.scene import TeamScene
 
 DEFAULT = 1e-8
 WITH_KINKS = 1e-12

@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.errors import InputError
-from mocobot_sim.actors import Stage
-from mocobot_sim.as_built import AsBuilt, units_of
-from mocobot_sim.control import ControlGains
+from mocobot_sim.control.control import ControlGains
 from mocobot_sim.guided.weight import Payload, up_in_payload, weight_shares
-from mocobot_sim.models import omnid_design
-from mocobot_sim.trajectories import minimum_jerk
+from mocobot_sim.scene.as_built import AsBuilt, units_of
+from mocobot_sim.scene.models import omnid_design
+from mocobot_sim.trial.actors import Stage
+from mocobot_sim.trial.trajectories import minimum_jerk
 
 Array = NDArray[np.float64]
 

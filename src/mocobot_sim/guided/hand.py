@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
-from mocobot_sim.actors import Stage
-from mocobot_sim.trajectories import minimum_jerk
+from mocobot_sim.trial.actors import Stage
+from mocobot_sim.trial.trajectories import minimum_jerk
 
 Array = NDArray[np.float64]
 

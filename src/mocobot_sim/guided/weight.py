@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimator import gimbal
+from estimator.arm import gimbal
 from estimator.errors import InputError
-from estimator.payload_estimate import PayloadEstimate
-from mocobot_sim.truth import GroundTruth
+from estimator.estimate.result import PayloadEstimate
+from mocobot_sim.trial.truth import GroundTruth
 
 Array = NDArray[np.float64]
 

@@ -17,16 +17,16 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.errors import InputError
-from estimator.estimate import estimate_payload
-from estimator.grasps import estimate_grasps
-from estimator.paper_tables import payload_truth
-from estimator.payload_estimate import PayloadEstimate
-from estimator.process import process_recording
-from estimator.recording import Recording
-from estimator.scoring import score
-from mocobot_sim.models import payload_path
-from mocobot_sim.sensors import PRESETS, SensorPreset, sensor_preset
-from mocobot_sim.simulate import TrialRequest, simulate
+from estimator.estimate.grasps import estimate_grasps
+from estimator.estimate.payload import estimate_payload
+from estimator.estimate.result import PayloadEstimate
+from estimator.recording.model import Recording
+from estimator.signals.process import process_recording
+from mocobot_sim.paper.published import payload_truth
+from mocobot_sim.paper.scoring import score
+from mocobot_sim.scene.models import payload_path
+from mocobot_sim.trial.sensors import PRESETS, SensorPreset, sensor_preset
+from mocobot_sim.trial.simulate import TrialRequest, simulate
 
 Progress = Callable[[int], object]
 # Positions p_1i and orientations R_1i between processes: arrays keep their bits there, a RigidTransform is normalised.

@@ -9,7 +9,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from estimator.paper_tables import published_errors
+from mocobot_sim.paper.published import published_errors
 
 COLOURS = {"paper": "#6b7280", "ideal": "#2a9d8f", "nominal": "#2f6fd0", "uncalibrated": "#e07b39"}
 MARKERS = {"paper": "D", "ideal": "v", "nominal": "o", "uncalibrated": "s"}

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from estimator.paper_tables import published_errors
+from mocobot_sim.paper.published import published_errors
 
 PAIRS = ("12", "23", "31")
 MOMENTS = ("Ixx", "Iyy", "Izz")

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy.emps.causes.base import Cause, force
-from discrepancy.emps.plant import FIRST_GUESS_KG
-from discrepancy.emps.preflight import resolution
+from discrepancy.emps.recording.preflight import resolution
 from estimator.filtering import differentiate, low_pass
+from mocobot_sim.emps.plant import FIRST_GUESS_KG
 
 CARRIAGE = 0.5
 """Share of the moving mass behind the play: assumed."""

@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.emps.plant import Plant
-from discrepancy.emps.signals import Signals, smooth
+from discrepancy.emps.recording.signals import Signals, smooth
+from mocobot_sim.emps.plant import Plant
 
 Array = NDArray[np.float64]
 Shape = Mapping[str, float]

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from discrepancy.emps.causes.base import Cause, force
-from discrepancy.emps.signals import at_delay
+from discrepancy.emps.recording.signals import at_delay
 from estimator.filtering import differentiate
 
 

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from discrepancy.emps.causes.base import Cause, filtered, force
-from discrepancy.emps.plant import PulseTrain
 from discrepancy.emps.pulse_search import rectangle
+from mocobot_sim.emps.plant import PulseTrain
 
 
 class InjectedForce(Cause):

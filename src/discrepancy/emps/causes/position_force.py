@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy.emps.causes.base import SHORTEST_RIPPLE_M, Cause, force
-from discrepancy.emps.plant import Ripple
+from mocobot_sim.emps.plant import Ripple
 
 
 class PositionForce(Cause):

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from discrepancy.emps.causes.base import Cause, force
-from discrepancy.emps.plant import ForcePush
+from mocobot_sim.emps.plant import ForcePush
 
 
 class Push(Cause):

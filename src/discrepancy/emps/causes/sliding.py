@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.emps.signals import Signals
+from discrepancy.emps.recording.signals import Signals
 
 Array = NDArray[np.float64]
 

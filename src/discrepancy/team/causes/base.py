@@ -10,8 +10,8 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.team.linear import TrialLinear
-from discrepancy.team.signals import Signals
+from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.trial_linear import TrialLinear
 
 Array = NDArray[np.float64]
 Shape = Mapping[str, float]

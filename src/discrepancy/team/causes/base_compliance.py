@@ -3,7 +3,7 @@
 import numpy as np
 
 from discrepancy.team.causes.base import Cause, stack
-from estimator.delta import leg_geometry, wrist_motion
+from estimator.arm.delta import leg_geometry, wrist_motion
 
 
 class BaseCompliance(Cause):

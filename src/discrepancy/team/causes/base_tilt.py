@@ -3,7 +3,7 @@
 import numpy as np
 
 from discrepancy.team.causes.base import Cause, stack
-from estimator.delta import jacobian_of, leg_geometry
+from estimator.arm.delta import jacobian_of, leg_geometry
 
 
 class BaseTilt(Cause):

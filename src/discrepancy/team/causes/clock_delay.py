@@ -2,7 +2,7 @@
 
 from discrepancy.team.causes.base import Cause, one_robot, stack
 from discrepancy.team.causes.shift import advanced
-from discrepancy.team.signals import with_rates
+from discrepancy.team.linear.signals import with_rates
 
 
 class ClockDelay(Cause):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from discrepancy.team.causes.base import Array, Cause, stack
-from estimator.fusion import fuse, fusion_matrix
+from estimator.estimate.fusion import fuse, fusion_matrix
 
 
 class Drag(Cause):

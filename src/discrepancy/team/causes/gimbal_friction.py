@@ -4,7 +4,7 @@ import numpy as np
 
 from discrepancy.team.causes.base import Cause, stack
 from discrepancy.team.causes.sliding import rests, sliding
-from estimator.gimbal import rate_matrix
+from estimator.arm.gimbal import rate_matrix
 
 
 class GimbalFriction(Cause):

@@ -3,7 +3,7 @@
 import numpy as np
 
 from discrepancy.team.causes.base import Cause, one_joint, one_robot, stack
-from estimator.delta import LEG_DIRECTIONS, leg_geometry
+from estimator.arm.delta import LEG_DIRECTIONS, leg_geometry
 
 
 class LinkLength(Cause):

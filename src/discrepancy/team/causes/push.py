@@ -3,7 +3,7 @@
 import numpy as np
 
 from discrepancy.team.causes.base import Array, Cause, Shape, stack
-from discrepancy.team.linear import TrialLinear
+from discrepancy.team.linear.trial_linear import TrialLinear
 
 
 def during(trial: TrialLinear, shape: Shape) -> Array:

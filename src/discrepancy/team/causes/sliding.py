@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.team.causes.free_while import free_while
-from discrepancy.team.noise import SMOOTH_HZ
+from discrepancy.team.linear.noise import SMOOTH_HZ
 from estimator.filtering import differentiate, low_pass
 
 Array = NDArray[np.float64]

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from discrepancy.team.causes.base import Array, Cause, stack
-from estimator.fusion import fuse
+from estimator.estimate.fusion import fuse
 
 LENGTHS_M, MOST_DAMPED = (0.04, 1.0), 0.3
 """Pendulums of 0.5 to 2.5 Hz that swing; what is slower, faster or damped more looks like drag or play."""

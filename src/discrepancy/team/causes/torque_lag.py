@@ -1,7 +1,7 @@
 """A first-order lag inside the torque sensors."""
 
 from discrepancy.team.causes.base import Cause, one_robot, stack
-from discrepancy.team.signals import with_rates
+from discrepancy.team.linear.signals import with_rates
 
 
 class TorqueLag(Cause):

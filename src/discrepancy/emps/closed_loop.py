@@ -1,0 +1,59 @@
+"""Run a recording's reference again, block by block from where each began."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.emps.causes import CAUSES
+from discrepancy.emps.recording.signals import Signals
+from discrepancy.rig import Candidate
+from mocobot_sim.emps.loop import Start, run
+from mocobot_sim.emps.plant import Plant
+
+Array = NDArray[np.float64]
+
+REMEMBERED = 16
+"""Samples before a block that the loop may still remember."""
+
+
+def plant_of(nominal: Plant, active: Sequence[tuple[Candidate, Array]]) -> Plant:
+    """The plant with causes in it."""
+    for candidate, values in active:
+        nominal = CAUSES[candidate.cause].apply(nominal, values, candidate.shape)
+    return nominal
+
+
+def start_of(signals: Signals, sample: int) -> Start:
+    """State at one sample of a recording, from its smoothed signals."""
+    before = slice(max(sample - REMEMBERED, 0), sample)
+    return Start(
+        float(signals.x[sample]),
+        float(signals.v[sample]),
+        signals.v[before].copy(),
+        signals.log.voltage[before].copy(),
+    )
+
+
+def errors_of_rerun(
+    plant: Plant,
+    time: Array,
+    reference: Array,
+    start: Start,
+    position: Array,
+    voltage: Array,
+    usable: NDArray[np.bool_],
+) -> dict[str, Array] | None:
+    """Recorded minus simulated position [m] and voltage [V] at usable samples; None where the simulation fails.
+
+    Args:
+        plant: the axis.
+        time, reference, position, voltage, usable: of one block, shape (Q,).
+        start: its state at the first sample.
+    """
+    x, volts = run(plant, time, reference, start)
+    if not np.isfinite(x).all():
+        return None
+    return {"position": (position - x)[usable], "voltage": (voltage - volts)[usable]}

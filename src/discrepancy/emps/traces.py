@@ -1,0 +1,40 @@
+"""The axis' residuals for the plots."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from discrepancy.emps.rig import EmpsRig
+from discrepancy.engine.explanation import Explanation
+from discrepancy.result.traces import Trace
+
+
+def traces(rig: EmpsRig, explanation: Explanation) -> list[Trace]:
+    """Residuals of every block: ``before`` as simulated, ``after`` with the named causes and tolerances."""
+    fit, problem = explanation.fit, explanation.problem
+    nominal = problem.fit(background=False)
+    causes = [
+        (candidate, fit.coefficients[span] * candidate.units)
+        for candidate, span in zip(problem.candidates, problem.spans, strict=True)
+        if np.any(fit.coefficients[span])
+    ]
+    before, after = rig.physical_residual([]), rig.physical_residual(causes)
+    out = []
+    for t, white in enumerate(rig.whitening):
+        n = len(rig.reduction.samples[t])
+        sigma = np.tile(np.linalg.norm(white.chol_moving, axis=1), (n, 1))
+        out.append(
+            Trace(
+                rig.trials[t],
+                rig.log.time[rig.reduction.samples[t]],
+                n,
+                rig.row_rate_hz(t),
+                before[t],
+                after[t],
+                sigma,
+                nominal.remaining(t),
+                fit.remaining(t),
+                rig.quantities(t),
+            )
+        )
+    return out

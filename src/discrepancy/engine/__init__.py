@@ -1,0 +1,1 @@
+"""The search for causes; knows no rig."""

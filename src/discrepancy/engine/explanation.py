@@ -1,0 +1,82 @@
+"""What a search found: causes with their values, and the misfit without and with them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.engine.leaders import SIGNIFICANT
+from discrepancy.least_squares.fit import Evidence, Fit
+from discrepancy.least_squares.problem import Problem
+from discrepancy.rig import Candidate
+
+Array = NDArray[np.float64]
+
+CLEAN = 1.15
+"""chi-square per number below which nothing is left to explain: clean recordings of a team gave 1.02 to 1.08."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A cause that the data speak for.
+
+    Attributes:
+        candidate: what and where, with its best shape.
+        values: its parameters, in their own units, shape (k,).
+        covariance: of the values and of what is determined of its shape (see ``best_shape``), in their own units.
+        evidence: when it was chosen.
+        rivals: other candidates then, best first, with the gap of their score [nats].
+        in_sample, held_out: share of the nominal model's misfit that it removes (see ``held_out.shares``).
+        folds: gain of chi-square on every trial when fitted to the others.
+    """
+
+    candidate: Candidate
+    values: Array
+    covariance: Array
+    evidence: Evidence
+    rivals: tuple[tuple[Candidate, float], ...]
+    in_sample: float
+    held_out: float | None
+    folds: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """What the search found.
+
+    Attributes:
+        found: causes in the order of discovery.
+        rejected: significant candidates that held-out trials did not confirm.
+        nominal: misfit of the nominal model, nothing off.
+        before, after: misfit with tolerances alone, and with the causes as well.
+        plain: misfit with the causes and no tolerances.
+        samples: number of residuals.
+        fit: the last fit.
+        problem: the last problem (with the causes' shapes and residual).
+        shared, local: displacements of the unknowns with the causes in the model.
+    """
+
+    found: tuple[Found, ...]
+    rejected: tuple[Candidate, ...]
+    nominal: float
+    before: float
+    after: float
+    plain: float
+    samples: int
+    fit: Fit
+    problem: Problem
+    shared: Array
+    local: tuple[Array, ...]
+
+    @property
+    def explained(self) -> float:
+        """Share of the nominal model's misfit above clean data that the causes alone remove."""
+        floor = min(self.plain, CLEAN * self.samples)
+        return float(np.clip((self.nominal - self.plain) / max(self.nominal - floor, 1e-9), 0.0, 1.0))
+
+    @property
+    def clean(self) -> bool:
+        """Whether what is left is noise, and tolerances used as they usually are."""
+        return self.after <= CLEAN * self.samples and self.fit.strain[2] > SIGNIFICANT

@@ -1,0 +1,119 @@
+"""What a cause is worth: recorded commands run again, with and without it, on trials it was not fitted to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from joblib import Parallel, delayed
+from numpy.typing import NDArray
+from scipy.stats import t as student
+
+from discrepancy.least_squares.problem import Problem
+from discrepancy.rig import Rig
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Response:
+    """How far one trial's response to its commands is from the simulated one.
+
+    Attributes:
+        rms: by channel, in the channel's unit.
+        nrmse: by channel, over the standard deviation of the motion.
+        chi2_per_n: mean square over the variance of sensor noise and integration error.
+    """
+
+    rms: Mapping[str, float]
+    nrmse: Mapping[str, float]
+    chi2_per_n: float
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Responses of every trial without and with the causes, each simulated with what the other trials say.
+
+    Attributes:
+        before, after: one per trial; None where the simulation failed.
+        held_out: False for a single trial, which predicts itself.
+    """
+
+    before: tuple[Response | None, ...]
+    after: tuple[Response | None, ...]
+    held_out: bool
+
+    @property
+    def pairs(self) -> list[tuple[Response, Response]]:
+        """Trials that were simulated both ways."""
+        both = zip(self.before, self.after, strict=True)
+        return [(a, b) for a, b in both if a is not None and b is not None]
+
+    def removed(self) -> tuple[float, float, float] | None:
+        """Share of the excess error (root mean square over noise) removed: mean over trials, 95 % interval."""
+        shares = [
+            1.0 - _excess(b.chi2_per_n) / _excess(a.chi2_per_n) for a, b in self.pairs if a.chi2_per_n > 1.0
+        ]
+        if not shares:
+            return None
+        mean = float(np.mean(shares))
+        if len(shares) < 2:
+            return mean, float("-inf"), 1.0
+        half = student.ppf(0.975, len(shares) - 1) * np.std(shares, ddof=1) / np.sqrt(len(shares))
+        return mean, mean - float(half), min(1.0, mean + float(half))
+
+
+def _excess(chi2_per_n: float) -> float:
+    return float(np.sqrt(max(chi2_per_n - 1.0, 0.0)))
+
+
+def responses(
+    rig: Rig, problem: Problem, hypotheses: Sequence[Sequence[int]], jobs: int = 1,
+    progress: Callable[[int], object] | None = None,
+) -> list[tuple[Response | None, ...]]:  # fmt: skip
+    """Simulate every trial under every hypothesis, with unknowns and causes fitted to the other trials.
+
+    Args:
+        rig: the rig.
+        problem: the linear problem.
+        hypotheses: sets of candidates (indices into the problem) that are in the model.
+        jobs: parallel processes.
+        progress: called with 1 for every simulated trial.
+    """
+    trials = range(len(problem.rows))
+    tasks = []
+    for free in hypotheses:
+        for t in trials:
+            others = [k for k in trials if k != t] or [t]
+            used = [i for i in free if not problem.candidates[i].detail]
+            # A push says nothing about other trials; its own trial has to tell it.
+            if len(used) < len(free):
+                others = list(trials)
+            fit = problem.fit(free, others, background=False)
+            shared, local = fit.coefficients[: problem.shared], fit.local(t)[: rig.local_unknowns]
+            active = [(problem.candidates[i], fit.part(i)[0] * problem.candidates[i].units) for i in free]
+            tasks.append((t, -shared, -local, active))
+    run = Parallel(n_jobs=jobs, return_as="generator")
+    done = []
+    for errors, task in zip(run(delayed(rig.simulation(*task))() for task in tasks), tasks, strict=True):
+        done.append(None if errors is None else _response(errors, rig.response_scale(task[0])))
+        if progress:
+            progress(1)
+    count = len(trials)
+    return [tuple(done[k * count : (k + 1) * count]) for k in range(len(hypotheses))]
+
+
+def _response(errors: Mapping[str, Array], scales: Mapping[str, tuple[Array, Array]]) -> Response:
+    rms, nrmse, squares = {}, {}, []
+    for name, error in errors.items():
+        noise, motion = scales[name]
+        rms[name] = float(np.sqrt(np.mean(error**2)))
+        nrmse[name] = rms[name] / float(np.sqrt(np.mean(motion**2)))
+        squares.append(np.mean((error / noise) ** 2))
+    return Response(rms, nrmse, float(np.mean(squares)))
+
+
+def mean_chi2(trials: Sequence[Response | None]) -> float:
+    """Mean chi-square per number; infinite where a trial could not be simulated."""
+    return float(np.mean([np.inf if r is None else r.chi2_per_n for r in trials]))

@@ -1,0 +1,93 @@
+"""Does a cause help where it was not fitted? Trials left out, blocks of a transient left out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from discrepancy.least_squares.fit import Fit
+from discrepancy.least_squares.problem import Problem
+from discrepancy.rig import Candidate
+
+SHORT_ROWS = 24
+"""A transient of fewer rows (2 s) cannot be split and tested on its own; its evidence has to do."""
+INSIDE = 0.1
+"""Rows that a transient reaches at all: taking out a trial's own unknowns spreads a trace of it everywhere."""
+SUPPORTING = 2
+"""Trials that a cause must help at least, when it was fitted to the others."""
+AGAINST = 1.0 / 3.0
+"""What it harms in some trials, over what it helps in the others, at most. One that does not show it hardly counts."""
+
+
+def confirmed(folds: Sequence[float]) -> bool:
+    """Whether the gains on what was left out speak for a cause; nothing left out says nothing against it."""
+    if len(folds) < 2:
+        return True
+    helped, harmed = sum(g for g in folds if g > 0), -sum(g for g in folds if g < 0)
+    return sum(gain > 0 for gain in folds) >= SUPPORTING and harmed <= AGAINST * helped
+
+
+def held_out_gains(problem: Problem, free: Sequence[int], index: int, candidate: Candidate) -> list[float]:
+    """How much rather every trial has a cause as the other trials fitted it than all within its tolerance."""
+    if candidate.detail:
+        return _interleaved(problem, free, index, int(candidate.detail["trial"]))
+    trials = range(len(problem.rows))
+    if len(problem.rows) < 2:
+        return []
+    gains = []
+    for t in trials:
+        values, _ = problem.fit([*free, index], [k for k in trials if k != t]).part(index)
+        tolerated = problem.fit(free, [t])
+        gains.append(tolerated.misfit - problem.fit(free, [t], fixed=(index, values)).misfit)
+    return gains
+
+
+def shares(problem: Problem, free: Sequence[int], index: int) -> tuple[float, float | None]:
+    """Share of the nominal model's misfit that a cause removes, in sample and on trials left out of the fit.
+
+    Nominal is the model with the causes before it and nothing else off; the room for improvement ends where the
+    cause and every tolerance together leave the data.
+    """
+    after = [*free, index]
+    full = problem.fit(after)
+    nominal, with_it = (problem.fit(chosen, background=False) for chosen in (free, after))
+    trials = range(len(problem.rows))
+    floor = sum(full.held_out(t) for t in trials)
+    in_sample = (nominal.misfit - with_it.misfit) / max(nominal.misfit - floor, 1e-9)
+    if len(trials) < 2 or problem.candidates[index].detail:
+        return float(np.clip(in_sample, 0.0, 1.0)), None
+    gained, room = 0.0, 0.0
+    for t in trials:
+        others = [k for k in trials if k != t]
+        before, after_it, best = (
+            problem.fit(free, others, background=False).held_out(t),
+            problem.fit(after, others, background=False).held_out(t),
+            problem.fit(after, others).held_out(t),
+        )
+        gained, room = gained + before - after_it, room + before - best
+    return float(np.clip(in_sample, 0.0, 1.0)), float(np.clip(gained / max(room, 1e-9), 0.0, 1.0))
+
+
+def _interleaved(
+    problem: Problem, free: Sequence[int], index: int, trial: int, blocks: int = 4
+) -> list[float]:
+    """The same within the trial of a transient, against none at all: fitted to all but every fourth block of it."""
+    rows = problem.rows[trial]
+    size = np.abs(rows[..., problem.spans[index]]).sum(axis=(1, 2))
+    inside = np.flatnonzero(size > INSIDE * size.max())
+    if len(inside) < SHORT_ROWS:
+        return []
+    width = max(1, len(inside) // (2 * blocks))
+    gains = []
+    for b in range(blocks):
+        out = np.zeros(len(rows), dtype=bool)
+        out[inside[(np.arange(len(inside)) // width) % blocks == b]] = True
+        apart = np.einsum("nck,ncl->kl", rows[out], rows[out], optimize=True)
+        gram = problem.grams.sum(axis=0) - apart
+        ends = []
+        for fit in (Fit.of(problem, gram, tuple(free), held=(index,)), Fit.of(problem, gram, (*free, index))):
+            x = np.append(-fit.coefficients, 1.0)
+            ends.append(float(x @ apart @ x))
+        gains.append(ends[0] - ends[1])
+    return gains

@@ -1,0 +1,1 @@
+"""Rows, unknowns and their fit."""

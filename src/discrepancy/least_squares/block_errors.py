@@ -1,0 +1,68 @@
+"""Standard errors that hold when what is left is correlated in time: a sandwich over blocks of rows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.engine.explanation import Explanation
+from discrepancy.least_squares.fit import Fit
+
+Array = NDArray[np.float64]
+
+
+def with_block_errors(explanation: Explanation, rows_per_block: int) -> Explanation:
+    """The explanation with the causes' covariances from ``block_covariance``.
+
+    A transient fits into a block or two, which says nothing of how it would scatter; it keeps the fit's own covariance,
+    scaled by what is left.
+    """
+    if not explanation.found:
+        return explanation
+    inflation = max(1.0, explanation.after / explanation.samples)
+    covariance = block_covariance(explanation.fit, rows_per_block)
+    found = []
+    for index, item in zip(explanation.fit.free, explanation.found, strict=True):
+        units = explanation.problem.candidates[index].units
+        part = part_of(explanation.fit, covariance, index)
+        if item.candidate.detail:
+            part = inflation * explanation.fit.part(index)[1]
+        found.append(replace(item, covariance=part * np.outer(units, units)))
+    return replace(explanation, found=tuple(found))
+
+
+def block_covariance(fit: Fit, rows_per_block: int) -> Array:
+    """Covariance of a fit's solution from how its scores vary between blocks of rows, shape (used, used), in units.
+
+    The fit's own covariance takes whitened rows to be independent and of unit variance. What the named causes leave is
+    neither where the model is not perfect. With H the normal matrix and g_b the score of block b,
+    cov = B / (B - 1) H^-1 (sum_b g_b g_b^T) H^-1: the cluster-robust covariance of Liang and Zeger ("Longitudinal data
+    analysis using generalized linear models", Biometrika 73, 1986), right for any correlation that ends within a block.
+
+    Args:
+        fit: a solution.
+        rows_per_block: length of a block; longer than the correlation, short enough to leave a dozen blocks.
+    """
+    scores = np.array(list(block_scores(fit, rows_per_block)))
+    if len(scores) < 2:
+        return fit.covariance
+    spread = scores @ fit.covariance
+    return np.asarray(len(scores) / (len(scores) - 1) * spread.T @ spread, dtype=np.float64)
+
+
+def block_scores(fit: Fit, rows_per_block: int) -> Iterator[Array]:
+    """Score of every block: its columns times what the fit leaves in it, one number per column in the fit."""
+    for t, rows in enumerate(fit.problem.rows):
+        left = fit.remaining(t)
+        count = max(1, round(len(rows) / rows_per_block))
+        for part in np.array_split(np.arange(len(rows)), count):
+            yield np.einsum("ncl,nc->l", rows[part][..., fit.used], left[part])
+
+
+def part_of(fit: Fit, covariance: Array, index: int) -> Array:
+    """One candidate's part of a covariance of a fit's solution, shape (k, k)."""
+    at = np.searchsorted(fit.used, np.arange(*fit.problem.spans[index].indices(1 << 30)))
+    return np.asarray(covariance[np.ix_(at, at)], dtype=np.float64)

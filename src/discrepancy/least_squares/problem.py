@@ -1,0 +1,168 @@
+"""All trials as one linear problem: Gram matrices, tolerances as priors, evidence of every candidate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.least_squares.fit import Fit
+from discrepancy.least_squares.gram import gram_of, orthonormal, project
+from discrepancy.rig import Candidate, Rows
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """Rows of all trials, with the trial's own unknowns projected out and without.
+
+    Columns are [shared | every candidate, in units of its tolerance | residual].
+
+    Attributes:
+        candidates: the candidates of the columns.
+        raw: rows per trial, shape (n, C, columns).
+        rows: the same without what the trial's own unknowns can explain.
+        local: columns of the trial's own unknowns, shape (n, C, l).
+        explicable: orthonormal columns that span the same.
+        grams: Gram matrices of ``rows``, shape (trials, columns, columns).
+        shared: number of shared unknowns.
+        spans: columns of every candidate.
+        tolerant: which candidate columns have a tolerance, shape (all candidate columns,).
+    """
+
+    candidates: tuple[Candidate, ...]
+    raw: tuple[Array, ...]
+    rows: tuple[Array, ...]
+    local: tuple[Array, ...]
+    explicable: tuple[Array, ...]
+    grams: Array
+    shared: int
+    spans: tuple[slice, ...]
+    tolerant: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, trials: Sequence[Rows], candidates: Sequence[Candidate]) -> Problem:
+        """Assemble the problem; columns become unit parameters by the candidates' units."""
+        units = [c.units for c in candidates]
+        raw = []
+        for trial in trials:
+            parts = [trial.shared, *(a * u for a, u in zip(trial.causes, units, strict=True))]
+            raw.append(np.concatenate([*parts, trial.residual[..., None]], axis=2))
+        return cls._from(candidates, raw, [trial.local for trial in trials], trials[0].shared.shape[2])
+
+    @classmethod
+    def _from(
+        cls, candidates: Sequence[Candidate], raw: Sequence[Array], local: Sequence[Array], shared: int
+    ) -> Problem:
+        spans, at = [], shared
+        for candidate in candidates:
+            spans.append(slice(at, at + len(candidate.parameters)))
+            at += len(candidate.parameters)
+        tolerant = np.array([p.tolerance > 0 for c in candidates for p in c.parameters], dtype=bool)
+        explicable = tuple(orthonormal(own) for own in local)
+        rows = [project(x, own) for x, own in zip(raw, explicable, strict=True)]
+        grams = np.array([gram_of(r, r) for r in rows])
+        return cls(
+            tuple(candidates), tuple(raw), tuple(rows), tuple(local), explicable, grams, shared, tuple(spans),
+            tolerant,
+        )  # fmt: skip
+
+    @property
+    def samples(self) -> int:
+        """Number of whitened residuals in all trials."""
+        return sum(r.shape[0] * r.shape[1] for r in self.rows)
+
+    def index_of(self, candidate: Candidate) -> int | None:
+        """Where a candidate of the same cause and place (and interval) is, or None."""
+        for index, other in enumerate(self.candidates):
+            if other.key == candidate.key and dict(other.detail) == dict(candidate.detail):
+                return index
+        return None
+
+    def with_residual(self, residuals: Sequence[Array]) -> Problem:
+        """The same columns with another residual, shape (n, C) per trial."""
+        return self._with(
+            len(self.tolerant) + self.shared, [r[..., None] for r in residuals], self.candidates
+        )
+
+    def with_columns(self, index: int, candidate: Candidate, columns: Sequence[Array]) -> Problem:
+        """One candidate replaced by another of as many parameters."""
+        candidates = (*self.candidates[:index], candidate, *self.candidates[index + 1 :])
+        return self._with(self.spans[index].start, [c * candidate.units for c in columns], candidates)
+
+    def _with(self, start: int, columns: Sequence[Array], candidates: tuple[Candidate, ...]) -> Problem:
+        raw, rows, grams = [], [], self.grams.copy()
+        for t, new in enumerate(columns):
+            at = slice(start, start + new.shape[2])
+            raw.append(self.raw[t].copy())
+            rows.append(self.rows[t].copy())
+            raw[t][..., at], rows[t][..., at] = new, project(new, self.explicable[t])
+            edge = gram_of(rows[t], rows[t][..., at])
+            grams[t][:, at], grams[t][at] = edge, edge.T
+        return Problem(
+            candidates, tuple(raw), tuple(rows), self.local, self.explicable, grams, self.shared, self.spans,
+            self.tolerant,
+        )  # fmt: skip
+
+    def with_unknowns(self, unknowns: Sequence[Array]) -> Problem:
+        """The problem with further unknowns of every trial, shape (n, C, k) each."""
+        if not any(u.shape[2] for u in unknowns):
+            return self
+        local = [np.concatenate([a, b], axis=2) for a, b in zip(self.local, unknowns, strict=True)]
+        return Problem._from(self.candidates, self.raw, local, self.shared)
+
+    def extended(self, candidate: Candidate, columns: Sequence[Array]) -> Problem:
+        """The problem with one candidate more."""
+        raw, rows, grams = [], [], []
+        for t, new in enumerate(columns):
+            scaled = new * candidate.units
+            own = project(scaled, self.explicable[t])
+            raw.append(np.concatenate([self.raw[t][..., :-1], scaled, self.raw[t][..., -1:]], axis=2))
+            rows.append(np.concatenate([self.rows[t][..., :-1], own, self.rows[t][..., -1:]], axis=2))
+            edge, corner = gram_of(self.rows[t], own), gram_of(own, own)
+            old = self.grams[t]
+            grams.append(
+                np.block(
+                    [
+                        [old[:-1, :-1], edge[:-1], old[:-1, -1:]],
+                        [edge[:-1].T, corner, edge[-1:].T],
+                        [old[-1:, :-1], edge[-1:], old[-1:, -1:]],
+                    ]
+                )
+            )
+        start = self.spans[-1].stop if self.spans else self.shared
+        span = slice(start, start + len(candidate.parameters))
+        tolerant = np.append(self.tolerant, [p.tolerance > 0 for p in candidate.parameters]).astype(bool)
+        return Problem(
+            (*self.candidates, candidate), tuple(raw), tuple(rows), self.local, self.explicable, np.array(grams),
+            self.shared, (*self.spans, span), tolerant,
+        )  # fmt: skip
+
+    def fit(
+        self,
+        free: Sequence[int] = (),
+        trials: Sequence[int] | None = None,
+        *,
+        background: bool = True,
+        fixed: tuple[int, Array] | None = None,
+    ) -> Fit:
+        """Least squares with tolerances as priors, except for the candidates in ``free``.
+
+        Args:
+            free: indices of candidates whose parameters may leave their tolerance.
+            trials: which trials count; None for all.
+            background: whether the other candidates are in the model, within their tolerances.
+            fixed: a candidate held at given values (in units) instead.
+        """
+        total = self.grams.sum(axis=0) if trials is None else self.grams[list(trials)].sum(axis=0)
+        held: tuple[int, ...] = ()
+        if fixed is not None:
+            index, values = fixed
+            held, span = (index,), self.spans[index]
+            full = np.eye(len(total))
+            full[span, -1] = -values  # the residual without what the fixed values explain
+            total = full.T @ total @ full
+        return Fit.of(self, total, tuple(free), background=background, held=held)

@@ -1,0 +1,76 @@
+"""The strongest candidates, with nothing named yet and with what is named in the model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from discrepancy.engine.explanation import CLEAN, Explanation
+from discrepancy.least_squares.fit import Fit
+from discrepancy.rig import Candidate
+
+MOST = 14
+BY_CHANCE = 28.0
+"""Gain of chi-square that one parameter reaches by chance with a probability of about 1e-6 or 1e-7."""
+
+
+def evidence_list(explanation: Explanation) -> dict[str, Any]:
+    """Plain data: ``before`` and ``after`` (null where nothing is named), lists of the strongest first.
+
+    Each entry has cause, family, robot, joint, place, ``at`` (trial from 1 and start [s] of an event, else null), gain
+    (of chi-square if its parameters leave their tolerance) and log10_p (of as much by chance). ``by_chance`` is what
+    chance can do.
+    """
+    problem = explanation.problem
+    return {
+        "before": _strongest(explanation, problem.fit()),
+        "after": _strongest(explanation, explanation.fit) if explanation.fit.free else None,
+        "by_chance": BY_CHANCE,
+    }
+
+
+def _strongest(explanation: Explanation, fit: Fit) -> list[dict[str, Any]]:
+    problem = explanation.problem
+    inflation = max(1.0, fit.misfit / (CLEAN * problem.samples))
+    strongest = sorted(fit.evidence(inflation), key=lambda e: -e.gain)[:MOST]
+    return [
+        place_of(problem.candidates[e.index])
+        | {
+            "at": _when(problem.candidates[e.index]),
+            "gain": float(e.gain),
+            "log10_p": max(float(e.log10_p), -1e6),
+        }
+        for e in strongest
+    ]
+
+
+def place_of(candidate: Candidate) -> dict[str, Any]:
+    """Cause, family and place of a candidate, as in every part of the JSON."""
+    return {
+        "cause": candidate.cause,
+        "family": candidate.family,
+        "robot": candidate.robot,
+        "joint": candidate.joint,
+        "place": candidate.place,
+    }
+
+
+def _when(candidate: Candidate) -> list[float] | None:
+    """Trial (from 1) and start [s] of an event."""
+    detail = candidate.detail
+    return [int(detail["trial"]) + 1, float(detail["start_s"])] if detail else None
+
+
+def label(entry: Mapping[str, Any]) -> str:
+    """Cause and place of an entry, for a plot."""
+    if entry["at"] is None:
+        return f"{entry['cause']} ({entry['place']})"
+    return f"{entry['cause']} (trial {entry['at'][0]}, {entry['at'][1]:.1f} s)"
+
+
+def relation(entry: Mapping[str, Any], causes: Sequence[Mapping[str, Any]]) -> str:
+    """What an entry is to the named causes: ``named``, of their ``family``, or ``other``."""
+    place = ("cause", "robot", "joint")
+    if any(all(entry[key] == cause[key] for key in place) for cause in causes):
+        return "named"
+    return "family" if any(entry["family"] == cause["family"] for cause in causes) else "other"

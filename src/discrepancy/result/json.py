@@ -1,0 +1,207 @@
+"""JSON form of a diagnosis: plain types, no NaN, units in the keys; null is what could not be had.
+
+format, version     "mocobot-diagnosis", 1
+recordings          names of the trials
+verdict             "consistent", "explained", "partly_explained" or "unexplained"
+causes              list, in the order of discovery, of
+    cause, family, robot, joint    robot and joint from 1, or null
+    place, sentence                in words
+    parameters                     {name: {value, se}}; se is null for what was chosen, not fitted
+    explained                      {in_sample, held_out}: share of the nominal model's misfit that the cause removes
+    log10_p                        of so much evidence in clean data
+    folds                          gain of chi-square on every trial when fitted to the others
+    shape                          numbers that change the cause's columns, such as a pendulum's length
+    separate                       what would tell the cause from its look-alikes
+    alternatives                   list of {cause, family, robot, joint, place, evidence_gap [nats], chi2_per_n,
+                                   ambiguous, separate}; chi2_per_n of its closed loop, null if not simulated
+evidence            the strongest candidates, see ``evidence_list``: {before, after, by_chance} with nothing named and
+                    with what is named (null), lists of {cause, family, robot, joint, place, at, gain, log10_p}
+rejected            significant candidates that other trials did not confirm: list of {cause, robot, joint, place}
+gain                null where the closed loop was not simulated and there is nothing to estimate, or
+    held_out        {before, after}: {<channel>_nrmse, <channel>_rms, chi2_per_n}, means over trials, null if failed
+    units           of the channels' rms
+    noise           {<channel>_rms}: what noise and integration error alone would leave
+    removed         share of the excess error removed, with interval [low, high] over trials, or null
+    trials          list of {name, before, after}
+    validated       false for a single trial, which was compared with what it was fitted to
+    estimates       {before, after}, as the rig has them
+    errors          {before, after} against the truth, only where it is known
+not_simulated       why there is no closed-loop comparison, or null
+undecidable         list of {what, why, remedy}: what no recordings of this rig decide, then what these do not
+detection_limits    list of {cause, robot, joint, parameters: {name: size}}: what would have been noticed nine times in
+                    ten; null where these recordings say nothing
+residual            {chi2_per_n, signature} of what the causes (with tolerances) leave, and
+    chi2_per_n_tolerated           with tolerances and no cause
+    tolerances                     {chi2, freedom, log10_p}: how hard they are used
+    nominal                        {chi2_per_n, signature} of the simulation as it is
+notes               sentences
+
+``mocobot diagnose`` adds ``provenance``: versions, options and hashes of the files it was made from
+(``mocobot.files.provenance``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from discrepancy.causes.words import Words
+from discrepancy.engine.diagnose import Alternative, Diagnosis
+from discrepancy.engine.explanation import Explanation, Found
+from discrepancy.engine.gain import Gain, Response
+from discrepancy.result.evidence_list import evidence_list, place_of
+from discrepancy.result.sensitivity import blind_spots, detection_limits
+from discrepancy.result.signature import signature
+from discrepancy.rig import Rig
+
+FORMAT, VERSION = "mocobot-diagnosis", 1
+LEAST_LOG10_P = -1e6
+
+
+def diagnosis_to_dict(
+    diagnosis: Diagnosis, rig: Rig, words: Words, estimates: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """The diagnosis as documented above.
+
+    Args:
+        diagnosis: the verdict.
+        rig: what was diagnosed.
+        words: of the rig.
+        estimates: what the rig estimates ``before`` and ``after``, plain JSON values; ``errors`` may lie beside them.
+    """
+    explanation = diagnosis.explanation
+    nominal = explanation.problem.fit(background=False)
+    gain = None if diagnosis.gain is None else _gain(diagnosis.gain, rig, words)
+    if estimates is not None:
+        gain = gain or {
+            "held_out": {"before": None, "after": None},
+            "units": {},
+            "noise": {},
+            "removed": None,
+            "validated": False,
+            "trials": [],
+        }
+        gain["estimates"] = {name: estimates[name] for name in ("before", "after")}
+        if "errors" in estimates:
+            gain["errors"] = estimates["errors"]
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "recordings": list(rig.trials),
+        "verdict": diagnosis.verdict,
+        "causes": [
+            _cause(found, alternatives, rig, words)
+            for found, alternatives in zip(diagnosis.causes, diagnosis.alternatives, strict=True)
+        ],
+        "evidence": evidence_list(explanation),
+        "rejected": [place_of(candidate) for candidate in explanation.rejected],
+        "gain": gain,
+        "not_simulated": diagnosis.not_simulated,
+        "undecidable": [*rig.undecidable(), *blind_spots(explanation)],
+        "detection_limits": detection_limits(explanation),
+        "residual": {
+            "chi2_per_n": explanation.after / explanation.samples,
+            "signature": plain(signature(rig, explanation)),
+            "chi2_per_n_tolerated": explanation.before / explanation.samples,
+            "tolerances": dict(zip(("chi2", "freedom", "log10_p"), _strain(explanation), strict=True)),
+            "nominal": {
+                "chi2_per_n": nominal.misfit / explanation.samples,
+                "signature": plain(signature(rig, replace(explanation, fit=nominal))),
+            },
+        },
+        "notes": list(diagnosis.notes),
+    }
+
+
+def _strain(explanation: Explanation) -> tuple[float, float, float]:
+    chi2, freedom, log10_p = explanation.fit.strain
+    return chi2, freedom, _log10_p(log10_p)
+
+
+def _log10_p(value: float) -> float:
+    return max(float(np.nan_to_num(value, nan=0.0)), LEAST_LOG10_P)
+
+
+def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: Words) -> dict[str, Any]:
+    candidate = found.candidate
+    values, se = rig.effect_parameters(candidate, found.values, found.covariance)
+    return {
+        **place_of(candidate),
+        "sentence": words.describe(candidate, values, se),
+        "parameters": {
+            name: {"value": float(value), "se": _finite(se.get(name))} for name, value in values.items()
+        },
+        "explained": {"in_sample": found.in_sample, "held_out": found.held_out},
+        "log10_p": _log10_p(found.evidence.log10_p),
+        "folds": [float(gain) for gain in found.folds],
+        "shape": plain(dict(candidate.shape)),
+        "separate": words.separate(candidate.cause),
+        "alternatives": [
+            {
+                **place_of(rival.candidate),
+                "evidence_gap": float(rival.evidence_gap),
+                "chi2_per_n": _finite(rival.chi2_per_n),
+                "ambiguous": bool(rival.ambiguous),
+                "separate": words.separate(rival.candidate.cause),
+            }
+            for rival in alternatives
+        ],
+    }
+
+
+def _gain(gain: Gain, rig: Rig, words: Words) -> dict[str, Any]:
+    channels = list(next((a.rms for a, _ in gain.pairs), {}))
+    removed = gain.removed()
+    both = zip(rig.trials, gain.before, gain.after, strict=True)
+    return {
+        "held_out": {
+            name: _mean([pair[k] for pair in gain.pairs]) for k, name in enumerate(("before", "after"))
+        },
+        "units": {name: words.unit(name) for name in channels},
+        "noise": {f"{name}_rms": _noise(rig, name) for name in channels},
+        "removed": None
+        if removed is None
+        else {"share": removed[0], "interval": [_finite(removed[1]), _finite(removed[2])]},
+        "validated": gain.held_out,
+        "trials": [{"name": name, "before": _response(a), "after": _response(b)} for name, a, b in both],
+    }
+
+
+def _noise(rig: Rig, channel: str) -> float:
+    squares = [np.mean(rig.response_scale(t)[channel][0] ** 2) for t in range(len(rig.trials))]
+    return float(np.sqrt(np.mean(squares)))
+
+
+def _response(response: Response | None) -> dict[str, float] | None:
+    if response is None:
+        return None
+    return (
+        {f"{name}_nrmse": float(v) for name, v in response.nrmse.items()}
+        | {f"{name}_rms": float(v) for name, v in response.rms.items()}
+        | {"chi2_per_n": float(response.chi2_per_n)}
+    )
+
+
+def _mean(responses: Sequence[Response]) -> dict[str, float] | None:
+    each = [values for values in map(_response, responses) if values is not None]
+    return {key: float(np.mean([values[key] for values in each])) for key in each[0]} if each else None
+
+
+def _finite(value: float | None) -> float | None:
+    return None if value is None or not np.isfinite(value) else float(value)
+
+
+def plain(value: Any) -> Any:
+    """numpy numbers and arrays to plain JSON values; what is not finite becomes null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple | np.ndarray):
+        return [plain(item) for item in value]
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    return _finite(float(value)) if isinstance(value, float | np.floating) else value

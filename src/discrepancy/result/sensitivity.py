@@ -1,0 +1,60 @@
+"""What these recordings could have shown: the smallest size of every cause that would have been noticed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from discrepancy.engine.explanation import Explanation
+from discrepancy.rig import Candidate
+
+NOTICED = 38.0
+"""Expected gain of chi-square at which a cause is found in about nine of ten data sets."""
+ABSURD = 1e3
+"""A limit of so many tolerances (or typical sizes) is none."""
+
+
+def detection_limits(explanation: Explanation) -> list[dict[str, Any]]:
+    """Detection limit of every parameter at every place: {cause, robot, joint, parameters: {name: size}}.
+
+    A size is None where the data say nothing about it. Causes that are named, and transients, are left out.
+    """
+    return [entry for _, entry in _judged(explanation)]
+
+
+def blind_spots(explanation: Explanation) -> list[dict[str, Any]]:
+    """Causes and places about which these recordings say nothing at all, in the form of ``Rig.undecidable``."""
+    places: dict[str, list[str]] = {}
+    for candidate, entry in _judged(explanation):
+        if all(size is None for size in entry["parameters"].values()):
+            places.setdefault(candidate.cause, []).append(candidate.place)
+    return [
+        {
+            "what": f"{cause} ({'; '.join(where)})",
+            "why": "its trace in these recordings cannot be told from the unknowns",
+            "remedy": "motion in more directions, where any helps",
+        }
+        for cause, where in places.items()
+    ]
+
+
+def _judged(explanation: Explanation) -> Iterator[tuple[Candidate, dict[str, Any]]]:
+    limits = explanation.fit.limits(NOTICED)
+    for index, (candidate, sizes) in enumerate(zip(explanation.problem.candidates, limits, strict=True)):
+        if index in explanation.fit.free or candidate.detail:
+            continue
+        parameters = {
+            p.name: float(size) if size < ABSURD * p.unit else None
+            for p, size in zip(candidate.parameters, np.asarray(sizes), strict=True)
+        }
+        yield (
+            candidate,
+            {
+                "cause": candidate.cause,
+                "robot": candidate.robot,
+                "joint": candidate.joint,
+                "parameters": parameters,
+            },
+        )

@@ -1,0 +1,151 @@
+"""The text report of a diagnosis: verdict first, then what supports it, what it is worth and what stays open."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from discrepancy.engine.explanation import CLEAN
+from discrepancy.result.text_gain import gain_lines
+
+WIDTH = 100
+STRAINED = -6.0
+"""log10 of the probability below which tolerances are no explanation."""
+Values = Mapping[str, Any]
+
+
+def format_diagnosis(values: Values) -> str:
+    """Readable report of at most 100 columns.
+
+    Args:
+        values: a diagnosis in the form of ``diagnosis_to_dict``.
+    """
+    lines = list(_wrapped(_verdict(values), ""))
+    for k, cause in enumerate(values["causes"], start=1):
+        lines += ["", f"[[Cause {k}: {_label(cause)}]]", *_cause(cause)]
+    lines += gain_lines(values)
+    notes = list(values["notes"])
+    if values["not_simulated"] and not values["causes"]:
+        notes.append(
+            f"The closed loop was not simulated ({values['not_simulated']}), so what shows only in the response to "
+            "the commands stays open."
+        )
+    if values["rejected"]:
+        names = ", ".join(_label(candidate) for candidate in values["rejected"])
+        notes.append(f"Looked likely, but did not hold on other trials: {names}.")
+    if notes:
+        lines += ["", "[[Notes]]"]
+        for note in notes:
+            lines += _wrapped(note)
+    lines += ["", "[[Residual]]", *(line for text in _residual(values) for line in _wrapped(text))]
+    if values["verdict"] == "consistent":
+        lines += [
+            "",
+            "[[What would have been noticed, nine times in ten]]",
+            *_limits(values["detection_limits"]),
+        ]
+    if values["verdict"] != "consistent":
+        lines += ["", "[[What such recordings cannot decide]]"]
+        for entry in values["undecidable"]:
+            lines += _wrapped(f"{entry['what']}: {entry['why']}; needs {entry['remedy']}.")
+    return "\n".join(lines)
+
+
+def _verdict(values: Values) -> str:
+    causes, count = values["causes"], len(values["recordings"])
+    data = "the recording" if count == 1 else f"the {count} recordings"
+    named = " ".join(cause["sentence"] for cause in causes)
+    if values["verdict"] == "consistent":
+        return f"CONSISTENT. The simulation explains {data} within noise and tolerances; nothing is named."
+    if values["verdict"] == "explained":
+        return f"EXPLAINED. {named}"
+    if values["verdict"] == "partly_explained":
+        return f"PARTLY EXPLAINED. {named} That is not all: something else is wrong, too."
+    said = f"UNEXPLAINED. {data[0].upper()}{data[1:]} and the simulation differ, and "
+    if causes:
+        return f"{said}the catalogue's best explains little of it: {named}"
+    return f"{said}no cause of the catalogue explains it."
+
+
+def _cause(cause: Values) -> Iterable[str]:
+    explained = f"Explains {_percent(cause['explained']['in_sample'])} of the misfit in sample"
+    if cause["explained"]["held_out"] is not None:
+        explained += f", {_percent(cause['explained']['held_out'])} on held-out trials"
+    if cause["folds"]:
+        better = sum(gain > 0 for gain in cause["folds"])
+        explained += f" (a gain on {better} of {len(cause['folds'])} folds)"
+    yield from _wrapped(f"{explained}; probability by chance {_power(cause['log10_p'])}.")
+    alike = [rival for rival in cause["alternatives"] if rival["ambiguous"]]
+    ruled_out = [rival for rival in cause["alternatives"] if not rival["ambiguous"]]
+    if alike:
+        names = ", ".join(f"{_label(rival)} by {rival['evidence_gap']:.1f} nats" for rival in alike)
+        yield from _wrapped(f"Cannot be told from: {names}.")
+        advice = dict.fromkeys(text for rival in [cause, *alike] if (text := rival["separate"]))
+        yield from _wrapped("To tell them apart: " + " ".join(advice)) if advice else ()
+    if ruled_out:
+        yield from _wrapped("Fits worse: " + ", ".join(_rival(r) for r in ruled_out[:4]) + ".")
+    if not cause["alternatives"]:
+        yield from _wrapped("No other cause comes near.")
+
+
+def _rival(rival: Values) -> str:
+    loop = "" if rival["chi2_per_n"] is None else f", closed loop chi2/n {rival['chi2_per_n']:.3g}"
+    gap = rival["evidence_gap"]
+    return f"{_label(rival)} ({abs(gap):.0f} nats {'worse' if gap >= 0 else 'better in the rows'}{loop})"
+
+
+def _residual(values: Values) -> Iterable[str]:
+    residual = values["residual"]
+    text = (
+        f"chi2/n is {residual['nominal']['chi2_per_n']:.3g} as simulated, "
+        f"{residual['chi2_per_n_tolerated']:.3g} with everything a little off, within tolerances"
+    )
+    if values["causes"]:
+        text += f", {residual['chi2_per_n']:.3g} with what is named"
+    yield f"{text} (up to {CLEAN:g} counts as clean)."
+    tolerances = residual["tolerances"]
+    if values["verdict"] != "consistent" and tolerances["log10_p"] < STRAINED:
+        yield (
+            f"The tolerances are used harder than chance allows: chi2 {tolerances['chi2']:.0f} of "
+            f"{tolerances['freedom']:.0f} (probability {_power(tolerances['log10_p'])})."
+        )
+    if values["verdict"] != "consistent":
+        yield f"As simulated: {residual['nominal']['signature']['sentence']}"
+    if residual["chi2_per_n"] > CLEAN:
+        yield f"What is left: {residual['signature']['sentence']}"
+
+
+def _limits(limits: Sequence[Values]) -> Iterable[str]:
+    """One line per cause: each parameter's smallest and largest limit over the places."""
+    sizes: dict[str, dict[str, list[float | None]]] = {}
+    for entry in limits:
+        for name, size in entry["parameters"].items():
+            sizes.setdefault(entry["cause"], {}).setdefault(name, []).append(size)
+    for cause, parameters in sizes.items():
+        each = ", ".join(f"{name} {_range(values)}" for name, values in parameters.items())
+        yield from _wrapped(f"{cause}: {each}")
+
+
+def _range(sizes: Sequence[float | None]) -> str:
+    seen = sorted(size for size in sizes if size is not None)
+    if not seen:
+        return "never"
+    low, high = f"{seen[0]:.2g}", f"{seen[-1]:.2g}"
+    return (low if low == high else f"{low}-{high}") + (", not everywhere" if len(seen) < len(sizes) else "")
+
+
+def _label(candidate: Values) -> str:
+    return f"{candidate['cause']} ({candidate['place']})"
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %"
+
+
+def _power(log10_p: float) -> str:
+    return f"1e{log10_p:.0f}" if log10_p < -2 else f"{10**log10_p:.2g}"
+
+
+def _wrapped(text: str, indent: str = "    ") -> Sequence[str]:
+    return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)

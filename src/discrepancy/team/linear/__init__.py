@@ -1,0 +1,1 @@
+"""Linearised trials of a team."""

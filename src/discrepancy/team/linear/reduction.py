@@ -1,0 +1,101 @@
+"""From 100 rows a second to nearly independent ones: low-pass and decimation in motion, one mean per hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from discrepancy.team.linear.signals import Signals
+from estimator.filtering import differentiate, low_pass
+
+Array = NDArray[np.float64]
+
+CUTOFF_HZ = 5.0
+DECIMATED_HZ = 12.5
+HOLD_CUTOFF_HZ = 2.0
+STILL_RAD_PER_S = 1e-3
+SHORTEST_HOLD_S = 1.2
+SETTLING_S = 0.3
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction:
+    """A linear map from the samples of a trial to its rows, the same for residuals and all their columns.
+
+    In motion the residual is filtered at 5 Hz and taken at 12.5 Hz, which leaves it nearly white. While
+    everything rests, an encoder repeats one rounding error for seconds, so a hold counts as one row: its mean; rests
+    too short for that are left out.
+
+    Attributes:
+        operator: rows from samples, shape (n, Q); moving rows first.
+        time: middle of every row [s], shape (n,).
+        moving: how many rows are in motion.
+        step: samples between moving rows.
+        sample: middle of every row, index into the samples, shape (n,).
+    """
+
+    operator: csr_array
+    time: Array
+    moving: int
+    step: int
+    sample: NDArray[np.intp]
+
+    def __call__(self, x: Array) -> Array:
+        """Reduce samples, shape (Q, ...) -> (n, ...)."""
+        rows = self.operator @ x.reshape(len(x), int(np.prod(x.shape[1:])))
+        return rows.reshape(len(self.time), *x.shape[1:])
+
+    @classmethod
+    def of(cls, signals: Signals) -> Reduction:
+        """Reduction of one trial, from where its joints move."""
+        rate, keep = signals.rate_hz, signals.keep
+        kernel = _kernel(rate)
+        half = len(kernel) // 2
+        step = max(1, round(rate / DECIMATED_HZ))
+        holds, in_hold = _holds(signals)
+        rows, columns, values, sample = [], [], [], []
+        first, last = max(keep.start, half), min(keep.stop, len(signals.time) - half)
+        for centre in range(first, last, step):
+            if not in_hold[centre]:
+                rows.append(np.full(len(kernel), len(sample)))
+                columns.append(np.arange(centre - half, centre + half + 1))
+                values.append(kernel)
+                sample.append(centre)
+        moving = len(sample)
+        for start, stop in holds:
+            rows.append(np.full(stop - start, len(sample)))
+            columns.append(np.arange(start, stop))
+            values.append(np.full(stop - start, 1.0 / (stop - start)))
+            sample.append((start + stop - 1) // 2)
+        shape = (len(sample), len(signals.time))
+        join = [np.concatenate(part) if part else np.zeros(0) for part in (values, rows, columns)]
+        operator = csr_array((join[0], (join[1].astype(int), join[2].astype(int))), shape=shape)
+        index = np.array(sample, dtype=np.intp)
+        return cls(operator, signals.time[index], moving, step, index)
+
+
+def _kernel(rate_hz: float) -> Array:
+    """Impulse response of the zero-phase filter, cut where it has died to 1e-4 of its peak."""
+    half = round(0.8 * rate_hz)
+    impulse = np.zeros(4 * half + 1)
+    impulse[2 * half] = 1.0
+    response = low_pass(impulse, rate_hz, CUTOFF_HZ)[half : 3 * half + 1]
+    return response / response.sum()
+
+
+def _holds(signals: Signals) -> tuple[list[tuple[int, int]], NDArray[np.bool_]]:
+    """Spans of samples during which no joint of any robot moves, and all samples at rest, shape (Q,)."""
+    rate = signals.rate_hz
+    # Rounding moves a resting joint too; below 2 Hz that is a twentieth of the threshold.
+    angles = np.concatenate([signals.phi, signals.theta], axis=1).reshape(len(signals.time), -1)
+    speed = np.abs(differentiate(low_pass(angles, rate, HOLD_CUTOFF_HZ), rate)).max(axis=1)
+    still = speed < STILL_RAD_PER_S
+    keep = signals.keep
+    still[: keep.start] = still[keep.stop :] = False
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+    settle, shortest = round(SETTLING_S * rate), round(SHORTEST_HOLD_S * rate)
+    spans = [(start + settle, stop - settle) for start, stop in edges.reshape(-1, 2)]
+    return [(start, stop) for start, stop in spans if stop - start >= shortest], still

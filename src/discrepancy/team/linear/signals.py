@@ -1,0 +1,57 @@
+"""One trial's joint signals as the diagnosis uses them: raw, and gently filtered with derivatives."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.filtering import differentiate, low_pass, trim_slice
+from estimator.recording.model import Recording
+
+Array = NDArray[np.float64]
+
+PRE_HZ = 20.0
+"""Cut-off before the nonlinear formulas [Hz]: high enough that filtering and they commute to within the noise."""
+TRIM_S = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """Joint signals of one trial, N robots, at the recording's rate and full length.
+
+    Attributes:
+        time: [s], shape (Q,).
+        phi, theta, tau: as recorded or corrected, shape (Q, N, 3).
+        rate_hz: sampling rate [Hz].
+    """
+
+    time: Array
+    phi: Array
+    theta: Array
+    tau: Array
+    rate_hz: float
+
+    @classmethod
+    def of(cls, recording: Recording) -> Signals:
+        """The signals of a recording, untouched."""
+        return cls(recording.time, recording.phi, recording.theta, recording.tau, recording.metadata.rate_hz)
+
+    def minus(
+        self, phi: Array | float = 0.0, theta: Array | float = 0.0, tau: Array | float = 0.0
+    ) -> Signals:
+        """The signals without an error of the sensors."""
+        return replace(self, phi=self.phi - phi, theta=self.theta - theta, tau=self.tau - tau)
+
+    @property
+    def keep(self) -> slice:
+        """Rows left once the filters' transients at both ends are dropped."""
+        return trim_slice(len(self.time), self.rate_hz, TRIM_S)
+
+
+def with_rates(x: Array, rate_hz: float) -> Array:
+    """Filtered value, rate and acceleration of joint angles, shape (Q, ...) -> (3, Q, ...)."""
+    value = low_pass(x, rate_hz, PRE_HZ)
+    rate = differentiate(value, rate_hz)
+    return np.stack([value, rate, differentiate(rate, rate_hz)])

@@ -1,0 +1,1 @@
+"""The arm: design, kinematics, dynamics."""

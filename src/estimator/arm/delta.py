@@ -1,0 +1,177 @@
+"""Kinematics of the three-legged Delta: wrist position from the driven angles, its derivatives, the inverse.
+
+Leg k lies at azimuth 0, 120, 240 deg. With u_k the horizontal unit vector of the leg and z up, shifting
+every platform joint onto the wrist (the platform only translates) turns the rods into three spheres:
+|h - c_k(phi_k)| = rod_length about c_k = (base_radius - platform_radius + L1 cos phi_k) u_k + L1 sin phi_k z.
+Everything here follows from that constraint; docs/method-arm.md has the derivation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimator.arm.design import OmnidDesign
+from estimator.errors import InputError
+
+Array = NDArray[np.float64]
+
+# Exact values: cos(2 pi / 3) in floating point is off by 2e-16, which would break the legs' symmetry.
+_HALF_SQRT_3 = np.sqrt(3.0) / 2.0
+LEG_DIRECTIONS: Array = np.array([[1.0, 0.0, 0.0], [-0.5, _HALF_SQRT_3, 0.0], [-0.5, -_HALF_SQRT_3, 0.0]])
+_Z: Array = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class LegGeometry:
+    """The rods and knees of one Delta at given driven angles; vectors in {b}, axis -2 counts the legs.
+
+    Attributes:
+        h: wrist position [m], shape (..., 3).
+        rod: wrist minus sphere centre, that is platform joint minus knee [m], shape (..., 3, 3).
+        knee_d1: derivative of the knee position with respect to phi_k [m/rad], shape (..., 3, 3).
+        knee_d2: second derivative [m/rad^2], shape (..., 3, 3).
+        leverage: rod . knee_d1 [m^2/rad], shape (..., 3); positive while the knee points outward, zero
+            where proximal link and rod are in line (singular).
+    """
+
+    h: Array
+    rod: Array
+    knee_d1: Array
+    knee_d2: Array
+    leverage: Array
+
+
+def forward_kinematics(phi: ArrayLike, design: OmnidDesign) -> Array:
+    """Wrist position h(phi) in {b} [m], shape (..., 3): equation (28); the higher of the two solutions.
+
+    Args:
+        phi: driven angles [rad], 0 horizontal outward, positive raises the knee, shape (..., 3).
+        design: the robot's numbers.
+
+    Raises:
+        InputError: the three spheres of the rods do not intersect at some configuration.
+    """
+    phi = np.asarray(phi, dtype=float)
+    foot, normal, square = _sphere_intersection(phi, design)
+    if not np.all(square > 0):
+        where = np.unravel_index(np.argmin(square > 0), square.shape)
+        angles = ", ".join(f"{value:.4g}" for value in phi[where])
+        raise InputError(f"no wrist position reaches all three rods at phi = ({angles}) rad")
+    return foot + np.sqrt(square)[..., None] * normal
+
+
+def is_reachable(phi: ArrayLike, design: OmnidDesign) -> NDArray[np.bool_]:
+    """Whether a wrist position exists for driven angles ``phi`` [rad], shape (..., 3) -> (...)."""
+    return _sphere_intersection(np.asarray(phi, dtype=float), design)[2] > 0
+
+
+def leg_geometry(phi: ArrayLike, design: OmnidDesign) -> LegGeometry:
+    """Wrist, rods and knee derivatives at driven angles ``phi`` [rad], shape (..., 3).
+
+    Raises:
+        InputError: the three spheres of the rods do not intersect at some configuration.
+    """
+    phi = np.asarray(phi, dtype=float)
+    h = forward_kinematics(phi, design)
+    cos, sin = np.cos(phi)[..., None], np.sin(phi)[..., None]
+    rod = h[..., None, :] - _sphere_centres(phi, design)
+    knee_d1 = design.proximal_length_m * (cos * _Z - sin * LEG_DIRECTIONS)
+    knee_d2 = -design.proximal_length_m * (cos * LEG_DIRECTIONS + sin * _Z)
+    return LegGeometry(h, rod, knee_d1, knee_d2, np.sum(rod * knee_d1, axis=-1))
+
+
+def jacobian(phi: ArrayLike, design: OmnidDesign) -> Array:
+    """dh/dphi [m/rad], shape (..., 3, 3): rows x, y, z of {b}, columns phi_1..3.
+
+    Raises:
+        InputError: the three spheres of the rods do not intersect at some configuration.
+    """
+    return jacobian_of(leg_geometry(phi, design))
+
+
+def jacobian_of(legs: LegGeometry) -> Array:
+    """dh/dphi [m/rad], shape (..., 3, 3), from rod_k . dh = leverage_k dphi_k."""
+    return _solve(legs.rod, legs.leverage[..., None] * np.eye(3))
+
+
+def wrist_motion(legs: LegGeometry, phi_dot: ArrayLike, phi_ddot: ArrayLike) -> tuple[Array, Array]:
+    """Velocity [m/s] and acceleration [m/s^2] of the wrist in {b}, each of shape (..., 3).
+
+    The constraint differentiated twice: rod_k . h_ddot = leverage_k phi_ddot_k
+    + rod_k . knee_d2_k phi_dot_k^2 - |d(rod_k)/dt|^2.
+
+    Args:
+        legs: geometry at the driven angles.
+        phi_dot: driven rates [rad/s], shape (..., 3).
+        phi_ddot: driven accelerations [rad/s^2], shape (..., 3).
+    """
+    phi_dot, phi_ddot = np.asarray(phi_dot, dtype=float), np.asarray(phi_ddot, dtype=float)
+    h_dot = _solve(legs.rod, (legs.leverage * phi_dot)[..., None])[..., 0]
+    rod_dot = h_dot[..., None, :] - legs.knee_d1 * phi_dot[..., None]
+    curvature = np.sum(legs.rod * legs.knee_d2, axis=-1) * phi_dot**2 - np.sum(rod_dot**2, axis=-1)
+    h_ddot = _solve(legs.rod, (legs.leverage * phi_ddot + curvature)[..., None])[..., 0]
+    return h_dot, h_ddot
+
+
+def inverse_kinematics(h: ArrayLike, design: OmnidDesign) -> Array:
+    """Driven angles phi(h) [rad], shape (..., 3), with every knee pointing outward.
+
+    Args:
+        h: wrist position in {b} [m], shape (..., 3).
+        design: the robot's numbers.
+
+    Raises:
+        InputError: a leg is too long or too short for some position.
+    """
+    h = np.asarray(h, dtype=float)
+    outward, up, cosine = _leg_triangles(h, design)
+    outside = ~(np.abs(cosine) <= 1.0)
+    if np.any(outside):
+        *where, leg = np.unravel_index(np.argmax(outside), outside.shape)
+        position = ", ".join(f"{value:.4g}" for value in h[tuple(where)])
+        raise InputError(f"leg {int(leg) + 1} cannot reach the wrist position ({position}) m")
+    # The outward knee lies clockwise of the line to the wrist if that points up, else counter-clockwise.
+    return np.arctan2(up, outward) - np.copysign(np.arccos(cosine), up)
+
+
+def is_in_reach(h: ArrayLike, design: OmnidDesign) -> NDArray[np.bool_]:
+    """Whether each leg reaches the wrist position ``h`` in {b} [m], shape (..., 3) -> (..., 3)."""
+    return np.abs(_leg_triangles(np.asarray(h, dtype=float), design)[2]) <= 1.0
+
+
+def _leg_triangles(h: Array, design: OmnidDesign) -> tuple[Array, Array, Array]:
+    """Wrist from each driven axis, outward and up [m], and the cosine of the angle there; each (..., 3)."""
+    l1, l2 = design.proximal_length_m, design.rod_length_m
+    with np.errstate(
+        all="ignore"
+    ):  # on the driven axis itself, or infinitely far: no cosine, so out of reach
+        # Once the platform joint is shifted onto the wrist.
+        reach = h[..., None, :] - (design.base_radius_m - design.platform_radius_m) * LEG_DIRECTIONS
+        outward, up = np.sum(reach * LEG_DIRECTIONS, axis=-1), reach[..., 2]
+        distance = np.hypot(outward, up)
+        return outward, up, (l1**2 + np.sum(reach**2, axis=-1) - l2**2) / (2.0 * l1 * distance)
+
+
+def _solve(matrix: Array, right: Array) -> Array:
+    return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+
+
+def _sphere_centres(phi: Array, design: OmnidDesign) -> Array:
+    radius = design.base_radius_m - design.platform_radius_m + design.proximal_length_m * np.cos(phi)
+    height = design.proximal_length_m * np.sin(phi)
+    return radius[..., None] * LEG_DIRECTIONS + height[..., None] * _Z
+
+
+def _sphere_intersection(phi: Array, design: OmnidDesign) -> tuple[Array, Array, Array]:
+    """Circumcentre of the sphere centres, upward unit normal of their plane, squared height over it."""
+    centres = _sphere_centres(phi, design)
+    a, b = centres[..., 1, :] - centres[..., 0, :], centres[..., 2, :] - centres[..., 0, :]
+    cross = np.cross(a, b)
+    cross_square = np.sum(cross**2, axis=-1, keepdims=True)
+    a_square, b_square = np.sum(a**2, axis=-1, keepdims=True), np.sum(b**2, axis=-1, keepdims=True)
+    offset = np.cross(a_square * b - b_square * a, cross) / (2.0 * cross_square)
+    normal = cross / np.sqrt(cross_square) * np.where(cross[..., 2:] < 0, -1.0, 1.0)
+    return centres[..., 0, :] + offset, normal, design.rod_length_m**2 - np.sum(offset**2, axis=-1)

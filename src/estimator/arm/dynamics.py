@@ -1,0 +1,111 @@
+"""Inverse dynamics of one Omnid arm alone, and the wrench that it exerts on the payload.
+
+The spring torque drives the arm's own bodies and the payload. Here the first part is computed from the
+motion and taken away from the second. Derivation: docs/method-arm.md. The paper (section IV.B) writes
+f_i = (dh/dphi)^-T tau_i for a massless arm; the motor's rotor lies before the spring and never appears.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from estimator.arm.delta import LegGeometry, jacobian_of, leg_geometry, wrist_motion
+from estimator.arm.design import OmnidDesign, Triple
+from estimator.arm.gimbal import angular_motion, rate_matrix, rotation
+
+Array = NDArray[np.float64]
+
+
+def arm_torque(phi: ArrayLike, phi_dot: ArrayLike, phi_ddot: ArrayLike, design: OmnidDesign) -> Array:
+    """Spring torques that move the unloaded arm [N m], positive raising the link, shape (..., 3).
+
+    Covers the driven links, the rods as uniform slender bodies and everything that translates with the
+    wrist; the gimbal's bodies are balanced, so their rotation does not reach the driven joints.
+
+    Args:
+        phi: driven angles [rad], shape (..., 3).
+        phi_dot: rates [rad/s], shape (..., 3).
+        phi_ddot: accelerations [rad/s^2], shape (..., 3).
+        design: the robot's numbers.
+
+    Raises:
+        InputError: no wrist position exists at some configuration.
+    """
+    return _arm_torque(leg_geometry(phi, design), phi, phi_dot, phi_ddot, design)
+
+
+def gimbal_torque(
+    theta: ArrayLike, theta_dot: ArrayLike, theta_ddot: ArrayLike, design: OmnidDesign
+) -> Array:
+    """Torques about the gimbal's axes that move its own bodies [N m], order (z, y, x), shape (..., 3).
+
+    Args:
+        theta: gimbal angles (theta_z, theta_y, theta_x) [rad], shape (..., 3).
+        theta_dot: rates [rad/s], shape (..., 3).
+        theta_ddot: accelerations [rad/s^2], shape (..., 3).
+        design: the robot's numbers.
+    """
+    theta, theta_dot, theta_ddot = (np.asarray(a, dtype=float) for a in (theta, theta_dot, theta_ddot))
+    yoke = design.yoke_inertia_kgm2[2] * theta_ddot * np.array([1.0, 0.0, 0.0])
+    # The ring's frame is {i} before the x rotation: the same formulas with theta_x and its rates at zero.
+    no_x = np.array([1.0, 1.0, 0.0])
+    ring = _rotor_torque(theta * no_x, theta_dot * no_x, theta_ddot * no_x, design.ring_inertia_kgm2) * no_x
+    return yoke + ring + _rotor_torque(theta, theta_dot, theta_ddot, design.flange_inertia_kgm2)
+
+
+def wrench_on_payload(
+    phi: tuple[ArrayLike, ArrayLike, ArrayLike],
+    theta: tuple[ArrayLike, ArrayLike, ArrayLike],
+    tau: ArrayLike,
+    design: OmnidDesign,
+) -> Array:
+    """Wrench (m_i [N m], f_i [N]) of the robot ON the payload at the origin of {i}, in {i}, shape (..., 6).
+
+    f_i = R_bi^T (dh/dphi)^-T (tau - arm_torque); the gimbal is passive, so m_i = -E^-T gimbal_torque.
+
+    Args:
+        phi: driven angles [rad], rates and accelerations, each of shape (..., 3).
+        theta: gimbal angles (theta_z, theta_y, theta_x) [rad], rates and accelerations, each (..., 3).
+        tau: spring torques [N m], shape (..., 3).
+        design: the robot's numbers.
+
+    Raises:
+        InputError: no wrist position exists at some configuration.
+    """
+    legs = leg_geometry(phi[0], design)
+    jacobian_T = np.swapaxes(jacobian_of(legs), -1, -2)
+    f_b = np.linalg.solve(jacobian_T, (np.asarray(tau) - _arm_torque(legs, *phi, design))[..., None])[..., 0]
+    f_i = np.einsum("...ji,...j->...i", rotation(theta[0]), f_b)
+    axes_T = np.swapaxes(rate_matrix(theta[0]), -1, -2)
+    m_i = -np.linalg.solve(axes_T, gimbal_torque(*theta, design)[..., None])[..., 0]
+    return np.concatenate([m_i, f_i], axis=-1, dtype=np.float64)
+
+
+def _arm_torque(
+    legs: LegGeometry, phi: ArrayLike, phi_dot: ArrayLike, phi_ddot: ArrayLike, design: OmnidDesign
+) -> Array:
+    phi, phi_dot, phi_ddot = (np.asarray(a, dtype=float) for a in (phi, phi_dot, phi_ddot))
+    g = np.array([0.0, 0.0, design.gravity_mps2])
+    _, h_ddot = wrist_motion(legs, phi_dot, phi_ddot)
+    knee_ddot = legs.knee_d1 * phi_ddot[..., None] + legs.knee_d2 * (phi_dot**2)[..., None]
+    # Consistent mass of a slender rod: T = m/6 (va.va + va.vb + vb.vb), half of the weight at each end.
+    wrist_ddot = h_ddot[..., None, :]
+    at_knee = design.rod_mass_kg * ((2.0 * knee_ddot + wrist_ddot) / 6.0 + g / 2.0)
+    at_wrist = design.rod_mass_kg * ((knee_ddot + 2.0 * wrist_ddot) / 6.0 + g / 2.0)
+    wrist_force = at_wrist.sum(axis=-2) + design.wrist_mass_kg * (h_ddot + g)
+    link_weight = design.proximal_mass_kg * design.gravity_mps2 * design.proximal_com_m * np.cos(phi)
+    return (
+        design.proximal_inertia_kgm2 * phi_ddot
+        + link_weight
+        + np.sum(legs.knee_d1 * at_knee, axis=-1)
+        + np.einsum("...ij,...i->...j", jacobian_of(legs), wrist_force)
+    )
+
+
+def _rotor_torque(theta: Array, theta_dot: Array, theta_ddot: Array, inertia: Triple) -> Array:
+    """Joint torques E^T (I omega_dot + omega x I omega) of one balanced body fixed in {i}."""
+    omega, omega_dot = angular_motion(theta, theta_dot, theta_ddot)
+    principal = np.array(inertia)
+    moment = principal * omega_dot + np.cross(omega, principal * omega)
+    return np.einsum("...ij,...i->...j", rate_matrix(theta), moment)

@@ -1,0 +1,1 @@
+"""Offsets between the robots' clocks."""

@@ -1,0 +1,1 @@
+"""From motions and wrenches to grasps and inertial parameters."""

@@ -1,0 +1,221 @@
+"""Checks that the recordings of one payload fit together, for data that are wrong rather than noisy.
+
+What cannot be seen: a full exchange of two robots' columns in a *single* recording is only a renumbering of
+the robots; and a payload is known by its wrenches alone, so a wrong torque sign or scale that all samples
+share looks like another payload unless internal forces or the inertia give it away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator import so3
+from estimator.errors import InputError
+from estimator.estimate.fusion import fuse
+from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.identifiability import StepReport
+from estimator.estimate.inertia import InertiaEstimate, inertia_regressor
+from estimator.estimate.principal import inertia_parameters
+from estimator.signals.grasp_data import GraspData
+from estimator.signals.holds import STILL_RATE_RADPS, STILL_SPEED_MPS
+
+Array = NDArray[np.float64]
+
+NOT_RIGID_ERROR = 0.5
+NOT_RIGID_FLAG = 0.1
+"""Residual of a pair's twists over their motion: more is not one rigid body, or deserves a flag."""
+ANGLE_TOLERANCE_RAD = np.deg2rad(5.0)
+POSITION_TOLERANCE = 0.05
+"""Disagreement of two recordings' grasps [m, and per m of distance] that no calibration error explains."""
+FORCE_FLAG = 0.05
+MOMENT_FLAG = 0.05
+"""Wrench balance: force residual over weight; moment residual over weight and over the grasps' span."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Processed data of one recording, with what its metadata say.
+
+    Attributes:
+        name: how messages call it.
+        kind: ``"random"``, ``"periodic"`` or ``"static"``.
+        payload: label of the payload, or None.
+        data: the data points.
+    """
+
+    name: str
+    kind: str
+    payload: str | None
+    data: GraspData
+
+
+def check_same_payload(trials: Sequence[Trial]) -> str | None:
+    """The common payload label, or None when no recording has one.
+
+    Raises:
+        InputError: there is no recording, or numbers of robots, payload labels or gravity differ.
+    """
+    if not trials:
+        raise InputError("no recording was given")
+    first = trials[0]
+    for trial in trials[1:]:
+        if trial.data.robots != first.data.robots:
+            raise InputError(
+                f"{trial.name} has {trial.data.robots} robots and {first.name} has {first.data.robots}; "
+                "recordings of one payload must have the same robots"
+            )
+        if trial.data.gravity_mps2 != first.data.gravity_mps2:
+            raise InputError(f"{trial.name} and {first.name} differ in gravity_mps2")
+    labelled = [trial for trial in trials if trial.payload is not None]
+    for trial in labelled[1:]:
+        if trial.payload != labelled[0].payload:
+            raise InputError(
+                f"{trial.name} is of payload {trial.payload!r} and {labelled[0].name} of "
+                f"{labelled[0].payload!r}; estimate one payload at a time"
+            )
+    return labelled[0].payload if labelled else None
+
+
+def check_rigid(name: str, grasps: GraspEstimate) -> list[str]:
+    """Flags for pairs of robots whose twists do not fit one rigid body.
+
+    Raises:
+        InputError: a pair's residual is of the size of its motion.
+    """
+    flags = []
+    for i, j in combinations(range(grasps.robots), 2):
+        distance = float(np.linalg.norm(grasps.p_1i[i] - grasps.p_1i[j]))
+        angular = float(np.mean(grasps.angular_motion_rms[[i, j]]))
+        linear = max(*grasps.linear_motion_rms[[i, j]], distance * angular)
+        ratio = max(
+            grasps.angular_residual_rms[i, j] / angular if angular else 0.0,
+            grasps.linear_residual_rms[i, j] / linear if linear else 0.0,
+        )
+        what = (
+            f"{name}: robots {i + 1} and {j + 1} do not move like one rigid body "
+            f"({100 * ratio:.0f} % of their motion is unexplained)"
+        )
+        if ratio > NOT_RIGID_ERROR:
+            raise InputError(f"{what}; check their columns and units")
+        if ratio > NOT_RIGID_FLAG:
+            flags.append(f"{what}.")
+    return flags
+
+
+def check_disagreement_is_noise(name: str, steps: Sequence[StepReport]) -> None:
+    """For grasps that came out undetermined: is it for want of motion?
+
+    Raises:
+        InputError: the robots disagree by more than any encoder noise, so they are not on one rigid body.
+    """
+    for step in steps:
+        limit = STILL_RATE_RADPS if step.step.startswith("rotation") else STILL_SPEED_MPS
+        if step.noise > limit:
+            robot = step.step.split("_1")[1]
+            raise InputError(
+                f"{name}: robots 1 and {robot} do not move like one rigid body (they disagree by "
+                f"{step.noise:.2g} {step.unit.split(' per')[0]} rms); check their columns and units"
+            )
+
+
+def check_agreement(names: Sequence[str], grasps: Sequence[GraspEstimate]) -> None:
+    """Do the recordings, each on its own, find the same grasps?
+
+    Raises:
+        InputError: they do not; names the recording that stands out and, if exchanging two robots' columns
+            would explain it, those robots.
+    """
+    bad = [
+        (a, b)
+        for a, b in combinations(range(len(names)), 2)
+        if (_disagreement(grasps[a], grasps[b])) is not None
+    ]
+    if not bad:
+        return
+    counts = np.bincount(np.ravel(bad), minlength=len(names))
+    odd = int(np.argmax(counts))
+    others = [b if a == odd else a for a, b in bad if odd in (a, b)]
+    what = _disagreement(grasps[odd], grasps[others[0]])
+    alone = np.sum(counts == counts[odd]) == 1
+    subject = f"{names[odd]} disagrees" if alone else f"{names[odd]} and {names[others[0]]} disagree"
+    rest = "with the other recordings" if alone else "with each other"
+    message = f"{subject} {rest} about the grasps ({what})"
+    for i, j in combinations(range(grasps[odd].robots), 2):
+        if all(_disagreement(_exchanged(grasps[odd], i, j), grasps[other]) is None for other in others):
+            raise InputError(f"{message}, as if the columns of robots {i + 1} and {j + 1} were exchanged")
+    raise InputError(f"{message}; are they of the same payload and grasps?")
+
+
+def wrench_balance(
+    data: GraspData, grasps: GraspEstimate, mass: float, p_1c: Array, inertia: InertiaEstimate | None
+) -> tuple[float, float | None]:
+    """Force residual over weight, and moment residual about the CoM over weight [m]; rms over the trial.
+
+    Without an inertia there is no telling what the moments should be, and the second result is None.
+    """
+    motion = fuse(data, grasps)
+    lever = np.cross(motion.alpha, p_1c) + np.cross(motion.omega, np.cross(motion.omega, p_1c))
+    force = motion.force - mass * (motion.acceleration + lever + data.gravity_mps2 * motion.up)
+    weight = mass * data.gravity_mps2
+    if inertia is None:
+        return _rms(force) / weight, None
+    X = inertia_regressor(motion.omega, motion.alpha)
+    moment = motion.moment - np.cross(p_1c, motion.force) - X @ inertia_parameters(inertia.inertia)
+    return _rms(force) / weight, _rms(moment) / weight
+
+
+def balance_flags(name: str, force: float, moment_m: float | None, grasps: GraspEstimate) -> list[str]:
+    """Flags for a recording whose wrenches do not add up to the payload's motion."""
+    flags = []
+    if force > FORCE_FLAG:
+        flags.append(
+            f"{name}: the robots' forces do not add up to one payload ({100 * force:.0f} % of its weight is "
+            "left over); check the signs and columns of the torques."
+        )
+    span = float(np.max(np.linalg.norm(grasps.p_1i, axis=1))) if grasps.robots > 1 else 1.0
+    if moment_m is not None and moment_m > MOMENT_FLAG * span:
+        flags.append(
+            f"{name}: the moments do not balance, as if the centre of mass were {moment_m:.2g} m elsewhere; "
+            "check the torques' columns."
+        )
+    return flags
+
+
+def _rms(vectors: Array) -> float:
+    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))
+
+
+def _disagreement(a: GraspEstimate, b: GraspEstimate) -> str | None:
+    for j in range(1, a.robots):
+        part = slice(6 * (j - 1), 6 * j)
+        variance = np.diag(a.covariance)[part] + np.diag(b.covariance)[part]
+        angle = float(np.linalg.norm(so3.log(a.R_1i[j].T @ b.R_1i[j])))
+        shift = float(np.linalg.norm(a.p_1i[j] - b.p_1i[j]))
+        allowed = POSITION_TOLERANCE * (1 + float(np.linalg.norm(a.p_1i[j])))
+        if angle > max(ANGLE_TOLERANCE_RAD, 5 * np.sqrt(variance[:3].sum())):
+            return f"R_1{j + 1} differs by {np.rad2deg(angle):.0f} deg"
+        if shift > max(allowed, 5 * np.sqrt(variance[3:].sum())):
+            return f"p_1{j + 1} differs by {shift:.2g} m"
+    return None
+
+
+def _exchanged(grasps: GraspEstimate, i: int, j: int) -> GraspEstimate:
+    """The grasps with robots of index i < j renumbered; covariances only roughly, for the tolerance."""
+    order = np.arange(grasps.robots)
+    order[[i, j]] = order[[j, i]]
+    R, p = grasps.R_1i[order], grasps.p_1i[order]
+    moved = GraspEstimate(
+        R[0].T @ R,
+        (p - p[0]) @ R[0],
+        grasps.covariance,
+        grasps.angular_residual_rms,
+        grasps.linear_residual_rms,
+        grasps.angular_motion_rms,
+        grasps.linear_motion_rms,
+    )
+    return moved

@@ -1,0 +1,235 @@
+"""Relative grasp frames from twists (paper, section III-B): Wahba, positions, refinement over all pairs.
+
+The refinement has the unknowns T_12, ..., T_1N only. Every other T_ij is T_1i^-1 T_1j by construction, so all
+loops close exactly and no constraint is left to weigh against the data. It minimises the weighted squares of
+the residuals of all pairs i < j,
+
+    e_w = R_1i omega_i - R_1j omega_j,    e_v = R_1i v_i - R_1j v_j - [p_1j - p_1i] w,
+
+equation (2) rotated into {1}, with one difference: w is the mean of R_1k omega_k over all robots instead of
+R_1j omega_j. Noise in the angular velocity that multiplies p shortens the estimate of p; the mean has 1/N of
+that noise power, treats the two robots of a pair alike, and renumbering the robots changes nothing.
+
+All residuals are linear in the stacked twists V = [V_1; ...; V_N] of a sample, so sums of their products
+depend on the samples only through V V^T: one triangular 6N x 6N factor per window of samples replaces them.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from estimator import so3
+from estimator.estimate.grasp_estimate import GraspEstimate, single_robot
+from estimator.estimate.identifiability import StepReport, cross_information, judge
+from estimator.estimate.uncertainty import WINDOW_S, window_covariance, windows
+from estimator.signals.grasp_data import GraspData
+
+Array = NDArray[np.float64]
+
+RATE_FLOOR_RADPS = 1e-10
+"""Angular velocity that cannot be told from rounding error of differenced angles [rad/s]."""
+
+
+def pair_rotation(omega_i: Array, omega_j: Array) -> Array:
+    """R_ij that best maps omega_j onto omega_i (Wahba's problem), equations (3)-(5).
+
+    Args:
+        omega_i, omega_j: angular velocities [rad/s] in {i} and {j}, shape (Q, 3).
+    """
+    with warnings.catch_warnings():  # scipy warns when R is not unique; the caller judges that from the noise
+        warnings.simplefilter("ignore", UserWarning)
+        return Rotation.align_vectors(omega_i, omega_j)[0].as_matrix()
+
+
+def pair_position(twist_i: Array, twist_j: Array, R_ij: Array) -> Array:
+    """p_ij [m] that best explains the linear velocities, equations (6)-(8); shortest if not unique.
+
+    Args:
+        twist_i, twist_j: twists (omega, v) in {i} and {j}, shape (Q, 6).
+        R_ij: rotation, shape (3, 3).
+    """
+    A = so3.skew(twist_j[:, :3] @ R_ij.T).reshape(-1, 3)
+    b = (twist_j[:, 3:] @ R_ij.T - twist_i[:, 3:]).ravel()
+    return np.asarray(np.linalg.lstsq(A, b, rcond=None)[0], dtype=float)
+
+
+def estimate_grasps(
+    trials: Sequence[GraspData], window_s: float = WINDOW_S
+) -> tuple[GraspEstimate | None, tuple[StepReport, ...]]:
+    """Grasp frames of all robots from one or several trials of the same payload.
+
+    Args:
+        trials: data of the same N robots and grasps; trials count by their samples and motion.
+        window_s: length of the windows for the covariance [s].
+
+    Returns:
+        The estimate, or None when some T_1j is not determined, and two reports per robot j > 1 (rotation,
+        position). For N = 1 the estimate is exact and there is nothing to report.
+    """
+    N = trials[0].robots
+    if N == 1:
+        return single_robot(), ()
+    stacked = [trial.twist.reshape(trial.samples, -1) for trial in trials]  # (Q, 6N)
+    samples = sum(trial.samples for trial in trials)
+    pooled = _triangle(np.concatenate([_triangle(V) for V in stacked]))  # (6N, 6N)
+    V = pooled.reshape(-1, N, 6)  # its rows play the part of samples
+
+    R, p, reports = np.tile(np.eye(3), (N, 1, 1)), np.zeros((N, 3)), []
+    for j in range(1, N):
+        R[j] = pair_rotation(V[:, 0, :3], V[:, j, :3])
+        p[j] = pair_position(V[:, 0], V[:, j], R[j])
+        reports += _excitation(V[:, 0], V[:, j], R[j], p[j], j + 1, samples)
+    if not all(report.determined for report in reports):
+        return None, tuple(reports)
+
+    weights = np.ones((2, 1, 1))
+    for _ in range(2):  # the second round frees the weights from the pairs that the start is made of
+        weights = _weights(V, R, p)
+        R, p = _refine(V, R, p, weights)
+
+    normals, scores = [], []
+    for V_b in (
+        _factor(V[window.part], window.weights).reshape(-1, N, 6)
+        for trial, V in zip(trials, stacked, strict=True)
+        for window in windows(trial.samples, trial.rate_hz, window_s)
+    ):
+        J = (weights[..., None] * _jacobian(V_b, R, p)).reshape(-1, 6 * (N - 1))
+        normals.append(J.T @ J)
+        scores.append(J.T @ (weights * _residuals(V_b, R, p)).ravel())
+    covariance = window_covariance(np.array(normals), np.array(scores))
+
+    mean = 3 * samples
+    pair_rms = np.zeros((2, N, N))
+    for (i, j), e in zip(_pairs(N), _residuals(V, R, p), strict=True):
+        pair_rms[:, i, j] = pair_rms[:, j, i] = np.sqrt(np.sum(e**2, axis=(1, 2)) / mean)
+    rms = np.sqrt(np.sum(V.reshape(-1, N, 2, 3) ** 2, axis=(0, 3)) / mean)
+    estimate = GraspEstimate(R, p, covariance, pair_rms[0], pair_rms[1], rms[:, 0], rms[:, 1])
+    return estimate, tuple(reports)
+
+
+def _excitation(V_1: Array, V_j: Array, R: Array, p: Array, robot: int, samples: int) -> list[StepReport]:
+    """Does the payload turn about at least two axes, clearly above the disagreement of the two robots?"""
+    information = cross_information(V_1[:, :3]) * len(V_1) / samples
+    e_w = V_1[:, :3] - V_j[:, :3] @ R.T
+    e_v = V_1[:, 3:] - V_j[:, 3:] @ R.T + np.cross(V_j[:, :3] @ R.T, p)
+    noise_w, noise_v = (float(np.sqrt(np.sum(e**2) / (3 * samples))) for e in (e_w, e_v))
+    common: Any = {"frame": "{1}", "floor": RATE_FLOOR_RADPS}
+    why = "the payload does not turn enough about any axis across it"
+    rotation = judge(
+        f"rotation R_1{robot}",
+        ("about x", "about y", "about z"),
+        information,
+        noise_w,
+        unit="rad/s",
+        words="about",
+        reason=why,
+        **common,
+    )
+    return [
+        rotation,
+        # Scaled by 1 m: the velocity that a position error of 1 m would cause, against the residual's.
+        # With an open rotation that residual means nothing, and the rates' own noise stands in for it.
+        judge(
+            f"position p_1{robot}",
+            ("x", "y", "z"),
+            information,
+            noise_v if rotation.determined else noise_w,
+            unit="m/s per m",
+            words="along",
+            reason=why,
+            **common,
+        ),
+    ]
+
+
+def _weights(V: Array, R: Array, p: Array) -> Array:
+    """Weights (2, 1, 1) of angular and linear residuals: the inverse of their rms, the first scaled to 1."""
+    r = _residuals(V, R, p)
+    motion = np.sqrt(np.mean(V[..., :3] ** 2)), np.sqrt(np.mean(V[..., 3:] ** 2))
+    # The guard keeps exact data from dividing by zero.
+    rms = [max(float(np.sqrt(np.mean(r[:, k] ** 2))), 1e-12 * motion[k], 1e-300) for k in (0, 1)]
+    return np.array([1.0, rms[0] / rms[1]])[:, None, None]
+
+
+def _refine(V: Array, R: Array, p: Array, weights: Array) -> tuple[Array, Array]:
+    """Least squares over T_12..T_1N on the manifold, started at (R, p)."""
+    N = len(p)
+    R_0, p_0 = R.copy(), p.copy()
+
+    def frames(x: Array) -> tuple[Array, Array]:
+        x = x.reshape(N - 1, 6)
+        return np.concatenate([R_0[:1], so3.exp(x[:, :3]) @ R_0[1:]]), np.concatenate(
+            [p_0[:1], p_0[1:] + x[:, 3:]]
+        )
+
+    def residuals(x: Array) -> Array:
+        return (weights * _residuals(V, *frames(x))).ravel()
+
+    def jacobian(x: Array) -> Array:
+        J = weights[..., None] * _jacobian(V, *frames(x))  # with respect to a left error rotation
+        for k, phi in enumerate(x.reshape(N - 1, 6)[:, :3]):
+            J[..., 6 * k : 6 * k + 3] = J[..., 6 * k : 6 * k + 3] @ so3.left_jacobian(phi)
+        return J.reshape(-1, 6 * (N - 1))
+
+    start = np.zeros(6 * (N - 1))
+    size = float(np.sqrt(np.sum(jacobian(start) ** 2)))  # brings the cost near one, whatever the units
+    solution = least_squares(
+        lambda x: residuals(x) / size,
+        start,
+        jac=lambda x: jacobian(x) / size,  # type: ignore[arg-type]
+        method="lm",
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
+    )
+    return frames(solution.x)
+
+
+def _pairs(N: int) -> list[tuple[int, int]]:
+    return [(i, j) for i in range(N) for j in range(i + 1, N)]
+
+
+def _residuals(V: Array, R: Array, p: Array) -> Array:
+    """Residuals (e_w, e_v) in {1} of all pairs, shapes (Q, N, 6) -> (pairs, 2, Q, 3)."""
+    w, u = np.einsum("iab,qib->iqa", R, V[..., :3]), np.einsum("iab,qib->iqa", R, V[..., 3:])
+    i, j = np.array(_pairs(len(p))).T
+    e_v = u[i] - u[j] - np.cross((p[j] - p[i])[:, None], w.mean(axis=0))
+    return np.stack([w[i] - w[j], e_v], axis=1)
+
+
+def _jacobian(V: Array, R: Array, p: Array) -> Array:
+    """Derivative of ``_residuals`` by (d_2, e_2, ...), R_1i -> exp(d_i) R_1i, p_1i -> p_1i + e_i.
+
+    Shape (pairs, 2, Q, 3, 6(N-1)).
+    """
+    N = len(p)
+    w, u = np.einsum("iab,qib->iqa", R, V[..., :3]), np.einsum("iab,qib->iqa", R, V[..., 3:])
+    W, U = so3.skew(w), so3.skew(u)
+    W_mean = W.mean(axis=0)
+    J = np.zeros((len(_pairs(N)), 2, len(V), 3, N, 6))
+    for k, (i, j) in enumerate(_pairs(N)):
+        J[k, 0, :, :, i, :3], J[k, 0, :, :, j, :3] = -W[i], W[j]
+        J[k, 1, ..., :3] = np.moveaxis(so3.skew(p[j] - p[i]) @ W / N, 0, -2)
+        J[k, 1, :, :, i, :3] -= U[i]
+        J[k, 1, :, :, j, :3] += U[j]
+        J[k, 1, :, :, i, 3:], J[k, 1, :, :, j, 3:] = -W_mean, W_mean
+    return J[..., 1:, :].reshape(*J.shape[:4], 6 * (N - 1))
+
+
+def _triangle(V: Array) -> Array:
+    """Square factor R with R^T R = V^T V, shapes (Q, K) -> (K, K)."""
+    R = np.linalg.qr(V, mode="r")
+    return np.vstack([R, np.zeros((V.shape[1] - len(R), V.shape[1]))])
+
+
+def _factor(V: Array, weights: Array) -> Array:
+    """Square factor F with F^T F = V^T diag(weights) V: quicker than a triangle, exact in products."""
+    values, axes = np.linalg.eigh((V.T * weights) @ V)
+    return np.sqrt(np.maximum(values, 0.0))[:, None] * axes.T

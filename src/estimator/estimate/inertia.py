@@ -1,0 +1,196 @@
+"""Inertia matrix about the centre of mass from motion (paper, section III-D).
+
+{b} sits at the estimated centre of mass with the axes of {s} = {1}. Moments are taken about the centre of
+mass, so its acceleration enters nowhere: m_b = I alpha + omega x I omega, equation (18).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator import so3
+from estimator.estimate.fusion import acceleration_noise, fuse
+from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.identifiability import StepReport, WeakDirection, combination, judge
+from estimator.estimate.principal import PrincipalInertia, inertia_matrix, principal_inertia, project_positive
+from estimator.estimate.uncertainty import (
+    WINDOW_S,
+    Window,
+    numerical_jacobian,
+    window_covariance,
+    window_normals,
+    windows,
+)
+from estimator.signals.grasp_data import GraspData
+
+Array = NDArray[np.float64]
+
+PARAMETERS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+SE_LIMIT = 1 / 3
+"""Largest standard error of a determined direction, relative to the payload's typical inertia."""
+_JACOBIAN_SAMPLES = 1000  # carrying the covariance of grasps and CoM forward needs no more
+
+
+@dataclass(frozen=True)
+class InertiaEstimate:
+    """Inertia in {b}.
+
+    Attributes:
+        inertia: matrix about the centre of mass in the axes of {1} [kg m^2], shape (3, 3).
+        covariance: of (Ixx, Ixy, Ixz, Iyy, Iyz, Izz) [kg^2 m^4], errors of grasps and CoM included, (6, 6).
+        principal: moments and axes.
+        projected: True when a negative eigenvalue was replaced by zero (footnote 1).
+        residual_rms: rms per component of the moment balance about the CoM [N m].
+        moment_rms: rms per component of the moment that the inertia explains [N m].
+    """
+
+    inertia: Array
+    covariance: Array
+    principal: PrincipalInertia
+    projected: bool
+    residual_rms: float
+    moment_rms: float
+
+
+def momentum_regressor(w: Array) -> Array:
+    """L(w) with L(w) I_reg = I w and I_reg as in (20), shapes (..., 3) -> (..., 3, 6); (21) is L(alpha)."""
+    x, y, z = np.moveaxis(np.asarray(w, dtype=float), -1, 0)
+    o = np.zeros_like(x)
+    rows = [[x, y, z, o, o, o], [o, x, o, y, z, o], [o, o, x, o, y, z]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def inertia_regressor(omega: Array, alpha: Array) -> Array:
+    """A + B of (21)-(24): (A + B) I_reg = I alpha + omega x I omega, shapes (..., 3) -> (..., 3, 6).
+
+    B = [omega] L(omega). The paper prints B as six rows of three: its rows 1-3 are columns 1-3 and its rows
+    4-6 are columns 4-6 of the 3 x 6 matrix meant.
+    """
+    return momentum_regressor(alpha) + so3.skew(omega) @ momentum_regressor(omega)
+
+
+def estimate_inertia(
+    trials: Sequence[GraspData],
+    grasps: GraspEstimate,
+    p_1c: Array,
+    upstream: tuple[Array, Array] | None = None,
+    window_s: float = WINDOW_S,
+    step: str = "inertia",
+) -> tuple[InertiaEstimate | None, StepReport]:
+    """Inertia by (26) from one or several trials.
+
+    Args:
+        trials: motion of the same payload.
+        grasps: the grasp frames.
+        p_1c: centre of mass in {1} [m], shape (3,).
+        upstream: covariance of p_1c without the part due to the grasps, shape (3, 3), and derivative of p_1c
+            by the grasp errors, shape (3, 6(N-1)); None takes p_1c as exact.
+        window_s: length of the windows for the covariance [s].
+        step: name of the step in the report.
+
+    Returns:
+        The estimate, or None when a direction is not determined, and the report.
+    """
+    parts = [_equations(trial, grasps, p_1c) for trial in trials]
+    X, y = np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
+    alpha_noise = float(np.sqrt(np.mean([acceleration_noise(trial, grasps) ** 2 for trial in trials])))
+    report = rotational_excitation(X, alpha_noise, step)
+    if not report.determined:
+        return None, report
+    parameters = _solve(X, y)
+    residual = y - X @ parameters
+    noise, signal = float(np.sqrt(np.mean(residual**2))), float(np.sqrt(np.mean((X @ parameters) ** 2)))
+    if signal < noise:
+        why = f"the moments do not follow the motion (explained {signal:.2g} N m, left {noise:.2g} N m)"
+        return None, refuse(report, np.eye(6), why)
+
+    covariance = window_covariance(*window_normals(X, residual, trial_windows(trials, window_s)))
+    moment_scale, alpha_scale = np.sqrt(np.mean(y**2)), np.sqrt(np.mean(X[:, 0, 0] ** 2 + X[:, 1, 1] ** 2))
+    typical = moment_scale / alpha_scale
+    values, vectors = np.linalg.eigh(covariance)
+    uncertain = vectors[:, np.sqrt(np.maximum(values, 0.0)) > SE_LIMIT * typical]
+    if uncertain.size:
+        return None, refuse(report, uncertain.T, "its standard error is as large as a third of the inertia")
+
+    if upstream is not None:
+        covariance = covariance + _upstream_covariance(trials, grasps, p_1c, *upstream)
+    inertia, projected = project_positive(inertia_matrix(parameters))
+    estimate = InertiaEstimate(
+        inertia, covariance, principal_inertia(inertia, covariance), projected, noise, signal
+    )
+    return estimate, report
+
+
+def trial_windows(trials: Sequence[GraspData], window_s: float) -> list[Window]:
+    """Windows over the samples of several trials put one after the other."""
+    out, first = [], 0
+    for trial in trials:
+        out += windows(trial.samples, trial.rate_hz, window_s, first)
+        first += trial.samples
+    return out
+
+
+def rotational_excitation(X: Array, alpha_noise: float, step: str) -> StepReport:
+    """Judge the regressor (Q, 3, 6) against the noise of the angular acceleration [rad/s^2]."""
+    flat = X.reshape(-1, 6)
+    return judge(
+        step,
+        PARAMETERS,
+        flat.T @ flat / len(X),
+        alpha_noise,
+        unit="rad/s^2",
+        reason="the rotations do not excite it",
+        floor=1e-8,
+    )
+
+
+def refuse(report: StepReport, directions: Array, why: str) -> StepReport:
+    """The report with the given directions (K, parameters) added as not determined."""
+    weak = tuple(
+        WeakDirection(report.step, combination(d, report.parameters), tuple(float(v) for v in d), why)
+        for d in directions
+    )
+    return replace(report, weak=report.weak + weak)
+
+
+def _equations(trial: GraspData, grasps: GraspEstimate, p_1c: Array) -> tuple[Array, Array]:
+    """Regressor (Q, 3, 6) and moments about the CoM (Q, 3), equations (19), (21)-(24)."""
+    motion = fuse(trial, grasps)
+    return inertia_regressor(motion.omega, motion.alpha), motion.moment - np.cross(p_1c, motion.force)
+
+
+def _solve(X: Array, y: Array) -> Array:
+    flat = X.reshape(-1, 6)
+    return np.asarray(np.linalg.solve(flat.T @ flat, flat.T @ y.ravel()), dtype=float)
+
+
+def _upstream_covariance(
+    trials: Sequence[GraspData],
+    grasps: GraspEstimate,
+    p_1c: Array,
+    com_covariance: Array,
+    com_by_grasp: Array,
+) -> Array:
+    """Covariance of the inertia due to errors of the CoM and of the grasps, which also move the CoM."""
+    stride = max(1, sum(trial.samples for trial in trials) // _JACOBIAN_SAMPLES)
+    thin = [every(trial, stride) for trial in trials]
+    K = len(grasps.covariance)
+
+    def parameters(x: Array) -> Array:
+        moved = grasps.moved(x[:K])
+        parts = [_equations(trial, moved, p_1c + com_by_grasp @ x[:K] + x[K:]) for trial in thin]
+        return _solve(np.concatenate([X for X, _ in parts]), np.concatenate([y for _, y in parts]))
+
+    J = numerical_jacobian(parameters, np.zeros(K + 3))
+    return J[:, :K] @ grasps.covariance @ J[:, :K].T + J[:, K:] @ com_covariance @ J[:, K:].T
+
+
+def every(trial: GraspData, stride: int) -> GraspData:
+    """Every ``stride``-th sample of a trial."""
+    names = ("time", "R_bi", "p_bi", "twist", "twist_dot", "wrench")
+    thin = {name: getattr(trial, name)[::stride] for name in names}
+    return replace(trial, rate_hz=trial.rate_hz / stride, **thin)

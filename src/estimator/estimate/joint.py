@@ -1,0 +1,256 @@
+"""Mass, centre of mass and inertia in one least squares over the ten standard inertial parameters.
+
+With a the acceleration of the origin of {1}, G = a + g up, c = p_1c and J the inertia about that origin,
+
+    f = m G + [alpha] m c + [omega]^2 m c,
+    M = m c x G + J alpha + omega x J omega,
+
+linear in (m, m c, J). Needs no static hold, and the mass and centre of mass profit from the motion too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag, null_space
+
+from estimator import so3
+from estimator.errors import InputError
+from estimator.estimate.fusion import BodyMotion, acceleration_noise, fuse
+from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.identifiability import StepReport, cross_information, judge
+from estimator.estimate.inertia import (
+    SE_LIMIT,
+    InertiaEstimate,
+    every,
+    inertia_regressor,
+    refuse,
+    rotational_excitation,
+    trial_windows,
+)
+from estimator.estimate.principal import (
+    inertia_matrix,
+    inertia_parameters,
+    principal_inertia,
+    project_positive,
+)
+from estimator.estimate.statics import ComEstimate, MassEstimate, weak_com_reason
+from estimator.estimate.uncertainty import WINDOW_S, numerical_jacobian, window_covariance, window_normals
+from estimator.signals.grasp_data import GraspData
+
+Array = NDArray[np.float64]
+
+_JACOBIAN_SAMPLES = 1000
+
+
+@dataclass(frozen=True)
+class JointEstimate:
+    """Result of the joint least squares.
+
+    Attributes:
+        mass, com, inertia: as the staged scheme gives them; None where not determined.
+        covariance: of (m, p_1c, inertia parameters in {b}), shape (K, K) with K = 1, 4 or 10.
+    """
+
+    mass: MassEstimate
+    com: ComEstimate | None
+    inertia: InertiaEstimate | None
+    covariance: Array
+
+
+def newton_euler_regressor(omega: Array, alpha: Array, specific_force: Array) -> Array:
+    """Regressor of (f, M) at the origin of {1} by (m, m c, Jxx, Jxy, Jxz, Jyy, Jyz, Jzz).
+
+    Args:
+        omega, alpha: angular velocity [rad/s] and acceleration [rad/s^2] in {1}, shape (Q, 3).
+        specific_force: G = a + g up in {1} [m/s^2], shape (Q, 3).
+
+    Returns:
+        Shape (Q, 6, 10), force rows first.
+    """
+    W = so3.skew(omega)
+    Y = np.zeros((len(omega), 6, 10))
+    Y[:, :3, 0] = specific_force
+    Y[:, :3, 1:4] = so3.skew(alpha) + W @ W
+    Y[:, 3:, 1:4] = -so3.skew(specific_force)
+    Y[:, 3:, 4:] = inertia_regressor(omega, alpha)
+    return Y
+
+
+def estimate_joint(
+    trials: Sequence[GraspData], grasps: GraspEstimate, window_s: float = WINDOW_S, step: str = "inertia"
+) -> tuple[JointEstimate, tuple[StepReport, ...]]:
+    """Ten inertial parameters from any motion; fewer when the motion is poor.
+
+    Args:
+        trials: one or several trials of the same payload and N >= 1 robots, holds included.
+        grasps: the grasp frames.
+        window_s: length of the windows for the covariance [s].
+        step: name of the inertia step in the reports.
+
+    Returns:
+        The estimate and the reports on the centre of mass and the inertia.
+
+    Raises:
+        InputError: the robots do not carry anything (the mass comes out as zero or negative).
+    """
+    motions = [fuse(trial, grasps) for trial in trials]
+    Y, w, used = _equations(motions, trials)
+    gravity = trials[0].gravity_mps2
+    alpha_noise = float(np.sqrt(np.mean([acceleration_noise(trial, grasps) ** 2 for trial in trials])))
+    inertia_report = rotational_excitation(Y[:, 3:, 4:], alpha_noise, step)
+    # Directions without excitation leave the fit, the others of an open inertia stay: they explain moments.
+    turning = _excited(inertia_report)
+    basis = _blocks(np.eye(4), turning)
+    theta, weights = _weighted_solve(_spanned(Y, basis), w)
+    if theta[0] <= 0:
+        raise InputError(
+            f"the estimated mass is {theta[0]:.3g} kg: the robots do not lift anything; "
+            "check the sign of the torques"
+        )
+    residual = w - _spanned(Y, basis) @ theta
+    rms = np.sqrt(np.mean(residual.reshape(-1, 2, 3) ** 2, axis=(0, 2)))  # force, moment
+    com_report = judge(
+        "centre of mass p_1c",
+        ("x", "y", "z"),
+        cross_information(Y[:, :3, 0]) / gravity**2,
+        max(float(rms[1]) / (theta[0] * gravity), _tilt_noise(trials, grasps)),
+        unit="rad",
+        words="along",
+        frame="{1}",
+        floor=1e-9,
+        reason=weak_com_reason(
+            "the payload hardly tilts about any axis across it", float(rms[1]), theta[0] * gravity
+        ),
+    )
+    if not com_report.determined:
+        basis = _blocks(np.eye(1), _excited(com_report), turning)
+        theta, weights = _weighted_solve(_spanned(Y, basis), w)
+        residual = w - _spanned(Y, basis) @ theta
+        if inertia_report.determined:
+            inertia_report = refuse(inertia_report, np.eye(6), "it needs the centre of mass")
+    # How many of (m, p_1c, inertia) are reported.
+    K = 1 if not com_report.determined else 4 if not inertia_report.determined else 10
+    Y_b = _spanned(Y, basis)
+
+    scale = np.sqrt(np.einsum("qrk,qrk->k", Y_b, Y_b) / used)
+    parts = trial_windows(trials, window_s)
+    J_weighted = weights[:, None] * Y_b
+    J_weighted /= scale  # in place: these arrays are the largest of an estimate
+    normals, scores = window_normals(J_weighted, weights * residual, parts)
+    del J_weighted
+    covariance = window_covariance(normals, scores) / np.outer(scale, scale)
+
+    def moved(x: Array) -> Array:
+        equations = _equations([fuse(trial, grasps.moved(x)) for trial in thin], thin)
+        return _centred(_solve(_spanned(equations[0], basis), equations[1], weights), K)
+
+    stride = max(1, used // _JACOBIAN_SAMPLES)
+    thin = [every(trial, stride) for trial in trials]
+    J_own = numerical_jacobian(lambda x: _centred(x, K), theta)
+    J = numerical_jacobian(moved, np.zeros(len(grasps.covariance)))
+    own_covariance = J_own @ covariance @ J_own.T
+    covariance = own_covariance + J @ grasps.covariance @ J.T
+
+    values = _centred(theta, K)
+    mass = MassEstimate(float(values[0]), float(np.sqrt(covariance[0, 0])), float(rms[0]))
+    com = inertia = None
+    if K >= 4:
+        com = ComEstimate(
+            float(values[0]), values[1:4], covariance[:4, :4], own_covariance[:4, :4], J[1:4], float(rms[1])
+        )
+    if K == 10:
+        matrix, projected = project_positive(inertia_matrix(values[4:]))
+        of_inertia = covariance[4:, 4:]
+        explained = float(np.sqrt(np.mean((Y[:, 3:, 4:] @ theta[4:]) ** 2)))
+        eigenvalues, vectors = np.linalg.eigh(of_inertia)
+        uncertain = vectors[:, np.sqrt(np.maximum(eigenvalues, 0.0)) > SE_LIMIT * np.trace(matrix) / 3]
+        if uncertain.size:
+            why = "its standard error is as large as a third of the inertia"
+            inertia_report = refuse(inertia_report, uncertain.T, why)
+        else:
+            inertia = InertiaEstimate(
+                matrix, of_inertia, principal_inertia(matrix, of_inertia), projected, float(rms[1]), explained
+            )
+    return JointEstimate(mass, com, inertia, covariance), (com_report, inertia_report)
+
+
+def _equations(motions: Sequence[BodyMotion], trials: Sequence[GraspData]) -> tuple[Array, Array, int]:
+    """Regressor (Q, 6, 10), wrench (Q, 6) as (f, M), and Q over all trials."""
+    Y = np.concatenate(
+        [
+            newton_euler_regressor(m.omega, m.alpha, m.acceleration + trial.gravity_mps2 * m.up)
+            for m, trial in zip(motions, trials, strict=True)
+        ]
+    )
+    w = np.concatenate([np.concatenate([m.force, m.moment], axis=1) for m in motions])
+    return Y, w, len(w)
+
+
+def _excited(report: StepReport) -> Array:
+    """Orthonormal basis of the directions that are not weak, shape (parameters, directions)."""
+    if report.determined:
+        return np.eye(len(report.parameters))
+    return np.asarray(null_space(np.array([direction.vector for direction in report.weak])), dtype=float)
+
+
+def _spanned(Y: Array, basis: Array) -> Array:
+    """Y @ basis, without a copy where nothing is left out."""
+    complete = basis.shape[0] == basis.shape[1] and bool(np.all(basis == np.eye(len(basis))))
+    return Y if complete else Y @ basis
+
+
+def _blocks(*blocks: Array) -> Array:
+    return np.asarray(block_diag(*blocks), dtype=float)
+
+
+def _solve(Y: Array, w: Array, weights: Array) -> Array:
+    """Least squares with weights (6,) of the rows."""
+    A = (weights[:, None] * Y).reshape(-1, Y.shape[-1])
+    scale = np.linalg.norm(A, axis=0)
+    scale[scale == 0] = 1.0
+    normal = (A.T @ A) / np.outer(scale, scale)
+    right = A.T @ (weights * w).ravel() / scale
+    return np.asarray(np.linalg.lstsq(normal, right, rcond=1e-14)[0] / scale, dtype=float)
+
+
+def _weighted_solve(Y: Array, w: Array) -> tuple[Array, Array]:
+    """The same with weights from the residuals of forces and of moments; parameters and weights."""
+    weights = np.ones(6)
+    # Exact data leave rounding error only, which says nothing about weights.
+    floor = 1e-9 * np.sqrt(np.mean(w.reshape(-1, 2, 3) ** 2, axis=(0, 2))) + 1e-12
+    for _ in range(2):
+        residual = (w - Y @ _solve(Y, w, weights)).reshape(-1, 2, 3)
+        rms = np.maximum(np.sqrt(np.mean(residual**2, axis=(0, 2))), floor)
+        weights = np.repeat(rms[0] / rms, 3)
+    return _solve(Y, w, weights), weights
+
+
+def _centred(parameters: Array, count: int) -> Array:
+    """(m, m c, J about {1}, ...) -> the first 1, 4 or 10 of (m, c, inertia about c)."""
+    m = parameters[0]
+    if count == 1:
+        return parameters[:1]
+    c = parameters[1:4] / m
+    out = np.concatenate([[m], c])
+    if count == 4:
+        return out
+    shift = m * (c @ c * np.eye(3) - np.outer(c, c))
+    return np.concatenate([out, parameters[4:] - inertia_parameters(shift)])
+
+
+def _tilt_noise(trials: Sequence[GraspData], grasps: GraspEstimate) -> float:
+    """Rms disagreement of the robots' tilts around each robot's constant offset [rad]."""
+    if grasps.robots == 1:
+        return 0.0
+    total, count = 0.0, 0
+    for trial in trials:
+        up = np.einsum("iab,qib->qia", grasps.R_1i, trial.R_bi[..., 2, :])
+        apart = up - up.mean(axis=1, keepdims=True)
+        apart -= apart.mean(axis=0)
+        total += float(np.sum(apart**2))
+        count += 2 * (grasps.robots - 1) * trial.samples
+    return float(np.sqrt(total / count))

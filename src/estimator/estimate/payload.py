@@ -1,0 +1,241 @@
+"""The pipeline: from recordings of one payload to its estimate."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from estimator.errors import InputError
+from estimator.estimate.consistency import (
+    Trial,
+    balance_flags,
+    check_agreement,
+    check_disagreement_is_noise,
+    check_rigid,
+    check_same_payload,
+    wrench_balance,
+)
+from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.grasps import estimate_grasps
+from estimator.estimate.identifiability import StepReport
+from estimator.estimate.inertia import InertiaEstimate, estimate_inertia
+from estimator.estimate.joint import estimate_joint
+from estimator.estimate.result import PayloadEstimate, RecordingEstimate
+from estimator.estimate.statics import CONTRADICTION, ComEstimate, MassEstimate, estimate_com, estimate_mass
+from estimator.estimate.uncertainty import WINDOW_S
+from estimator.recording.model import Recording
+from estimator.signals.holds import Hold, find_holds
+from estimator.signals.process import process_recording
+
+Method = Literal["auto", "staged", "joint"]
+
+RESTING = 0.5
+"""A recording that rests for more than this share of its time does not serve the inertia, if another does."""
+
+
+def estimate_payload(
+    recordings: Iterable[Recording],
+    method: Method = "auto",
+    cutoff_hz: float = 5.0,
+    trim_s: float = 2.0,
+    window_s: float = WINDOW_S,
+    say: Callable[[str], object] = lambda _: None,
+) -> PayloadEstimate:
+    """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
+
+    Args:
+        recordings: one or several trials with the same robots and grasps; taken one after the other, so that an
+            iterator need not hold more than one.
+        method: ``"staged"``, the paper's sequence (grasps from motion; mass and centre of mass from static
+            holds; inertia from motion); ``"joint"``, one least squares for mass, centre of mass and inertia;
+            ``"auto"``, staged when the holds determine the centre of mass, else joint.
+        cutoff_hz: cut-off of the low-pass filter [Hz].
+        trim_s: time dropped at both ends of each recording [s].
+        window_s: length of the windows for standard errors [s].
+        say: takes the name of the stage that begins.
+
+    Raises:
+        InputError: the recordings do not belong together or contradict each other, the method needs what
+            they lack, nothing can be estimated from them, or their numbers are beyond arithmetic.
+    """
+    trials: list[Trial] = []
+    names: list[str] = []
+    try:
+        with np.errstate(over="raise", divide="raise"):
+            for recording in recordings:
+                names.append(recording.name)
+                trials.append(_trial(recording, cutoff_hz, trim_s))
+                del recording  # or the next one would be read before this one is let go
+            return estimate_from_trials(trials, method, window_s, say)
+    except (FloatingPointError, np.linalg.LinAlgError) as error:
+        raise InputError(
+            f"{', '.join(names)}: the equations cannot be solved ({error}); are the numbers in 'design' plausible?"
+        ) from error
+
+
+def _trial(recording: Recording, cutoff_hz: float, trim_s: float) -> Trial:
+    labels = recording.metadata
+    return Trial(
+        recording.name, labels.trial, labels.payload, process_recording(recording, cutoff_hz, trim_s)
+    )
+
+
+def estimate_from_trials(
+    trials: Sequence[Trial],
+    method: Method = "auto",
+    window_s: float = WINDOW_S,
+    say: Callable[[str], object] = lambda _: None,
+) -> PayloadEstimate:
+    """The same from processed data; see ``estimate_payload``."""
+    if method not in ("auto", "staged", "joint"):
+        raise InputError(f"method is {method!r}; it must be 'auto', 'staged' or 'joint'")
+    payload = check_same_payload(trials)
+    names = _distinct([trial.name for trial in trials])
+    trials = [replace(trial, name=name) for trial, name in zip(trials, names, strict=True)]
+    say("static holds")
+    holds = [find_holds(trial.data) for trial in trials]
+    records = [
+        RecordingEstimate(t.name, t.kind, t.data.samples / t.data.rate_hz, len(h))
+        for t, h in zip(trials, holds, strict=True)
+    ]
+    flags: list[str] = []
+    say("grasps")
+    grasps, steps = _grasps(trials, records, flags, window_s)
+
+    say("mass and centre of mass")
+    every_hold = [hold for found in holds for hold in found]
+    mass, com, com_step = _from_holds(every_hold, grasps, trials[0].data.gravity_mps2)
+    if method == "staged" and not every_hold:
+        raise InputError(
+            "method 'staged' needs static holds and the recordings have none; use 'joint' or 'auto'"
+        )
+    if method == "auto":
+        method = "joint" if com is None and grasps is not None else "staged"
+    inertia: InertiaEstimate | None = None
+    if method == "joint":
+        if grasps is None:
+            raise InputError(f"nothing can be estimated jointly: {_why(steps)}")
+        say("mass, centre of mass and inertia")
+        joint, joint_steps = estimate_joint([trial.data for trial in trials], grasps, window_s)
+        mass, com, inertia = joint.mass, joint.com, joint.inertia
+        steps += joint_steps
+    else:
+        steps += [com_step] if com_step else []
+    moving = _moving(trials, holds)
+    if grasps is not None and com is not None:
+        upstream = com.own_covariance[1:, 1:], com.grasp_jacobian
+        if method == "staged":
+            say("inertia")
+            data = [trials[k].data for k in moving]
+            inertia, step = estimate_inertia(data, grasps, com.p_1c, upstream, window_s)
+            steps.append(step)
+        say("each recording alone")
+        for k in moving:
+            records[k] = replace(records[k], inertia=_alone(trials[k], grasps, com, method, window_s))
+        for k, trial in enumerate(trials):
+            known = inertia or records[k].inertia
+            force, moment = wrench_balance(trial.data, grasps, com.mass, com.p_1c, known)
+            records[k] = replace(records[k], force_residual=force, moment_residual_m=moment)
+            flags += balance_flags(trial.name, force, moment, grasps)
+    if inertia is not None:
+        flags += _inertia_flags(inertia)
+    doubts = {weak.reason for step in steps for weak in step.weak if CONTRADICTION in weak.reason}
+    flags += [f"No centre of mass, and a doubtful mass: {doubt}." for doubt in sorted(doubts)[:1]]
+    if mass is None and inertia is None and (grasps is None or grasps.robots == 1):
+        raise InputError(f"nothing can be estimated from these recordings: {_why(steps)}")
+    return PayloadEstimate(
+        payload=payload,
+        robots=trials[0].data.robots,
+        method=method,
+        grasps=grasps,
+        mass=mass,
+        p_1c=None if com is None else com.p_1c,
+        p_1c_covariance=None if com is None else com.covariance[1:, 1:],
+        inertia=inertia,
+        steps=tuple(steps),
+        recordings=tuple(records),
+        flags=tuple(flags),
+    )
+
+
+def _grasps(
+    trials: Sequence[Trial], records: list[RecordingEstimate], flags: list[str], window_s: float
+) -> tuple[GraspEstimate | None, list[StepReport]]:
+    """Grasps of every recording alone (into ``records``), checked against each other, and pooled."""
+    for k, trial in enumerate(trials):
+        alone, steps = estimate_grasps([trial.data], window_s)
+        records[k] = replace(records[k], grasps=alone)
+        if alone is not None:
+            flags += check_rigid(trial.name, alone)
+        else:
+            check_disagreement_is_noise(trial.name, steps)
+    found = [(record.name, record.grasps) for record in records if record.grasps is not None]
+    check_agreement([name for name, _ in found], [grasps for _, grasps in found])
+    pooled, steps = estimate_grasps([trial.data for trial in trials], window_s)
+    return pooled, list(steps)
+
+
+def _from_holds(
+    holds: Sequence[Hold], grasps: GraspEstimate | None, gravity_mps2: float
+) -> tuple[MassEstimate | None, ComEstimate | None, StepReport | None]:
+    if not holds:
+        return None, None, None
+    mass = estimate_mass(holds, gravity_mps2)
+    if grasps is None:
+        return mass, None, None
+    return mass, *estimate_com(holds, mass, grasps, gravity_mps2)
+
+
+def _moving(trials: Sequence[Trial], holds: Sequence[Sequence[Hold]]) -> list[int]:
+    rest = [sum(hold.end_s - hold.start_s for hold in found) for found in holds]
+    length = [float(trial.data.time[-1] - trial.data.time[0]) for trial in trials]
+    moving = [k for k in range(len(trials)) if rest[k] <= RESTING * length[k]]
+    return moving or list(range(len(trials)))
+
+
+def _alone(
+    trial: Trial, grasps: GraspEstimate, com: ComEstimate, method: str, window_s: float
+) -> InertiaEstimate | None:
+    if method == "joint":
+        return estimate_joint([trial.data], grasps, window_s)[0].inertia
+    upstream = com.own_covariance[1:, 1:], com.grasp_jacobian
+    return estimate_inertia([trial.data], grasps, com.p_1c, upstream, window_s)[0]
+
+
+def _inertia_flags(inertia: InertiaEstimate) -> list[str]:
+    flags = []
+    if inertia.projected:
+        flags.append("The least-squares inertia had a negative eigenvalue, which was replaced by zero.")
+    moments, se = inertia.principal.moments, inertia.principal.moments_se
+    excess, excess_se = moments[2] - moments[0] - moments[1], float(np.sqrt(np.sum(se**2)))
+    if excess > max(3 * excess_se, 0.02 * moments[2]):
+        flags.append("The largest principal moment exceeds the sum of the others: no real body has that.")
+    if inertia.principal.R_1c is None:
+        flags.append("Two principal moments are equal within their errors, so their axes are not determined.")
+    if inertia.residual_rms > 0.5 * inertia.moment_rms:
+        share = inertia.residual_rms / inertia.moment_rms
+        flags.append(
+            f"The moments follow the motion poorly (residual {100 * share:.0f} % of what is explained)."
+        )
+    return flags
+
+
+def _why(steps: Sequence[StepReport]) -> str:
+    weak = [str(weak) for step in steps for weak in step.weak]
+    if not weak:
+        return "there is no static hold and no motion"
+    more = f" (and {len(weak) - 1} more)" if len(weak) > 1 else ""
+    return weak[0] + more
+
+
+def _distinct(names: Sequence[str]) -> list[str]:
+    """Names with a running number where two recordings share one."""
+    seen: dict[str, int] = {}
+    out = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        out.append(name if seen[name] == 1 else f"{name} ({seen[name]})")
+    return out

@@ -1,0 +1,242 @@
+"""Mass and centre of mass from static holds (paper, section III-C).
+
+Mass, (9), (11)-(13): the bases are level, so the vertical force sum needs each robot's own gimbal only and no
+grasp frame. Centre of mass, (10), (14)-(17): M = m g p_1c x up, with M the moment sum about {1}; only its
+components across gravity are seen, hence two or more tilts.
+
+Errors of a hold: the noise of its mean, from batch means, and errors that differ from hold to hold but not
+within one (torque rounding, friction, geometry), a variance estimated from the residuals between holds and
+added to every hold: a random-effects model, scaled once for forces and once for moments. Its shape is that of
+equal, independent errors in every robot's force, so moments take it through the grasps' levers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag, eigh, null_space
+from scipy.optimize import brentq
+
+from estimator import so3
+from estimator.errors import InputError
+from estimator.estimate.fusion import fused_up, robot_up, total_wrench
+from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.identifiability import StepReport, cross_information, judge
+from estimator.estimate.uncertainty import numerical_jacobian
+from estimator.signals.holds import Hold
+
+Array = NDArray[np.float64]
+
+CONTRADICTION = "the wrenches contradict each other"
+CONTRADICTION_M = 0.02
+"""Moment left over, per weight [m], that is more than noise and poor calibration leave."""
+
+
+@dataclass(frozen=True)
+class MassEstimate:
+    """Mass from the vertical forces of the holds.
+
+    Attributes:
+        mass: m [kg].
+        se: its standard error [kg].
+        residual_rms: rms of the vertical force balance over the holds [N].
+    """
+
+    mass: float
+    se: float
+    residual_rms: float
+
+
+@dataclass(frozen=True)
+class ComEstimate:
+    """Mass and centre of mass from the holds, with their common covariance.
+
+    Attributes:
+        mass: the mass it goes with [kg].
+        p_1c: centre of mass in {1} [m], shape (3,).
+        covariance: of (m [kg], p_1c [m]), grasp errors included, shape (4, 4).
+        own_covariance: the same without the part due to the grasps.
+        grasp_jacobian: derivative of p_1c by the grasp errors of ``GraspEstimate``, shape (3, 6(N-1)).
+        residual_rms: rms per component of the moment balance about {1} over the holds [N m].
+    """
+
+    mass: float
+    p_1c: Array
+    covariance: Array
+    own_covariance: Array
+    grasp_jacobian: Array
+    residual_rms: float
+
+
+def estimate_mass(holds: Sequence[Hold], gravity_mps2: float) -> MassEstimate:
+    """Mass by (13), from one or more holds of any N >= 1 robots.
+
+    Raises:
+        InputError: the robots do not carry anything (the mass comes out as zero or negative).
+    """
+    vertical = np.array([vertical_force(hold.R_bi, hold.wrench[None])[0] for hold in holds])  # (H,)
+    mass = float(vertical.mean() / gravity_mps2)
+    if mass <= 0:
+        raise InputError(
+            f"the estimated mass is {mass:.3g} kg: the robots do not lift anything; "
+            "check the sign of the torques"
+        )
+    within = [_mean_covariance(vertical_force(hold.R_bi, hold.batches)[:, None]) for hold in holds]
+    residual = vertical - vertical.mean()
+    between = _between(residual @ residual, len(holds) - 1, float(np.mean(within)))
+    se = np.sqrt(np.mean(within) + between) / np.sqrt(len(holds)) / gravity_mps2
+    return MassEstimate(mass, float(se), float(np.sqrt(np.mean(residual**2))))
+
+
+def estimate_com(
+    holds: Sequence[Hold], mass: MassEstimate, grasps: GraspEstimate, gravity_mps2: float
+) -> tuple[ComEstimate | None, StepReport]:
+    """Centre of mass by (17); None when the tilts of the holds do not differ enough."""
+    up, moment = _loads(holds, grasps)
+    p_1c, A = _solve(up, moment, mass.mass, gravity_mps2)
+    residual = moment - (A @ p_1c).reshape(-1, 3)
+    dof = 3 * len(holds) - 3
+    rss = float(residual.ravel() @ residual.ravel())
+    within = [_mean_covariance(_signals(hold, grasps)) for hold in holds]  # (4, 4): vertical, moment
+    # Few holds leave few residuals; the noise within them is a second opinion.
+    within_rms = float(np.sqrt(np.mean([np.trace(S[1:, 1:]) / 3 for S in within])))
+    noise = max(float(np.sqrt(rss / dof)) if dof else 0.0, within_rms)
+    weight = mass.mass * gravity_mps2
+    tilt_noise = _tilt_noise(holds, grasps)
+    report = judge(
+        "centre of mass p_1c",
+        ("x", "y", "z"),
+        cross_information(up),
+        # As angles: what a moment residual looks like at 1 m from the CoM, and how well the tilt is known.
+        max(noise / weight, tilt_noise),
+        unit="rad",
+        words="along",
+        frame="{1}",
+        floor=1e-9,
+        reason=weak_com_reason("the holds hardly differ in tilt about any axis across it", noise, weight),
+    )
+    if not report.determined:
+        return None, report
+
+    def com(x: Array) -> Array:
+        return _solve(*_loads(holds, grasps.moved(x)), mass.mass, gravity_mps2)[0]
+
+    def residuals(x: Array) -> Array:
+        up_x, moment_x = _loads(holds, grasps.moved(x))
+        p_x, A_x = _solve(up_x, moment_x, mass.mass, gravity_mps2)
+        return moment_x.ravel() - A_x @ p_x
+
+    # x -> (m, p): each hold contributes errors of its vertical force and of its moment.
+    H, K = len(holds), np.linalg.pinv(A).reshape(3, len(holds), 3)
+    shapes = [_force_error_shape(up_q, grasps) for up_q in up]
+    J_residual = numerical_jacobian(residuals, np.zeros(len(grasps.covariance)))
+    known = np.asarray(block_diag(*[S[1:, 1:] for S in within]), dtype=float)
+    known += J_residual @ grasps.covariance @ J_residual.T
+    shape = np.asarray(block_diag(*[S[1:, 1:] for S in shapes]), dtype=float)
+    between = np.sqrt(_excess_variance(residual.ravel(), A, known, shape))
+    vertical_within = float(np.mean([S[0, 0] for S in within]))
+    between_force = np.sqrt(max(0.0, (mass.se * gravity_mps2) ** 2 * H - vertical_within) / grasps.robots)
+    scale = np.diag([between_force, between, between, between])
+    covariance = np.zeros((4, 4))
+    for q in range(H):
+        S = within[q] + scale @ shapes[q] @ scale
+        L = np.zeros((4, 4))
+        L[0, 0] = 1 / (H * gravity_mps2)
+        L[1:, 0] = -p_1c / (mass.mass * H * gravity_mps2)  # p scales with 1 / m
+        L[1:, 1:] = K[:, q]
+        covariance += L @ S @ L.T
+
+    J = numerical_jacobian(com, np.zeros(len(grasps.covariance)))
+    total = covariance.copy()
+    total[1:, 1:] += J @ grasps.covariance @ J.T
+    rms = float(np.sqrt(np.mean(residual**2)))
+    return ComEstimate(mass.mass, p_1c, total, covariance, J, rms), report
+
+
+def weak_com_reason(tilt: str, moment_rms: float, weight: float) -> str:
+    """Why the centre of mass is open: too little ``tilt`` [sentence], or moments [N m] that make no sense."""
+    if moment_rms < CONTRADICTION_M * weight:
+        return tilt
+    return (
+        f"{CONTRADICTION} ({moment_rms:.2g} N m rms are left over); "
+        "check the signs and columns of the torques"
+    )
+
+
+def vertical_force(R_bi: Array, wrench: Array) -> Array:
+    """Sum over robots of the vertical force [N], from R_bi (N, 3, 3) and wrenches (Q, N, 6), shape (Q,)."""
+    return np.einsum("ib,qib->q", R_bi[:, 2], wrench[..., 3:])
+
+
+def _loads(holds: Sequence[Hold], grasps: GraspEstimate) -> tuple[Array, Array]:
+    """Direction against gravity and moment sum about {1}, both in {1}, shape (H, 3)."""
+    up = fused_up(np.array([hold.R_bi for hold in holds]), grasps)
+    return up, total_wrench(np.array([hold.wrench for hold in holds]), grasps)[1]
+
+
+def _solve(up: Array, moment: Array, mass: float, gravity: float) -> tuple[Array, Array]:
+    A = -mass * gravity * so3.skew(up).reshape(-1, 3)
+    return np.asarray(np.linalg.lstsq(A, moment.ravel(), rcond=None)[0], dtype=float), A
+
+
+def _signals(hold: Hold, grasps: GraspEstimate) -> Array:
+    """Vertical force and moment about {1} of every batch of a hold, shape (batches, 4)."""
+    return np.column_stack([vertical_force(hold.R_bi, hold.batches), total_wrench(hold.batches, grasps)[1]])
+
+
+def _force_error_shape(up: Array, grasps: GraspEstimate) -> Array:
+    """Covariance of (vertical force, moment about {1}) for unit force errors of all robots, shape (4, 4)."""
+    L = [np.vstack([up, so3.skew(p)]) for p in grasps.p_1i]
+    shape = np.sum([L_i @ L_i.T for L_i in L], axis=0)
+    if np.trace(shape[1:, 1:]) < 1e-6:  # all grasps at {1}: only errors of the moments themselves are left
+        shape = np.diag([float(grasps.robots), 1.0, 1.0, 1.0])
+    return shape
+
+
+def _excess_variance(residual: Array, A: Array, known: Array, shape: Array) -> float:
+    """Factor v >= 0 such that the covariance ``known + v * shape`` explains the residual (Mandel and Paule).
+
+    v solves z^T (known + v shape)^-1 z = dof, with z the part of the residual across the columns of A. Errors
+    of the grasps are in ``known``: what they leave must not count again as scatter between holds.
+    """
+    U = null_space(A.T)
+    z, V_0, V_1 = U.T @ residual, U.T @ known @ U, U.T @ shape @ U
+    V_1 = V_1 + 1e-6 * np.trace(V_1) / len(V_1) * np.eye(len(V_1))  # two grasps leave a direction of no error
+
+    eigenvalues, axes = eigh(V_0, V_1)
+    eigenvalues, squares = np.maximum(eigenvalues, 0.0), (axes.T @ z) ** 2
+
+    def excess(v: float) -> float:
+        return float(np.sum(squares / (eigenvalues + v))) - len(z)
+
+    most = float(np.sum(squares)) / len(z)  # the solution if nothing else were known
+    least = 1e-9 * most
+    if most <= 0 or excess(least) <= 0:
+        return 0.0
+    if excess(most) >= 0:
+        return most
+    return float(np.asarray(brentq(excess, least, most)))
+
+
+def _mean_covariance(batches: Array) -> Array:
+    """Covariance of the mean of independent batches (B, K), shape (K, K)."""
+    centred = batches - batches.mean(axis=0)
+    return centred.T @ centred / (len(batches) * (len(batches) - 1))
+
+
+def _between(rss: float, dof: int, within: float) -> float:
+    return max(0.0, rss / dof - within) if dof else 0.0
+
+
+def _tilt_noise(holds: Sequence[Hold], grasps: GraspEstimate) -> float:
+    """How much the robots' tilts disagree from hold to hold [rad]; a constant offset is no noise."""
+    if grasps.robots == 1 or len(holds) < 2:
+        return 0.0
+    up = robot_up(np.array([hold.R_bi for hold in holds]), grasps)  # (H, N, 3)
+    apart = up - up.mean(axis=1, keepdims=True)
+    apart -= apart.mean(axis=0)
+    dof = (len(holds) - 1) * (grasps.robots - 1) * 2  # a direction has two components
+    return float(np.sqrt(np.sum(apart**2) / dof))

@@ -1,0 +1,1 @@
+"""Recordings: model, metadata, checks, files."""

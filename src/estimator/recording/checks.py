@@ -1,0 +1,174 @@
+"""Is a recording plausible? Checked before anything is computed from it; one sentence per fault."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.arm.delta import is_reachable, leg_geometry
+from estimator.errors import InputError
+from estimator.filtering import MIN_SAMPLES, trim_slice
+
+if TYPE_CHECKING:
+    from estimator.recording.model import Recording
+
+Array = NDArray[np.float64]
+
+SPACING_TOLERANCE = 0.5  # of one sample period: a time stamp may jitter by so much
+TORQUE_FACTOR = 2.0  # of torque_limit_Nm: no spring reads beyond, so it is another unit or a spike
+RATE_TOLERANCE = 1e-3  # of rate_hz: enters accelerations, and so inertia, twice
+
+
+def check_recording(recording: Recording) -> None:
+    """Check number of rows, finiteness, time axis, joint ranges, torques and leg geometry of a recording.
+
+    Raises:
+        InputError: names the recording, the column, the row (counted from 0), the value and what is allowed.
+    """
+    rows = len(recording.time)
+    if rows < MIN_SAMPLES:
+        raise InputError(f"{recording.name}: {rows} rows are too few; at least {MIN_SAMPLES} are needed")
+    check_finite(recording.name, recording.columns())
+    _check_time(recording)
+    design = recording.metadata.design
+    _check_range(recording, ("phi1", "phi2", "phi3"), design.phi_min_rad, design.phi_max_rad)
+    limit = design.gimbal_limit_rad
+    _check_range(recording, ("theta_z", "theta_y", "theta_x"), -limit, limit)
+    _check_torques(recording)
+    _check_legs(recording)
+
+
+def check_duration(recording: Recording, trim_s: float) -> None:
+    """Check that samples are left once ``trim_s`` seconds are dropped at each end.
+
+    Raises:
+        InputError: nothing would be left, or trim_s is not a non-negative number.
+    """
+    try:
+        trim_slice(len(recording.time), recording.metadata.rate_hz, trim_s)
+    except InputError as error:
+        raise InputError(f"{recording.name}: {error}") from error
+
+
+def check_finite(name: str, columns: Mapping[str, Array]) -> None:
+    """Check that columns hold finite numbers only.
+
+    Raises:
+        InputError: names the recording, the column and the row (counted from 0).
+    """
+    for column, values in columns.items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if len(bad):
+            raise InputError(
+                f"{name}: column {column!r} is {values[bad[0]]} in {len(bad)} of {len(values)} rows, "
+                f"first in row {bad[0]}; every value must be a finite number"
+            )
+
+
+def _check_time(recording: Recording) -> None:
+    time, rate_hz, name = recording.time, recording.metadata.rate_hz, recording.name
+    spacing = np.diff(time)
+    backward = np.flatnonzero(spacing <= 0)
+    if len(backward):
+        row = int(backward[0]) + 1
+        what = "repeats" if spacing[row - 1] == 0 else "goes back"
+        raise InputError(
+            f"{name}: time {what} in row {row} (from {time[row - 1]:.9g} s to {time[row]:.9g} s); "
+            "it must increase"
+        )
+    # The median is blind to gaps, the mean to jitter; a gap must not be reported as a wrong rate.
+    if abs(np.median(spacing) * rate_hz - 1.0) > SPACING_TOLERANCE / 2:
+        raise InputError(
+            f"{name}: samples are {np.median(spacing):.6g} s apart, but rate_hz is {rate_hz:g}, "
+            f"which makes {1 / rate_hz:.6g} s"
+        )
+    uneven = np.flatnonzero(np.abs(spacing * rate_hz - 1.0) > SPACING_TOLERANCE)
+    if len(uneven):
+        row = int(uneven[0]) + 1
+        low, high = (1 - SPACING_TOLERANCE) / rate_hz, (1 + SPACING_TOLERANCE) / rate_hz
+        what = "a gap" if spacing[row - 1] > high else "a crowding"
+        raise InputError(
+            f"{name}: {what} in time of {spacing[row - 1]:.6g} s before row {row} "
+            f"(from {time[row - 1]:.9g} s to {time[row]:.9g} s); "
+            f"samples must be {low:.4g} to {high:.4g} s apart at {rate_hz:g} Hz"
+        )
+    intervals, duration = len(spacing), time[-1] - time[0]
+    # Counted in samples; the first and the last stamp may jitter too.
+    drift = duration * rate_hz - intervals
+    if abs(drift) > RATE_TOLERANCE * intervals + 2 * SPACING_TOLERANCE:
+        raise InputError(
+            f"{name}: samples come at {intervals / duration:.6g} Hz on average, but rate_hz is {rate_hz:g}; "
+            f"they must agree within {100 * RATE_TOLERANCE:g} %"
+        )
+
+
+def _check_range(recording: Recording, suffixes: tuple[str, ...], low: float, high: float) -> None:
+    """Joint limits of one kind of joint; the bound itself is allowed."""
+    columns = {name: x for name, x in recording.columns().items() if name.rpartition(".")[2] in suffixes}
+    least, largest = min(x.min() for x in columns.values()), max(x.max() for x in columns.values())
+    # Far outside as radians, all inside as degrees; a single jump or a slight excess is neither.
+    in_degrees = (
+        max(-least, largest) > 2.0 * max(-low, high)
+        and np.deg2rad(least) >= low
+        and np.deg2rad(largest) <= high
+    )
+    for name, values in columns.items():
+        bad = np.flatnonzero((values < low) | (values > high))
+        if len(bad):
+            worst = values[bad[np.argmax(np.abs(values[bad]))]]
+            raise InputError(
+                f"{recording.name}: {_called(recording, name)} reaches {worst:.6g} rad (outside in {len(bad)} of "
+                f"{len(values)} rows, first in row {bad[0]}); its range is {low:.6g} to {high:.6g} rad"
+                + (" - the values look like degrees" if in_degrees else "")
+            )
+
+
+def _called(recording: Recording, name: str) -> str:
+    """A column in words that fit the file: at wrist level it holds neither driven angles nor torques."""
+    robot, _, channel = name.partition(".")
+    if recording.metadata.level == "joint" or channel.startswith("theta"):
+        return f"column {name!r}"
+    of = "h_x, h_y, h_z" if channel.startswith("phi") else "force_x, force_y, force_z and the wrist position"
+    return f"{channel} of {robot}, which follows from its {of},"
+
+
+def _check_torques(recording: Recording) -> None:
+    limit = recording.metadata.design.torque_limit_Nm
+    for name, values in recording.columns().items():
+        bad = np.flatnonzero(np.abs(values) > TORQUE_FACTOR * limit) if ".tau" in name else []
+        if len(bad):
+            worst = values[bad[np.argmax(np.abs(values[bad]))]]
+            raise InputError(
+                f"{recording.name}: {_called(recording, name)} reaches {worst:.6g} N m (in {len(bad)} of {len(values)} "
+                f"rows, first in row {bad[0]}), more than {TORQUE_FACTOR:g} times the design's "
+                f"torque_limit_Nm of {limit:g}"
+            )
+
+
+def _check_legs(recording: Recording) -> None:
+    phi, design = recording.phi, recording.metadata.design
+
+    def fail(row: int, robot: int, what: str) -> None:
+        angles = ", ".join(f"{value:.6g}" for value in phi[row, robot])
+        raise InputError(
+            f"{recording.name}: omnid{robot + 1} has phi = ({angles}) rad in row {row}, where {what}; "
+            "are zeros, signs and order of the joints right?"
+        )
+
+    # One robot at a time: the geometry takes ten times the memory of its angles.
+    apart = [np.flatnonzero(~is_reachable(phi[:, robot], design)) for robot in range(phi.shape[1])]
+    if (first := _first(apart)) is not None:
+        fail(*first, "the three rods cannot meet")
+    folded = [leg_geometry(phi[:, robot], design).leverage <= 0 for robot in range(phi.shape[1])]
+    if (first := _first([np.flatnonzero(legs.any(axis=1)) for legs in folded])) is not None:
+        leg = int(np.argmax(folded[first[1]][first[0]]))
+        fail(*first, f"leg {leg + 1} is past its stretched position")
+
+
+def _first(rows: list[NDArray[np.intp]]) -> tuple[int, int] | None:
+    """The first row that any robot has, and that robot, from the rows of each."""
+    found = [(int(of_robot[0]), robot) for robot, of_robot in enumerate(rows) if len(of_robot)]
+    return min(found) if found else None

@@ -1,0 +1,157 @@
+"""The JSON metadata of a recording: strict both ways, every error names the key and what is allowed."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from estimator.arm.design import OmnidDesign
+from estimator.errors import InputError
+
+FORMAT = "mocobot-recording"
+VERSIONS = (1, 2)
+"""Version 2 has the key ``level``; files of version 1 are joint level, and joint level is still written as such."""
+TRIALS = ("random", "periodic", "static")
+Level = Literal["joint", "wrist"]
+LEVELS: tuple[Level, ...] = ("joint", "wrist")
+_REQUIRED = ("format", "version", "robots", "rate_hz", "trial", "source", "payload", "seed", "design")
+_OPTIONAL = ("control",)
+
+
+@dataclass(frozen=True)
+class RecordingMetadata:
+    """What a recording says about itself.
+
+    Attributes:
+        robots: number of robots N, at least 1.
+        rate_hz: sampling rate [Hz].
+        trial: "random", "periodic" or "static".
+        source: what produced the samples, free text.
+        payload: name of the payload, or None where unknown.
+        seed: seed of a simulated trial, or None.
+        design: numbers of the robots (all alike).
+        control: gains, feed-forward and inner loop as plain JSON values, or None.
+        level: how the file tells the samples: "joint" (phi, theta, tau) or "wrist" (h, theta, force).
+    """
+
+    robots: int
+    rate_hz: float
+    trial: str
+    source: str
+    payload: str | None
+    seed: int | None
+    design: OmnidDesign
+    control: dict[str, Any] | None = None
+    level: Level = "joint"
+
+    def to_json(self) -> str:
+        """The metadata as JSON text.
+
+        Raises:
+            InputError: a value is not allowed, or ``control`` is not plain finite JSON.
+        """
+        values: dict[str, Any] = {
+            "format": FORMAT,
+            "version": 1 if self.level == "joint" else 2,
+            "robots": self.robots,
+            "rate_hz": self.rate_hz,
+            "trial": self.trial,
+            "source": self.source,
+            "payload": self.payload,
+            "seed": self.seed,
+            "design": self.design.to_dict(),
+        }
+        if self.level != "joint":
+            values["level"] = self.level
+        if self.control is not None:
+            values["control"] = self.control
+        try:
+            text = json.dumps(values, allow_nan=False)
+        except (TypeError, ValueError, RecursionError) as error:
+            raise InputError(f"recording metadata cannot be written as JSON: {error}") from error
+        # One set of rules: what cannot be read back must not be written.
+        self.from_json(text, "recording metadata")
+        return text
+
+    @classmethod
+    def from_json(cls, text: str | bytes, where: str = "metadata") -> RecordingMetadata:
+        """Parse and check JSON metadata.
+
+        Args:
+            text: UTF-8 JSON.
+            where: what to call it in messages.
+
+        Raises:
+            InputError: not JSON, a key unknown, missing or repeated, or a value of the wrong type or range.
+        """
+        try:
+            values = json.loads(text, object_pairs_hook=_unique_keys, parse_constant=_no_constant)
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"{where}: not valid JSON ({error})") from error
+        if not isinstance(values, dict):
+            raise InputError(f"{where}: must be a JSON object, not {values!r:.60}")
+        _check_format(values, where)
+        required = _REQUIRED + (("level",) if values.get("version") == 2 else ())
+        for key in sorted(set(values) - {*required, *_OPTIONAL}):
+            raise InputError(f"{where}: unknown key {key!r}; the keys are {', '.join(required + _OPTIONAL)}")
+        for key in required:
+            if key not in values:
+                raise InputError(f"{where}: missing key {key!r}; required are {', '.join(required)}")
+        _check_values(values, where)
+        return cls(
+            robots=values["robots"],
+            rate_hz=float(values["rate_hz"]),
+            trial=values["trial"],
+            source=values["source"],
+            payload=values["payload"],
+            seed=values["seed"],
+            design=OmnidDesign.from_dict(values["design"], where=f"{where}: design"),
+            control=values.get("control"),
+            level=values.get("level", "joint"),
+        )
+
+
+def _check_format(values: dict[str, Any], where: str) -> None:
+    """Before anything else: another version may well have other keys."""
+    if values.get("format", FORMAT) != FORMAT:
+        raise InputError(f"{where}: format is {values['format']!r}; it must be {FORMAT!r}")
+    version = values.get("version", VERSIONS[0])
+    if type(version) is not int or version not in VERSIONS:
+        known = " and ".join(str(known) for known in VERSIONS)
+        raise InputError(f"{where}: version is {version!r:.60}; this program reads versions {known}")
+
+
+def _check_values(values: dict[str, Any], where: str) -> None:
+    def require(key: str, allowed: str, *, good: bool) -> None:
+        if not good:
+            raise InputError(f"{where}: {key} is {values[key]!r:.60}; it must be {allowed}")
+
+    robots, rate, payload, seed = (values[key] for key in ("robots", "rate_hz", "payload", "seed"))
+    require("robots", "a whole number, at least 1", good=type(robots) is int and robots >= 1)
+    # A bound instead of isfinite, which overflows on whole numbers beyond the range of a float.
+    is_rate = type(rate) in (int, float) and 0 < rate < 1e9
+    require("rate_hz", "a number of hertz, greater than 0 and less than 1e9", good=is_rate)
+    require("trial", f"one of {', '.join(TRIALS)}", good=values["trial"] in TRIALS)
+    require("source", "text", good=isinstance(values["source"], str))
+    # It is printed; control characters and half surrogates are not for terminals.
+    is_label = payload is None or (isinstance(payload, str) and payload.isprintable())
+    require("payload", "text or null, all of it printable", good=is_label)
+    require("seed", "a whole number or null", good=seed is None or type(seed) is int)
+    require("design", "an object", good=isinstance(values["design"], dict))
+    if "level" in values:
+        require("level", f"one of {', '.join(LEVELS)}", good=values["level"] in LEVELS)
+    if "control" in values:
+        require("control", "an object (leave it out if unknown)", good=isinstance(values["control"], dict))
+
+
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    values = dict(pairs)
+    if len(values) != len(pairs):
+        repeated = next(key for i, (key, _) in enumerate(pairs) if key in dict(pairs[:i]))
+        raise ValueError(f"key {repeated!r} appears twice")
+    return values
+
+
+def _no_constant(name: str) -> None:
+    raise ValueError(f"{name} is not a JSON number")

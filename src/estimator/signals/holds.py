@@ -1,0 +1,154 @@
+"""Static holds: stretches in which the payload does not move and the measured forces stay constant.
+
+The paper takes data "when the measured forces along all axes remained constant (with a tolerance of 0.01 N)
+for a continuous duration of six seconds". With torque noise of 0.01 N m the forces scatter by 0.016 N rms
+even after filtering, and the bare criterion never fires. Here a window of six seconds is part of a hold when
+
+* every force component stays within +-(0.01 N + 5 sigma) of its mid-range, where sigma is that component's
+  noise in the window, from its second differences over 0.1 s (blind to drift and to slow motion), as the
+  median over half seconds (blind to a jump);
+* its running mean over 1 s stays within +-(0.01 N + 4 sigma_1s), sigma_1s = sigma sqrt(0.1 / 1) for noise
+  below 5 Hz: a drift hidden by the noise in single samples shows here;
+* the encoders show a payload at rest: wrist speed and angular velocity below 5 mm/s and 0.02 rad/s rms.
+  This rejects fast vibration, which a difference over 0.1 s would take for noise.
+
+Without noise sigma is 0 and the first rule is the paper's criterion. With noise a hold may reach a little
+into the motion before and after it, so means are taken without half a second at either end.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
+
+from estimator import so3
+from estimator.signals.grasp_data import GraspData
+
+Array = NDArray[np.float64]
+
+TOLERANCE_N = 0.01
+DURATION_S = 6.0
+STILL_SPEED_MPS = 5e-3
+STILL_RATE_RADPS = 2e-2
+_SIGMAS = 5.0
+_SLOW_SIGMAS = 4.0  # fewer independent values in a window, and drift should not hide
+_LAG_S = 0.1  # noise below 5 Hz has forgotten itself after this time
+_SMOOTH_S = 1.0
+_BATCH_S = 0.5
+_MARGIN_S = 0.5
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Mean pose and wrench of one static hold.
+
+    Attributes:
+        start_s, end_s: first and last sample time of the hold [s].
+        R_bi: mean orientation of {i} in {b}, shape (N, 3, 3).
+        wrench: mean wrench (m_i, f_i) in {i} [N m, N], shape (N, 6).
+        batches: means of the wrench over consecutive half seconds, shape (batches, N, 6); their scatter is
+            the measurement noise within the hold.
+    """
+
+    start_s: float
+    end_s: float
+    R_bi: Array
+    wrench: Array
+    batches: Array
+
+    @property
+    def robots(self) -> int:
+        """Number of robots N."""
+        return len(self.wrench)
+
+
+def find_holds(
+    data: GraspData, tolerance_N: float = TOLERANCE_N, duration_s: float = DURATION_S
+) -> list[Hold]:
+    """All static holds of a trial, in order of time; empty when there are none.
+
+    Args:
+        data: one trial.
+        tolerance_N: how far a noise-free force component may be from its mid-range in any window [N].
+        duration_s: length of the window, and the least length of a hold [s].
+    """
+    window = round(duration_s * data.rate_hz) + 1
+    Q = data.samples
+    if window > Q or window < 3:
+        return []
+    steady = np.ones(Q - window + 1, dtype=bool)
+    for robot in range(data.robots):  # one at a time, for the sake of memory
+        steady &= _rests(data, robot, window, tolerance_N)
+    starts = np.flatnonzero(steady)
+    if not len(starts):
+        return []
+    runs = np.split(starts, np.flatnonzero(np.diff(starts) > 1) + 1)
+    holds: list[tuple[int, int]] = []
+    for run in runs:
+        first, last = int(run[0]), int(run[-1]) + window
+        if holds and first < holds[-1][1]:  # windows of one hold with a rejected one in between
+            first = holds.pop()[0]
+        holds.append((first, last))
+    return [_hold(data, first, last) for first, last in holds]
+
+
+def _rests(data: GraspData, robot: int, window: int, tolerance_N: float) -> NDArray[np.bool_]:
+    """Whether one robot's forces are constant and its grasp is still, in every window; shape (Q - window + 1,)."""
+    force = np.einsum("qab,qb->qa", data.R_bi[:, robot], data.wrench[:, robot, 3:])
+    variance = _noise_variance(force, data.rate_hz, window)  # (windows, 3)
+    smooth = uniform_filter1d(force, _odd(_SMOOTH_S * data.rate_hz), axis=0, mode="nearest")
+    slow = variance * min(1.0, _LAG_S / _SMOOTH_S)
+
+    steady = _half_range(force, window) <= tolerance_N + _SIGMAS * np.sqrt(variance)
+    # The running mean looks half its length beyond the window, where the payload may already move.
+    edge = min(_odd(_SMOOTH_S * data.rate_hz) // 2, (window - 1) // 2)
+    inner = _half_range(smooth, window - 2 * edge)[edge : edge + len(steady)]
+    steady &= inner <= tolerance_N + _SLOW_SIGMAS * np.sqrt(slow)
+    rests = steady.all(axis=1)
+    for part, limit in ((slice(3, 6), STILL_SPEED_MPS), (slice(0, 3), STILL_RATE_RADPS)):
+        square = np.sum(data.twist[:, robot, part] ** 2, axis=1, keepdims=True)
+        rests &= np.sqrt(_window_mean(square, window))[:, 0] <= limit
+    return rests
+
+
+def _hold(data: GraspData, first: int, last: int) -> Hold:
+    margin = min(round(_MARGIN_S * data.rate_hz), (last - first) // 4)
+    inside = slice(first + margin, last - margin)
+    wrench = data.wrench[inside]
+    count = max(2, int(len(wrench) / (_BATCH_S * data.rate_hz)))
+    batches = np.array([part.mean(axis=0) for part in np.array_split(wrench, count)])
+    R_bi = so3.chordal_mean(data.R_bi[inside])
+    return Hold(float(data.time[first]), float(data.time[last - 1]), R_bi, wrench.mean(axis=0), batches)
+
+
+def _noise_variance(force: Array, rate_hz: float, window: int) -> Array:
+    """Variance of uncorrelated-over-the-lag noise in every window, shape (Q - window + 1, components)."""
+    lag = max(1, min(round(_LAG_S * rate_hz), (window - 1) // 2))
+    second = force[2 * lag :] - 2 * force[lag:-lag] + force[: -2 * lag]
+    length = window - 2 * lag
+    piece = min(length, max(1, round(_BATCH_S * rate_hz)))
+    means = _window_mean(second**2, piece) / 6  # var(a - 2b + c) = 6 var
+    starts = np.arange(0, length - piece + 1, piece)
+    count = len(second) - length + 1
+    # The median over half seconds: a jump, or the first instants of a motion, are not noise.
+    return np.median([means[start : start + count] for start in starts], axis=0)
+
+
+def _window_mean(x: Array, window: int) -> Array:
+    total = np.concatenate([np.zeros((1, x.shape[1])), np.cumsum(x, axis=0)])
+    return np.maximum(total[window:] - total[:-window], 0.0) / window
+
+
+def _half_range(x: Array, window: int) -> Array:
+    """Half of max - min over every window, shape (Q - window + 1, components)."""
+    ahead = -(window // 2)  # entry k is the window that starts at k
+    high = maximum_filter1d(x, window, axis=0, origin=ahead)
+    low = minimum_filter1d(x, window, axis=0, origin=ahead)
+    return 0.5 * (high - low)[: len(x) - window + 1]
+
+
+def _odd(x: float) -> int:
+    return 2 * max(0, int(x / 2)) + 1

@@ -1,0 +1,99 @@
+"""From a recording's joint angles and spring torques to the data points D_iq (paper, section IV.B)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.arm.delta import leg_geometry, wrist_motion
+from estimator.arm.design import OmnidDesign
+from estimator.arm.dynamics import wrench_on_payload
+from estimator.arm.gimbal import angular_motion, rotation
+from estimator.errors import InputError
+from estimator.filtering import differentiate, low_pass, trim_slice
+from estimator.recording.checks import check_duration, check_recording
+from estimator.recording.model import Recording
+from estimator.signals.grasp_data import GraspData
+
+Array = NDArray[np.float64]
+
+BLOCK = 16_384
+"""Samples of one robot that are converted at a time; the result does not depend on it."""
+
+
+def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: float = 2.0) -> GraspData:
+    """Filter, differentiate and convert a recording to poses, twists, twist derivatives and wrenches.
+
+    Joint angles and torques pass through the same zero-phase filter. Rates and accelerations come from
+    sixth-order differences of the *joint* angles; the twist (29), its derivative and the wrench then
+    follow analytically.
+
+    Args:
+        recording: one trial.
+        cutoff_hz: cut-off of the Butterworth filter [Hz], at least 1/trim_s: transients die as
+            exp(-pi cutoff t), and what a lower cut-off leaves of them after trim_s is no motion.
+        trim_s: time dropped at each end against filter transients [s].
+
+    Raises:
+        InputError: the recording is not usable (see ``check_recording``), or an option is out of range.
+    """
+    check_recording(recording)
+    check_duration(recording, trim_s)
+    if cutoff_hz > 0.0 and 0.0 < cutoff_hz * trim_s < 1.0:
+        raise InputError(
+            f"cutoff_hz is {cutoff_hz!r}; with {trim_s:g} s dropped at each end it must be at least "
+            f"{1.0 / trim_s:g} Hz, or the filter's transients remain"
+        )
+    rate_hz, design = recording.metadata.rate_hz, recording.metadata.design
+    keep = trim_slice(len(recording.time), rate_hz, trim_s)
+    time = recording.time[keep]
+    shape = len(time), recording.metadata.robots
+    data = GraspData(
+        time=time,
+        R_bi=np.empty((*shape, 3, 3)),
+        p_bi=np.empty((*shape, 3)),
+        twist=np.empty((*shape, 6)),
+        twist_dot=np.empty((*shape, 6)),
+        wrench=np.empty((*shape, 6)),
+        rate_hz=rate_hz,
+        gravity_mps2=design.gravity_mps2,
+    )
+    for robot in range(shape[1]):
+        sensors = (samples[:, robot] for samples in (recording.phi, recording.theta, recording.tau))
+        phi, theta, tau = (low_pass(samples, rate_hz, cutoff_hz) for samples in sensors)
+        driven, gimbal = (_derivatives(angles, rate_hz, keep) for angles in (phi, theta))
+        tau = tau[keep]
+        # In blocks: what lies between takes ten times the memory of the result.
+        for first in range(0, len(time), BLOCK):
+            block = slice(first, first + BLOCK)
+            _fill(data, robot, block, driven[:, block], gimbal[:, block], tau[block], design)
+    return data
+
+
+def _derivatives(angles: Array, rate_hz: float, keep: slice) -> Array:
+    """Angles [rad], rates and accelerations of the samples to be kept, shape (3, q, 3)."""
+    rate = differentiate(angles, rate_hz)
+    return np.stack([angles[keep], rate[keep], differentiate(rate, rate_hz)[keep]])
+
+
+def _fill(
+    data: GraspData,
+    robot: int,
+    block: slice,
+    phi: Array,
+    theta: Array,
+    tau: Array,
+    design: OmnidDesign,
+) -> None:
+    """Data points of one robot from its angles with their derivatives, (3, q, 3), and its torques, (q, 3)."""
+    legs = leg_geometry(phi[0], design)
+    h_dot, h_ddot = wrist_motion(legs, phi[1], phi[2])
+    R_bi = rotation(theta[0])
+    omega, omega_dot = angular_motion(theta[0], theta[1], theta[2])
+    v = np.einsum("...ji,...j->...i", R_bi, h_dot)
+    v_dot = np.einsum("...ji,...j->...i", R_bi, h_ddot) - np.cross(omega, v)
+    data.R_bi[block, robot], data.p_bi[block, robot] = R_bi, legs.h
+    data.twist[block, robot] = np.concatenate([omega, v], axis=-1)
+    data.twist_dot[block, robot] = np.concatenate([omega_dot, v_dot], axis=-1)
+    wrench = wrench_on_payload((phi[0], phi[1], phi[2]), (theta[0], theta[1], theta[2]), tau, design)
+    data.wrench[block, robot] = wrench

@@ -1,0 +1,42 @@
+"""``mocobot estimate``: read recordings, estimate what they hold, write and print it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from estimator.errors import InputError
+from estimator.estimate.payload import estimate_payload
+from estimator.estimate.text import format_estimate
+from estimator.recording.model import Recording, read_recording
+from mocobot.files.given import check_recordings
+from mocobot.files.provenance import provenance
+from mocobot.files.writing import write_json
+from mocobot.progress import stages
+
+if TYPE_CHECKING:
+    from mocobot.cli import Estimate
+
+
+def run(options: Estimate) -> None:
+    """Run the command.
+
+    Raises:
+        InputError: recordings that cannot be used, or an output that cannot be written.
+    """
+    if not options.rec:
+        raise InputError("no recording given; name at least one file")
+    check_recordings(options.rec, options.out)
+    with stages() as (say, _):
+
+        def each() -> Iterator[Recording]:
+            for path in options.rec:
+                say(f"reading {path.name}")
+                yield read_recording(path)
+
+        estimate = estimate_payload(each(), options.method, options.cutoff_hz, say=say)
+    if options.out:
+        made = provenance("estimate", asdict(options), options.rec)
+        write_json(options.out, estimate.to_dict() | {"provenance": made})
+    print(format_estimate(estimate))

@@ -1,0 +1,40 @@
+"""``mocobot inspect``: a look at a log before anyone trusts a number from it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from estimator.arm.design import load_design
+from estimator.errors import InputError
+from mocobot.files.writing import check_target, write_json
+from mocobot.progress import bar
+from mocobot_inspect.inspection import inspect_log
+from mocobot_inspect.json import inspection_dict
+from mocobot_inspect.text import format_inspection
+from mocobot_logs.map.files import read_map
+from mocobot_logs.open_log import open_log
+from mocobot_sim.scene.models import omnid_design
+
+if TYPE_CHECKING:
+    from mocobot.cli import Inspect
+
+
+def run(options: Inspect) -> None:
+    """Run the command; whatever is found, it ends well.
+
+    Raises:
+        InputError: the log, map or design cannot be read, or the JSON cannot be written.
+    """
+    if options.json is not None:
+        check_target(options.json)
+        if options.json.exists() and options.json.samefile(options.rec):
+            raise InputError(f"{options.json}: is the log; write the report to another file")
+    log_map = read_map(options.map) if options.map is not None else None
+    design = load_design(options.design) if options.design is not None else omnid_design()
+    source = open_log(Path(options.rec), log_map, options.episode)
+    with bar(source.size, "reading", "") as advance, bar(None, "checking", "mistake") as try_advance:
+        found = inspect_log(source, design, advance, try_advance)
+    if options.json is not None:
+        write_json(options.json, inspection_dict(found))
+    print(format_inspection(found))

@@ -1,0 +1,93 @@
+"""``mocobot paper``: run the experiment, print the tables, write the results."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import asdict
+from typing import TYPE_CHECKING
+
+from estimator.errors import InputError
+from estimator.recording.model import write_recording
+from mocobot.files.provenance import NAME, folder_provenance, provenance
+from mocobot.files.writing import make_folder, write_json, write_text
+from mocobot.progress import bar
+from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
+from mocobot_sim.paper.plots import save_plots
+from mocobot_sim.paper.tables import format_summary, format_tables
+from mocobot_sim.scene.scene import build_team
+from mocobot_sim.trial.sensors import sensor_preset
+from mocobot_sim.trial.simulate import draw_units
+from mocobot_sim.trial.truth import GroundTruth, truth_path, write_truth
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from mocobot.cli import Paper
+
+
+def run(options: Paper) -> None:
+    """Run the command.
+
+    Raises:
+        InputError: an option that cannot be met.
+        TrialError: the physics of a trial cannot be trusted.
+    """
+    plan = PaperPlan(options.payload, options.preset, options.trials, options.seed)
+    if options.recordings and not options.out:
+        raise InputError("--recordings needs --out")
+    if options.jobs < 1:
+        raise InputError(f"jobs is {options.jobs}; it must be at least 1")
+    if options.out:
+        make_folder(options.out)
+    start, made_with = time.perf_counter(), provenance("paper", asdict(options))
+    with bar(plan.steps, "paper", "step") as advance:
+        result = run_paper(plan, options.jobs, advance)
+    tables = f"{format_tables(result.scores)}\n\n{format_summary(result.scores)}"
+    print(tables)
+    print(f"\n{_summary(result)} Wall time {time.perf_counter() - start:.0f} s.")
+    if options.out:
+        written = _write(options.out, plan, result, tables)
+        if options.recordings:
+            written += _write_recordings(make_folder(options.out / "recordings"), plan, result)
+        write_json(options.out / NAME, folder_provenance(made_with, options.out, written))
+        print(f"Written to {options.out}: paper.json, tables.txt, provenance.json, estimates and plots.")
+
+
+def _summary(result: PaperResult) -> str:
+    trials = result.trials
+    return (
+        f"{len(trials)} trials: payload rotation at most {max(t.rotation_deg for t in trials):.1f} deg, "
+        f"SEA torque {max(t.torque_Nm for t in trials):.1f} N m, "
+        f"rod error {1e3 * max(t.rod_error_m for t in trials):.4f} mm, "
+        f"weld error {1e3 * max(t.weld_error_m for t in trials):.4f} mm "
+        f"and {max(t.weld_error_deg for t in trials):.5f} deg."
+    )
+
+
+def _write(folder: Path, plan: PaperPlan, result: PaperResult, tables: str) -> list[Path]:
+    """Write scores, tables, estimates and plots, and say where."""
+    scores, text, trials = (folder / name for name in ("paper.json", "tables.txt", "trials.json"))
+    write_json(scores, result.scores)
+    write_text(text, tables + "\n")
+    write_json(trials, {"trials": [asdict(trial) for trial in result.trials]})
+    written = [scores, text, trials]
+    estimates = make_folder(folder / "estimates")
+    for preset in plan.presets:
+        for payload in plan.payloads:
+            written.append(estimates / f"{payload}_{preset}.json")
+            write_json(written[-1], result.estimates[preset][payload].to_dict())
+    return written + save_plots(result.scores, folder)
+
+
+def _write_recordings(folder: Path, plan: PaperPlan, result: PaperResult) -> list[Path]:
+    """Write recordings with the truth beside each, and say where."""
+    written = []
+    for payload in plan.payloads:
+        for preset in plan.presets:
+            truth = GroundTruth.of(build_team(payload, draw_units(payload, sensor_preset(preset), plan.seed)))
+            for recording in result.recordings[preset][payload]:
+                path = folder / f"{recording.name}.parquet"
+                write_recording(recording, path)
+                write_truth(truth, path)
+                written += [path, truth_path(path)]
+    return written

@@ -1,0 +1,209 @@
+"""The preflight: everything that can be said about a log before anyone trusts a number from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.arm.design import OmnidDesign
+from estimator.clocks.offsets import ClockEstimate, estimate_clocks
+from mocobot_inspect.excerpt import SHORTEST_S, clean_stream, stretches
+from mocobot_inspect.readiness import Readiness, readiness
+from mocobot_inspect.segments import Segments, segments
+from mocobot_inspect.signals import RATE_HZ, Group, Signals, signals_of
+from mocobot_inspect.stream.channels import Channel
+from mocobot_inspect.stream.survey import Survey, survey
+from mocobot_inspect.stream.timing import Timing
+from mocobot_inspect.wiring.mistakes import Mistake
+from mocobot_inspect.wiring.wiring import Wiring, check_wiring
+from mocobot_logs.log import NS, Level, LogSource
+
+Array = NDArray[np.float64]
+
+SLOWEST_HZ, FASTEST_HZ = 10.0, 20_000.0
+"""Rates within which samples are taken for those of a robot."""
+OFFSET_S = 2e-4
+"""Clocks that differ by more than this, and by more than five standard errors, do differ."""
+SIGMAS = 5.0
+MOSTLY = 0.5
+"""A channel that stands for more than this share of its log is wrong as a whole."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection:
+    """What was found in a log.
+
+    Attributes:
+        name, level, robots, channel_names: the log.
+        assumed_design: whether the robots' numbers are not the log's own.
+        design: the robots' numbers.
+        survey: stamps and channels of every robot.
+        checked: stretches looked at, first instant and duration after the log's first stamp [s].
+        unchecked: why motion and forces could not be looked at, or None.
+        clocks: clocks of the robots, or None.
+        skewed: whether they differ; everything below then holds with that taken out.
+        segments: rest and motion, or None.
+        wiring: suspected mistakes, or None.
+        ready: what the log is good for as it is, or None.
+        ready_undone: the same with all mistakes found undone, or None where there is none.
+    """
+
+    name: str
+    level: Level
+    robots: int
+    channel_names: tuple[str, ...]
+    assumed_design: bool
+    design: OmnidDesign
+    survey: Survey
+    checked: tuple[tuple[float, float], ...]
+    unchecked: str | None
+    clocks: ClockEstimate | None = None
+    skewed: bool = False
+    segments: Segments | None = None
+    wiring: Wiring | None = None
+    ready: Readiness | None = None
+    ready_undone: Readiness | None = None
+
+
+def inspect_log(
+    source: LogSource,
+    design: OmnidDesign,
+    advance: Callable[[int], object] = lambda _: None,
+    try_advance: Callable[[int], object] = lambda _: None,
+) -> Inspection:
+    """Look at a log; whatever is wrong with its samples is reported and not refused.
+
+    Args:
+        source: the log.
+        design: the robots' numbers, where the log does not say.
+        advance: takes the progress made in reading, in the source's units.
+        try_advance: takes the number of wiring mistakes tried.
+
+    Raises:
+        InputError: the log cannot be read.
+    """
+    known = source.metadata.design if source.metadata is not None else None
+    seen = survey(source, advance)
+    result = Inspection(
+        name=source.name,
+        level=source.level,
+        robots=source.robots,
+        channel_names=source.channels,
+        assumed_design=known is None,
+        design=known or design,
+        survey=seen,
+        checked=(),
+        unchecked=None,
+    )
+    rates = [timing.rate_hz for timing in seen.timing]
+    for robot, rate in enumerate(rates):
+        if rate is None:
+            return replace(result, unchecked=f"robot {robot + 1} has too few samples")
+        if not SLOWEST_HZ <= rate <= FASTEST_HZ:
+            return replace(result, unchecked=f"robot {robot + 1} is sampled at {rate:.3g} Hz")
+    streams = [
+        clean_stream(samples, seen.origin_ns, _faulty(channels, timing))
+        for samples, channels, timing in zip(seen.excerpt, seen.channels, seen.timing, strict=True)
+    ]
+    return _motion(result, streams, try_advance)
+
+
+def _faulty(channels: tuple[Channel, ...], timing: Timing) -> list[tuple[int, int]]:
+    """Stamps between which a channel is stuck or clipped [ns]; not those of one that nearly always is."""
+    assert timing.first_ns is not None
+    found = []
+    for c in channels:
+        for every in (c.stuck, c.clipped):
+            if sum(s.duration_s for s in every) < MOSTLY * timing.duration_s:
+                starts = [timing.first_ns + round(s.start_s / NS) for s in every]
+                found += [(a, a + round(s.duration_s / NS)) for a, s in zip(starts, every, strict=True)]
+    return found
+
+
+def _motion(
+    result: Inspection, streams: list[tuple[Array, Array]], advance: Callable[[int], object]
+) -> Inspection:
+    parts = stretches(streams)
+    clocks = _clocks(parts)
+    skewed = clocks is not None and any(differs(clocks, robot) for robot in range(1, result.robots))
+    if skewed and clocks is not None:
+        parts = stretches(streams, _moved(clocks, parts)) or parts
+    if not parts:
+        return replace(
+            result,
+            unchecked=f"the robots share no {SHORTEST_S:g} s of samples that can be used, without a gap",
+        )
+    noise = np.array([[c.white_noise for c in of_robot[:9]] for of_robot in result.survey.channels])
+    samples = [part for _, part in parts]
+    wiring = check_wiring(signals_of(result.level, samples, noise), result.design, advance)
+    undone = None
+    if wiring.found:
+        right = [(start, _undone(part, wiring, result.level)) for start, part in parts]
+        undone = readiness(result.name, result.level, right, result.design)
+        if clocks is not None and not clocks.determined:
+            clocks = _known(clocks, _clocks(right))
+    return replace(
+        result,
+        checked=tuple((start, len(part) / RATE_HZ) for start, part in parts),
+        clocks=clocks,
+        skewed=skewed,
+        segments=segments(result.level, parts, result.design),
+        wiring=wiring,
+        ready=readiness(result.name, result.level, parts, result.design),
+        ready_undone=undone,
+    )
+
+
+def _clocks(parts: list[tuple[float, Array]]) -> ClockEstimate | None:
+    """From the longest stretch, by its own count of time."""
+    if not parts or parts[0][1].shape[1] < 2:
+        return None
+    start, part = max(parts, key=lambda entry: len(entry[1]))
+    theta = [np.ascontiguousarray(part[:, robot, 3:6]) for robot in range(part.shape[1])]
+    return estimate_clocks(theta, np.full(len(theta), start), RATE_HZ)
+
+
+def _known(clocks: ClockEstimate, again: ClockEstimate | None) -> ClockEstimate:
+    """What is known of each clock as it is, and of the others with all mistakes undone."""
+    if again is None:
+        return clocks
+    new = np.array([why is not None for why in clocks.why_not])
+    return replace(
+        clocks,
+        offset_s=np.where(new, again.offset_s, clocks.offset_s),
+        drift=np.where(new, again.drift, clocks.drift),
+        covariance=np.where(new[:, None, None], again.covariance, clocks.covariance),
+        mismatch=np.where(new, again.mismatch, clocks.mismatch),
+        repeats_s=np.where(new, again.repeats_s, clocks.repeats_s),
+        why_not=tuple(b if a else None for a, b in zip(clocks.why_not, again.why_not, strict=True)),
+    )
+
+
+def differs(clocks: ClockEstimate, robot: int) -> bool:
+    """Whether the clock of a robot (from 0) is known to differ from that of robot 1."""
+    offset, error = clocks.offset_s[robot], clocks.offset_se_s[robot]
+    return bool(np.isfinite(offset) and abs(offset) > max(OFFSET_S, SIGMAS * error))
+
+
+def _moved(clocks: ClockEstimate, parts: list[tuple[float, Array]]) -> ClockEstimate:
+    """Clocks with what is not known left alone."""
+    known = np.isfinite(clocks.offset_s)
+    return replace(
+        clocks, offset_s=np.where(known, clocks.offset_s, 0.0), drift=np.where(known, clocks.drift, 0.0)
+    )
+
+
+def _undone(part: Array, wiring: Wiring, level: Level) -> Array:
+    """The samples themselves with all mistakes undone."""
+    nothing = np.zeros(part.shape[1:])
+    signals = Signals(
+        level, *(Group(part[None, ..., 3 * k : 3 * k + 3], nothing[:, 3 * k : 3 * k + 3]) for k in range(3))
+    )
+    mistakes: list[Mistake] = [found.mistake for found in wiring.found]
+    for mistake in mistakes:
+        signals = mistake.undo(signals)
+    groups = signals.position, signals.theta, signals.effort
+    return np.concatenate([group.values[0] for group in groups], axis=2)

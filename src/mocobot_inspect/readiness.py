@@ -1,0 +1,148 @@
+"""What an estimate would make of the log: excitation of every step, and what it is ready for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.arm.design import OmnidDesign
+from estimator.arm.wrist_level import joints_of, wrist_fault
+from estimator.errors import InputError
+from estimator.estimate.consistency import Trial
+from estimator.estimate.identifiability import FACTOR, StepReport
+from estimator.estimate.payload import estimate_from_trials
+from estimator.estimate.result import PayloadEstimate
+from estimator.recording.metadata import RecordingMetadata
+from estimator.recording.model import Recording
+from estimator.signals.grasp_data import GraspData
+from estimator.signals.process import process_recording
+from mocobot_inspect.signals import CUTOFF_HZ, RATE_HZ, TRIM_S
+from mocobot_logs.log import Level
+
+Array = NDArray[np.float64]
+
+QUANTITIES = ("grasps", "mass", "centre of mass", "inertia")
+AXES = ("roll", "pitch", "yaw")
+"""Rotation about x, y and z of {1}."""
+_HARDLY = 0.1  # of the rotation about the liveliest axis
+_ALONG = np.cos(np.deg2rad(20.0))
+
+
+@dataclass(frozen=True)
+class Readiness:
+    """What can be estimated.
+
+    Attributes:
+        steps: excitation of every step of the estimate.
+        holds: static holds found.
+        axes: angular velocity about x, y, z of {1} [rad/s rms], or None.
+        reasons: for every one of ``QUANTITIES`` why it cannot be had, None where it can.
+        flags: what the estimate itself doubts.
+    """
+
+    steps: tuple[StepReport, ...]
+    holds: int
+    axes: tuple[float, float, float] | None
+    reasons: dict[str, str | None]
+    flags: tuple[str, ...]
+
+
+def readiness(
+    name: str, level: Level, parts: Sequence[tuple[float, Array]], design: OmnidDesign
+) -> Readiness:
+    """Run the estimate and report on its steps.
+
+    Args:
+        name: the log's name.
+        level: what the channels are.
+        parts: uniform stretches: first instant [s] and samples (q, N, 9) at 100 Hz.
+        design: the robots' numbers.
+    """
+    try:
+        with np.errstate(over="raise", divide="raise"):
+            data = [
+                _processed(f"{name} from {start:.1f} s", level, part, start, design) for start, part in parts
+            ]
+            trials = [Trial(f"stretch {k + 1}", "random", None, d) for k, d in enumerate(data)]
+            estimate = estimate_from_trials(trials)
+    except InputError as error:
+        return Readiness((), 0, None, dict.fromkeys(QUANTITIES, str(error)), ())
+    except (FloatingPointError, np.linalg.LinAlgError) as error:
+        return Readiness(
+            (), 0, None, dict.fromkeys(QUANTITIES, f"the equations cannot be solved ({error})"), ()
+        )
+    omega = np.concatenate([d.twist[:, 0, :3] for d in data])
+    axes = np.sqrt(np.mean(omega**2, axis=0))
+    return Readiness(
+        steps=estimate.steps,
+        holds=sum(recording.holds for recording in estimate.recordings),
+        axes=(float(axes[0]), float(axes[1]), float(axes[2])),
+        reasons=_reasons(estimate, omega),
+        flags=estimate.flags,
+    )
+
+
+def _processed(name: str, level: Level, part: Array, start_s: float, design: OmnidDesign) -> GraspData:
+    position, theta, effort = np.split(part, 3, axis=2)
+    if level == "wrist":
+        fault = wrist_fault(position, design)
+        if fault is not None:
+            (row, robot), what = fault
+            raise InputError(f"omnid{robot + 1}, {start_s + row / RATE_HZ:.2f} s: {what}")
+        position, effort = joints_of(position, effort, design)
+    metadata = RecordingMetadata(part.shape[1], RATE_HZ, "random", "inspection", None, None, design)
+    time = start_s + np.arange(len(part)) / RATE_HZ
+    return process_recording(
+        Recording(time, position, theta, effort, None, metadata, name), CUTOFF_HZ, TRIM_S
+    )
+
+
+def _reasons(estimate: PayloadEstimate, omega: Array) -> dict[str, str | None]:
+    weak = [direction for step in estimate.steps for direction in step.weak]
+
+    def why(*words: str) -> str:
+        idle = idle_axes(omega, _noise(estimate))
+        if idle:
+            return " and ".join(idle) + " not excited"
+        found = next((d for d in weak if any(word in d.step for word in words)), None) or next(
+            iter(weak), None
+        )
+        return f"{found.direction}: {found.reason}" if found else "nothing moves, and there is no static hold"
+
+    had = {
+        "grasps": estimate.grasps is not None,
+        "mass": estimate.mass is not None,
+        "centre of mass": estimate.p_1c is not None,
+        "inertia": estimate.inertia is not None,
+    }
+    steps = {"grasps": ("rotation", "position"), "mass": ("mass",)}
+    reasons: dict[str, str | None] = {}
+    for name, known in had.items():
+        needs_grasps = name in ("centre of mass", "inertia") and not had["grasps"]
+        words = steps.get(name, (name,))
+        reasons[name] = None if known else "it needs the grasps" if needs_grasps else why(*words)
+    return reasons
+
+
+def _noise(estimate: PayloadEstimate) -> float:
+    return max((step.noise for step in estimate.steps if step.step.startswith("rotation")), default=0.0)
+
+
+def idle_axes(omega: Array, noise: float) -> list[str]:
+    """Axes of {1} about which there is hardly any rotation, in words; none where the idle axis is oblique.
+
+    Args:
+        omega: angular velocities in {1} [rad/s], shape (Q, 3).
+        noise: their noise [rad/s rms].
+    """
+    values, vectors = np.linalg.eigh(omega.T @ omega / len(omega))
+    rates = np.sqrt(np.maximum(values, 0.0))
+    idle = []
+    for rate, axis in zip(rates, vectors.T, strict=True):
+        k = int(np.argmax(np.abs(axis)))
+        if rate <= max(FACTOR * noise, _HARDLY * rates[-1]) and abs(axis[k]) > _ALONG:
+            idle.append(AXES[k])
+    return idle

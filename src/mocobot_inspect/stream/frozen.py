@@ -1,0 +1,127 @@
+"""Stretches in which a channel is stuck, or clipped at an extreme, while the robot's other channels move."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mocobot_inspect.stream.resolution import noise_level, quantisation_step
+
+Array = NDArray[np.float64]
+
+STUCK_S = 0.5
+"""Shortest time for which a channel must stand to be stuck."""
+CLIPPED_SAMPLES = 5
+"""Shortest run at an extreme to be clipped."""
+_MOVES = 0.05  # others move: by this share of their range
+_JUMP = 4.0  # times the usual large step from sample to sample
+_CORNER = 0.3  # of the same
+_NOISY = 0.5  # of the quantisation step; rounding alone looks like 0.3
+_SPEED_S, _AT_SPEED = 0.1, 0.5  # time over which speed is taken; share of the usual high speed
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """One stretch.
+
+    Attributes:
+        kind: ``stuck`` or ``clipped``.
+        channel: which channel, from 0.
+        start, stop: rows, the last one not included.
+        value: where it stands [SI].
+    """
+
+    kind: Literal["stuck", "clipped"]
+    channel: int
+    start: int
+    stop: int
+    value: float
+
+
+def frozen(values: Array, rate_hz: float) -> list[Frozen]:
+    """Stuck and clipped stretches of one robot's channels.
+
+    A channel that stands because nothing moves is not stuck; nor is one that rests while others move. A stuck one jumps
+    when it comes back, stops dead before the log ends, or repeats itself
+    although it has no steps or more noise than steps.
+
+    Args:
+        values: samples of the robot's channels, finite, shape (q, C).
+        rate_hz: their rate [Hz].
+    """
+    found = []
+    ranges = np.ptp(values, axis=0) if len(values) else np.zeros(values.shape[1])
+    for channel in range(values.shape[1]):
+        x = values[:, channel]
+        steps = np.abs(np.diff(x))
+        if not steps.any():
+            if len(x) and _others_move(values, ranges, channel, 0, len(x)):
+                found.append(Frozen("stuck", channel, 0, len(x), float(x[0])))
+            continue
+        usual = float(np.quantile(steps[steps > 0], 0.95))
+        # Without a resolution, or with noise that covers it, a live channel does not repeat itself for long.
+        resolution = quantisation_step(x)
+        restless = np.mean(steps == 0) < 0.5 and (resolution is None or noise_level(x) > _NOISY * resolution)
+        for start, stop in _runs(x):
+            if stop - start < CLIPPED_SAMPLES or not _others_move(values, ranges, channel, start, stop):
+                continue
+            back = steps[stop - 1] if stop < len(x) else 0.0
+            into = steps[start - 1] if start else 0.0
+            if stop - start >= max(STUCK_S * rate_hz, CLIPPED_SAMPLES) and (
+                restless or max(back, into) > _JUMP * usual or _stops_dead(x, steps, start, stop, rate_hz)
+            ):
+                found.append(Frozen("stuck", channel, start, stop, float(x[start])))
+    return found + _clipped(values)
+
+
+def _stops_dead(x: Array, steps: Array, start: int, stop: int, rate_hz: float) -> bool:
+    """Whether a stretch that begins or ends with the log is left or entered at speed."""
+    window = max(2, round(_SPEED_S * rate_hz))
+    if len(x) <= 2 * window or (start > 0) == (stop < len(x)):
+        return False
+    usual = float(np.quantile(np.abs(x[window:] - x[:-window]), 0.95))
+    other = max(start - window, 0) if start else min(stop - 1 + window, len(x) - 1)
+    moved = abs(x[other] - x[start])
+    return moved > max(_AT_SPEED * usual, _JUMP * float(steps[steps > 0].min()))
+
+
+def _clipped(values: Array) -> list[Frozen]:
+    found = []
+    for channel in range(values.shape[1]):
+        x = values[:, channel]
+        steps = np.abs(np.diff(x))
+        if not steps.any():
+            continue
+        usual = float(np.quantile(steps[steps > 0], 0.95))
+        for extreme in (x.min(), x.max()):
+            runs = [(a, b) for a, b in _runs(x, x == extreme) if b - a >= CLIPPED_SAMPLES]
+            # A peak is round; a clipped one has corners: speed up to the limit, and none from there on.
+            corners = [
+                (a, b)
+                for a, b in runs
+                if (a >= 2 and steps[a - 2] > _CORNER * usual)
+                or (b + 1 < len(x) and steps[b] > _CORNER * usual)
+            ]
+            if len(corners) >= 2:
+                found += [Frozen("clipped", channel, a, b, float(extreme)) for a, b in corners]
+    return found
+
+
+def _runs(x: Array, where: NDArray[np.bool_] | None = None) -> list[tuple[int, int]]:
+    """Runs of equal values (start, stop), or those of rows ``where`` only."""
+    edges = np.flatnonzero(np.diff(x) != 0) + 1
+    bounds = np.concatenate([[0], edges, [len(x)]])
+    runs = zip(bounds[:-1].tolist(), bounds[1:].tolist(), strict=True)
+    return [(a, b) for a, b in runs if where is None or where[a]]
+
+
+def _others_move(values: Array, ranges: Array, channel: int, start: int, stop: int) -> bool:
+    """Whether at least two other channels move in both halves of a stretch."""
+    middle = (start + stop + 1) // 2
+    first, second = np.ptp(values[start:middle], axis=0), np.ptp(values[middle - 1 : stop], axis=0)
+    moved = np.minimum(first, second) > _MOVES / 2 * ranges
+    moved[channel] = False
+    return int(np.sum(moved & (ranges > 0))) >= 2

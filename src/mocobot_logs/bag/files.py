@@ -1,0 +1,206 @@
+"""From a path to the files of a bag: a single one, or a folder whose ``metadata.yaml`` names them (rosbag2).
+
+Only the names of the files and their compression are taken from ``metadata.yaml``; its topics, times and counts say
+nothing that the files do not say themselves, and are often wrong after a recording was interrupted or repaired.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import weakref
+from dataclasses import dataclass
+from itertools import accumulate
+from pathlib import Path, PurePosixPath
+from tempfile import mkdtemp
+from typing import Any
+
+from ruamel.yaml import YAML
+
+from estimator.errors import InputError
+from mocobot_logs.bag.mcap import McapBag
+from mocobot_logs.bag.mcap_runs import MAGIC
+from mocobot_logs.bag.messages import Storage
+from mocobot_logs.bag.sqlite import HEAD, SqliteBag
+from mocobot_logs.bag.unpack import unpack_file
+from mocobot_logs.faults import detail_of
+
+VERSIONS = range(1, 10)
+"""Of ``metadata.yaml`` that are read; all that rosbag2 has written so far."""
+METADATA = "metadata.yaml"
+STORAGES = {"mcap": MAGIC, "sqlite3": HEAD}
+SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
+_ROS1 = b"#ROSBAG"
+_ZSTD = b"\x28\xb5\x2f\xfd"
+_METADATA_BYTES = 1 << 20
+_DEEPEST = 64
+_KEY = "rosbag2_bagfile_information"
+
+
+class Scratch:
+    """A temporary folder that goes when this goes."""
+
+    def __init__(self, wanted_by: Path) -> None:
+        """Create it.
+
+        Raises:
+            InputError: it cannot be created.
+        """
+        try:
+            self.path = Path(mkdtemp(prefix="mocobot-bag-"))
+        except OSError as error:
+            raise InputError(
+                f"{wanted_by}: cannot be unpacked, there is no temporary folder ({error})"
+            ) from error
+        weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
+
+
+@dataclass(frozen=True, eq=False)
+class BagFiles:
+    """The files of a bag, opened.
+
+    Attributes:
+        storages: files in order.
+        packed: whether every message is compressed by itself (zstd).
+        unpacked: keeps the folder with unpacked copies, which goes when this goes.
+    """
+
+    storages: tuple[Storage, ...]
+    packed: bool
+    unpacked: Scratch | None
+
+
+def is_bag(path: Path) -> bool:
+    """Whether a path is meant as a bag: a folder with a bag's files, or a file that begins or is named like one."""
+    try:
+        if path.is_dir():
+            return (path / METADATA).exists() or any(_has_suffix(entry) for entry in path.iterdir())
+        if not path.is_file():
+            return False
+        with path.open("rb") as file:
+            head = file.read(16)
+        return _has_suffix(path) or head.startswith((MAGIC, HEAD, _ROS1))
+    except (OSError, ValueError):
+        return False
+
+
+def open_files(path: Path) -> BagFiles:
+    """Open all files of a bag.
+
+    Raises:
+        InputError: there is no bag, its ``metadata.yaml`` is not usable, or a file is not complete.
+    """
+    try:
+        exists, is_folder = path.exists(), path.is_dir()
+    except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL in it
+        raise InputError(f"{str(path)!r:.80}: not a usable file name ({error})") from error
+    if not exists:
+        raise InputError(f"{path}: there is no such file or folder")
+    if is_folder:
+        names, packed = _read_metadata(path)
+        paths = [path / name for name in names]
+    else:
+        packed, paths = False, [path]
+    holder: Scratch | None = None
+    storages = []
+    for number, file in enumerate(paths):
+        head = _head(file)
+        local = file
+        if head.startswith(_ZSTD):
+            holder = holder or Scratch(file)
+            local = holder.path / str(number)
+            unpack_file(file, local, tuple(STORAGES.values()), str(file))
+            head = _head(local)
+        storages.append(_storage(local, head, str(file)))
+    return BagFiles(tuple(storages), packed, holder)
+
+
+def _storage(path: Path, head: bytes, name: str) -> Storage:
+    if head.startswith(MAGIC):
+        return McapBag(path, name)
+    if head.startswith(HEAD):
+        return SqliteBag(path, name)
+    if head.startswith(_ROS1):
+        raise InputError(
+            f"{name}: a bag of ROS 1; `rosbags-convert` makes a ROS 2 bag of it, which can be read"
+        )
+    what = "is empty" if not head else "is neither an MCAP nor an SQLite file, as those of a ROS 2 bag are"
+    raise InputError(f"{name}: {what}")
+
+
+def _head(path: Path) -> bytes:
+    try:
+        if not path.exists():
+            raise InputError(f"{path}: there is no such file, though the bag's {METADATA} names it")
+        if not path.is_file():
+            raise InputError(f"{path}: is not a regular file")
+        with path.open("rb") as file:
+            return file.read(16)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
+
+
+def _has_suffix(path: Path) -> bool:
+    return path.name.lower().endswith(SUFFIXES)
+
+
+def _read_metadata(folder: Path) -> tuple[list[str], bool]:
+    """Names of the files, and whether every message is compressed by itself."""
+    path = folder / METADATA
+    try:
+        if not path.is_file():
+            found = sorted(entry.name for entry in folder.iterdir() if _has_suffix(entry))
+            if not found:
+                raise InputError(f"{folder}: is a folder without a bag ({METADATA} and .mcap or .db3 files)")
+            raise InputError(
+                f"{folder}: has no {METADATA}; `ros2 bag reindex` writes it, or name a single file such as "
+                f"{folder / found[0]}"
+            )
+        with path.open("rb") as file:
+            content = file.read(_METADATA_BYTES + 1)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
+    if len(content) > _METADATA_BYTES:
+        raise InputError(f"{path}: is larger than {_METADATA_BYTES >> 20} MiB, which no bag's metadata is")
+    values = _load(content, path).get(_KEY)
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: has no table {_KEY!r}, so it is not the metadata of a bag")
+    version = values.get("version")
+    if type(version) is not int or version not in VERSIONS:
+        raise InputError(
+            f"{path}: version is {version!r:.40}; bags of versions {VERSIONS[0]} to {VERSIONS[-1]} are read"
+        )
+    _one_of(values.get("storage_identifier"), tuple(STORAGES), "storage_identifier", path)
+    mode = str(values.get("compression_mode") or "none").lower()
+    _one_of(mode, ("none", "file", "message"), "compression_mode", path)
+    if mode != "none":
+        _one_of(values.get("compression_format"), ("zstd",), "compression_format", path)
+    files = values.get("relative_file_paths")
+    if not isinstance(files, list) or not files or not all(isinstance(name, str) for name in files):
+        raise InputError(f"{path}: relative_file_paths is {files!r:.60}; it must list the bag's files")
+    names = [PurePosixPath(name).name for name in files]  # the oldest versions put the bag's folder before it
+    if "" in names or ".." in names or len(set(names)) < len(names) or any("\0" in name for name in names):
+        raise InputError(
+            f"{path}: relative_file_paths is {files!r:.60}; each must be another file in the folder"
+        )
+    return names, mode == "message"
+
+
+def _load(content: bytes, path: Path) -> dict[str, Any]:
+    text = content.decode("utf-8", errors="replace")
+    depth = accumulate((1 if mark in "[{" else -1 for mark in re.findall(r"[\[\]{}]", text)), initial=0)
+    if re.search(r"<<\s*:|(?:^|\s)!\S|^\s*%", text, re.MULTILINE) or max(depth) > _DEEPEST:
+        # Merged keys grow without bound, tags make objects, deep nesting takes minutes: no recorder writes them.
+        raise InputError(f"{path}: holds YAML beyond plain values, which no bag's metadata does")
+    try:
+        values = YAML(typ="safe", pure=True).load(text)
+    except Exception as error:  # on damaged text the parser raises many types, not all of them its own
+        raise InputError(f"{path}: not readable YAML ({detail_of(error)})") from error
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: has no table {_KEY!r}, so it is not the metadata of a bag")
+    return values
+
+
+def _one_of(value: object, allowed: tuple[str, ...], key: str, path: Path) -> None:
+    if value not in allowed:
+        raise InputError(f"{path}: {key} is {value!r:.40}; it must be one of {', '.join(allowed)}")

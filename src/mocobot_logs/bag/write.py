@@ -1,0 +1,261 @@
+"""Recordings as ROS 2 bags: rosbag2 folders or single files, MCAP or SQLite, that the robot's own tools open.
+
+Topics per robot i, from 1:
+
+- ``/omnid{i}/joint/joint_states`` (sensor_msgs/msg/JointState): at joint level the joints phi1, phi2, phi3 (position
+  [rad], effort = spring torque [N m]), at wrist level x, y, z (position of the wrist in {b} [m], effort = force of the
+  springs on it [N]), then gimbal_z, gimbal_y, gimbal_x (position [rad], effort 0: they are passive); no velocities.
+- ``/omnid{i}/wrist/command`` (geometry_msgs/msg/PointStamped): commanded wrist position in {b} [m], if recorded.
+
+``/mocobot/metadata`` (std_msgs/msg/String, latched) has the recording's metadata as JSON, once. Header stamps and log
+times are the recording's times. The maps ``mocobot-ros2`` and ``omnid-ros2`` read such bags.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import sqlite3
+import uuid
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from rosbags.interfaces import (
+    Connection,
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
+from rosbags.rosbag2 import StoragePlugin, WriterError
+from rosbags.rosbag2 import Writer as BagWriter
+from rosbags.rosbag2.storage_sqlite3 import Sqlite3Writer
+from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys.store import Typestore
+
+from estimator.arm.wrist_level import wrist_of
+from estimator.errors import InputError
+from estimator.recording.model import Recording
+from mocobot_logs.bag.messages import Topic
+from mocobot_logs.bag.read import METADATA_TOPIC
+from mocobot_logs.bag.storage_mcap import ChecksummedMcap
+from mocobot_logs.bag.types import JOINT_STATE, STRING, message_type
+from mocobot_logs.bag.walk import Walk
+from mocobot_logs.log import Array, Level, Stamps
+
+Storage = Literal["mcap", "sqlite3"]
+
+SUFFIXES: dict[Storage, str] = {"mcap": ".mcap", "sqlite3": ".db3"}
+"""Of single files; any other path is a folder."""
+POINT = "geometry_msgs/msg/PointStamped"
+_ARM: dict[Level, tuple[str, ...]] = {"joint": ("phi1", "phi2", "phi3"), "wrist": ("x", "y", "z")}
+_GIMBAL = ("gimbal_z", "gimbal_y", "gimbal_x")
+_LAST_S = 2**31 - 1  # seconds of a stamp are an int32
+_AT_ONCE = 4096
+_VERSION = 8  # of metadata.yaml; the newest in which quality of service is text, as ROS 2 Humble needs it
+_LATCHED = Qos(
+    QosHistory.KEEP_LAST,
+    1,
+    QosReliability.RELIABLE,
+    QosDurability.TRANSIENT_LOCAL,
+    *(QosTime(0, 0), QosTime(0, 0)),
+    QosLiveliness.AUTOMATIC,
+    QosTime(0, 0),
+    avoid_ros_namespace_conventions=False,
+)
+
+
+class _Writer(BagWriter):
+    STORAGE_PLUGINS = {StoragePlugin.SQLITE3: Sqlite3Writer, StoragePlugin.MCAP: ChecksummedMcap}  # noqa: RUF012
+
+
+def write_bag(
+    recording: Recording,
+    path: Path | str,
+    *,
+    level: Level = "joint",
+    storage: Storage = "mcap",
+    advance: Callable[[int], object] = lambda _: None,
+) -> None:
+    """Write a recording as a ROS 2 bag; at joint level every sample comes back bit by bit, times to the nanosecond.
+
+    Args:
+        recording: what to write.
+        path: a single file if it ends in .mcap or .db3 (an existing one is replaced once the new one is complete),
+            else a new folder with ``metadata.yaml``.
+        level: "joint" (phi, theta, tau) or "wrist" (h, theta, force).
+        storage: "mcap" or "sqlite3".
+        advance: takes the number of samples written since the last call.
+
+    Raises:
+        InputError: the target exists or cannot be written, times are not within [0, 2^31) s, or level or storage is
+            not one of the above.
+    """
+    path = Path(path)
+    for value, allowed, what in ((level, get_args(Level), "level"), (storage, get_args(Storage), "storage")):
+        if value not in allowed:
+            raise InputError(f"{path}: {what} is {value!r:.40}; it must be one of {', '.join(allowed)}")
+    single = _check_target(path, storage)
+    stamps = _stamps(recording)
+    temporary = path.parent / f".{uuid.uuid4().hex}.tmp"
+    name = path.stem if single else path.name
+    try:
+        temporary.mkdir()
+        with _Writer(
+            temporary / name, version=_VERSION, storage_plugin=StoragePlugin[storage.upper()]
+        ) as bag:
+            _write(recording, stamps, level, bag, advance)
+        if single:
+            os.replace(temporary / name / f"{name}{SUFFIXES[storage]}", path)
+        else:
+            os.replace(temporary / name, path)  # takes the place of an empty folder
+    except InputError:
+        raise
+    except (OSError, ValueError, sqlite3.Error, WriterError) as error:
+        detail = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be written ({detail})") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+def _check_target(path: Path, storage: Storage) -> bool:
+    """Whether the target is a single file."""
+    suffix = path.suffix.lower()
+    single = suffix in SUFFIXES.values()
+    try:
+        if single and suffix != SUFFIXES[storage]:
+            raise InputError(
+                f"{path}: a {suffix} file does not hold {storage}; name a {SUFFIXES[storage]} file"
+            )
+        if single and path.is_dir():
+            raise InputError(f"{path}: is a folder; name the file to write")
+        if not single and path.exists() and not (path.is_dir() and not any(path.iterdir())):
+            what = "is a folder that holds something" if path.is_dir() else "is a file"
+            raise InputError(f"{path}: {what}; name a new folder for the bag, or a {SUFFIXES[storage]} file")
+        if not path.parent.is_dir():
+            raise InputError(f"{path.parent}: there is no such folder")
+    except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL in it
+        if isinstance(error, InputError):
+            raise
+        raise InputError(f"{str(path)!r:.80}: cannot be written ({error})") from error
+    return single
+
+
+def _stamps(recording: Recording) -> Stamps:
+    """Times in whole nanoseconds; seconds apart, since a float of the Unix time has no room for them."""
+    time = recording.time
+    if not (np.isfinite(time).all() and (not len(time) or 0 <= time.min() <= time.max() < _LAST_S)):
+        raise InputError(
+            f"{recording.name}: time runs from {time.min():.10g} to {time.max():.10g} s; stamps of a bag hold 0 to "
+            f"{_LAST_S} s"
+        )
+    seconds = np.floor(time)
+    return seconds.astype(np.int64) * 1_000_000_000 + np.rint((time - seconds) * 1e9).astype(np.int64)
+
+
+def _write(
+    recording: Recording, stamps: Stamps, level: Level, bag: _Writer, advance: Callable[[int], object]
+) -> None:
+    types = get_typestore(Stores.LATEST)
+    metadata = replace(recording.metadata, level=level).to_json()
+    latched = bag.add_connection(METADATA_TOPIC, STRING, typestore=types, offered_qos_profiles=[_LATCHED])
+    streams: list[_Stream] = []
+    for robot in range(1, recording.metadata.robots + 1):
+        topic = f"/omnid{robot}/joint/joint_states"
+        streams.append(_joint_states(bag.add_connection(topic, JOINT_STATE, typestore=types), level, types))
+        if recording.ref is not None:
+            topic, frame = f"/omnid{robot}/wrist/command", f"omnid{robot}/base"
+            streams.append(_commands(bag.add_connection(topic, POINT, typestore=types), frame, types))
+    text = types.types[STRING](data=metadata)
+    bag.write(
+        latched, int(stamps[0]) if len(stamps) else 0, types.serialize_cdr(text, STRING, little_endian=True)
+    )
+    for begin in range(0, len(stamps), _AT_ONCE):
+        part = slice(begin, begin + _AT_ONCE)
+        contents = [
+            s.messages(stamps[part], *v)
+            for s, v in zip(streams, _values(recording, part, level), strict=True)
+        ]
+        for k, stamp in enumerate(stamps[part].tolist()):
+            for stream, content in zip(streams, contents, strict=True):
+                bag.write(stream.connection, stamp, content[k])
+        advance(len(stamps[part]))
+
+
+def _values(recording: Recording, part: slice, level: Level) -> Iterator[tuple[Array, ...]]:
+    """What goes into the messages of each stream: position and effort of the joints, or the point."""
+    for robot in range(recording.metadata.robots):
+        position, effort = recording.phi[part, robot], recording.tau[part, robot]
+        if level == "wrist":
+            try:
+                position, effort = wrist_of(position, effort, recording.metadata.design)
+            except InputError as error:
+                raise InputError(f"{recording.name}: robot {robot + 1}: {error}") from error
+        theta = recording.theta[part, robot]
+        yield np.hstack([position, theta]), np.hstack([effort, np.zeros_like(theta)])
+        if recording.ref is not None:
+            yield (recording.ref[part, robot],)
+
+
+@dataclass(frozen=True, eq=False)
+class _Stream:
+    """Messages of one topic that differ in their stamps and numbers only.
+
+    Attributes:
+        connection: the topic.
+        template: one message.
+        record: where its stamp and its numbers are.
+    """
+
+    connection: Connection
+    template: bytes
+    record: np.dtype
+
+    def messages(self, stamps: Stamps, *values: Array) -> list[bytes]:
+        """One message per stamp, with numbers (q, n) for each array that the record has after the stamp."""
+        rows: NDArray[np.uint8] = np.tile(np.frombuffer(self.template, np.uint8), (len(stamps), 1))
+        table = rows.view(self.record)[:, 0]
+        table["sec"], table["nanosec"] = np.divmod(stamps, 1_000_000_000)
+        for name, value in zip((self.record.names or ())[2:], values, strict=True):
+            table[name] = value
+        return [row.tobytes() for row in rows]
+
+
+def _joint_states(connection: Connection, level: Level, types: Typestore) -> _Stream:
+    names, zeros = (*_ARM[level], *_GIMBAL), np.zeros(6)
+    message = types.types[JOINT_STATE](
+        header=_header(types, ""), name=list(names), position=zeros, velocity=zeros[:0], effort=zeros
+    )
+    return _stream(connection, message, {"position": 6, "effort": 6}, types)
+
+
+def _commands(connection: Connection, frame: str, types: Typestore) -> _Stream:
+    point = types.types["geometry_msgs/msg/Point"](x=0.0, y=0.0, z=0.0)
+    message = types.types[POINT](header=_header(types, frame), point=point)
+    return _stream(connection, message, {"point.x": 3}, types)  # y and z follow x
+
+
+def _header(types: Typestore, frame: str) -> Any:
+    time = types.types["builtin_interfaces/msg/Time"](sec=0, nanosec=0)
+    return types.types["std_msgs/msg/Header"](stamp=time, frame_id=frame)
+
+
+def _stream(connection: Connection, message: object, arrays: dict[str, int], types: Typestore) -> _Stream:
+    template = bytes(types.serialize_cdr(message, connection.msgtype, little_endian=True))
+    kind = message_type(Topic(connection.topic, connection.msgtype, "cdr"), "bag")
+    walk = Walk(template, kind, {"header.stamp.sec", "header.stamp.nanosec", *arrays}, names=False)
+    record = np.dtype(
+        {
+            "names": ["sec", "nanosec", *arrays],
+            "formats": ["<i4", "<u4", *(("<f8", (count,)) for count in arrays.values())],
+            "offsets": [walk.leaves[p].offset for p in ("header.stamp.sec", "header.stamp.nanosec", *arrays)],
+            "itemsize": len(template),
+        }
+    )
+    return _Stream(connection, template, record)

@@ -1,0 +1,1 @@
+"""Maps: which column is what."""

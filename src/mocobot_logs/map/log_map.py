@@ -1,0 +1,173 @@
+"""What a map says: where a log has each channel of each robot, and in which unit, sign and zero."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.errors import InputError
+from mocobot_logs.log import CHANNELS, REF, Level
+from mocobot_logs.map.units import TIME_UNITS
+
+Array = NDArray[np.float64]
+
+PLACEHOLDERS = ("robot", "robot0", "channel")
+"""Number of the robot from 1, number of the robot from 0, name of the channel."""
+
+
+@dataclass(frozen=True)
+class ChannelMap:
+    """Where one channel of one robot is, and how to bring it to SI: ``scale * (raw + offset)``.
+
+    Attributes:
+        topic: topic of a bag, or None.
+        joint: name of the joint in a sensor_msgs/msg/JointState, or None.
+        field: ``position``, ``velocity`` or ``effort`` of that joint, or the dotted path in another message.
+        column: column of a table, ``name[i, j]`` inside an array, or None.
+        scale: sign times the size of one raw unit in SI.
+        offset: added before sign and unit [raw unit].
+        optional: whether a log may lack it (commands only).
+    """
+
+    topic: str | None = None
+    joint: str | None = None
+    field: str | None = None
+    column: str | None = None
+    scale: float = 1.0
+    offset: float = 0.0
+    optional: bool = False
+
+    def apply(self, raw: Array) -> Array:
+        """Raw samples in SI; the same array where nothing is to be done."""
+        shifted = raw + self.offset if self.offset else raw
+        return shifted * self.scale if self.scale != 1.0 else shifted
+
+    def undo(self, si: Array) -> Array:
+        """SI samples as the log has them: the inverse of ``apply``."""
+        return si / self.scale - self.offset
+
+
+@dataclass(frozen=True)
+class TimeMap:
+    """Where a log's time is.
+
+    Attributes:
+        column: column of a table, which may hold ``{robot}``; None stands for ``time``, and for ``timestamp`` in a
+            LeRobot dataset.
+        unit: ``s``, ``ms``, ``us`` or ``ns``.
+        clock: stamp of a bag's messages: ``header`` (when the robot took the sample) or ``log`` (when it was written).
+    """
+
+    column: str | None = None
+    unit: str = "s"
+    clock: Literal["header", "log"] = "header"
+
+    @property
+    def unit_ns(self) -> int:
+        """Nanoseconds in one unit."""
+        return TIME_UNITS[self.unit]
+
+    def column_of(self, robot: int) -> str | None:
+        """The time column of one robot, counted from 1."""
+        return None if self.column is None else fill(self.column, robot)
+
+
+@dataclass(frozen=True)
+class CsvMap:
+    """How a text table is written.
+
+    Attributes:
+        delimiter: what stands between two cells, or None to find out.
+        decimal: the decimal mark.
+    """
+
+    delimiter: str | None = None
+    decimal: Literal[".", ","] = "."
+
+
+@dataclass(frozen=True)
+class LogMap:
+    """A map: strict, complete, and the same for every robot up to overrides.
+
+    Attributes:
+        name: what messages call it.
+        level: whether angles and torques or wrist positions and forces are logged.
+        robots: number of robots, or None to count those that the log has.
+        trial: kind of trial, or None.
+        time: where time is.
+        csv: how a text table is written.
+        common: every mapped channel, with placeholders.
+        own: by robot (from 1), the channels that differ.
+    """
+
+    name: str
+    level: Level
+    robots: int | None
+    trial: str | None
+    time: TimeMap
+    csv: CsvMap
+    common: Mapping[str, ChannelMap]
+    own: Mapping[int, Mapping[str, ChannelMap]] = field(default_factory=dict)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Mapped channels in the order of ``Samples.values``: those of the level, then the commands if mapped."""
+        return tuple(name for name in (*CHANNELS[self.level], *REF) if name in self.common)
+
+    def channels(self, robot: int) -> dict[str, ChannelMap]:
+        """Every mapped channel of one robot, counted from 1, placeholders filled, in the order of ``names``."""
+        own = self.own.get(robot, {})
+        return {name: _filled(own.get(name, self.common[name]), robot, name) for name in self.names}
+
+    def require(self, key: Literal["topic", "field", "column"], kind: str) -> None:
+        """Check that the map locates every channel in a kind of log.
+
+        Args:
+            key: what that kind needs.
+            kind: the kind of log in the plural, for the message.
+
+        Raises:
+            InputError: a channel lacks the key.
+        """
+        for robot in (None, *self.own):
+            channels = self.common if robot is None else self.own[robot]
+            for name, channel in channels.items():
+                if getattr(channel, key) is None:
+                    table = f"channels.{name}" if robot is None else f"robot.{robot}.channels.{name}"
+                    raise InputError(
+                        f"map {self.name}: {table}: missing key {key!r}, by which {kind} are read "
+                        "(it may also stand in [defaults])"
+                    )
+
+    def one_robot_only(self, key: Literal["topic", "column"]) -> bool:
+        """Whether every robot would be read from the same place, so that a log can hold just one."""
+        return not self.own and not any(
+            "{robot" in (getattr(channel, key) or "") + (channel.joint or "")
+            for channel in self.common.values()
+        )
+
+
+def fill(text: str, robot: int, channel: str = "") -> str:
+    """Put numbers and names in the place of ``{robot}``, ``{robot0}`` and ``{channel}``."""
+    values = {"robot": str(robot), "robot0": str(robot - 1), "channel": channel}
+    return re.sub(r"\{(\w+)\}", lambda found: values[found.group(1)], text)
+
+
+def _filled(channel: ChannelMap, robot: int, name: str) -> ChannelMap:
+    def part(text: str | None) -> str | None:
+        return None if text is None else fill(text, robot, name)
+
+    return ChannelMap(
+        part(channel.topic),
+        part(channel.joint),
+        part(channel.field),
+        part(channel.column),
+        channel.scale,
+        channel.offset,
+        channel.optional,
+    )

@@ -1,0 +1,1 @@
+"""Onto one even grid."""

@@ -1,0 +1,1 @@
+"""Tables: CSV, NPZ, Parquet, LeRobot."""

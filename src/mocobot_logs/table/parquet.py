@@ -1,0 +1,200 @@
+"""Parquet tables, mocobot's own recordings among them: read as they are, so that broken ones can be looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from estimator.errors import InputError
+from estimator.recording.metadata import RecordingMetadata
+from estimator.recording.model import METADATA_KEY
+from mocobot_logs.claims import check_claim
+from mocobot_logs.faults import detail_of
+from mocobot_logs.log import Stamps
+from mocobot_logs.table.stamps import from_numbers
+from mocobot_logs.table.table import Block, rows_at_a_time
+
+Clock = tuple[Stamps, NDArray[np.bool_]]
+
+
+class ParquetTable:
+    """One or more Parquet files of the same columns as a ``Table``.
+
+    Columns may hold numbers or lists of always as many numbers; time may also be a timestamp, whose unit is its own.
+    """
+
+    aliases: Mapping[str, tuple[str, tuple[int, ...]]] = {}
+    time_column = "time"
+    sparse = True
+
+    def __init__(self, files: Sequence[Path], name: str) -> None:
+        """Look at the files' footers.
+
+        Raises:
+            InputError: a file cannot be read, or their columns differ.
+        """
+        self.name, self._files = name, tuple(files)
+        self.metadata: RecordingMetadata | None = None
+        self.size = 0
+        schemas: list[pa.Schema] = []
+        for path in self._files:
+            with opened(path, name) as file:
+                self.size += file.metadata.num_rows
+                schemas.append(file.schema_arrow)
+        self._schema = schemas[0]
+        if any(not schema.equals(self._schema) for schema in schemas):
+            raise InputError(f"{name}: its Parquet files have different columns")
+        repeated = next((n for n in self._schema.names if self._schema.names.count(n) > 1), None)
+        if repeated is not None:
+            raise InputError(f"{name}: column {repeated!r:.80} appears more than once")
+        text = (self._schema.metadata or {}).get(METADATA_KEY)
+        if text is not None:
+            self.metadata = RecordingMetadata.from_json(text, where=f"{name}: metadata")
+            # Rows without any value are part of a broken recording, which is to be seen as it is.
+            self.sparse = False
+        self.shapes: Mapping[str, tuple[int, ...]] = self._row_shapes()
+
+    def blocks(
+        self,
+        columns: tuple[str, ...],
+        clocks: tuple[str, ...],
+        unit_ns: int,
+        advance: Callable[[int], object],
+    ) -> Iterator[Block]:
+        """Rows in the order of the files, see ``Table.blocks``.
+
+        Raises:
+            InputError: a file is damaged, or holds what is not a number.
+        """
+        names = list(dict.fromkeys([*columns, *clocks]))
+        for name in names:
+            self._check_type(name, time=name in clocks)
+        cells = sum(int(np.prod(self.shapes[name], dtype=np.int64)) for name in names)
+        row = 0
+        for path in self._files:
+            with opened(path, self.name) as file:
+                check_claim(
+                    8 * cells * file.metadata.num_rows, path.stat().st_size, f"{self.name}: the table"
+                )
+                for batch in file.iter_batches(rows_at_a_time(cells), columns=names, use_threads=False):
+                    yield self._block(batch, columns, clocks, unit_ns, row)
+                    row += batch.num_rows
+                    advance(batch.num_rows)
+        pa.default_memory_pool().release_unused()
+
+    def _block(
+        self, batch: pa.RecordBatch, columns: tuple[str, ...], clocks: tuple[str, ...], unit_ns: int, row: int
+    ) -> Block:
+        def where(name: str) -> str:
+            return f"{self.name}: column {name!r}"
+
+        return Block(
+            {name: numbers(batch.column(name), self.shapes[name], where(name)) for name in columns},
+            {
+                name: _clock(batch.column(name), self.shapes[name], unit_ns, where(name), row)
+                for name in clocks
+            },
+        )
+
+    def _check_type(self, name: str, *, time: bool) -> None:
+        kind = _innermost(self._schema.field(name).type)
+        if time and pa.types.is_timestamp(kind):
+            return
+        if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)):
+            raise InputError(f"{self.name}: column {name!r} holds {kind}; it must hold numbers")
+
+    def _row_shapes(self) -> dict[str, tuple[int, ...]]:
+        """Lists whose length the schema does not fix are measured in the first row."""
+        shapes = {field.name: _fixed_shape(field.type) for field in self._schema}
+        open_names = [name for name, shape in shapes.items() if shape is None]
+        if open_names and self.size:
+            with opened(next(path for path in self._files), self.name) as file:
+                first = next(file.iter_batches(1, columns=open_names, use_threads=False), None)
+            for name in open_names if first is not None and first.num_rows else ():
+                shapes[name] = np.shape(first.column(name)[0].as_py()) if first is not None else ()
+        return {name: shape or () for name, shape in shapes.items()}
+
+
+@contextmanager
+def opened(path: Path, name: str) -> Iterator[pq.ParquetFile]:
+    """A Parquet file, whose every failure inside the block becomes one sentence.
+
+    Raises:
+        InputError: the file is not Parquet, or damaged, or cannot be read.
+    """
+    try:
+        # Not pre-buffered: that would hold a whole row group, which may be a whole log.
+        with pq.ParquetFile(
+            path, page_checksum_verification=True, pre_buffer=False, buffer_size=1 << 20
+        ) as file:
+            yield file
+    except InputError:
+        raise
+    except PermissionError as error:
+        raise InputError(f"{name}: cannot be read (permission denied)") from error
+    except Exception as error:  # on damaged bytes pyarrow raises many types, not all of them its own
+        raise InputError(
+            f"{name}: not a readable Parquet file, or a damaged one ({detail_of(error)})"
+        ) from error
+
+
+def numbers(column: pa.Array, shape: tuple[int, ...], where: str) -> NDArray:
+    """A column as an array (q, *shape) of whole numbers or floats, NaN where a row is empty.
+
+    Raises:
+        InputError: a row does not have that shape.
+    """
+    rows = len(column)
+    given = column.is_valid().to_numpy(zero_copy_only=False)
+    flat = column if given.all() else column.drop_null()
+    for length in shape:
+        if not pa.types.is_fixed_size_list(flat.type) and np.any(
+            flat.value_lengths().to_numpy(zero_copy_only=False) != length
+        ):
+            raise InputError(f"{where} has rows of different lengths; all must have the shape {shape}")
+        flat = flat.flatten()
+    if pa.types.is_decimal(flat.type) or flat.null_count:
+        flat = flat.cast(pa.float64(), safe=False)
+    filled = flat.to_numpy(zero_copy_only=False)
+    if len(filled) != given.sum() * int(np.prod(shape, dtype=np.int64)):
+        raise InputError(f"{where} has rows of different lengths; all must have the shape {shape}")
+    filled = filled.reshape(-1, *shape)
+    if given.all():
+        return filled
+    whole = np.full((rows, *shape), np.nan)
+    whole[given] = filled
+    return whole
+
+
+def _clock(column: pa.Array, shape: tuple[int, ...], unit_ns: int, where: str, row: int) -> Clock:
+    if pa.types.is_timestamp(column.type):
+        given = column.is_valid().to_numpy(zero_copy_only=False)
+        ns = column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64()).fill_null(0)
+        return ns.to_numpy(zero_copy_only=False), given
+    return from_numbers(numbers(column, shape, where).reshape(len(column)), unit_ns, where, row)
+
+
+def _innermost(kind: pa.DataType) -> pa.DataType:
+    while _is_list(kind):
+        kind = kind.value_type
+    return kind
+
+
+def _is_list(kind: pa.DataType) -> bool:
+    return pa.types.is_list(kind) or pa.types.is_large_list(kind) or pa.types.is_fixed_size_list(kind)
+
+
+def _fixed_shape(kind: pa.DataType) -> tuple[int, ...] | None:
+    shape: list[int] = []
+    while _is_list(kind):
+        if not pa.types.is_fixed_size_list(kind):
+            return None
+        shape.append(kind.list_size)
+        kind = kind.value_type
+    return tuple(shape)

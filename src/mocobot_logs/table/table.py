@@ -1,0 +1,235 @@
+"""Tables as logs: columns of any table, by a map, become the robots' channels."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.errors import InputError
+from estimator.recording.metadata import RecordingMetadata
+from mocobot_logs.faults import shown
+from mocobot_logs.log import CHANNELS, REF, Level, Samples, Stamps
+from mocobot_logs.map.log_map import ChannelMap, LogMap
+
+SHOWN_COLUMNS = 12
+"""So many columns are listed in a message."""
+GAP_OF_ROBOTS = 20
+"""So far beyond the last robot found another one is looked for, which would mean that one is missing."""
+CELLS = 1 << 20
+"""About so many numbers are in memory at a time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Block:
+    """Consecutive rows of a table.
+
+    Attributes:
+        columns: by name, each of shape (q, ...).
+        clocks: by name, stamps [ns] and whether there is one, each of shape (q,).
+    """
+
+    columns: Mapping[str, NDArray]
+    clocks: Mapping[str, tuple[Stamps, NDArray[np.bool_]]]
+
+
+class Table(Protocol):
+    """A table that can be read in blocks of rows, any number of times.
+
+    Attributes:
+        name: the path as the user gave it.
+        size: all that there is to read, in units of ``advance``.
+        metadata: what the file says about itself where mocobot wrote it, else None.
+        shapes: every column that may be mapped, and the shape of one row of it: () for a number.
+        aliases: other names of single numbers in a row: the column and the index there.
+        time_column: where time is unless a map says so.
+        sparse: whether a row without any value of a robot is no sample of it.
+    """
+
+    name: str
+    size: int
+    metadata: RecordingMetadata | None
+    shapes: Mapping[str, tuple[int, ...]]
+    aliases: Mapping[str, tuple[str, tuple[int, ...]]]
+    time_column: str
+    sparse: bool
+
+    def blocks(
+        self,
+        columns: tuple[str, ...],
+        clocks: tuple[str, ...],
+        unit_ns: int,
+        advance: Callable[[int], object],
+    ) -> Iterator[Block]:
+        """Rows in the order of the file.
+
+        Args:
+            columns: names to read as numbers.
+            clocks: names to read as time.
+            unit_ns: nanoseconds in one unit of time.
+            advance: takes the progress made since the last call.
+
+        Raises:
+            InputError: the file is damaged or holds what is not a number.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class Place:
+    """One number in every row of a table: a column, and the index in it where it is an array."""
+
+    column: str
+    index: tuple[int, ...] = ()
+
+
+class TableSource:
+    """A table as a ``LogSource``."""
+
+    def __init__(self, table: Table, log_map: LogMap) -> None:
+        """Find every channel of every robot.
+
+        Raises:
+            InputError: the map does not suit the table.
+        """
+        log_map.require("column", "tables")
+        self._table, self._map = table, log_map
+        self.name, self.size, self.metadata = table.name, table.size, table.metadata
+        self.level: Level = log_map.level
+        self.robots = self._count_robots()
+        self.channels: tuple[str, ...] = CHANNELS[self.level] + (REF if self._has_commands() else ())
+        self._places = [self._places_of(robot) for robot in range(1, self.robots + 1)]
+        self._clocks = [self._clock_of(robot) for robot in range(1, self.robots + 1)]
+        self._check_shared()
+
+    def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
+        """Samples of one robot after the other, see ``LogSource.chunks``.
+
+        Raises:
+            InputError: the table is damaged, or holds what is not a number.
+        """
+        maps = [self._map.channels(robot) for robot in range(1, self.robots + 1)]
+        columns = tuple(dict.fromkeys(place.column for places in self._places for place in places))
+        clocks = tuple(dict.fromkeys(self._clocks))
+        row = 0
+        for block in self._table.blocks(columns, clocks, self._map.time.unit_ns, advance):
+            for robot, (places, channels) in enumerate(zip(self._places, maps, strict=True)):
+                stamps, given = block.clocks[self._clocks[robot]]
+                values = np.empty((len(stamps), len(self.channels)))
+                # What is beyond floats, and signalling NaN of damaged files, are for the reader of the log to judge.
+                with np.errstate(invalid="ignore", over="ignore"):
+                    for k, (name, place) in enumerate(zip(self.channels, places, strict=True)):
+                        raw = np.asarray(block.columns[place.column][(slice(None), *place.index)], float)
+                        values[:, k] = channels[name].apply(raw)
+                if self._table.sparse and (blank := np.isnan(values).all(axis=1)).any():
+                    stamps, given, values = stamps[~blank], given[~blank], values[~blank]
+                if not given.all():
+                    raise InputError(
+                        f"{self.name}: column {self._clocks[robot]!r} has no time for {np.sum(~given)} samples of "
+                        f"robot {robot + 1} from row {row} on; every sample needs one"
+                    )
+                yield robot, Samples(stamps, values)
+            row += len(next(iter(block.clocks.values()))[0])
+
+    def _count_robots(self) -> int:
+        if self._map.robots is not None:
+            return self._map.robots
+        if self._map.one_robot_only("column"):
+            return 1
+        count = 0
+        while self._has_robot(count + 1):
+            count += 1
+        for later in range(count + 2, count + 2 + GAP_OF_ROBOTS):
+            if count and self._has_robot(later):
+                raise InputError(
+                    f"{self.name}: there are columns of robots {count} and {later}, but none of robot {count + 1}; "
+                    "robots are counted from 1 without a gap, or set by the key robots in a map"
+                )
+        return max(count, 1)  # without any robot, the first one's columns are what is missing
+
+    def _has_robot(self, robot: int) -> bool:
+        channels = self._map.channels(robot)
+        return any(self._find(channels[name]) is not None for name in CHANNELS[self.level])
+
+    def _has_commands(self) -> bool:
+        if REF[0] not in self._map.common:
+            return False
+        optional = all(self._map.common[name].optional for name in REF)
+        every = [self._map.channels(robot)[name] for robot in range(1, self.robots + 1) for name in REF]
+        return not optional or any(self._find(channel) is not None for channel in every)
+
+    def _places_of(self, robot: int) -> list[Place]:
+        channels, places = self._map.channels(robot), []
+        for name in self.channels:
+            place = self._find(channels[name])
+            if place is None:
+                raise InputError(self._missing(channels[name].column or "", f"{name} of robot {robot}"))
+            places.append(place)
+        return places
+
+    def _clock_of(self, robot: int) -> str:
+        name = self._map.time.column_of(robot) or self._table.time_column
+        shape = self._table.shapes.get(name)
+        if shape is None:
+            raise InputError(self._missing(name, "time"))
+        if shape not in ((), (1,)):
+            raise InputError(f"{self.name}: column {name!r} has {shape} numbers in a row; time must be one")
+        return name
+
+    def _find(self, channel: ChannelMap) -> Place | None:
+        address, shapes = channel.column or "", self._table.shapes
+        if (shape := shapes.get(address)) is not None:
+            if np.prod(shape, dtype=object) != 1:
+                first = ", ".join("0" for _ in shape)
+                raise InputError(
+                    f"{self.name}: column {address!r} has {shape} numbers in a row; "
+                    f"name one of them in the map, such as '{address}[{first}]'"
+                )
+            return Place(address, (0,) * len(shape))
+        if address in self._table.aliases:
+            return Place(*self._table.aliases[address])
+        found = re.fullmatch(r"(.+?)\[\s*(?::\s*,\s*)?(\d{1,9}(?:\s*,\s*\d{1,9})*)\s*\]", address)
+        if found is None or (shape := shapes.get(found[1])) is None:
+            return None
+        index = tuple(int(part) for part in found[2].split(","))
+        if len(index) != len(shape):
+            raise InputError(
+                f"{self.name}: {address!r} has {len(index)} indices, but a row of {found[1]!r} has the shape {shape}"
+            )
+        inside = all(i < length for i, length in zip(index, shape, strict=True))
+        return Place(found[1], index) if inside else None
+
+    def _missing(self, address: str, what: str) -> str:
+        mapped = {c.column for robot in range(1, self.robots + 1) for c in self._map.channels(robot).values()}
+        names = sorted({*self._table.shapes, *self._table.aliases} - mapped)
+        close = difflib.get_close_matches(address, names[:1000], n=1, cutoff=0.75)
+        hint = f" (did you mean {close[0]!r:.60}?)" if close else ""
+        listed = ", ".join(shown(name) for name in list(self._table.shapes)[:SHOWN_COLUMNS])
+        more = f", ... ({len(self._table.shapes)} in all)" if len(self._table.shapes) > SHOWN_COLUMNS else ""
+        return (
+            f"{self.name}: missing column {address!r:.80} for {what} by map {self._map.name}{hint}; "
+            f"the columns are {listed or 'none'}{more}"
+        )
+
+    def _check_shared(self) -> None:
+        """One number of the table is one channel: all else is a slip in the map."""
+        seen: dict[Place, str] = {}
+        for robot, places in enumerate(self._places, 1):
+            for name, place in zip(self.channels, places, strict=True):
+                what = f"{name} of robot {robot}"
+                if place in seen:
+                    raise InputError(
+                        f"{self.name}: by map {self._map.name}, {seen[place]} and {what} are the same column "
+                        f"{place.column!r:.80}; every channel needs its own"
+                    )
+                seen[place] = what
+
+
+def rows_at_a_time(cells: int) -> int:
+    """Rows in a block of a table that has so many numbers in a row."""
+    return max(CELLS // max(cells, 1), 64)

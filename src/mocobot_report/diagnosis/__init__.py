@@ -1,0 +1,1 @@
+"""A diagnosis' part of a report."""

@@ -1,0 +1,94 @@
+"""What a diagnosis leaves open: limits of detection, what cannot be decided, the extended model, notes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from mocobot_report.blocks.blocks import Entry, Num, bullets, folded, paragraph, section, table, tidy
+from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.html import Child, Node, el
+from mocobot_report.blocks.numbers import plain, size
+from mocobot_report.blocks.units import parameter
+from mocobot_report.folder import Diagnosed
+
+Values = Mapping[str, Any]
+EXTENDED = "extended"
+
+
+def rest_sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
+    """Detection limits, undecidable questions, the extended model's files, notes."""
+    values, out = diagnosed.values, []
+    if values["detection_limits"]:
+        limits = _limits(values)
+        if values["verdict"] != "consistent":
+            limits = folded("Show the limits", limits)
+        out.append(section(book, "What would have been noticed", limits))
+    if values["undecidable"]:
+        entries = [
+            item
+            for entry in values["undecidable"]
+            for item in (
+                el("dt", tidy(entry["what"])),
+                el("dd", tidy(f"{entry['why']}; needs {entry['remedy']}.")),
+            )
+        ]
+        out.append(section(book, "What such recordings cannot decide", el("dl", *entries, class_="list")))
+    model = _extended(diagnosed.folder / EXTENDED)
+    if model is not None:
+        out.append(section(book, "The extended model", *model))
+    notes = list(values["notes"])
+    if values["rejected"]:
+        names = ", ".join(f"{c['cause']} ({c['place']})" for c in values["rejected"])
+        notes.append(f"Looked likely, but did not hold on other trials: {names}.")
+    if notes:
+        out.append(section(book, "Notes", bullets([tidy(note) for note in notes])))
+    return out
+
+
+def _limits(values: Values) -> Node:
+    """One row per cause and parameter: smallest and largest limit over the places."""
+    sizes: dict[tuple[str, str], list[float | None]] = {}
+    for entry in values["detection_limits"]:
+        for name, limit in entry["parameters"].items():
+            sizes.setdefault((entry["cause"], name), []).append(limit)
+    rows: list[list[Entry]] = []
+    last = ""
+    for (cause, name), found in sizes.items():
+        words, unit = parameter(name)
+        seen = sorted(limit for limit in found if limit is not None)
+        low, high = (plain(seen[0], 2), plain(seen[-1], 2)) if seen else ("never", "never")
+        blind = len(found) - len(seen)
+        where = f"nowhere: these recordings say nothing ({len(found)} places)" if not seen else (
+            f"{len(seen)} of {len(found)}" if blind else "everywhere"
+        )  # fmt: skip
+        rows.append([cause if cause != last else "", words, Num(low), Num(high), unit, where])
+        last = cause
+    return table(
+        "Size that would have been noticed nine times in ten", ["cause", "parameter", "best place", "worst place",
+        "unit", "seen at"], rows, groups=True,
+        note="had it been there, in these very recordings",
+    )  # fmt: skip
+
+
+def _extended(folder: Path) -> list[Node] | None:
+    try:
+        files = sorted(path for path in folder.rglob("*") if path.is_file())
+    except OSError:
+        return None
+    if not files:
+        return None
+    rows: list[list[Entry]] = [
+        [el("code", path.relative_to(folder.parent).as_posix()), Num(size(path.stat().st_size))]
+        for path in files
+    ]
+    team = any(path.name == "team.xml" for path in files)
+    how: list[Child] = [
+        "The estimated team with the named causes in it: ", el("code", "team.xml"), " loads in plain MuJoCo, and ",
+        el("code", "mocobot simulate --model extended"), " takes the folder.",
+    ] if team else ["The model with the named causes in it; it loads in plain MuJoCo."]  # fmt: skip
+    return [
+        paragraph(*how, " Its own README says what is where."),
+        table("Files beside this report", ["file", "size"], rows),
+    ]

@@ -1,0 +1,1 @@
+"""An estimate's part of a report."""

@@ -1,0 +1,170 @@
+"""What the recordings leave of one rigid payload: gaps at the grasps, balance of forces and moments, their spectra."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import welch
+
+from estimator.errors import InputError
+from estimator.estimate.result import PayloadEstimate
+from estimator.recording.model import Recording
+from mocobot_report.blocks.blocks import Entry, bullets, paragraph, table, tabs, value, verdict
+from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.charts import Json, Key, chart, layout, log_axis, numbers, paint, shared
+from mocobot_report.blocks.html import Node, el
+from mocobot_report.blocks.series import Line, Panel, height, stacked, thinned
+from mocobot_report.sources import Source
+from mocobot_view.replay.replay_trial import ReplayTrial, replay_trial
+
+Array = NDArray[np.float64]
+
+AXES = (Key("x", "x", "c1"), Key("y", "y", "c2"), Key("z", "z", "c3"))
+SEGMENT_S = 10.0
+
+
+@dataclass(frozen=True)
+class Left:
+    """One quantity that is zero if all is well.
+
+    Attributes:
+        name: of it.
+        unit: of its values.
+        keys: one per column.
+        time: [s], shape (n,).
+        values: shape (n, C).
+    """
+
+    name: str
+    unit: str
+    keys: tuple[Key, ...]
+    time: Array
+    values: Array
+
+
+def signal_sections(book: Book, found: list[Source], e: PayloadEstimate) -> list[Node]:
+    """Plots of every recording that is still there, and what is missing."""
+    if not found:
+        return [
+            verdict(
+                "warn", "No plots over time",
+                "The file does not say which recordings it was made from; estimate again with this version "
+                "of mocobot.",
+            )
+        ]  # fmt: skip
+    panels: list[tuple[str, list[Node]]] = []
+    rows: list[list[Entry]] = []
+    missing: list[str] = []
+    head: list[str] = []
+    for source in found:
+        book.say(f"signals of {source.name}")
+        recording = source.read()
+        if isinstance(recording, str):
+            missing.append(recording)
+            continue
+        try:
+            trial = replay_trial(recording, source.name, e)
+        except InputError as error:
+            missing.append(str(error))
+            continue
+        left = _left(trial)
+        if not left:
+            missing.append(f"{source.name}: nothing can be said without grasps and a centre of mass")
+            continue
+        head = ["recording", *(f"{one.name} [{one.unit}]" for one in left)]
+        rows.append([source.name, *(value(rms(one.values), 2) for one in left)])
+        panels.append((source.name, _plots(book, recording, left, list(trial.notes))))
+    out: list[Node] = []
+    if panels:
+        out.append(
+            paragraph(
+                "With the estimated grasps, flanges and grasps must stay together, and the robots' forces and "
+                "moments must add up to what the payload's motion needs. What is left over is noise if the "
+                "estimate is right and the robots are as designed; a pattern in it is something that the model "
+                "does not have.",
+                kind="note",
+            )
+        )
+        if len({len(row) for row in rows}) == 1:
+            out.append(table("Left over, rms", head, rows))
+        out += tabs(book, "Recording", panels)
+    if missing:
+        out.append(verdict("warn", "Not all recordings could be shown"))
+        out[-1].append(bullets([f"{text}." for text in missing]))
+    return out
+
+
+def rms(values: Array) -> float:
+    """Root mean square of the rows' lengths."""
+    return float(np.sqrt(np.mean(np.sum(values**2, axis=1))))
+
+
+def _left(trial: ReplayTrial) -> list[Left]:
+    out = []
+    if trial.motion is not None and trial.robots > 1:
+        keys = tuple(Key(f"r{k + 1}", f"robot {k + 1}", f"r{k % 6 + 1}") for k in range(trial.robots))
+        out.append(Left("gap", "mm", keys, trial.time, 1e3 * trial.motion.gap_position_m))
+        out.append(Left("gap angle", "mrad", keys, trial.time, 1e3 * trial.motion.gap_rotation_rad))
+    if trial.balance is not None and trial.data is not None:
+        out.append(Left("force", "N", AXES, trial.data.time, trial.balance.force))
+        if trial.balance.moment is not None:
+            out.append(Left("moment", "N m", AXES, trial.data.time, trial.balance.moment))
+    return out
+
+
+def _plots(book: Book, recording: Recording, left: list[Left], notes: list[str]) -> list[Node]:
+    gaps, balance = [one for one in left if one.keys is not AXES], [one for one in left if one.keys is AXES]
+    out: list[Node] = []
+    if gaps:
+        out.append(_over_time(book, "Flanges and grasps apart", gaps, recording))
+    if balance:
+        out.append(_over_time(book, "Wrenches minus what the motion needs, in {1}", balance, recording))
+        spectra = [_spectrum(book, one) for one in balance]
+        out.append(el("div", *spectra, class_="pair"))
+    return [*out, *([bullets(notes)] if notes else [])]
+
+
+def _over_time(book: Book, title: str, left: list[Left], recording: Recording) -> Node:
+    panels = []
+    for one in left:
+        time, values = thinned(one.time, one.values)
+        lines = [Line(key, time, values[:, k]) for k, key in enumerate(one.keys)]
+        panels.append(Panel(one.name, one.unit, lines))
+    keys = left[0].keys
+    return chart(
+        book, title, stacked(panels), height=height(panels), keys=keys,
+        label=f"{title}, over time, {recording.name}; rms values are in the table.",
+    )  # fmt: skip
+
+
+def _spectrum(book: Book, one: Left) -> Node:
+    """Amplitude density of each component."""
+    step = float(np.median(np.diff(one.time)))
+    frequency, power = welch(
+        one.values, 1.0 / step, nperseg=min(len(one.time), round(SEGMENT_S / step)), axis=0
+    )
+    density = np.sqrt(power[1:])
+    shown = np.maximum(density, 1e-12)
+    data: list[Json] = [
+        {
+            "type": "scatter", "mode": "lines", "x": shared("f"), "y": numbers(shown[:, k]), "name": key.label,
+            "legendgroup": key.group, "line": {"color": paint(key.colour), "width": 1.4},
+            "hovertemplate": f"{key.label}, %{{x:.2f}} Hz: %{{y:.2g}} {one.unit}/√Hz<extra></extra>",
+        }
+        for k, key in enumerate(one.keys)
+    ]  # fmt: skip
+    figure: Json = {
+        "data": data,
+        "arrays": {"f": numbers(frequency[1:])},
+        "layout": layout(
+            xaxis=log_axis("frequency [Hz]", float(frequency[1]), float(frequency[-1])),
+            yaxis=log_axis(f"{one.unit}/√Hz", float(np.percentile(shown, 2)), float(shown.max())),
+            margin={"l": 64, "r": 12, "t": 8, "b": 44},
+        ),
+    }
+    return chart(
+        book, f"Spectrum of the {one.name} left over", figure, height=260, keys=one.keys,
+        label=f"Amplitude spectral density of the {one.name} that is left over.", note="filtered at 5 Hz",
+    )  # fmt: skip

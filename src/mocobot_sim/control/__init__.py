@@ -1,0 +1,1 @@
+"""Impedance control over SEA torque loops."""

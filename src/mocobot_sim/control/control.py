@@ -1,0 +1,206 @@
+"""Wrist impedance control of one Omnid team, with the SEA torque loop inside.
+
+Each robot sees only its own joints, as read by its own sensors (calibration errors included), and the design
+geometry. Per robot, at the control rate:
+
+    F     = K (ref - h) + D (ref_dot - h_dot) + F_ff               wrist force, in {b}
+    tau_d = (dh/dphi)^T F + tau_gravity(phi)                        desired spring torque
+    u     = tau_d + k_p (tau_d - tau) - k_d tau_dot                 motor torque
+
+F_ff takes the static load up from the measured wrist force during the first seconds and is then frozen: the
+controller never knows the payload.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, fields
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.arm.design import OmnidDesign
+from estimator.errors import InputError
+from mocobot_sim.control.kernel import update_team
+from mocobot_sim.control.kernel import wrist as wrist
+from mocobot_sim.scene.as_built import AsBuilt, units_of
+from mocobot_sim.scene.sensor_effects import SensorEffects
+from mocobot_sim.scene.team_index import TeamIndex
+
+Array = NDArray[np.float64]
+
+# Also refuses inf, NaN and whole numbers too large for a float.
+_LARGEST = sys.float_info.max
+
+
+@dataclass(frozen=True)
+class ControlGains:
+    """Gains of the wrist impedance and of the SEA torque loop.
+
+    Attributes:
+        rate_hz: control rate [Hz].
+        stiffness_N_per_m: K, isotropic.
+        damping_Ns_per_m: D, isotropic.
+        torque_gain: k_p [-].
+        torque_rate_gain_s: k_d [s].
+        rate_filter_s: time constant of the first-order filter on differenced phi and tau [s].
+        take_up_s: how long F_ff follows the measured wrist force [s].
+        take_up_time_constant_s: with which time constant it follows [s].
+        motor_torque_limit_Nm: saturation of u [N m].
+    """
+
+    rate_hz: float = 1000.0
+    stiffness_N_per_m: float = 400.0
+    damping_Ns_per_m: float = 50.0
+    torque_gain: float = 4.0
+    torque_rate_gain_s: float = 0.05
+    rate_filter_s: float = 0.002
+    take_up_s: float = 1.0
+    take_up_time_constant_s: float = 0.3
+    motor_torque_limit_Nm: float = 40.0
+
+    def to_dict(self) -> dict[str, float]:
+        """Plain numbers, keyed as documented for a recording's ``control``."""
+        return asdict(self)
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> ControlGains:
+        """Read the gains out of a recording's ``control`` (other keys there are left alone).
+
+        Raises:
+            InputError: a gain is missing or not a positive number.
+        """
+        gains = {}
+        for entry in fields(cls):
+            value = values.get(entry.name)
+            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= _LARGEST:
+                raise InputError(f"control.{entry.name} is {value!r}; it must be a number greater than 0")
+            gains[entry.name] = float(value)
+        return cls(**gains)
+
+
+class TeamController:
+    """Controller of all robots; holds their filter states and feed-forward forces.
+
+    Args:
+        index: addresses in the model.
+        design: geometry and masses that the robots believe in.
+        gains: control gains.
+        data: MuJoCo data of the trial; the controller reads ``qpos`` and writes ``ctrl`` in place.
+        as_built: sensor zeros of every unit; empty for robots as designed.
+        sensors: timing faults; only the torque's lag reaches the controller.
+        feed_forward: F_ff of every robot in its {b} [N], shape (N, 3), held from the start; None to take it up.
+        sensed: filled with what the sensors see, (phi, theta, torque) of one tick per row, shape (T, N, 3, 3).
+
+    Raises:
+        InputError: ``as_built`` or ``feed_forward`` does not match the number of robots.
+    """
+
+    def __init__(
+        self,
+        index: TeamIndex,
+        design: OmnidDesign,
+        gains: ControlGains,
+        data: mujoco.MjData,
+        as_built: Sequence[AsBuilt] = (),
+        sensors: SensorEffects | None = None,
+        feed_forward: Array | None = None,
+        sensed: Array | None = None,
+    ) -> None:
+        units = units_of(as_built, index.robots)
+        phi_zero = np.array([unit.phi_zero_rad for unit in units])
+        self._qpos, self._ctrl = data.qpos, data.ctrl
+        # (N, 4, leg or gimbal axis)
+        self._address = np.stack(
+            [index.motor_qpos, index.spring_qpos, index.actuator, index.gimbal_qpos], axis=1
+        )
+        self._offset = np.stack([home_phi(design) + phi_zero, [unit.tau_zero_Nm for unit in units]], axis=1)
+        self._constants = (
+            design.base_radius_m - design.platform_radius_m,
+            design.proximal_length_m,
+            design.rod_length_m,
+            design.sea_stiffness_Nm_per_rad,
+            # gravity torque per cos(phi) of a driven link that carries half its rod at the knee [N m]
+            design.gravity_mps2
+            * (
+                design.proximal_mass_kg * design.proximal_com_m
+                + 0.5 * design.rod_mass_kg * design.proximal_length_m
+            ),
+            # weight that hangs at the wrist [N]
+            design.gravity_mps2 * (design.wrist_mass_kg + 1.5 * design.rod_mass_kg),
+            gains.stiffness_N_per_m,
+            gains.damping_Ns_per_m,
+            gains.torque_gain,
+            gains.torque_rate_gain_s,
+            1.0 / gains.rate_hz,
+            1.0 / (1.0 + gains.rate_filter_s * gains.rate_hz),
+            1.0 / (gains.take_up_time_constant_s * gains.rate_hz),
+            gains.motor_torque_limit_Nm,
+        )
+        # phi, tau, their filtered rates, F_ff, torque before and after the sensor's lag
+        self._state = np.zeros((index.robots, 7, 3))
+        self._given = feed_forward is not None
+        if feed_forward is not None:
+            if np.shape(feed_forward) != (index.robots, 3) or not np.isfinite(feed_forward).all():
+                raise InputError(f"feed-forward is not {index.robots} x 3 finite forces; it must be, in N")
+            self._state[:, 4] = feed_forward
+        lag = (sensors or SensorEffects()).of("torque_lag_s", index.robots)
+        self._lag = np.array([_lag_filter(time_constant, 1.0 / gains.rate_hz) for time_constant in lag])
+        self._home = home_phi(design)
+        self._sensed = np.empty((1, index.robots, 3, 3)) if sensed is None else sensed
+        self._keep = sensed is not None
+        self._take_up_ticks = round(gains.take_up_s * gains.rate_hz)
+        self._tick = 0
+
+    @property
+    def feed_forward(self) -> Array:
+        """F_ff of every robot in its {b} [N], shape (N, 3)."""
+        return self._state[:, 4].copy()
+
+    @feed_forward.setter
+    def feed_forward(self, force: Array) -> None:
+        """Set F_ff, and take up no load from now on."""
+        self._state[:, 4] = force
+        self._given = True
+
+    def update(self, ref: Array, ref_dot: Array) -> None:
+        """One control tick: read ``qpos``, write ``ctrl``.
+
+        Args:
+            ref: commanded wrist positions in every robot's {b} [m], shape (N, 3).
+            ref_dot: their rates [m/s], shape (N, 3).
+        """
+        phase = 1 if self._tick < self._take_up_ticks and not self._given else 2
+        update_team(
+            self._qpos, self._ctrl, self._address, self._offset, self._constants, self._state,
+            ref, ref_dot, self._tick == 0, phase == 1, self._lag, self._home,
+            self._sensed[self._tick if self._keep else 0],
+        )  # fmt: skip
+        self._tick += 1
+
+
+def home_phi(design: OmnidDesign) -> float:
+    """Driven angle of every leg at the home height [rad]: where ``qpos`` = 0 in the MJCF."""
+    reach = design.base_radius_m - design.platform_radius_m
+    height = design.home_height_m
+    distance = np.hypot(reach, height)
+    # Triangle axis - knee - platform joint; the knee is outside the line from axis to platform joint.
+    cosine = (design.proximal_length_m**2 + distance**2 - design.rod_length_m**2) / (
+        2.0 * design.proximal_length_m * distance
+    )
+    return float(np.arctan2(height, -reach) - np.arccos(cosine))
+
+
+def _lag_filter(time_constant_s: float, period_s: float) -> tuple[float, float, float]:
+    """Coefficients of y = a y + b_old x_old + b_new x_new, exact for inputs that are straight between ticks.
+
+    Without a lag y = x, and all are zero.
+    """
+    if not time_constant_s:
+        return 0.0, 0.0, 0.0
+    a = float(np.exp(-period_s / time_constant_s))
+    held = time_constant_s / period_s * (1.0 - a)
+    return a, held - a, 1.0 - held

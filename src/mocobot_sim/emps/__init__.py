@@ -1,0 +1,1 @@
+"""The EMPS axis and its digital loop."""

@@ -1,0 +1,1 @@
+"""Extended models: folders that plain MuJoCo loads."""

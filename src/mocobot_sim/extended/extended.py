@@ -1,0 +1,219 @@
+"""Extended models: a team with its effects as a folder that plain MuJoCo loads and a trial can run on."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import uuid
+from collections.abc import Sequence
+from dataclasses import asdict, fields
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from estimator.errors import InputError
+from mocobot_sim.effects import Effect, effect_from_dict, effect_to_dict
+from mocobot_sim.effects.push import Push
+from mocobot_sim.extended.json import Fields, parse_object, poses_to_list
+from mocobot_sim.extended.readme import readme
+from mocobot_sim.scene.as_built import AsBuilt
+from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.scene.sensor_effects import SensorEffects
+from mocobot_sim.scene.team_index import TeamIndex
+
+FORMAT = "mocobot-extended-model"
+VERSION = 1
+SCENE, NUMBERS, README = "team.xml", "effects.json", "README.md"
+KEYS = (
+    "format", "version", "robots", "effects", "wrist_home_b_m", "theta_home_rad", "grasps", "mounts", "initial",
+    "as_built", "sensors", "grasp_slack_m", "extra",
+)  # fmt: skip
+
+
+def write_extended(scene: TeamScene, effects: Sequence[Effect], folder: Path, extra: dict[str, Any]) -> None:
+    """Write a scene, effects applied, as an extended model; the folder appears whole or not at all.
+
+    Args:
+        scene: what ``apply_effects`` returned.
+        effects: what was applied.
+        folder: to be created; an extended model that is there already is replaced.
+        extra: plain JSON values to keep with it.
+
+    Raises:
+        InputError: the folder is something else, or cannot be written, or ``extra`` is not plain JSON.
+    """
+    values: dict[str, Any] = {
+        "format": FORMAT,
+        "version": VERSION,
+        "robots": scene.robots,
+        "effects": [effect_to_dict(effect) for effect in effects],
+        "wrist_home_b_m": scene.wrist_home_b.tolist(),
+        "theta_home_rad": scene.theta_home.tolist(),
+        "grasps": poses_to_list(scene.X_1i),
+        "mounts": poses_to_list(scene.mounts),
+        "initial": scene.initial
+        and {
+            name: _list(angles) for name, angles in zip(("phi_rad", "theta_rad"), scene.initial, strict=True)
+        },
+        "as_built": [{key: value.tolist() for key, value in asdict(unit).items()} for unit in scene.units],
+        "sensors": {
+            entry.name: list(scene.sensors.of(entry.name, scene.robots)) for entry in fields(SensorEffects)
+        },
+        "grasp_slack_m": list(scene.grasp_slack_m or (0.0,) * scene.robots),
+        "extra": extra,
+    }
+    try:
+        text = json.dumps(values, indent=1, allow_nan=False) + "\n"
+    except (TypeError, ValueError, RecursionError) as error:
+        raise InputError(f"{folder}: what is to be kept cannot be written as JSON ({error})") from error
+    assets = scene.root.get_assets() if scene.xml is None else scene.assets
+    files = {
+        SCENE: scene.to_xml().encode(),
+        NUMBERS: text.encode(),
+        README: readme(values["effects"], scene.robots).encode(),
+        **assets,
+    }
+    _write_folder(Path(folder), files)
+
+
+def _list(angles: Any) -> list[list[float]]:
+    return [[float(angle) for angle in row] for row in angles]
+
+
+def _write_folder(folder: Path, files: dict[str, bytes]) -> None:
+    if folder.exists() and not _is_extended(folder):
+        raise InputError(f"{folder}: exists and is not an extended model; name a new folder")
+    mark = uuid.uuid4().hex
+    temporary, old = folder.parent / f".{mark}.tmp", folder.parent / f".{mark}.old"
+    try:
+        temporary.mkdir()
+        for name, content in files.items():
+            (temporary / name).write_bytes(content)
+        if folder.exists():
+            folder.rename(old)
+        temporary.rename(folder)
+    except OSError as error:
+        if old.exists() and not folder.exists():
+            old.rename(folder)
+        raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+        shutil.rmtree(old, ignore_errors=True)
+
+
+def _is_extended(folder: Path) -> bool:
+    try:
+        return json.loads((folder / NUMBERS).read_text(encoding="utf-8"))["format"] == FORMAT
+    except (OSError, ValueError, TypeError, KeyError):
+        return False
+
+
+def load_extended(folder: Path) -> TeamScene:
+    """Read an extended model; the scene runs like the one that was written, but takes no further effects.
+
+    Raises:
+        InputError: a file is missing or cannot be read, a key is unknown, missing or has a value that is not
+            allowed, or the MJCF is not the team that the numbers describe.
+    """
+    folder = Path(folder)
+    where = str(folder / NUMBERS)
+    values = parse_object(_read(folder / NUMBERS), where)
+    if values.get("format") != FORMAT or values.get("version") != VERSION or type(values["version"]) is bool:
+        raise InputError(
+            f"{where}: format and version are {values.get('format')!r:.60} and {values.get('version')!r:.60}; "
+            f"this program reads {FORMAT!r} {VERSION}"
+        )
+    read = Fields(values, KEYS, where)
+    robots = read.whole("robots")
+    effects = tuple(_effects(read.list("effects"), where))
+    assets = {
+        path.name: path.read_bytes()
+        for path in sorted(folder.iterdir())
+        if path.is_file() and path.name not in (SCENE, NUMBERS, README)
+    }
+    scene = TeamScene(
+        root=None,
+        robots=robots,
+        wrist_home_b=read.array("wrist_home_b_m", (robots, 3)),
+        theta_home=read.array("theta_home_rad", (robots, 3)),
+        X_1i=_poses(read, "grasps", robots),
+        units=_units(read, robots),
+        mounts=_poses(read, "mounts", robots),
+        initial=_initial(read, robots),
+        sensors=_sensors(read, robots),
+        pushes=tuple(effect for effect in effects if isinstance(effect, Push)),
+        grasp_slack_m=tuple(read.array("grasp_slack_m", (robots,)).tolist()),
+        effects=effects,
+        xml=_read(folder / SCENE),
+        assets=assets,
+    )
+    read.object("extra")
+    _check_model(scene, folder / SCENE)
+    return scene
+
+
+def extra_of(folder: Path) -> dict[str, Any]:
+    """What was kept with an extended model.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    path = Path(folder) / NUMBERS
+    return Fields(parse_object(_read(path), str(path)), KEYS, str(path)).object("extra")
+
+
+def _read(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, ValueError) as error:
+        detail = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: cannot be read ({detail}); an extended model has this file") from error
+
+
+def _effects(entries: list[Any], where: str) -> list[Effect]:
+    effects = []
+    for entry in entries:
+        try:
+            effects.append(effect_from_dict(entry))
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from error
+    return effects
+
+
+def _poses(read: Fields, key: str, robots: int) -> RigidTransform:
+    return read.poses(key, robots)
+
+
+def _units(read: Fields, robots: int) -> tuple[AsBuilt, ...]:
+    names = tuple(entry.name for entry in fields(AsBuilt))
+    entries = read.list("as_built", robots)
+    units = []
+    for i, entry in enumerate(entries, start=1):
+        unit = read.within(entry, names, f"as_built[{i}]")
+        units.append(AsBuilt(**{name: unit.array(name, (3,)) for name in names}))
+    return tuple(units)
+
+
+def _sensors(read: Fields, robots: int) -> SensorEffects:
+    names = tuple(entry.name for entry in fields(SensorEffects))
+    inner = read.within(read.object("sensors"), names, "sensors")
+    return SensorEffects(**{name: tuple(inner.array(name, (robots,)).tolist()) for name in names})
+
+
+def _initial(read: Fields, robots: int) -> tuple[NDArray[Any], NDArray[Any]] | None:
+    if read.values["initial"] is None:
+        return None
+    inner = read.within(read.object("initial"), ("phi_rad", "theta_rad"), "initial")
+    return inner.array("phi_rad", (robots, 3)), inner.array("theta_rad", (robots, 3))
+
+
+def _check_model(scene: TeamScene, path: Path) -> None:
+    try:
+        index = TeamIndex.of(scene.compile())
+    except (InputError, KeyError) as error:
+        text = " ".join(str(error).strip("\"'").split())
+        raise InputError(f"{path}: not the MJCF of a team ({text})") from error
+    if index.robots != scene.robots:
+        raise InputError(f"{path}: has {index.robots} robots; {NUMBERS} says {scene.robots}")

@@ -1,0 +1,41 @@
+"""The page that goes with an extended model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+
+def readme(effects: Sequence[Mapping[str, Any]], robots: int) -> str:
+    """Markdown for a user who finds the folder.
+
+    Args:
+        effects: as ``effect_to_dict`` gives them.
+        robots: number of robots.
+    """
+    rows = []
+    for effect in effects:
+        place = (
+            ", ".join(f"{name} {effect[name]}" for name in ("robot", "joint") if name in effect) or "payload"
+        )
+        numbers = ", ".join(f"`{name}` = {value:.6g}" for name, value in effect["parameters"].items())
+        rows.append(f"| `{effect['cause']}` | {place} | {numbers} |")
+    table = "\n".join(["| cause | where | parameters |", "|---|---|---|", *rows]) if rows else "None."
+    many = "1 Omnid" if robots == 1 else f"{robots} Omnids"
+    return f"""# Extended model
+
+A team of {many} and its payload in MuJoCo, with these effects built in:
+
+{table}
+
+- `team.xml`: the scene, complete. `mujoco.MjModel.from_xml_path("team.xml")` or MuJoCo's viewer loads it. What MJCF
+  cannot express is not in it: encoder and torque zeros, sensor timing, pushes.
+- `effects.json`: all numbers, those included.
+
+Simulate a trial with it:
+
+    mocobot simulate --model . --trajectory random --out trial.parquet
+
+From Python: `mocobot_sim.extended.extended.load_extended(folder)`, then `mocobot_sim.trial.trial.run_trial` or
+`mocobot_sim.trial.resimulate.rerun`.
+"""

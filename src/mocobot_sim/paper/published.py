@@ -1,0 +1,107 @@
+"""The paper's tables as data: ground truth of the four payloads (Table I) and published errors (II-V)."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator import so3
+from estimator.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class PayloadTruth:
+    """What is true of a payload; frames as in ``PayloadEstimate``.
+
+    Attributes:
+        name: label of the payload.
+        R_1i: rotations of the grasp frames in {1}, shape (N, 3, 3).
+        p_1i: their origins in {1} [m], shape (N, 3).
+        mass: mass [kg].
+        p_1c: centre of mass in {1} [m], shape (3,).
+        R_1c: principal axes in {1}, as columns, shape (3, 3).
+        principal_moments: about the axes of {c}, ascending [kg m^2], shape (3,).
+    """
+
+    name: str
+    R_1i: Array
+    p_1i: Array
+    mass: float
+    p_1c: Array
+    R_1c: Array
+    principal_moments: Array
+
+    @property
+    def inertia(self) -> Array:
+        """Inertia matrix in {b}: about the centre of mass, axes of {1} [kg m^2], shape (3, 3)."""
+        return self.R_1c @ np.diag(self.principal_moments) @ self.R_1c.T
+
+    def T(self, i: int, j: int) -> Array:
+        """Homogeneous transform T_ij, shape (4, 4); robots counted from 1."""
+        T = np.eye(4)
+        T[:3, :3] = self.R_1i[i - 1].T @ self.R_1i[j - 1]
+        T[:3, 3] = self.R_1i[i - 1].T @ (self.p_1i[j - 1] - self.p_1i[i - 1])
+        return T
+
+
+PAYLOADS = ("a", "b", "c", "d")
+
+
+def payload_truth(name: str) -> PayloadTruth:
+    """Table I for payload ``"a"``, ``"b"``, ``"c"`` or ``"d"``.
+
+    T_12 and T_31 are taken as printed; T_13 is the inverse of T_31, and T_23 follows.
+
+    Raises:
+        InputError: there is no such payload.
+    """
+    row = _payload(name)["truth"]
+    R_12, R_31 = so3.exp(np.deg2rad(row["R_12_deg"])), so3.exp(np.deg2rad(row["R_31_deg"]))
+    p_13 = -R_31.T @ np.array(row["p_31_m"])
+    return PayloadTruth(
+        name=name,
+        R_1i=np.stack([np.eye(3), R_12, R_31.T]),
+        p_1i=np.stack([np.zeros(3), np.array(row["p_12_m"]), p_13]),
+        mass=row["mass_kg"],
+        p_1c=np.array(row["p_1c_m"]),
+        R_1c=so3.exp(np.deg2rad(row["R_1c_deg"])),
+        principal_moments=np.array(row["principal_kgm2"]),
+    )
+
+
+def published_errors(name: str) -> dict[str, Any]:
+    """Tables II-V for a payload, keys as of ``mocobot_sim.paper.scoring.score``; inertia under ``"all"`` only.
+
+    Raises:
+        InputError: there is no such payload.
+    """
+    return _payload(name)["errors"]
+
+
+def printed_truth(name: str) -> dict[str, Any]:
+    """The row of Table I exactly as printed (degrees, metres), T_23 included.
+
+    Raises:
+        InputError: there is no such payload.
+    """
+    return _payload(name)["truth"]
+
+
+def _payload(name: str) -> dict[str, Any]:
+    tables = _tables()
+    if name not in tables:
+        raise InputError(f"there is no payload {name!r} in the paper; it has {', '.join(sorted(tables))}")
+    return tables[name]
+
+
+@cache
+def _tables() -> dict[str, Any]:
+    return tomllib.loads(files("mocobot_sim.paper").joinpath("published.toml").read_text(encoding="utf-8"))

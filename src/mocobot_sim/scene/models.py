@@ -1,0 +1,56 @@
+"""Where the hand-written models are: in the repository, or inside an installed wheel."""
+
+from __future__ import annotations
+
+from functools import cache
+from pathlib import Path
+
+import mujoco
+
+from estimator.arm.design import OmnidDesign, load_design
+from estimator.errors import InputError
+
+
+@cache
+def models_dir() -> Path:
+    """Folder that holds ``omnid`` and ``payload_*``.
+
+    Raises:
+        FileNotFoundError: the installation carries no models.
+    """
+    here = Path(__file__).resolve()
+    for folder in (here.parents[1] / "mjcf", here.parents[3] / "models"):
+        if (folder / "omnid" / "omnid.xml").is_file():
+            return folder
+    raise FileNotFoundError("the mocobot models are missing from this installation")
+
+
+def payload_names() -> list[str]:
+    """Names of the shipped payloads, such as ``a``."""
+    return sorted(path.name.removeprefix("payload_") for path in models_dir().glob("payload_*"))
+
+
+def payload_path(name: str) -> Path:
+    """MJCF file of a shipped payload.
+
+    Raises:
+        InputError: there is no payload of that name.
+    """
+    if name not in payload_names():
+        raise InputError(f"payload {name!r} does not exist; the payloads are {', '.join(payload_names())}")
+    return models_dir() / f"payload_{name}" / "payload.xml"
+
+
+@cache
+def omnid_design() -> OmnidDesign:
+    """Design numbers of the shipped Omnid model."""
+    return load_design(models_dir() / "omnid" / "design.toml")
+
+
+@cache
+def base_height_m() -> float:
+    """Height of {b} over the floor mount of an Omnid, whose axes it shares [m]."""
+    model = mujoco.MjModel.from_xml_path(str(models_dir() / "omnid" / "omnid.xml"))
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    return float(data.body("base").xpos[2])

@@ -1,0 +1,118 @@
+"""A payload's MJCF: one rigid body, its frame at the first grasp, a site at every grasp."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from estimator.errors import InputError
+from mocobot_sim.scene.models import payload_path
+from mocobot_sim.scene.pymjcf import mjcf
+
+OWN_COMPILER_SETTINGS = ("angle", "autolimits", "eulerseq", "assetdir", "meshdir", "texturedir")
+# What else a payload's file may hold: the rest of MJCF would act on the robots too, or on the payload from outside.
+OWN_ELEMENTS = ("asset", "compiler", "default", "statistic", "visual", "worldbody")
+GRASP = re.compile(r"grasp([0-9]+)")
+
+
+def load_payload(payload: str | Path) -> mjcf.RootElement:
+    """Read a payload's MJCF.
+
+    Args:
+        payload: name of a shipped payload, or path of an ``.xml`` file.
+
+    Raises:
+        InputError: it cannot be read, or something in it would act on the robots, too.
+    """
+    path = Path(payload) if Path(payload).suffix == ".xml" else payload_path(str(payload))
+    try:
+        root = mjcf.from_path(str(path))
+    except (OSError, ValueError, AttributeError, KeyError, SyntaxError) as error:
+        raise InputError(f"{path}: not a readable MJCF ({error})") from error
+    if root.compiler.angle != "radian":
+        # The composed scene has one compiler setting for all parts; degrees here would be read as radians.
+        raise InputError(f'{path}: compiler angle is {root.compiler.angle or "degree"}; it must be "radian"')
+    own = set(root.compiler.get_attributes()) - set(OWN_COMPILER_SETTINGS)
+    if own:
+        raise InputError(
+            f"{path}: compiler setting {min(own)!r} would act on the robots too; "
+            f"the payload may set {', '.join(OWN_COMPILER_SETTINGS)}"
+        )
+    foreign = [child.tag for child in root.all_children() if child.tag not in OWN_ELEMENTS and _is_set(child)]
+    if foreign:
+        raise InputError(
+            f"{path}: <{foreign[0]}> would act on the whole team; "
+            f"the payload may have {', '.join(f'<{tag}>' for tag in OWN_ELEMENTS)}"
+        )
+    root.model = "payload"
+    return root
+
+
+def _is_set(element: Any) -> bool:
+    """Whether the file says anything in an element; PyMJCF has empty ones for all that it does not."""
+    return bool(element.get_attributes()) or any(_is_set(child) for child in element.all_children())
+
+
+def grasp_frames(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
+    """Grasp frames X_1i, N transforms; from the compiled payload, so every MJCF orientation attribute works.
+
+    Raises:
+        InputError: MuJoCo cannot compile it, or it is not one rigid body ``payload`` with sites ``grasp1`` ..
+            ``graspN``, the first at its origin.
+    """
+    try:
+        model = mujoco.MjModel.from_xml_string(payload_root.to_xml_string(), payload_root.get_assets())
+    except ValueError as error:
+        raise InputError(
+            f"{where}: MuJoCo cannot compile the payload ({' '.join(str(error).split())})"
+        ) from error
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    numbers = sorted(int(n[1]) for i in range(model.nsite) if (n := GRASP.fullmatch(model.site(i).name)))
+    if not numbers or numbers != list(range(1, len(numbers) + 1)):
+        missing = next(n for n in range(1, len(numbers) + 2) if n not in numbers)
+        raise InputError(f"{where}: the payload has no site 'grasp{missing}'; it needs grasp1 .. graspN")
+    ids = [model.site(f"grasp{n}").id for n in numbers]
+    _check_rigid(model, where)
+    if not np.isfinite(data.site_xpos).all():
+        raise InputError(f"{where}: the payload has a site whose position is not finite")
+    if (
+        np.abs(data.site_xpos[ids[0]]).max() > 1e-9
+        or np.abs(data.site_xmat[ids[0]] - np.eye(3).ravel()).max() > 1e-9
+    ):
+        raise InputError(
+            f"{where}: site 'grasp1' must be at the origin of body 'payload', and that at the world's"
+        )
+    X_Wi = RigidTransform.from_components(
+        data.site_xpos[ids], Rotation.from_matrix(data.site_xmat[ids].reshape(-1, 3, 3))
+    )
+    return X_Wi[0].inv() * X_Wi
+
+
+def _check_rigid(model: mujoco.MjModel, where: str) -> None:
+    """The payload is one rigid body ``payload`` with all the mass: the ground truth is read from it."""
+    body = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "payload")
+    if body < 0:
+        raise InputError(f"{where}: the payload has no body 'payload'")
+    if model.njnt:
+        raise InputError(f"{where}: the payload has joints, {model.njnt} of them; it must be rigid")
+    if model.body_mocapid[body] >= 0 or model.body_gravcomp.any():
+        raise InputError(
+            f"{where}: the payload must be free to move and have its weight: no mocap, no gravcomp"
+        )
+    if (model.geom_bodyid == 0).any():
+        # It would ride on robot 1's flange with the payload, its mass unseen by the ground truth.
+        raise InputError(f"{where}: a geom stands in the world; all geoms must be in body 'payload'")
+    numbers = [*model.body_mass, *model.body_inertia[body], *model.body_ipos[body]]
+    if not np.isfinite(numbers).all():
+        raise InputError(f"{where}: the payload's mass, inertia or centre of mass is not finite")
+    if not model.body_mass[body] > 0 or model.body_mass.sum() != model.body_mass[body]:
+        raise InputError(
+            f"{where}: body 'payload' weighs {model.body_mass[body]:g} kg of {model.body_mass.sum():g} kg; "
+            "it must carry all the mass, and some"
+        )

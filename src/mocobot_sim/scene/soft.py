@@ -1,0 +1,101 @@
+"""Exact linear springs and dampers made of soft equality constraints, solved together with the stiff ones.
+
+A passive spring or damper on a light body is unstable at 1 ms, or is integrated implicitly where the constraint
+solver cannot see it and pulls the welds open. A soft ``equality`` row is part of the solver's own problem. MuJoCo
+gives a row that keeps a coordinate x at zero the force
+
+    R f = -(B x_dot + K d x + x_ddot),   K = s / d^2,  B = b / d,  R = (1 - d) / d * A
+
+for ``solref = (-s, -b)``, a constant impedance d = ``solimp[0] = solimp[1]`` and A, MuJoCo's inverse inertia of the
+coordinate in the model's zero pose. So x has stiffness s / ((1 - d) A), or, with s = 0, damping b / ((1 - d) A).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import mujoco
+import numpy as np
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
+
+# Of d and of 1 - d: MuJoCo clips d to this range.
+_LEAST = 1e-4
+# As stiff as the welds: (4 ms)^-2; a third of it with a small (1 - d) would still be.
+_STIFFNESS_PER_S2 = 62500.0
+_STIFFEST_PER_S2 = 250000.0
+# A rate that stops a coordinate within one step of 1 ms.
+_DAMPING_PER_S = 1000.0
+
+
+@dataclass(frozen=True)
+class SoftRow:
+    """An ``equality`` on one joint or fixed tendon that acts as a spring or as a damper.
+
+    Attributes:
+        equality: its name in the scene.
+        compliance: of the spring [m/N or rad/(N m)], or None.
+        damping: of the damper [N s/m or N m s/rad], or None.
+    """
+
+    equality: str
+    compliance: float | None = None
+    damping: float | None = None
+
+
+def spring_parameters(compliance: float, inverse_inertia: float) -> tuple[list[float], list[float]]:
+    """``solref`` and ``solimp`` of a critically damped spring.
+
+    Args:
+        compliance: of the spring, greater than 0 [m/N or rad/(N m)].
+        inverse_inertia: A, as MuJoCo has it [1/kg or 1/(kg m^2)].
+    """
+    s = min(_STIFFNESS_PER_S2, 0.5 * inverse_inertia / compliance)
+    soft = s * compliance / inverse_inertia
+    if soft < _LEAST:
+        soft, s = _LEAST, min(_LEAST * inverse_inertia / compliance, _STIFFEST_PER_S2)
+    return [-s, -2.0 * np.sqrt(s)], _constant_impedance(1.0 - soft)
+
+
+def damper_parameters(damping: float, inverse_inertia: float) -> tuple[list[float], list[float]]:
+    """``solref`` and ``solimp`` of a linear damper; arguments as in ``spring_parameters``."""
+    rate = damping * inverse_inertia
+    impedance = max(1.0 - _DAMPING_PER_S / rate, _LEAST)
+    return [-1e-12, -(1.0 - impedance) * rate], _constant_impedance(impedance)
+
+
+def _constant_impedance(d: float) -> list[float]:
+    return [float(d), float(d), 0.001, 0.5, 2.0]
+
+
+def tuned(scene: TeamScene) -> TeamScene:
+    """Set every soft row for the inertias that the scene has now; returns the scene, edited in place."""
+    if not scene.soft:
+        return scene
+    model = scene.compile()
+    for row in scene.soft:
+        equality = model.equality(row.equality).id
+        on = model.eq_obj1id[equality]
+        if model.eq_type[equality] == mujoco.mjtEq.mjEQ_TENDON:
+            inverse_inertia = float(model.tendon_invweight0[on])
+        else:
+            inverse_inertia = float(model.dof_invweight0[model.jnt_dofadr[on]])
+        if row.compliance is not None:
+            solref, solimp = spring_parameters(row.compliance, inverse_inertia)
+        else:
+            assert row.damping is not None
+            solref, solimp = damper_parameters(row.damping, inverse_inertia)
+        element = scene.root.find("equality", row.equality)
+        element.solref, element.solimp = solref, solimp
+    return scene
+
+
+def row_compliance(model: mujoco.MjModel, joint: int) -> float:
+    """Compliance of the spring row that holds a joint at zero, read back from the model; 0 if there is none."""
+    for k in range(model.neq):
+        if model.eq_type[k] == mujoco.mjtEq.mjEQ_JOINT and model.eq_obj1id[k] == joint:
+            s, soft = -model.eq_solref[k, 0], 1.0 - model.eq_solimp[k, 0]
+            return float(soft * model.dof_invweight0[model.jnt_dofadr[joint]] / s)
+    return 0.0

@@ -1,0 +1,1 @@
+"""Trials: what is commanded, simulated and recorded."""

@@ -1,0 +1,157 @@
+"""Start a trial at rest: close every loop at home, then load the springs so that nothing moves."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.errors import InputError
+from mocobot_sim.control.control import home_phi
+from mocobot_sim.scene.models import omnid_design
+from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.scene.soft import row_compliance
+from mocobot_sim.scene.team_index import TeamIndex
+from mocobot_sim.trial.loops import close, hang, loop_jacobian, open_by, turn_free_directions
+
+Array = NDArray[np.float64]
+
+# How far closing the loops may move a wrist or turn a gimbal from where the scene has them.
+LARGEST_SHIFT_M = 0.06
+LARGEST_TURN_RAD = 0.2
+UNHELD_NM = 1e-6
+
+
+def assemble_at_home(scene: TeamScene, model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex) -> Array:
+    """Set ``data`` to static equilibrium in the home pose, or near ``scene.initial``, and return the spring torques.
+
+    Platforms and gimbals go to their home values, the legs follow by Newton steps on MuJoCo's own constraint
+    Jacobian, and the springs take the static load. With N robots the load's distribution has free internal
+    forces; the one with the least sum of squared spring torques is taken. Where home cannot close the loops (tilted
+    bases, mounts that are estimates), all joints share the correction; yielding bases and grasps settle under their
+    loads, and pendulums hang down.
+
+    Returns:
+        Spring torques [N m] at rest, positive raising the link, shape (N, 3); also written to ``data.ctrl``.
+
+    Raises:
+        InputError: no configuration near home closes the loops (a grasp is out of reach), or no spring
+            torques hold the payload at rest there (one or two grasps leave it free to swing).
+    """
+    mujoco.mj_resetData(model, data)
+    legs = np.concatenate([index.motor_dof.ravel(), index.knee_dof.ravel()])
+    arms = np.concatenate([legs, index.slide_dof.ravel(), index.gimbal_dof.ravel()])
+    if scene.initial is None:
+        design_home = np.array([0.0, 0.0, omnid_design().home_height_m])
+        data.qpos[index.slide_qpos] = scene.wrist_home_b - design_home
+        data.qpos[index.gimbal_qpos] = scene.theta_home
+        close(model, data, legs)
+    else:
+        phi, theta = scene.initial
+        data.qpos[index.motor_qpos] = phi - home_phi(omnid_design())
+        data.qpos[index.gimbal_qpos] = theta
+        # Rods alone: knees and platforms follow the driven angles.
+        close(model, data, np.concatenate([index.knee_dof.ravel(), index.slide_dof.ravel()]), welds=False)
+    start = data.qpos.copy()
+    _close_arms(model, data, index, arms, start)
+    # Two or three times, because where things yield the loads shift a little.
+    for _ in range(3):
+        if not _settle(model, data, index, arms, start):
+            break
+        _close_arms(model, data, index, arms, start)
+    torque = _static_forces(model, data, index)[0]
+    deflection = _deflection(model, index, torque)
+    data.qpos[index.spring_qpos] += deflection
+    data.qpos[index.motor_qpos] -= deflection
+    data.ctrl[index.actuator] = torque
+    mujoco.mj_forward(model, data)
+    return torque
+
+
+def _close_arms(
+    model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex, arms: NDArray[np.intp], start: Array
+) -> None:
+    gap = open_by(model, data)
+    if gap > 1e-9:
+        before = data.qpos.copy()
+        gap = close(model, data, arms)
+        shift = np.abs(data.qpos[index.slide_qpos] - start[index.slide_qpos]).max()
+        turn = np.abs(data.qpos[index.gimbal_qpos] - start[index.gimbal_qpos]).max()
+        if not (gap <= 1e-9 and shift <= LARGEST_SHIFT_M and turn <= LARGEST_TURN_RAD):
+            data.qpos[:] = before
+            raise InputError(
+                f"the team cannot be assembled: a loop stays open by {open_by(model, data):.2g} m; "
+                "the grasps' heights and tilts must be within the arms' reach"
+            )
+
+
+def _settle(
+    model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex, arms: NDArray[np.intp], start: Array
+) -> bool:
+    """Put everything that yields where its load holds it; whether anything moved."""
+    moved = hang(model, data, index.slosh_dof)
+    _, unheld, load = _static_forces(model, data, index, check=False)
+    if unheld > UNHELD_NM:
+        locked = np.concatenate([index.motor_dof.ravel(), index.spring_dof.ravel()])
+        if not turn_free_directions(model, data, index, locked, arms) or not _near(data, index, start):
+            raise _swings(unheld)
+        return True
+    for dof in index.yielding_dof:
+        joint = model.dof_jntid[dof]
+        compliance = row_compliance(model, int(joint))
+        if compliance:
+            data.qpos[model.jnt_qposadr[joint]] = compliance * load[dof]
+            moved = True
+        elif model.jnt_limited[joint] and abs(load[dof]) > 1e-3:
+            data.qpos[model.jnt_qposadr[joint]] = model.jnt_range[joint, int(load[dof] > 0)]
+            moved = True
+    return moved
+
+
+def _swings(unheld: float) -> InputError:
+    return InputError(
+        f"the payload cannot rest in the home pose: {unheld:.2g} N m stay unbalanced; with one or two "
+        "grasps its centre of mass must hang under them"
+    )
+
+
+def _near(data: mujoco.MjData, index: TeamIndex, start: Array) -> bool:
+    return bool(np.abs(data.qpos[index.gimbal_qpos] - start[index.gimbal_qpos]).max() <= LARGEST_TURN_RAD)
+
+
+def _static_forces(
+    model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex, check: bool = True
+) -> tuple[Array, float, Array]:
+    """Spring torques (N, 3) that hold the team, what they leave unheld, and the load on every dof (nv,)."""
+    mujoco.mj_fwdPosition(model, data)
+    mujoco.mj_fwdVelocity(model, data)
+    spring = index.spring_dof.ravel()
+    # The floor carries released bases: their wheels settle in a trial's first milliseconds.
+    apart = np.concatenate([index.motor_dof.ravel(), index.yielding_dof, index.slosh_dof, index.base_dof])
+    rows = np.setdiff1d(np.arange(model.nv), apart)
+    jacobian = loop_jacobian(model, data)[0].T  # (nv, loops)
+    constraint = jacobian[rows]
+    selection = (rows[:, None] == spring).astype(float)  # (rows, 3 N)
+    needed = data.qfrc_bias - data.qfrc_passive
+    # Constraint forces are free, spring torques cost: weigh the former out of the least-norm solution.
+    free = 1e4
+    forces = np.hstack([free * constraint, selection])
+    solution = np.linalg.lstsq(forces, needed[rows])[0]
+    unheld = float(np.abs(forces @ solution - needed[rows]).max())
+    if check and unheld > UNHELD_NM:
+        raise _swings(unheld)
+    load = jacobian @ (free * solution[: jacobian.shape[1]]) - needed
+    return solution[jacobian.shape[1] :].reshape(index.spring_dof.shape), unheld, load
+
+
+def _deflection(model: mujoco.MjModel, index: TeamIndex, torque: Array) -> Array:
+    """Deflections of the springs under a torque [rad], shape (N, 3)."""
+    springs = model.dof_jntid[index.spring_dof]
+    stiffness, poly = model.jnt_stiffness[springs], model.jnt_stiffnesspoly[springs]
+    deflection = -torque / stiffness
+    cubic = poly[..., 1]
+    if cubic.any():
+        for _ in range(50):
+            excess = stiffness * deflection + cubic * deflection**3 + torque
+            deflection = deflection - excess / (stiffness + 3.0 * cubic * deflection**2)
+    return deflection

@@ -1,0 +1,91 @@
+"""Run a recording's commands again in closed loop, and what its sensors should then have read."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.errors import InputError
+from estimator.recording.model import Recording
+from mocobot_sim.control.control import ControlGains
+from mocobot_sim.scene.scene import TIMESTEP_S, TeamScene
+from mocobot_sim.trial.sensors import measure, sensor_preset
+from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
+from mocobot_sim.trial.trial import TrialLog, run_trial
+
+Array = NDArray[np.float64]
+
+
+def rerun(
+    recording: Recording,
+    scene: TeamScene,
+    gains: ControlGains | None = None,
+    timestep_s: float = TIMESTEP_S,
+    trial_number: int | None = None,
+) -> TrialLog:
+    """Simulate a recording's commands with another team.
+
+    The robots follow the recorded commands with the recorded gains and the recorded, frozen feed-forward force; they
+    start at rest near the recorded first posture. A take-up phase is not repeated: the first seconds differ.
+
+    Args:
+        recording: with commands and ``control`` (see docs/recording.md).
+        scene: the team that is to do it.
+        gains: control gains; None for the recorded ones.
+        timestep_s: integration step [s].
+        trial_number: which trial this is, from 1, for the scene's pushes; None lets all act.
+
+    Raises:
+        InputError: the recording has no commands or no control, or is for another number of robots or another rate.
+        TrialError: the physics cannot be trusted.
+    """
+    meta = recording.metadata
+    if recording.ref is None:
+        raise InputError(
+            f"{recording.name}: has no commands (ref_x, ref_y, ref_z); running it again needs them"
+        )
+    if meta.control is None:
+        raise InputError(f"{recording.name}: metadata has no 'control'; running it again needs it")
+    if meta.robots != scene.robots:
+        raise InputError(f"{recording.name}: is of {meta.robots} robots; the scene has {scene.robots}")
+    if meta.rate_hz != RATE_HZ:
+        raise InputError(f"{recording.name}: rate_hz is {meta.rate_hz:g}; running it again needs {RATE_HZ:g}")
+    feed_forward = _feed_forward(recording)
+    try:
+        gains = gains or ControlGains.from_dict(meta.control)
+    except InputError as error:
+        raise InputError(f"{recording.name}: {error}") from error
+    phi = recording.phi[0] - [unit.phi_zero_rad for unit in scene.units]
+    theta = recording.theta[0] - [unit.theta_zero_rad for unit in scene.units]
+    return run_trial(
+        replace(scene, initial=(phi, theta)),
+        Trajectory(meta.trial, recording.ref),
+        gains,
+        trial_number=trial_number,
+        feed_forward=feed_forward,
+        timestep_s=timestep_s,
+    )
+
+
+def _feed_forward(recording: Recording) -> Array:
+    control = recording.metadata.control or {}
+    given = control.get("feed_forward_N")
+    robots = recording.metadata.robots
+    try:
+        force = np.array(given, dtype=float)
+    except (TypeError, ValueError, OverflowError):
+        force = np.array(np.nan)
+    if force.shape != (robots, 3) or not np.isfinite(force).all():
+        text = json.dumps(given)
+        raise InputError(
+            f"{recording.name}: control.feed_forward_N is {text:.60}; it must be {robots} x 3 finite numbers"
+        )
+    return force
+
+
+def predicted(log: TrialLog) -> Recording:
+    """What ideal sensors read in a trial, the scene's zeros and timing faults included."""
+    return measure(log, sensor_preset("ideal"), np.random.default_rng(0), name="predicted")

@@ -1,0 +1,144 @@
+"""From a payload's name to recordings: build the team, run a trial, read it through the sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from estimator.errors import InputError
+from estimator.recording.model import Recording
+from mocobot_sim.control.control import ControlGains
+from mocobot_sim.scene.as_built import AsBuilt
+from mocobot_sim.scene.scene import TeamScene, build_team
+from mocobot_sim.trial.sensors import PRESETS, SensorPreset, measure
+from mocobot_sim.trial.trajectories import Trajectory, random_vias, sphere_motion, static_orientations
+from mocobot_sim.trial.trial import TrialLog, run_trial
+from mocobot_sim.trial.truth import GroundTruth
+
+TRIALS = ("random", "periodic", "static")
+
+
+@dataclass(frozen=True)
+class TrialRequest:
+    """One trial to simulate; equal requests give equal bits.
+
+    Attributes:
+        payload: name of a shipped payload, or path of a payload MJCF.
+        trial: ``random``, ``periodic`` or ``static``.
+        seed: seed of everything random, at least 0.
+        number: which of several trials of that kind, at least 0.
+        vias: number of vias of a random trial.
+        duration_s: length of a periodic trial's motion [s].
+    """
+
+    payload: str
+    trial: str
+    seed: int = 0
+    number: int = 0
+    vias: int = 80
+    duration_s: float = 60.0
+
+    @property
+    def label(self) -> str:
+        """Name of the payload: a custom payload goes by its file's name."""
+        return Path(self.payload).stem
+
+    def rng(self, purpose: str) -> np.random.Generator:
+        """Independent stream for one purpose of this trial."""
+        words = f"{purpose}|{self.label}|{self.trial}|{self.number}".encode()
+        return np.random.default_rng(np.random.SeedSequence([self.seed, *words]))
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """A finished trial.
+
+    Attributes:
+        recordings: one per sensor preset.
+        log: what truly happened.
+        truth: the payload and the robots.
+    """
+
+    recordings: dict[str, Recording]
+    log: TrialLog
+    truth: GroundTruth
+
+
+def simulate(
+    request: TrialRequest,
+    presets: Sequence[SensorPreset],
+    grasps: RigidTransform | None = None,
+    gains: ControlGains | None = None,
+    progress: Callable[[int], object] | None = None,
+    scene: TeamScene | None = None,
+) -> Simulated:
+    """Run one trial and read it through one or several sensor presets.
+
+    Presets with the same calibration spread share the trial: noise and quantisation of the logged channels do not
+    act on the motion. The units of a team depend on the seed alone, so they are the same in all its trials.
+
+    Args:
+        request: what to simulate.
+        presets: sensor presets, all with the same calibration spread.
+        grasps: grasp frames X_1i that the robots believe in when they construct periodic and static
+            trajectories, N transforms; None for the true ones.
+        gains: control gains; None for the defaults.
+        progress: called with the number of samples done since the last call.
+        scene: the team, in place of one built from ``request.payload``, which then is its label only; its robots are
+            what they are, so the presets must be calibrated ones.
+
+    Raises:
+        InputError: a request or preset that cannot be met.
+        TrialError: the physics of the trial cannot be trusted.
+    """
+    if request.trial not in TRIALS:
+        raise InputError(f"trial {request.trial!r} does not exist; the trials are {', '.join(TRIALS)}")
+    if len({preset.spread for preset in presets}) != 1:
+        raise InputError("presets of one trial must share their calibration spread")
+    if request.seed < 0:
+        raise InputError(f"seed is {request.seed}; it must be at least 0")
+    if scene is None:
+        scene = build_team(request.payload, draw_units(request.payload, presets[0], request.seed))
+    elif not presets[0].calibrated:
+        raise InputError(
+            f"preset {presets[0].name!r} draws robots of its own, but the model already says how its robots deviate; "
+            f"use {' or '.join(name for name, preset in PRESETS.items() if preset.calibrated)}"
+        )
+    trajectory = make_trajectory(request, scene, grasps)
+    log = run_trial(scene, trajectory, gains, progress, trial_number=request.number + 1)
+    recordings = {
+        preset.name: measure(
+            log,
+            preset,
+            request.rng(f"sensors {preset.name}"),
+            payload=request.label,
+            seed=request.seed,
+            name=f"{request.label}_{request.trial}{request.number}_{preset.name}",
+        )
+        for preset in presets
+    }
+    return Simulated(recordings, log, GroundTruth.of(scene))
+
+
+def draw_units(payload: str, preset: SensorPreset, seed: int) -> tuple[AsBuilt, ...]:
+    """The robots that carry a payload: as designed (empty) if the preset is calibrated, else drawn from the seed."""
+    if preset.calibrated:
+        return ()
+    return preset.spread.draw(build_team(payload).robots, np.random.default_rng([seed, *b"units"]))
+
+
+def make_trajectory(
+    request: TrialRequest, scene: TeamScene, grasps: RigidTransform | None = None
+) -> Trajectory:
+    """Commands of a request (arguments as in ``simulate``)."""
+    home, X_1i = scene.wrist_home_b, scene.X_1i if grasps is None else grasps
+    rng = request.rng("trajectory")
+    if request.trial == "random":
+        return random_vias(home, rng, vias=request.vias)
+    if request.trial == "periodic":
+        return sphere_motion(home, X_1i, duration_s=request.duration_s, rng=rng)
+    return static_orientations(home, X_1i)

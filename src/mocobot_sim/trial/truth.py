@@ -1,0 +1,112 @@
+"""Ground truth of a scene's payload, read back from the compiled MuJoCo model, and its sidecar file."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from estimator.errors import InputError
+from mocobot_sim.effects import Effect, effect_to_dict
+from mocobot_sim.scene.as_built import AsBuilt
+from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.scene.team_index import TeamIndex
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class GroundTruth:
+    """The payload, and the robots, as MuJoCo simulates them.
+
+    Attributes:
+        R_1i: grasp orientations in {1}, shape (N, 3, 3).
+        p_1i: grasp positions in {1} [m], shape (N, 3).
+        mass_kg: mass.
+        p_1c: centre of mass in {1} [m], shape (3,).
+        R_1c: principal axes in {1}, moments ascending, shape (3, 3).
+        principal_kgm2: principal moments of inertia, ascending, shape (3,).
+        units: how each robot deviates from the design, N entries.
+        effects: what else was hidden in the team.
+    """
+
+    R_1i: Array
+    p_1i: Array
+    mass_kg: float
+    p_1c: Array
+    R_1c: Array
+    principal_kgm2: Array
+    units: tuple[AsBuilt, ...]
+    effects: tuple[Effect, ...] = ()
+
+    @classmethod
+    def of(cls, scene: TeamScene) -> GroundTruth:
+        """Read the truth from the compiled scene."""
+        model = scene.compile()
+        data = mujoco.MjData(model)
+        mujoco.mj_kinematics(model, data)
+        index = TeamIndex.of(model)
+        body = index.payload_body
+        R_W = data.site_xmat[index.payload_site].reshape(-1, 3, 3)
+        p_W = data.site_xpos[index.payload_site]
+        R_1W = R_W[0].T
+        R_1c = R_1W @ data.ximat[body].reshape(3, 3)
+        order = np.argsort(model.body_inertia[body])
+        R_1c = R_1c[:, order]
+        R_1c[:, 2] = np.cross(R_1c[:, 0], R_1c[:, 1])
+        return cls(
+            R_1i=R_1W @ R_W,
+            p_1i=(p_W - p_W[0]) @ R_1W.T,
+            mass_kg=float(model.body_mass[body]),
+            p_1c=R_1W @ (data.xipos[body] - p_W[0]),
+            R_1c=R_1c,
+            principal_kgm2=model.body_inertia[body][order].copy(),
+            units=scene.units,
+            effects=scene.effects,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """JSON-able form, units in the keys; orientations as rotation vectors in degrees."""
+        return {
+            "grasps": [
+                {"p_1i_m": p.tolist(), "R_1i_rotvec_deg": _rotvec_deg(R)}
+                for p, R in zip(self.p_1i, self.R_1i, strict=True)
+            ],
+            "mass_kg": self.mass_kg,
+            "p_1c_m": self.p_1c.tolist(),
+            "R_1c_rotvec_deg": _rotvec_deg(self.R_1c),
+            "principal_inertia_kgm2": self.principal_kgm2.tolist(),
+            "as_built": [{key: value.tolist() for key, value in asdict(unit).items()} for unit in self.units],
+            "effects": [effect_to_dict(effect) for effect in self.effects],
+        }
+
+
+def truth_path(recording: Path) -> Path:
+    """Sidecar of a recording: ``rec.parquet`` has ``rec.truth.json``."""
+    return recording.with_suffix(".truth.json")
+
+
+def write_truth(truth: GroundTruth, recording: Path) -> None:
+    """Write the sidecar beside a recording; the estimator never reads it.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    path = truth_path(recording)
+    temporary = path.with_suffix(".tmp")
+    try:
+        temporary.write_text(json.dumps(truth.to_dict(), indent=1) + "\n", encoding="utf-8")
+        temporary.replace(path)
+    except OSError as error:
+        temporary.unlink(missing_ok=True)
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+
+
+def _rotvec_deg(R: Array) -> list[float]:
+    return Rotation.from_matrix(R).as_rotvec(degrees=True).tolist()

@@ -1,0 +1,96 @@
+"""Motion of an Omnid's bodies from its joint angles alone: the closed chain solved, not simulated.
+
+The rods and the platform carry no sensor; the Delta's kinematics places them. Each body moves against a frame that is
+fixed in its parent (see ``robot.PATHS``), either turning about that frame's origin or shifting without turning, so a
+viewer that knows the tree needs no more than what varies.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.arm.delta import LEG_DIRECTIONS, leg_geometry
+from estimator.arm.design import OmnidDesign
+from mocobot_view.bodies.robot import GIMBAL, LEGS
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class BodyMotion:
+    """How the bodies of N robots move at Q samples.
+
+    Attributes:
+        wrist: positions of the platform in {b} [m], shape (Q, N, 3).
+        turns: quaternions (x, y, z, w) of the links, rods and gimbal bodies in their fixed frames, by name,
+            shape (Q, N, 4).
+    """
+
+    wrist: Array
+    turns: dict[str, Array]
+
+
+def body_motion(phi: Array, theta: Array, design: OmnidDesign) -> BodyMotion:
+    """Solve the arms and gimbals of all robots.
+
+    A link turns by phi about minus its driven axis, the rod by Ry(swing) Rz(tilt) against the link.
+
+    Args:
+        phi: driven angles [rad], shape (Q, N, 3).
+        theta: gimbal angles (theta_z, theta_y, theta_x) [rad], shape (Q, N, 3).
+        design: the robots' numbers.
+
+    Raises:
+        InputError: the rods do not meet at some sample.
+    """
+    wrist, swing, tilt = rod_angles(phi, design)
+    turns = {}
+    for leg in LEGS:
+        turns[f"proximal{leg}"] = _about(1, -phi[..., leg - 1])
+        turns[f"rod{leg}"] = _about_y_then_z(swing[..., leg - 1], tilt[..., leg - 1])
+    for column, (name, axis) in enumerate(zip(GIMBAL, (2, 1, 0), strict=True)):
+        turns[name] = _about(axis, theta[..., column])
+    return BodyMotion(wrist, turns)
+
+
+def rod_angles(phi: Array, design: OmnidDesign) -> tuple[Array, Array, Array]:
+    """Where the arms are, from the driven angles alone.
+
+    Seen from the knee, the rod's direction (x, y, z) in the link is
+    Ry(swing) Rz(tilt) e_x = (cos swing cos tilt, sin tilt, -sin swing cos tilt).
+
+    Args:
+        phi: driven angles [rad], shape (..., 3).
+        design: the robots' numbers.
+
+    Returns:
+        Wrist positions in {b} [m], and swing and tilt of each leg's rod against its link [rad]; shapes (..., 3).
+
+    Raises:
+        InputError: the rods do not meet at some sample.
+    """
+    legs = leg_geometry(phi, design)
+    swing, tilt = np.empty_like(legs.h), np.empty_like(legs.h)
+    for k, u in enumerate(LEG_DIRECTIONS):
+        angle, rod = phi[..., k], legs.rod[..., k, :] / design.rod_length_m
+        outward, aside, up = rod @ u, rod @ [-u[1], u[0], 0.0], rod[..., 2]
+        x = np.cos(angle) * outward + np.sin(angle) * up
+        z = np.cos(angle) * up - np.sin(angle) * outward
+        swing[..., k], tilt[..., k] = np.arctan2(-z, x), np.arcsin(np.clip(aside, -1.0, 1.0))
+    return legs.h, swing, tilt
+
+
+def _about(axis: int, angle: Array) -> Array:
+    """Quaternions of rotations about a coordinate axis, shape (..., 4)."""
+    q = np.zeros((*angle.shape, 4))
+    q[..., axis], q[..., 3] = np.sin(0.5 * angle), np.cos(0.5 * angle)
+    return q
+
+
+def _about_y_then_z(y: Array, z: Array) -> Array:
+    """Quaternions of Ry(y) Rz(z), shape (..., 4)."""
+    (sy, cy), (sz, cz) = ((np.sin(0.5 * a), np.cos(0.5 * a)) for a in (y, z))
+    return np.stack([sy * sz, sy * cz, cy * sz, cy * cz], axis=-1)

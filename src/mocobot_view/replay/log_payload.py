@@ -1,0 +1,84 @@
+"""The payload of a replay in Rerun: where the grasps say it is, and what is known of its body."""
+
+from __future__ import annotations
+
+import numpy as np
+import rerun as rr
+from scipy.spatial.transform import Rotation
+
+from mocobot_view import colours
+from mocobot_view.colours import Colour
+from mocobot_view.facts.body_facts import BodyFacts
+from mocobot_view.replay.log_robots import log_label, log_shape
+from mocobot_view.replay.log_time import send_poses
+from mocobot_view.replay.replay_trial import ReplayTrial
+from mocobot_view.sizes import FRAME_M
+
+
+def log_payload(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
+    """Log the payload below the trial's root, in frame {1}; nothing where its grasps are not known."""
+    if trial.motion is None:
+        return
+    payload = f"{trial.name}/payload"
+    send_poses(stream, payload, trial.time, trial.motion.p_W1, trial.motion.quaternion)
+    if trial.shape is not None:
+        log_shape(stream, f"{payload}/shape", trial.shape)
+    if trial.facts is not None:
+        _log_facts(stream, f"{payload}/estimate", trial.facts, "", colours.ESTIMATE, thick=1.0)
+    if trial.truth is not None:
+        # Longer and thinner, so that both show where they agree.
+        _log_facts(stream, f"{payload}/truth", trial.truth, " true", colours.TRUTH, thick=0.5)
+
+
+def _log_facts(
+    stream: rr.RecordingStream, path: str, facts: BodyFacts, suffix: str, colour: Colour, thick: float
+) -> None:
+    """Grasp frames, centre of mass, principal axes and inertia ellipsoid in {1}."""
+    longer = FRAME_M * (1.0 if thick == 1.0 else 1.5)
+    if facts.grasps is not None:
+        for i, (p, R) in enumerate(zip(facts.grasps.p_1i, facts.grasps.R_1i, strict=True), start=1):
+            stream.log(
+                f"{path}/grasp{i}",
+                rr.Arrows3D(
+                    origins=np.tile(p, (3, 1)),
+                    vectors=longer * R.T,
+                    colors=colours.AXES,
+                    radii=0.006 * thick,
+                ),
+                static=True,
+            )
+            log_label(stream, f"{path}/grasp{i}/name", p, f"{{{i}}}{suffix}", colour, show=not suffix)
+    if facts.p_1c is None:
+        return
+    stream.log(
+        f"{path}/com",
+        rr.Points3D([facts.p_1c], colors=[colour], radii=0.022 * thick),
+        static=True,
+    )
+    log_label(stream, f"{path}/com/name", facts.p_1c, f"CoM{suffix}", colour, show=not suffix)
+    semi_axes = facts.semi_axes_m()
+    if semi_axes is None or facts.R_1c is None:
+        return
+    stream.log(
+        f"{path}/inertia",
+        rr.Ellipsoids3D(
+            half_sizes=[semi_axes],
+            centers=[facts.p_1c],
+            quaternions=[Rotation.from_matrix(facts.R_1c).as_quat()],
+            colors=[colour],
+            line_radii=0.002 * thick,
+            fill_mode=rr.components.FillMode.MajorWireframe,
+        ),
+        static=True,
+    )
+    if facts.axes_known:
+        stream.log(
+            f"{path}/axes",
+            rr.Arrows3D(
+                origins=np.tile(facts.p_1c, (3, 1)),
+                vectors=(facts.R_1c * semi_axes).T,
+                colors=[colour] * 3,
+                radii=0.005 * thick,
+            ),
+            static=True,
+        )

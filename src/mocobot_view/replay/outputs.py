@@ -1,0 +1,137 @@
+"""Where a replay goes: a file, a browser, or the viewer."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import sys
+import uuid
+import warnings
+import webbrowser
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from urllib.parse import quote
+
+import rerun as rr
+from rerun.chunk import RrdReader
+
+from estimator.errors import InputError
+from mocobot_view.replay.replay_trial import ReplayTrial
+from mocobot_view.replay.stream import log_replay, new_stream
+
+Progress = Callable[[int], object] | None
+
+WEB_PORT, DATA_PORT = 9090, 9876
+"""Ports of the web viewer and of its data: Rerun's own."""
+FLUSH_S = 20.0
+"""How long a viewer may take to accept everything; a long recording takes it one."""
+
+
+def has_display() -> bool:
+    """Whether a window could be opened."""
+    return not sys.platform.startswith("linux") or bool(
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    )
+
+
+def check_enabled() -> None:
+    """Find out that Rerun is switched off, when it takes everything and keeps nothing.
+
+    Raises:
+        InputError: it is.
+    """
+    if not rr.is_enabled(new_stream()):
+        raise InputError(
+            f"RERUN is {os.environ.get('RERUN', '')!r} in the environment, which turns Rerun off; unset it"
+        )
+
+
+def save_replay(trials: Sequence[ReplayTrial], path: Path, progress: Progress = None) -> None:
+    """Write a replay as an .rrd file, which takes the place of an earlier one only when it is complete.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    temporary = path.parent / f".{uuid.uuid4().hex}.tmp"
+    try:
+        with open(temporary, "xb"):  # the SDK's message would name the temporary file
+            pass
+        stream = new_stream()
+        stream.save(temporary)
+        log_replay(stream, trials, progress)
+        stream.flush()
+        stream.disconnect()
+        _check_complete(temporary)
+        os.replace(temporary, path)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+    except RuntimeError as error:  # the SDK's writer, which does not say what the system told it
+        raise InputError(f"{path}: cannot be written ({_line(error)}); is the disk full?") from error
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def show_replay(trials: Sequence[ReplayTrial], progress: Progress = None) -> None:
+    """Open the viewer, or use one that is open, and return when it has everything.
+
+    Raises:
+        InputError: the viewer does not start.
+    """
+    stream = new_stream()
+    beside = shutil.which("rerun", path=str(Path(sys.executable).parent))
+    try:
+        rr.spawn(executable_path=beside, hide_welcome_screen=True, recording=stream)
+        log_replay(stream, trials, progress)
+        stream.flush(timeout_sec=FLUSH_S)
+    except (RuntimeError, ValueError, OSError) as error:
+        raise InputError(
+            f"the Rerun viewer does not open ({_line(error)}); write a file with --save, or use --web"
+        ) from error
+    stream.disconnect()
+
+
+def serve_replay(trials: Sequence[ReplayTrial], progress: Progress = None) -> tuple[rr.RecordingStream, str]:
+    """Serve a replay to browsers until the process, or the stream that is returned, ends.
+
+    Returns:
+        The stream, to be kept, and the address to open.
+
+    Raises:
+        InputError: the servers do not start; another one may be using their ports.
+    """
+    stream = new_stream()
+    try:
+        data = stream.serve_grpc()
+        rr.serve_web_viewer(web_port=WEB_PORT, open_browser=False)
+        log_replay(stream, trials, progress)
+        stream.flush(timeout_sec=FLUSH_S)
+    except (RuntimeError, ValueError, OSError) as error:
+        raise InputError(
+            f"the replay cannot be served ({_line(error)}); is another one running on ports {WEB_PORT} and {DATA_PORT}?"
+        ) from error
+    # Labels are drawn for the dark theme, whatever the browser prefers.
+    address = f"http://localhost:{WEB_PORT}?url={quote(data, safe='')}&theme=dark"
+    if has_display():
+        webbrowser.open(address)
+    return stream, address
+
+
+def _check_complete(path: Path) -> None:
+    """The SDK writes in the background and only logs what goes wrong there, so read back what it says it wrote."""
+    try:
+        with warnings.catch_warnings():  # about a missing footer, which is an error here
+            warnings.simplefilter("ignore")
+            reader = RrdReader(path)
+            whole = (
+                len(reader.recordings()) == 1 and len(reader.blueprints()) >= 1 and len(reader.store()) > 0
+            )
+    except (RuntimeError, ValueError):
+        whole = False
+    if not whole:
+        raise OSError("only a part of it arrived; is the disk full?")
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())

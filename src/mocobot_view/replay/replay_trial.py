@@ -1,0 +1,217 @@
+"""One recording made ready to be shown: poses, signals, and what an estimate, the truth and a diagnosis say."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.arm.gimbal import rotation
+from estimator.errors import InputError
+from estimator.estimate.grasp_estimate import single_robot
+from estimator.estimate.payload import estimate_payload
+from estimator.estimate.result import PayloadEstimate
+from estimator.recording.model import Recording
+from estimator.signals.grasp_data import GraspData
+from mocobot_view.bodies.payload_shape import bars, cad_shape, drawn_payload
+from mocobot_view.bodies.poses import BodyMotion, body_motion
+from mocobot_view.bodies.robot import robot_shapes
+from mocobot_view.bodies.shapes import Shape
+from mocobot_view.facts.body_facts import BodyFacts, facts_of
+from mocobot_view.facts.diagnosis import Diagnosis
+from mocobot_view.facts.placement import (
+    Bases,
+    Grasps,
+    PayloadMotion,
+    in_a_row,
+    payload_motion,
+    place_bases,
+)
+from mocobot_view.replay.signals import Balance, balance, filtered
+
+Array = NDArray[np.float64]
+
+MISFIT_M, MISFIT_RAD = 0.01, 0.03
+"""Gaps between flanges and grasps (rms) above which something is wrong; robots that were never calibrated show 6 mm
+and 10 mrad."""
+
+
+@dataclass(frozen=True, eq=False)
+class ReplayTrial:
+    """All that is drawn of one recording.
+
+    Attributes:
+        name: root of its entities, unique among the recordings shown together.
+        recording: the samples.
+        time: since the first sample [s], shape (Q,).
+        bodies: motion of the robots' bodies.
+        bases: where the robots stand.
+        motion: that of the payload, or None where its grasps are not known.
+        shape: the payload's, in {1}, or None.
+        data: filtered twists and wrenches, or None.
+        balance: residual of Newton and Euler, or None.
+        estimate: the payload's, or None.
+        facts: the drawable part of the estimate, or None.
+        truth: the payload's, or None.
+        diagnosis: what is wrong with the team, or None.
+        notes: what a viewer should know, sentences.
+    """
+
+    name: str
+    recording: Recording
+    time: Array
+    bodies: BodyMotion
+    bases: Bases
+    motion: PayloadMotion | None
+    shape: Shape | None
+    data: GraspData | None
+    balance: Balance | None
+    estimate: PayloadEstimate | None
+    facts: BodyFacts | None
+    truth: BodyFacts | None
+    diagnosis: Diagnosis | None
+    notes: tuple[str, ...]
+
+    @property
+    def robots(self) -> int:
+        """Number of robots N."""
+        return self.recording.metadata.robots
+
+
+def replay_trial(
+    recording: Recording,
+    name: str,
+    estimate: PayloadEstimate | None = None,
+    truth: BodyFacts | None = None,
+    diagnosis: Diagnosis | None = None,
+    payload: str | Path | None = None,
+) -> ReplayTrial:
+    """Work out everything that is drawn of a recording.
+
+    Args:
+        recording: one trial.
+        name: what to call it.
+        estimate: of the payload; None to estimate from this recording, as far as it goes.
+        truth: of the payload.
+        diagnosis: of these robots.
+        payload: name or MJCF of the payload's geometry; None for what the recording's label names.
+
+    Raises:
+        InputError: estimate or diagnosis are of another number of robots, or ``payload`` is not a payload for them.
+    """
+    meta = recording.metadata
+    notes: list[str] = []
+    estimate = _given(estimate, recording, notes) if estimate else _estimated(recording, notes)
+    if diagnosis is not None:
+        _check_diagnosis(diagnosis, recording, notes)
+    bodies = body_motion(recording.phi, recording.theta, meta.design)
+    R_bi, wrist = rotation(recording.theta), bodies.wrist
+    height = robot_shapes(meta.design).base_height_m
+    facts = None if estimate is None else facts_of(estimate)
+    grasps = None if facts is None else facts.grasps
+    if grasps is None and meta.robots == 1:
+        alone = single_robot()
+        grasps = Grasps(alone.R_1i, alone.p_1i)
+    if grasps is None:
+        bases, motion = in_a_row(meta.robots, height), None
+        notes.append(
+            "The grasps are not known, so neither is where the robots stand: they are drawn in a row, without a "
+            "payload. Give an estimate from recordings with motion (--estimate)."
+        )
+    else:
+        bases = place_bases(R_bi, wrist, grasps, height)
+        motion = payload_motion(R_bi, wrist, grasps, bases)
+        gap, turn = (float(np.sqrt(np.mean(g**2))) for g in (motion.gap_position_m, motion.gap_rotation_rad))
+        if gap > MISFIT_M or turn > MISFIT_RAD:
+            notes.append(
+                f"The grasps do not fit this recording: flanges and grasps are {1e3 * gap:.0f} mm and "
+                f"{1e3 * turn:.0f} mrad apart (rms)."
+            )
+    data = filtered(recording, notes)
+    return ReplayTrial(
+        name=name,
+        recording=recording,
+        time=recording.time - recording.time[0],
+        bodies=bodies,
+        bases=bases,
+        motion=motion,
+        shape=_shape(recording, payload, facts, grasps, notes),
+        data=data,
+        balance=None if data is None or estimate is None else balance(data, estimate),
+        estimate=estimate,
+        facts=facts,
+        truth=truth,
+        diagnosis=diagnosis,
+        notes=tuple(notes),
+    )
+
+
+def distinct_names(recordings: Sequence[Path]) -> list[str]:
+    """File names without their ending, with a running number where two are alike.
+
+    What is not a letter, a digit, a dot or a hyphen becomes an underscore: names are parts of entity paths.
+    """
+    names: list[str] = []
+    for path in recordings:
+        stem = re.sub(r"[^A-Za-z0-9.-]", "_", path.stem)
+        stem = re.sub(r"^_+(?=_)", "", stem)  # two underscores in front are Rerun's own
+        name, k = stem, 1
+        while name in names:
+            k += 1
+            name = f"{stem}-{k}"
+        names.append(name)
+    return names
+
+
+def _given(estimate: PayloadEstimate, recording: Recording, notes: list[str]) -> PayloadEstimate:
+    robots, label = recording.metadata.robots, recording.metadata.payload
+    if estimate.robots != robots:
+        raise InputError(
+            f"the estimate is of {estimate.robots} robots; {recording.name} is of {robots} robots"
+        )
+    if None not in (estimate.payload, label) and estimate.payload != label:
+        notes.append(f"The estimate is of payload {estimate.payload!r}; this recording is of {label!r}.")
+    return estimate
+
+
+def _estimated(recording: Recording, notes: list[str]) -> PayloadEstimate | None:
+    try:
+        return estimate_payload([recording])
+    except InputError as error:
+        notes.append(f"Nothing could be estimated from this recording: {error}.")
+        return None
+
+
+def _check_diagnosis(diagnosis: Diagnosis, recording: Recording, notes: list[str]) -> None:
+    if diagnosis.robots() > recording.metadata.robots:
+        raise InputError(
+            f"the diagnosis names robot {diagnosis.robots()}; {recording.name} is of "
+            f"{recording.metadata.robots} robots"
+        )
+    if Path(recording.name).name not in {Path(name).name for name in diagnosis.recordings}:
+        notes.append(
+            f"The diagnosis was made from other recordings ({', '.join(diagnosis.recordings)}), not from this one."
+        )
+
+
+def _shape(
+    recording: Recording,
+    payload: str | Path | None,
+    facts: BodyFacts | None,
+    grasps: Grasps | None,
+    notes: list[str],
+) -> Shape | None:
+    """The payload's geometry: by CAD if that fits the grasps, else bars."""
+    meta = recording.metadata
+    if grasps is None:
+        if payload is not None:
+            cad_shape(payload, meta.robots)  # refuse what cannot be drawn even where nothing is
+        return None
+    drawn = drawn_payload(payload, meta.payload, grasps, notes)
+    if drawn is not None:
+        return cad_shape(drawn, meta.robots)[0]
+    return bars(facts or BodyFacts(grasps, None, None, None, None))

@@ -1,0 +1,122 @@
+"""``mocobot diagnose`` as a user meets it: what it says and what it writes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from diagnose_run import BIAS_NM, Edit, refused, run
+from diagnosed import check_schema
+from discrepancy.result.traces_file import load_traces
+from mocobot.commands.diagnose_folder import _is_diagnosis
+from mocobot_sim.extended.extended import load_extended
+
+
+@pytest.mark.slow
+def test_hidden_bias_is_named_extended_and_written(
+    biased_trials: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "verdict"
+    out.mkdir()  # an empty folder may be used
+    code, text, _ = run(capsys, *biased_trials, "--out", out, "--jobs", 1)
+    values = json.loads((out / "diagnosis.json").read_text())
+    check_schema(values)
+    assert code == 0
+    assert text.startswith("EXPLAINED. Robot 2, joint 1: the torque sensor reads 0.0")
+    assert "N m too much" in text
+    assert max(len(line) for line in text.splitlines() if "Written" not in line) <= 100
+    assert (out / "report.txt").read_text().strip() in text
+
+    assert values["verdict"] == "explained"
+    cause = values["causes"][0]
+    assert (cause["cause"], cause["robot"], cause["joint"]) == ("sea_bias", 2, 1)
+    assert cause["parameters"]["bias_Nm"]["value"] == pytest.approx(BIAS_NM, rel=0.1)
+    assert cause["explained"]["held_out"] > 0.8
+    gain = values["gain"]
+    assert gain["validated"]
+    assert gain["held_out"]["after"]["chi2_per_n"] < 0.1 * gain["held_out"]["before"]["chi2_per_n"]
+    assert gain["errors"]["after"]["mass_percent"] < 0.2 * gain["errors"]["before"]["mass_percent"]
+    assert gain["estimates"]["after"]["mass_kg"] == pytest.approx(11.672, rel=1e-3)
+
+    pictures = {path.name for path in out.glob("*.png")}
+    assert pictures == {
+        "residual_trial1.png", "residual_trial2.png", "residual_against.png", "evidence.png", "closed_loop.png"
+    }  # fmt: skip
+    assert load_extended(out / "extended").units[1].tau_zero_Nm[0] == pytest.approx(BIAS_NM, rel=0.1)
+    mujoco.MjModel.from_xml_path(str(out / "extended" / "team.xml"))
+    assert [path.name for path in tmp_path.iterdir()] == ["verdict"]
+
+    made = values["provenance"]
+    assert (made["command"], made["options"]["closed_loop"]) == ("diagnose", True)
+    truths = [path.with_suffix("").with_suffix(".truth.json") for path in biased_trials]
+    assert [entry["path"] for entry in made["files"]] == [str(path) for path in (*biased_trials, *truths)]
+    for entry in made["files"]:
+        assert entry["sha256"] == hashlib.sha256(Path(entry["path"]).read_bytes()).hexdigest()
+
+    traces, channels = load_traces(out / "residuals.npz")
+    assert [trace.name for trace in traces] == values["recordings"]
+    assert [channel.name for channel in channels[-3:]] == ["moment x", "moment y", "moment z"]
+    chi2 = sum(np.sum(trace.white_before**2) for trace in traces)
+    samples = sum(trace.white_before.size for trace in traces)
+    assert chi2 / samples == pytest.approx(values["residual"]["nominal"]["chi2_per_n"], rel=0.01)
+    assert sum(np.sum(trace.white_after**2) for trace in traces) < 0.1 * chi2
+    (out / "report.html").write_text("a page made of it")
+    assert _is_diagnosis(out)
+
+    # Its own result may be replaced, but nothing that someone put there is lost.
+    (out / "notes.txt").write_text("mine")
+    assert "not an earlier diagnosis" in refused(capsys, *biased_trials, "--out", out)
+    assert (out / "notes.txt").read_text() == "mine"
+
+
+@pytest.mark.slow
+def test_one_trial_without_commands_says_what_stays_open(
+    edited: Callable[[str, Edit], str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    bare = edited(
+        "bare.parquet", lambda t: t.drop_columns([name for name in t.column_names if ".ref_" in name])
+    )
+    out = tmp_path / "verdict"
+    code, text, _ = run(capsys, bare, "--out", out, "--jobs", 1)
+    values, words = json.loads((out / "diagnosis.json").read_text()), " ".join(text.split())
+    check_schema(values, simulated=False)
+    assert code == 0
+    assert "has no commands (ref_x, ref_y, ref_z)" in words
+    assert "One trial only: nothing could be validated" in words
+    assert "has no commands" in values["not_simulated"]
+    assert values["gain"]["held_out"] == {"before": None, "after": None}
+    assert "errors" not in values["gain"]
+    assert not (out / "closed_loop.png").exists()
+
+
+@pytest.mark.slow
+def test_excluded_cause_is_not_named(biased_trials: list[Path], capsys: pytest.CaptureFixture[str]) -> None:
+    code, text, _ = run(
+        capsys, biased_trials[0], "--no-closed-loop", "--jobs", 1, "--exclude", "sea_bias", "joint_friction"
+    )
+    assert code == 0
+    assert "sea_bias" not in text
+    assert "left out on request" in " ".join(text.split())
+
+
+def test_nothing_is_left_when_interrupted(
+    biased_trials: list[Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def stop(*_: object) -> None:
+        assert [path.name for path in tmp_path.iterdir()] != []
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("mocobot.commands.diagnose.estimate_payload", stop)
+    code, out, err = run(capsys, *biased_trials, "--out", tmp_path / "verdict")
+    assert (code, out) == (130, "")
+    assert err.endswith("mocobot: interrupted")
+    assert not list(tmp_path.iterdir())

@@ -1,0 +1,88 @@
+"""Numbers of a cause's shape: found between the grid's points, with errors as large as stated."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discrepancy.engine.search import search
+from discrepancy.least_squares.problem import Problem
+from fake_rig import CATALOGUE, CHANNELS, RATE_HZ, ROWS, FakeRig, cause
+
+TRUE_W, SIZE, GRID = 1.313, 1.2, 0.04
+WAVE = replace(cause("wave", tolerance=0.0), shape={"w": 1.3})
+PATTERN = np.array([1.0, -0.7, 0.4, 0.9])
+
+
+class Wave(FakeRig):
+    """Besides the others a wave of unknown frequency, of which the catalogue has a coarse grid."""
+
+    def __post_init__(self):
+        super().__post_init__()
+        wave = replace(WAVE, shape={"w": TRUE_W})
+        self.data = [
+            (x + SIZE * self.columns(wave)[t][..., 0], *own) for t, (x, *own) in enumerate(self.data)
+        ]
+
+    def columns(self, candidate):
+        if candidate.cause != "wave":
+            return super().columns(candidate)
+        time = np.arange(ROWS) / RATE_HZ
+        waves = [np.sin(candidate.shape["w"] * time + t) for t in range(len(self.trials))]
+        return [(wave[:, None] * PATTERN)[..., None] for wave in waves]
+
+    def refinements(self, candidate, *, finer=False):
+        if candidate.cause != "wave" or finer:
+            return []
+        return [replace(candidate, shape={"w": w}) for w in np.arange(1.1, 1.5, GRID)]
+
+    def steps(self, candidate):
+        if candidate.cause != "wave":
+            return []
+        w = candidate.shape["w"]
+        return [(replace(candidate, shape={"w": w - 0.02}), replace(candidate, shape={"w": w + 0.02}), 0.04)]
+
+
+def found_in(seed):
+    explanation = search(Wave({}, catalogue=(*CATALOGUE, WAVE), seed=seed))
+    (found,) = explanation.found
+    return found
+
+
+def test_shape_is_found_between_the_grids_points_with_errors_as_stated():
+    """Monte Carlo over noise, unknowns and the tolerances of all other causes."""
+    runs = [found_in(seed) for seed in range(60)]
+    off = np.array([[f.values[0] - SIZE, f.candidate.shape["w"] - TRUE_W] for f in runs])
+    stated = np.mean([f.covariance for f in runs], axis=0)
+    assert stated.shape == (2, 2)
+    assert np.sqrt(stated[1, 1]) < 0.25 * GRID  # the grid alone would miss by more
+    spread = off.T @ off / len(runs)
+    # The square of 60 draws is known to 18 % (one standard error).
+    np.testing.assert_allclose(np.diag(spread), np.diag(stated), rtol=0.5)
+    squares = [x @ np.linalg.solve(f.covariance, x) for x, f in zip(off, runs, strict=True)]
+    assert np.mean(squares) == pytest.approx(2.0, abs=0.8)
+
+
+def test_solution_with_further_columns_is_that_of_the_extended_problem():
+    rig = FakeRig({2: 25.0})
+    problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
+    rng = np.random.default_rng(4)
+    columns = [rng.standard_normal((ROWS, CHANNELS, 2)) for _ in rig.trials]
+    event = cause("event", tolerance=0.0, parameters=2)
+    wider = problem.extended(event, columns)
+    expected = wider.fit([2, len(wider.candidates) - 1]).part(len(wider.candidates) - 1)
+    got = problem.fit([2]).solution_with(columns)
+    np.testing.assert_allclose(got[0], expected[0], rtol=1e-8)
+    np.testing.assert_allclose(got[1], expected[1], rtol=1e-8)
+
+
+def test_column_that_tells_nothing_gets_nothing():
+    """No division by nought, and the others as without it."""
+    rig = FakeRig({2: 25.0})
+    fit = Problem.of(rig.rows(rig.candidates()), rig.candidates()).fit([2])
+    rng = np.random.default_rng(4)
+    columns = [rng.standard_normal((ROWS, CHANNELS, 1)) for _ in rig.trials]
+    empty = [np.concatenate([c, np.zeros_like(c)], axis=2) for c in columns]
+    values, covariance = fit.solution_with(empty)
+    np.testing.assert_allclose(values, [fit.solution_with(columns)[0][0], 0.0], rtol=1e-9)
+    np.testing.assert_array_equal(covariance[1], 0.0)

@@ -1,0 +1,82 @@
+"""A transient against one sensor that is wrong for as long."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discrepancy.engine.search import search
+from discrepancy.least_squares.problem import Problem
+from discrepancy.team.imitators import wrong_torques
+from discrepancy.team.pushes import push
+from discrepancy.team.tolerances import DEFAULTS
+from fake_rig import FakeRig
+from team_case import exact, residual_of
+
+TRIAL = 1
+
+
+class Imitated(FakeRig):
+    """One sensor is wrong in the direction of the push's first column, if ``turn`` is 0."""
+
+    turn = 0.0
+
+    def imitators(self, candidate):
+        columns = self.columns(candidate)
+        away = np.random.default_rng(5).standard_normal(columns[TRIAL][40:90, :, :1].shape)
+        other = [np.zeros((*c.shape[:2], 1)) for c in columns]
+        other[TRIAL][40:90] = np.cos(self.turn) * columns[TRIAL][40:90, :, :1] + np.sin(self.turn) * away
+        return [other]
+
+
+def with_burst(rig, values):
+    candidate = rig.transients([])[0]
+    x, local, shared = rig.data[TRIAL]
+    rig.data[TRIAL] = x + rig.columns(candidate)[TRIAL] @ np.array(values), local, shared
+    return rig
+
+
+@pytest.mark.parametrize(
+    ("turn", "values", "named"),
+    [
+        (0.0, [3.0, 0.0], False),  # the sensor alone does it, with one number
+        (0.0, [3.0, 2.0], True),  # the sensor does half of it
+        (np.pi / 2, [3.0, 0.0], True),  # the sensor has nothing to do with it
+    ],
+)
+def test_transient_that_one_sensor_imitates_is_not_named(turn, values, named):
+    rig = with_burst(Imitated({}, burst=(TRIAL, 0.0, 2)), values)
+    rig.turn = turn
+    explanation = search(rig)
+    assert [f.candidate.cause for f in explanation.found] == (["push"] if named else [])
+    assert ("push" in [c.cause for c in explanation.rejected]) is not named
+
+
+def test_fall_is_that_of_the_extended_problem():
+    rig = with_burst(FakeRig({2: 25.0}, burst=(TRIAL, 0.0, 3)), [2.0, -1.0, 0.5])
+    problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
+    event = rig.transients([])[0]
+    columns = rig.columns(event)
+    wider = problem.extended(event, columns)
+    fit = problem.fit([2])
+    expected = fit.misfit - wider.fit([2, len(wider.candidates) - 1]).misfit
+    assert expected > 100.0
+    assert fit.fall_with(columns) == pytest.approx(expected, rel=1e-7)
+    twice = [np.concatenate([c, c[..., :1]], axis=2) for c in columns]  # a column that tells nothing new
+    assert fit.fall_with(twice) == pytest.approx(expected, rel=1e-7)
+
+
+def test_wrong_torque_lasts_as_long_as_the_push():
+    """Against the residual of a recording in which one spring read 0.2 N m too much for two seconds."""
+    case = exact()
+    start, lasting = 6.0, 2.0
+    time = case.signals.time
+    tau = case.signals.tau.copy()
+    tau[(time >= start) & (time < start + lasting), 1, 2] += 0.2
+    changed = residual_of(case, replace(case.signals, tau=tau)) - case.linear.residual
+    unwhitened = [lambda x: x] * 2
+    found = wrong_torques([case.linear] * 2, unwhitened, push(1, start, lasting, DEFAULTS["push"]))
+    assert len(found) == 9
+    for columns in found:
+        assert not columns[0].any()
+    np.testing.assert_allclose(0.2 * found[5][1][..., 0], changed, atol=2e-3 * np.abs(changed).max())

@@ -1,0 +1,151 @@
+"""The report and the pictures of a diagnosis, from numbers made up."""
+
+from __future__ import annotations
+
+import math
+import string
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagnosed import small_diagnosis
+from discrepancy.causes.words import number
+from discrepancy.least_squares.whitening import Whitening
+from discrepancy.result.json import plain
+from discrepancy.result.plots import file_names
+from discrepancy.result.plots_evidence import closed_loop_figure
+from discrepancy.result.text import WIDTH, format_diagnosis
+from discrepancy.result.traces import groups
+from discrepancy.rig import Candidate, Channel
+from discrepancy.team.causes import CAUSES
+from discrepancy.team.estimates import errors
+from discrepancy.team.traces import unwhitened
+from discrepancy.team.words import TeamWords
+from mocobot_sim.effects.catalogue import EFFECTS
+
+
+def test_verdict_comes_first_and_lines_are_short() -> None:
+    text = format_diagnosis(small_diagnosis())
+    assert text.startswith(
+        "EXPLAINED. Robot 2, joint 1: the torque sensor reads 0.0500 +- 0.0010 N m too much."
+    )
+    assert max(map(len, text.splitlines())) <= WIDTH
+    for words in (
+        "Explains 99 % of the misfit in sample, 98 % on held-out trials (a gain on 2 of 2 folds)",
+        "Cannot be told from: sea_scale (robot 2, joint 1) by 2.0 nats.",
+        "A known weight separates them.",
+        "99.0 % of the excess error removed (95 % interval over 2 trials: 90.0 to 100.0 %)",
+        "A note.",
+        "this: of that; needs a weight.",
+        "chi2/n is 12 as simulated",
+    ):
+        assert words in text
+
+
+def test_consistent_data_have_a_short_report() -> None:
+    text = format_diagnosis(small_diagnosis("consistent"))
+    assert text.startswith("CONSISTENT.")
+    assert len(text.splitlines()) <= 23
+    assert "cannot decide" not in text
+    assert "sea_bias: bias_Nm 0.019-0.021" in text
+    assert "theta_zero: zero_rad 0.0006, not everywhere" in text
+    assert "slosh: mass_kg never" in text
+
+
+def test_unexplained_data_say_where_the_misfit_is() -> None:
+    values = small_diagnosis("unexplained")
+    values["residual"] |= {"chi2_per_n": 5.0, "tolerances": {"chi2": 90.0, "freedom": 30.0, "log10_p": -9.0}}
+    text = format_diagnosis(values)
+    assert text.startswith("UNEXPLAINED. The 2 recordings and the simulation differ")
+    assert "What is left: somewhere." in text
+    assert "used harder than chance allows: chi2 90 of 30" in " ".join(text.split())
+
+
+def test_a_rival_that_the_closed_loop_rules_out() -> None:
+    values = small_diagnosis()
+    values["causes"][0]["alternatives"][0] |= {"ambiguous": False, "evidence_gap": -3.0, "chi2_per_n": 40.0}
+    text = " ".join(format_diagnosis(values).split())
+    assert "sea_scale (robot 2, joint 1) (3 nats better in the rows, closed loop chi2/n 40)" in text
+    assert "Cannot be told" not in text
+
+
+def test_errors_against_the_truth_are_shown() -> None:
+    values = small_diagnosis()
+    estimate = values["gain"]["estimates"]["before"]
+    off = estimate | {"mass_kg": 11.7 * 1.01, "p_1c_m": [0.1, 0.2, 0.303]}
+    found = errors(off, estimate)
+    assert found["mass_percent"] == pytest.approx(1.0)
+    assert found["com_mm"] == pytest.approx(3.0)
+    assert found["grasp_rotation_deg"] == 0.0
+    values["gain"]["errors"] = {"before": found, "after": errors(estimate, estimate)}
+    assert "centre of mass [mm]" in format_diagnosis(values)
+    with pytest.raises(ValueError, match="not"):
+        errors(estimate, estimate | {"p_1c_m": [0.1, 0.2]})
+
+
+@pytest.mark.parametrize("cause", sorted(CAUSES))
+def test_every_cause_has_a_sentence_with_its_numbers(cause: str) -> None:
+    kind = CAUSES[cause]
+    robot, joint = (None if kind.per == "payload" else 2), (3 if kind.per == "joint" else None)
+    candidate = Candidate(cause, kind.family, robot, joint, ())
+    names = EFFECTS[cause].parameter_names()
+    for sign in (1.0, -1.0):
+        values = {name: sign * 0.0123 for name in names} | ({"trial": 2.0} if cause == "push" else {})
+        text = TeamWords().describe(candidate, values, dict.fromkeys(names, 1e-4) | {"trial": math.nan})
+        assert text.endswith(".")
+        assert text[0] in string.ascii_uppercase
+        assert "+-" in text
+        assert ("Robot 2" in text) == (robot is not None)
+        assert "_" not in text
+
+
+def test_a_cause_of_ones_own_gets_its_docstring(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Mine(type(CAUSES["drag"])):
+        """A ghost holds the payload back."""
+
+    monkeypatch.setitem(CAUSES, "ghost", Mine())
+    text = TeamWords().describe(Candidate("ghost", "f", None, None, ()), {"c_N": 2.0}, {"c_N": 0.1})
+    assert text == "Payload: A ghost holds the payload back (c_N = 2.00 +- 0.10)."
+
+
+def test_numbers_have_as_many_digits_as_they_deserve() -> None:
+    assert number(0.05, 0.00123, "N m") == "0.0500 +- 0.0012 N m"
+    assert number(-0.05, 1.0, "m", 1e3) == "-50 +- 1000 m"
+    assert number(0.05, math.nan, "s") == "0.05 s"
+
+
+def test_plain_values_have_no_nan() -> None:
+    mixed = {"a": np.float64("nan"), "b": [np.int64(2), np.array([1.0, np.inf])], "c": np.bool_(True)}
+    assert plain(mixed) == {"a": None, "b": [2, [1.0, None]], "c": True}
+
+
+def test_file_names_are_distinct_and_safe() -> None:
+    names = file_names(["/x/rec.parquet", "y/rec.parquet", "a b/c:d", "against", ""])
+    assert names == ["rec", "rec_2", "c_d", "against_2", "trial"]
+
+
+def test_channels_are_grouped_by_name() -> None:
+    channels = [Channel(f"force {a}", "balance", None, "N") for a in "xyz"] + [Channel("gap", "k", 1, "m")]
+    found = groups(channels)
+    assert [(g.name, g.columns, g.components) for g in found] == [
+        ("force", (0, 1, 2), ("x", "y", "z")),
+        ("gap", (3,), ("gap",)),
+    ]
+
+
+def test_whitening_can_be_undone() -> None:
+    rng = np.random.default_rng(1)
+    draws = np.cumsum(rng.standard_normal((20, 60, 4)), axis=1) * 0.1 + rng.standard_normal((20, 60, 4))
+    white = Whitening.of(draws, 50)
+    assert unwhitened(white, white(draws[0])) == pytest.approx(draws[0], abs=1e-10)
+
+
+def test_no_closed_loop_no_picture(tmp_path: Path) -> None:
+    values = small_diagnosis()
+    figure = closed_loop_figure(values)
+    assert figure is not None
+    figure.savefig(tmp_path / "loop.png")
+    assert len(figure.axes) == 4
+    values["gain"]["trials"] = []
+    assert closed_loop_figure(values) is None

@@ -1,0 +1,368 @@
+"""Errors of readings: columns of causes against the full residual of signals spoiled by independent means."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import make_interp_spline
+from scipy.optimize import brentq
+from scipy.signal import lfilter
+
+from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes.base import Context
+from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.residual import Bases, Shared
+from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.trial_linear import linearise
+from discrepancy.team.pushes import push
+from discrepancy.team.rig import TeamRig
+from discrepancy.team.tolerances import DEFAULTS
+from estimator.arm.delta import LEG_DIRECTIONS, forward_kinematics, jacobian
+from estimator.estimate.grasp_estimate import GraspEstimate
+from mocobot_sim.effects.catalogue import EFFECTS, make_effect
+from team_case import DESIGN, exact, residual_of
+
+ROBOTS = (0, 2)
+RATE = 100.0
+
+
+@pytest.fixture(scope="module")
+def case():
+    return exact()
+
+
+def put(array, robot, new):
+    out = array.copy()
+    out[:, robot] = new
+    return out
+
+
+def with_joint(array, joint, new):
+    out = array.copy()
+    out[:, joint] = new
+    return out
+
+
+def resampled(x, delay):
+    """x(t - delay) by a spline of the seventh degree, held at the ends."""
+    time = np.arange(len(x)) / RATE
+    return make_interp_spline(time, x, k=7)(np.clip(time - delay, 0.0, time[-1]))
+
+
+def lagged(x, constant):
+    """T y' + y = x, integrated at 10 kHz, at rest before."""
+    time = np.arange(len(x)) / RATE
+    fine = np.arange((len(x) - 1) * 100 + 1) / (100 * RATE)
+    decay = np.exp(-1.0 / (100 * RATE) / constant)
+    u = make_interp_spline(time, x, k=5)(fine)
+    # Over one step the input is taken as its mean.
+    mean = np.concatenate([u[:1], 0.5 * (u[1:] + u[:-1])])
+    y = lfilter([1.0 - decay], [1.0, -decay], mean, axis=0, zi=decay * u[:1])[0]
+    return y[::100]
+
+
+def rate_of(x):
+    return make_interp_spline(np.arange(len(x)) / RATE, x, k=5).derivative()(np.arange(len(x)) / RATE)
+
+
+def hardened(tau, cubic):
+    k = DESIGN.sea_stiffness_Nm_per_rad
+    return np.array([k * brentq(lambda d, t=t: k * d + cubic * d**3 - t, -3.0, 3.0) for t in tau])
+
+
+def leg_angles(h, joint, proximal, rod, radius):
+    """Angle at which one leg of these lengths reaches wrists h, knee outward; the design's legs elsewhere."""
+    reach = h - (DESIGN.base_radius_m - DESIGN.platform_radius_m + radius) * LEG_DIRECTIONS[joint]
+    along, up = reach @ LEG_DIRECTIONS[joint], reach[:, 2]
+    l1, l2 = DESIGN.proximal_length_m + proximal, DESIGN.rod_length_m + rod
+    # The law of cosines in the triangle of axis, knee and wrist.
+    cosine = (l1**2 + np.sum(reach**2, axis=1) - l2**2) / (2 * l1 * np.hypot(along, up))
+    return np.arctan2(up, along) - np.arccos(cosine)
+
+
+def other_leg(case, robot, joint, lengths):
+    """Angles and torques of a robot with one leg of other lengths that does the same to the payload."""
+    phi, tau = case.signals.phi[:, robot], case.signals.tau[:, robot]
+    h = forward_kinematics(phi, DESIGN)
+    step = 1e-5
+
+    def angles(h):
+        true = np.array([leg_angles(h, j, 0.0, 0.0, 0.0) for j in range(3)]).T
+        true[:, joint] = leg_angles(h, joint, *lengths)
+        return true
+
+    # dphi/dh of the true robot, by differences; its inverse transposed takes torques to forces.
+    inverse = np.stack(
+        [(angles(h + step * e) - angles(h - step * e)) / (2 * step) for e in np.eye(3)], axis=2
+    )
+    # What hangs at the knees stays with the legs, all else goes through the wrist.
+    at_knee = (
+        DESIGN.proximal_mass_kg * DESIGN.proximal_com_m + 0.5 * DESIGN.rod_mass_kg * DESIGN.proximal_length_m
+    )
+    own = DESIGN.gravity_mps2 * at_knee * np.cos(phi)
+    force = np.linalg.solve(np.swapaxes(jacobian(phi, DESIGN), 1, 2), (tau - own)[..., None])
+    new = angles(h)
+    at_knee = at_knee + 0.5 * DESIGN.rod_mass_kg * lengths[0] * np.eye(3)[joint]
+    loaded = np.linalg.solve(np.swapaxes(inverse, 1, 2), force)[..., 0]
+    return new, loaded + DESIGN.gravity_mps2 * at_knee * np.cos(new)
+
+
+def spoiled(case, cause, robot, joint, values):
+    """The signals with an error in them."""
+    s = case.signals
+    phi, theta, tau = s.phi[:, robot], s.theta[:, robot], s.tau[:, robot]
+    if cause == "phi_zero":
+        phi = with_joint(phi, joint, phi[:, joint] + values[0])
+    elif cause == "theta_zero":
+        theta = with_joint(theta, joint, theta[:, joint] + values[0])
+    elif cause == "sea_bias":
+        tau = with_joint(tau, joint, tau[:, joint] + values[0])
+    elif cause == "sea_scale":
+        tau = with_joint(tau, joint, tau[:, joint] / (1.0 + values[0]))
+    elif cause == "sea_hardening":
+        tau = with_joint(tau, joint, hardened(tau[:, joint], values[0]))
+    elif cause == "sea_hysteresis":
+        reading = tau[:, joint] - values[0] * np.clip(rate_of(tau[:, joint]) / 0.2, -1, 1)
+        tau = with_joint(tau, joint, reading)
+    elif cause == "joint_friction":
+        rate = rate_of(phi[:, joint])
+        reading = tau[:, joint] + values[0] * np.clip(rate / 1e-3, -1, 1) + values[1] * rate
+        tau = with_joint(tau, joint, reading)
+    elif cause == "torque_skew":
+        tau = resampled(tau, values[0])
+    elif cause == "torque_lag":
+        tau = lagged(tau, values[0])
+    elif cause == "clock_delay":
+        phi, theta, tau = (resampled(x, values[0]) for x in (phi, theta, tau))
+    elif cause == "link_length":
+        phi, tau = other_leg(case, robot, joint, values)
+    return replace(
+        s, phi=put(s.phi, robot, phi), theta=put(s.theta, robot, theta), tau=put(s.tau, robot, tau)
+    )
+
+
+READINGS = {
+    "phi_zero": [1e-4],
+    "theta_zero": [1e-4],
+    "sea_bias": [0.01],
+    "sea_scale": [1e-3],
+    "sea_hardening": [5.0],
+    "sea_hysteresis": [0.02],
+    "joint_friction": [0.02, 0.01],
+    "torque_skew": [2e-3],
+    "torque_lag": [2e-3],
+    "clock_delay": [5e-4],
+    "link_length": [1e-4, -5e-5, 8e-5],
+}
+# link_length takes what hangs at the knees for a part of the load on the wrist: a tenth of its small wrench.
+TOLERANCE = {"link_length": 0.01, "joint_friction": 0.04, "sea_hysteresis": 0.03, "torque_lag": 0.02}
+
+
+# Channels of one unit, with what filtering leaves: rotations, positions, force, moment.
+BLOCKS = (
+    ((0, 1, 2, 6, 7, 8), 1e-7),
+    ((3, 4, 5, 9, 10, 11), 1e-7),
+    ((12, 13, 14), 2e-4),
+    ((15, 16, 17), 2e-4),
+)
+
+
+def assert_close(got, expected, tolerance):
+    """Rms of the difference against the rms of what is expected, channels of each unit together."""
+    for block, floor in BLOCKS:
+        if block[-1] >= got.shape[1]:
+            continue
+        block = list(block)
+        size = np.sqrt(np.mean(expected[:, block] ** 2))
+        apart = np.sqrt(np.mean((got[:, block] - expected[:, block]) ** 2))
+        assert apart <= tolerance * size + floor, (block, apart, size)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+@pytest.mark.parametrize("name", READINGS)
+def test_columns_are_what_the_error_adds(case, name, robot):
+    cause, values = CAUSES[name], np.array(READINGS[name])
+    for joint in range(3) if cause.per == "joint" else (0,):
+        signals = spoiled(case, name, robot, joint, values)
+        exact_change = residual_of(case, signals) - case.linear.residual
+        column = cause.columns(case.linear, robot, joint, cause.shapes[0])
+        assert column.shape == (*case.linear.residual.shape, len(values))
+        assert np.abs(exact_change).max() > 1e-5
+        assert_close(column @ values, exact_change, TOLERANCE.get(name, 0.01))
+        if np.abs(exact_change[:, :12]).max() > 1e-6:
+            assert_close((column @ values)[:, :12], exact_change[:, :12], 0.01)
+        for k, value in enumerate(values):
+            if len(values) > 1:
+                single = np.zeros(len(values))
+                single[k] = value
+                change = residual_of(case, spoiled(case, name, robot, joint, single)) - case.linear.residual
+                assert_close(column[..., k] * value, change, TOLERANCE.get(name, 0.01))
+
+
+@pytest.mark.parametrize("name", READINGS)
+def test_undo_takes_the_error_out_again(case, name):
+    """Several times the size of above: what is left is of second order."""
+    cause, robot, joint = CAUSES[name], 1, 2
+    # Friction in a spring shows in the very reading that tells its direction: little of it only.
+    values = (0.1 if name == "sea_hysteresis" else 10.0) * np.array(READINGS[name])
+    share = {"link_length": 0.01, "sea_hysteresis": 0.1}.get(name, 0.03)
+    signals = spoiled(case, name, robot, joint, values)
+    restored = cause.undo(signals, case.linear, robot, joint, values, cause.shapes[0])
+    for field in ("phi", "theta", "tau"):
+        error = getattr(signals, field) - getattr(case.signals, field)
+        left = (getattr(restored, field) - getattr(case.signals, field))[200:-200]
+        if name == "link_length" and field == "phi":
+            assert np.abs(left).max() <= 0.02 * np.abs(error).max()
+        assert np.sqrt(np.mean(left**2)) <= share * np.sqrt(np.mean(error**2)) + 1e-9
+    without = cause.undo(signals, case.linear, robot, joint, np.zeros(len(values)), cause.shapes[0])
+    np.testing.assert_array_equal(without.tau, signals.tau)
+    np.testing.assert_array_equal(without.phi, signals.phi)
+
+
+@pytest.mark.parametrize("name", sorted(set(CAUSES) - set(READINGS)))
+def test_causes_that_are_no_errors_of_readings_leave_signals_alone(case, name):
+    cause = CAUSES[name]
+    values = np.ones(len(cause.parameters))
+    shape = cause.shapes[0] or {"start_s": 5.0, "duration_s": 1.0}
+    assert cause.undo(case.signals, case.linear, 0, 0, values, shape) is None
+
+
+def test_friction_at_rest_takes_any_force_that_changes_slowly(case):
+    """A joint stands still from 6 s to 8 s: a torque that drifts then is an unknown, and none while it moves on."""
+    s = case.signals
+    frozen = s.phi.copy()
+    start, stop = 600, 800
+    frozen[start:stop, 1, 0] = frozen[start, 1, 0]
+    frozen[stop:, 1, 0] += frozen[start, 1, 0] - s.phi[stop, 1, 0]
+    linear = replace(case.linear, signals=replace(s, phi=frozen))
+    cause = CAUSES["joint_friction"]
+    unknowns = cause.unknowns(linear, 1, 0, {"slow_rad_per_s": 1e-3})
+    moves = cause.unknowns(case.linear, 1, 0, {"slow_rad_per_s": 1e-3})
+    assert len(moves) < len(unknowns) <= len(moves) + 6  # 2 s, a knot every half second
+    added = np.stack([u.ravel() for u in unknowns], axis=1)
+    for drift in (0.0, 0.7):
+        torque = np.zeros((len(s.time), 3))
+        torque[start + 5 : stop - 5, 0] = 1.0 - drift * np.linspace(0.0, 1.0, stop - start - 10)
+        expected = case.linear.of_signals(1, tau=torque).ravel()
+        left = expected - added @ np.linalg.lstsq(added, expected, rcond=None)[0]
+        assert np.linalg.norm(left) < 0.35 * np.linalg.norm(expected)
+
+
+def team_of(case, robots):
+    """A team of any size from the robots at hand; it need not be in balance."""
+    which = [(0, 1, 2, 1, 2)[k] for k in range(robots)]
+    s, grasps = case.signals, case.shared.grasps
+    nothing = np.zeros((robots, robots))
+    held = GraspEstimate(
+        grasps.R_1i[which], grasps.p_1i[which] + 0.05 * np.arange(robots)[:, None], np.zeros((6 * robots - 6,) * 2),
+        nothing, nothing, np.zeros(robots), np.zeros(robots),
+    )  # fmt: skip
+    signals = Signals(s.time, s.phi[:, which], s.theta[:, which], s.tau[:, which], s.rate_hz)
+    bases = Bases(case.bases.R[which], case.bases.p[which])
+    shared = Shared(held, case.shared.pi)
+    linear = linearise(signals, shared, bases, DESIGN, Reduction.of(signals), full=True)
+    return TeamRig((), None, None, (linear,), (lambda x: x,), DEFAULTS, frozenset())
+
+
+@pytest.mark.parametrize("robots", [1, 2, 5])
+def test_every_cause_has_finite_columns_and_an_effect(case, robots):
+    rig = team_of(case, robots)
+    candidates = [*rig.candidates(), push(0, 5.0, 1.0, {})]
+    per = {"joint": 3 * robots, "robot": robots, "payload": 1}
+    undecidable = robots  # the zero of every last gimbal axis
+    assert len(candidates) == sum(per[CAUSES[name].per] for name in CAUSES) - undecidable
+    assert len({c.key for c in candidates}) == len(candidates)
+    assert len(rig.channels) == rig.linear[0].channels == 6 * robots
+    assert rig.local_unknowns == 4 * (robots - 1)
+    rng = np.random.default_rng(8)
+    for candidate in candidates:
+        if robots == 5 and candidate.robot not in (None, 1, 5):
+            continue
+        columns = rig.columns(candidate)[0]
+        k = len(candidate.parameters)
+        assert columns.shape == (len(rig.linear[0].reduction.time), 6 * robots, k)
+        assert np.all(np.isfinite(columns))
+        values = candidate.units * rng.uniform(0.5, 2.0, k)
+        parameters, se = rig.effect_parameters(candidate, values, np.diag(candidate.units**2))
+        effect = make_effect(candidate.cause, parameters, candidate.robot, candidate.joint)
+        assert set(parameters) == set(EFFECTS[candidate.cause].parameter_names()) == set(se)
+        assert effect.cause == candidate.cause
+        assert rig.effect(candidate, values) == effect
+
+
+def test_no_cause_is_silent(case):
+    rig = team_of(case, 2)
+    for candidate in rig.candidates():
+        size = np.abs(rig.columns(candidate)[0]).max(axis=(0, 1)) * candidate.units
+        assert np.all(size > 1e-8), candidate.label
+
+
+def test_catalogue_is_complete():
+    assert set(CAUSES) == set(EFFECTS)
+    for name, cause in CAUSES.items():
+        assert cause.name == name
+        assert cause.separate
+        place = set(EFFECTS[name].place_names())
+        assert place == {"joint": {"robot", "joint"}, "robot": {"robot"}, "payload": set()}[cause.per]
+        if name in DEFAULTS:
+            assert tuple(DEFAULTS[name]) == cause.parameters
+            assert not cause.scales
+        else:
+            assert len(cause.scales) == len(cause.parameters)
+
+
+def test_negative_friction_is_no_effect_but_none(case):
+    rig = team_of(case, 2)
+    candidate = next(c for c in rig.candidates() if c.cause == "joint_friction")
+    effect = rig.effect(candidate, np.array([-0.1, 0.2]))
+    assert (effect.coulomb_Nm, effect.viscous_Nms_per_rad) == (0.0, 0.2)
+    with_negative = next(c for c in rig.candidates() if c.cause == "grasp_play")
+    assert rig.effect(with_negative, np.array([-1e-4])) is None
+
+
+def test_standard_errors_of_derived_parameters():
+    """Delta method against draws: stiffness and anchor of a tether."""
+    rng = np.random.default_rng(2)
+    values = np.array([4.0, -3.0, 5.0, 20.0])
+    root = 0.02 * rng.standard_normal((4, 4)) * values
+    covariance = root.T @ root
+    context = Context(np.zeros(3), 0.4, {}, None)
+    physical, se = CAUSES["tether"].report(values, covariance, context)
+    draws = [CAUSES["tether"].physical(values + root.T @ z, context) for z in rng.standard_normal((4000, 4))]
+    for name in physical:
+        assert se[name] == pytest.approx(np.std([d[name] for d in draws]), rel=0.06)
+    assert physical["anchor_z_m"] == pytest.approx(5.0 / 20.0 + 0.4)
+    _, se = CAUSES["slosh"].report(
+        np.array([0.3, 0.0, 0.0, 0.0]), 1e-4 * np.eye(4), Context(np.zeros(3), 0.4, {"length_m": 0.2}, None)
+    )
+    assert np.isnan(se["length_m"])
+    assert se["mass_kg"] == pytest.approx(0.01)
+    of_shape = np.diag([1e-4, 1e-4, 1e-4, 1e-4, 4e-6, 9e-6])
+    context = Context(np.zeros(3), 0.4, {"length_m": 0.2, "damping_ratio": 0.05}, None)
+    _, se = CAUSES["slosh"].report(np.array([0.3, 0.0, 0.0, 0.0]), of_shape, context)
+    assert se["length_m"] == pytest.approx(2e-3)
+    assert se["damping_ratio"] == pytest.approx(3e-3)
+    assert se["mass_kg"] == pytest.approx(0.01)
+
+
+def test_a_mass_swings_only_if_it_is_there_and_within_reach():
+    """What a look-alike leaves over fits a pendulum of no mass far outside, or one that hardly swings."""
+    slosh = CAUSES["slosh"]
+
+    def possible(mass, moment, se=1e-3, damping=0.05):
+        errors = np.array([1e-3, 1e-3, se, 1e-3])
+        shape = {"length_m": 0.2, "damping_ratio": damping}
+        return slosh.possible(np.array([mass, 0.01, moment, 0.0]), errors, shape)
+
+    assert possible(0.02, -0.02)
+    assert not possible(1.5e-3, 0.0)  # within two standard errors of nothing
+    assert not possible(-0.02, 0.0)
+    assert not possible(0.02, 0.05)  # hangs 2.5 m from the centre
+    assert possible(0.02, 0.05, se=0.02)
+    assert not possible(0.02, -0.02, damping=0.29)
+    shape = {"length_m": 0.97, "damping_ratio": 0.28}
+    for _ in range(3):
+        near = slosh.finer(shape)
+        assert near
+        assert all(0.04 <= s["length_m"] <= 1.0 and s["damping_ratio"] <= 0.3 for s in near)
+        shape = max(near, key=lambda s: (s["damping_ratio"], s["length_m"]))

@@ -1,0 +1,277 @@
+"""Causes outside the sensors, put into an exact recording by hand: wrenches on the payload, displaced frames."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import make_interp_spline
+from scipy.spatial.transform import Rotation
+
+from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes.base import Context
+from discrepancy.team.linear.residual import balance
+from discrepancy.team.linear.trial_linear import linearise
+from estimator.arm.delta import forward_kinematics, inverse_kinematics, jacobian, leg_geometry
+from estimator.arm.dynamics import arm_torque
+from recorded_team import COM, GRASPS, HOME, STEP_S, as_matrix, derivatives
+from team_case import DESIGN, exact, residual_of
+from test_team_causes import assert_close, rate_of
+
+
+@pytest.fixture(scope="module")
+def case():
+    return exact()
+
+
+@pytest.fixture(scope="module")
+def motion(case):
+    """Attitude R of the payload in the world, position and velocity of its centre of mass, twist in {1}."""
+    x = case.path(case.signals.time[:, None] + STEP_S * np.arange(-4, 5))
+    R, v = as_matrix("xyz", x[:, 4, :3]), derivatives(x)[1][:, 3:]
+    return R, x[:, 4, 3:] + COM, v
+
+
+def point(motion, r):
+    """World position of the payload's point r (in {1})."""
+    R, c, _ = motion
+    return c + R @ (r - COM)
+
+
+def relieved(case, motion, force, moment):
+    """Torques once an outside wrench (world axes, about {1}'s origin in the payload) takes part of the load."""
+    R, _, _ = motion
+    wrench = np.concatenate([np.einsum("qji,qj->qi", R, x) for x in (force, moment)], axis=1)
+    grasp = np.block(
+        [[np.eye(3)] * 3, [np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) for _, (x, y, z) in GRASPS]]
+    )
+    less = (-wrench @ np.linalg.pinv(grasp).T).reshape(-1, 3, 3)  # of the robots' forces, in {1}
+    tau = case.signals.tau.copy()
+    for i, (R_1i, _) in enumerate(GRASPS):
+        in_b = np.einsum("qij,qj->qi", R, less[:, i]) @ R_1i  # {b_i} is turned like {i} at rest
+        tau[:, i] += np.einsum("qij,qi->qj", jacobian(case.signals.phi[:, i], DESIGN), in_b)
+    return replace(case.signals, tau=tau)
+
+
+def check_wrench(case, motion, name, robot, joint, shape, values, force, moment, tolerance=0.01):
+    changed = residual_of(case, relieved(case, motion, force, moment)) - case.linear.residual
+    column = CAUSES[name].columns(case.linear, robot, joint, shape)
+    np.testing.assert_array_equal(column[:, :12], 0.0)
+    assert np.abs(changed[:, 12:]).max() > 1e-3
+    assert_close(column @ values, changed, tolerance)
+
+
+def reported(case, name, values, shape=None, trial=None):
+    context = Context(COM, DESIGN.home_height_m, shape or {}, trial)
+    return CAUSES[name].physical(np.asarray(values), context)
+
+
+@pytest.mark.parametrize("robot", [0, 1, 2])
+def test_tether(case, motion, robot):
+    stiffness, anchor = 30.0, np.array([0.1, -0.2, 0.9])  # in {b} of the robot
+    R_1i, p_1i = GRASPS[robot]
+    wrist = forward_kinematics(case.signals.phi[:, robot], DESIGN)
+    force = stiffness * (anchor - wrist) @ R_1i.T  # world
+    lever = motion[0] @ p_1i
+    values = np.append(stiffness * (anchor - HOME), stiffness)
+    check_wrench(case, motion, "tether", robot, 0, {}, values, force, np.cross(lever, force))
+    physical = reported(case, "tether", values)
+    assert physical["stiffness_N_per_m"] == stiffness
+    np.testing.assert_allclose([physical[f"anchor_{a}_m"] for a in "xyz"], anchor)
+
+
+def test_drag(case, motion):
+    force = -5.0 * motion[2]
+    check_wrench(case, motion, "drag", 0, 0, {}, [5.0], force, np.cross(motion[0] @ COM, force))
+
+
+def test_push(case, motion):
+    """The window's edges fall into the filters: what counts is the force in between."""
+    time = case.signals.time
+    window = ((time >= 6.0) & (time < 9.0))[:, None]
+    applied, at = np.array([2.0, -1.0, 3.0]), np.array([0.8, 0.4, -0.1])
+    force = applied * window
+    moment = np.cross(motion[0] @ at, force)
+    samples = motion[0].swapaxes(1, 2)
+    shape = {"start_s": 6.0, "duration_s": 3.0}
+    columns = CAUSES["push"].columns(case.linear, 0, 0, shape)
+    changed = residual_of(case, relieved(case, motion, force, moment)) - case.linear.residual
+    # The moment columns are constant in {1}, the point is fixed there: the force turns a little in between.
+    in_1 = np.einsum("qij,qj->qi", samples, np.tile(applied, (len(time), 1)))
+    moments = np.cross(at, in_1)
+    values = np.append(applied, moments[(time >= 6.0) & (time < 9.0)].mean(axis=0))
+    assert_close(columns @ values, changed, 0.12)
+    np.testing.assert_allclose((columns @ values)[:, 12:15], changed[:, 12:15], atol=0.15)
+    # As far as the payload is level, the reported point lies on the line of action.
+    physical = reported(case, "push", np.append(applied, np.cross(at, applied)), shape, 2)
+    named = np.array([physical[f"point_{a}_m"] for a in "xyz"])
+    np.testing.assert_allclose(np.cross(named - at, applied), 0.0, atol=1e-9)
+    assert (named - COM) @ applied == pytest.approx(0.0, abs=1e-9)
+    assert (physical["trial"], physical["start_s"], physical["duration_s"]) == (2, 6.0, 3.0)
+    np.testing.assert_allclose([physical[f"force_{a}_N"] for a in "xyz"], applied)
+
+
+def test_slosh(case, motion):
+    """A pendulum under a moving point, its equation integrated by Runge-Kutta; the columns take it near the centre."""
+    mass, at, shape = 0.4, COM + np.array([0.02, -0.03, 0.01]), {"length_m": 0.2, "damping_ratio": 0.05}
+    time = case.signals.time
+    pivot = make_interp_spline(time, point(motion, at), k=5)
+    accel = pivot.derivative(2)
+    w = np.sqrt(DESIGN.gravity_mps2 / shape["length_m"])
+    across = np.array([1.0, 1.0, 0.0])
+
+    def rate(t, y):
+        return np.append(y[3:], -across * accel(t) - 2 * 0.05 * w * y[3:] - w**2 * y[:3])
+
+    y = solve_ivp(rate, (0.0, time[-1]), np.zeros(6), t_eval=time, rtol=1e-9, atol=1e-12).y.T
+    swing = -across * accel(time) - 2 * 0.05 * w * y[:, 3:] - w**2 * y[:, :3]
+    force = -mass * swing
+    values = np.append(mass, mass * (at - COM))
+    check_wrench(case, motion, "slosh", 0, 0, shape, values, force, np.cross(motion[0] @ at, force), 0.03)
+    physical = reported(case, "slosh", values, shape)
+    np.testing.assert_allclose([physical[f"point_{a}_m"] for a in "xyz"], at)
+    assert physical["mass_kg"] == mass
+
+
+@pytest.mark.parametrize("joint", [0, 1, 2])
+@pytest.mark.parametrize("robot", [0, 2])
+def test_gimbal_friction(case, motion, robot, joint):
+    """The moment on the payload has -torque about the rubbing axis and nothing about the other two."""
+    theta = case.signals.theta[:, robot]
+    rate = rate_of(theta[:, joint])
+    torque = 0.03 * np.clip(rate / 1e-3, -1, 1) + 0.2 * rate
+    turn_z = Rotation.from_euler("Z", theta[:, :1])
+    turn_zy = Rotation.from_euler("ZY", theta[:, :2])
+    ones = np.ones((len(theta), 1))
+    axes = np.stack(
+        [ones * [0.0, 0.0, 1.0], turn_z.apply([0.0, 1.0, 0.0]), turn_zy.apply([1.0, 0.0, 0.0])], axis=1
+    )  # in {b}
+    moment_b = np.linalg.solve(axes, -torque[:, None, None] * np.eye(3)[joint][:, None])[..., 0]
+    moment = moment_b @ GRASPS[robot][0].T
+    shape = {"slow_rad_per_s": 1e-3}
+    check_wrench(
+        case, motion, "gimbal_friction", robot, joint, shape, [0.03, 0.2], 0.0 * moment, moment, 0.05
+    )
+
+
+# Displaced frames: the payload moves as it does and feels the same forces; the robot's joints adapt.
+
+
+def adapted(case, robot, displaced, turned=None, up=(0.0, 0.0, 1.0)):
+    """Signals of a robot whose wrist is displaced in its {b} (Q, 3), whose gimbal sees another attitude."""
+    s = case.signals
+    phi, theta, tau = (x[:, robot] for x in (s.phi, s.theta, s.tau))
+    force = np.linalg.solve(
+        np.swapaxes(jacobian(phi, DESIGN), 1, 2), (tau - own_torque(phi, (0.0, 0.0, 1.0)))[..., None]
+    )[..., 0]
+    h, R = forward_kinematics(phi, DESIGN), Rotation.from_euler("ZYX", theta)
+    if turned is not None:
+        h, R, force = turned.apply(h), turned * R, turned.apply(force)
+    new = inverse_kinematics(h + displaced, DESIGN)
+    loaded = np.einsum("qij,qi->qj", jacobian(new, DESIGN), force) + own_torque(new, up)
+    out = {"phi": new, "theta": R.as_euler("ZYX"), "tau": loaded}
+    changed = {}
+    for name, values in out.items():
+        changed[name] = getattr(s, name).copy()
+        changed[name][:, robot] = values
+    return replace(s, **changed)
+
+
+def own_torque(phi, up):
+    """Weight of the arm on its joints, as the slope of its potential energy."""
+
+    def energy(phi):
+        legs = leg_geometry(phi, DESIGN)
+        knees = legs.h[:, None] - legs.rod  # platform joints shifted onto the wrist
+        share = DESIGN.proximal_com_m / DESIGN.proximal_length_m
+        moved = (DESIGN.wrist_mass_kg + 1.5 * DESIGN.rod_mass_kg) * legs.h
+        moved = moved + (DESIGN.proximal_mass_kg * share + 0.5 * DESIGN.rod_mass_kg) * knees.sum(axis=1)
+        return DESIGN.gravity_mps2 * moved @ np.asarray(up)
+
+    step = 1e-5
+    return np.stack(
+        [(energy(phi + step * e) - energy(phi - step * e)) / (2 * step) for e in np.eye(3)], axis=1
+    )
+
+
+def test_weight_of_the_arm_is_that_of_the_estimator(case):
+    phi = case.signals.phi[::50, 0]
+    still = np.zeros_like(phi)
+    np.testing.assert_allclose(own_torque(phi, (0, 0, 1)), arm_torque(phi, still, still, DESIGN), atol=1e-7)
+
+
+def check_pose(case, signals, column, values, tolerance=0.01, balance_tolerance=0.03):
+    changed = residual_of(case, signals) - case.linear.residual
+    got = column @ np.asarray(values)
+    assert np.abs(changed[:, :12]).max() > 1e-6
+    assert_close(got[:, :12], changed[:, :12], tolerance)
+    # The payload's motion is taken from all wrists, so it is a little wrong. The joints carry their load at another
+    # angle, but that the poses tell.
+    data = linearise(signals, case.shared, case.bases, DESIGN, case.reduction, full=False).data
+    data = replace(data, wrench=case.linear.data.wrench)
+    moved = case.reduction(balance(data, case.shared)[0]) - case.linear.residual[:, 12:]
+    np.testing.assert_allclose(got[:, 12:], moved, atol=balance_tolerance * np.abs(moved).max() + 1e-7)
+
+
+@pytest.mark.parametrize("robot", [0, 1, 2])
+def test_base_creep(case, robot):
+    """The base gets ahead by v t; its wrist then lies back in {b}."""
+    v = np.array([4e-6, -3e-6])
+    gone = np.append(v, 0.0) * case.signals.time[:, None]
+    column = CAUSES["base_creep"].columns(case.linear, robot, 0, {})
+    check_pose(case, adapted(case, robot, -gone), column, v)
+
+
+def force_of(case, robot):
+    """On the payload, in {i} and in {b}."""
+    f = case.carried.wrench[:, robot, 3:]
+    return f, Rotation.from_euler("ZYX", case.signals.theta[:, robot]).apply(f)
+
+
+@pytest.mark.parametrize("robot", [0, 1, 2])
+def test_grasp_flex(case, robot):
+    """The payload hangs back against the force on it, so the flange leads by compliance times force."""
+    c = 2e-6
+    signals = adapted(case, robot, c * force_of(case, robot)[1])
+    column = CAUSES["grasp_flex"].columns(case.linear, robot, 0, {})
+    check_pose(case, signals, column, [c], 0.02)
+
+
+@pytest.mark.parametrize("robot", [0, 1])
+def test_grasp_play(case, robot):
+    play = 2e-5
+    f = force_of(case, robot)[0]
+    lead = Rotation.from_euler("ZYX", case.signals.theta[:, robot]).apply(play * np.clip(f / 0.4, -1.0, 1.0))
+    signals = adapted(case, robot, lead)
+    column = CAUSES["grasp_play"].columns(case.linear, robot, 0, {"force_N": 0.4})
+    check_pose(case, signals, column, [play], 0.02)
+
+
+@pytest.mark.parametrize("robot", [0, 1, 2])
+def test_base_compliance(case, robot):
+    """The force on the base is what payload and arm's bodies do not keep for their own acceleration."""
+    c = 1e-5
+    phi = case.signals.phi[:, robot]
+    legs = leg_geometry(phi, DESIGN)
+    knees = legs.h[:, None] - legs.rod
+    share = DESIGN.proximal_com_m / DESIGN.proximal_length_m
+    moved = (DESIGN.wrist_mass_kg + 1.5 * DESIGN.rod_mass_kg) * legs.h
+    moved = moved + (DESIGN.proximal_mass_kg * share + 0.5 * DESIGN.rod_mass_kg) * knees.sum(axis=1)
+    on_base = -(force_of(case, robot)[1] + rate_of(rate_of(moved))) * [1.0, 1.0, 0.0]
+    signals = adapted(case, robot, -c * on_base)
+    column = CAUSES["base_compliance"].columns(case.linear, robot, 0, {})
+    # Twice differentiated, what the two know differently of the arm's own acceleration counts for more.
+    check_pose(case, signals, column, [c], 0.03, 0.12)
+
+
+@pytest.mark.parametrize("robot", [0, 1, 2])
+@pytest.mark.parametrize("axis", [0, 1])
+def test_base_tilt(case, robot, axis):
+    """{b} is turned about its place on the floor: wrist, gimbal and the vertical turn back in it."""
+    angle = 3e-4
+    back = Rotation.from_rotvec(-angle * np.eye(3)[axis])
+    signals = adapted(case, robot, np.zeros(3), back, back.apply([0.0, 0.0, 1.0]))
+    changed = residual_of(case, signals) - case.linear.residual
+    column = CAUSES["base_tilt"].columns(case.linear, robot, 0, {})[..., axis]
+    assert np.abs(changed[:, :12]).max() > 1e-4
+    assert_close(column * angle, changed, 0.03)

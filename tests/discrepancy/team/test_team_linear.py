@@ -1,0 +1,189 @@
+"""The stacked residual and its derivatives on exact recordings, against brute force."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discrepancy.team.linear.residual import balance, grasp_data, pose_error, pose_residual
+from discrepancy.team.linear.signals import with_rates
+from discrepancy.team.linear.trial_linear import start_bases
+from estimator import so3
+from recorded_team import GRASPS
+from team_case import DESIGN, exact, residual_of, true_bases, true_shared
+
+
+@pytest.fixture(scope="module")
+def case():
+    return exact()
+
+
+@pytest.fixture(scope="module")
+def linear(case):
+    return case.linear
+
+
+def unfiltered(case, signals=None, shared=None, bases=None):
+    """The residual's rows in full, from scratch."""
+    return residual_of(case, signals or case.signals, shared or case.shared, bases or case.bases)
+
+
+def test_residual_of_an_ideal_team_is_zero(linear):
+    split = 12
+    assert np.abs(linear.residual[:, :split]).max() < 2e-7  # rad, m
+    assert np.abs(linear.residual[:, split:]).max() < 0.02  # of 115 N and some 60 N m: what the filters bend
+    assert np.sqrt(np.mean(linear.residual[:, split:] ** 2)) < 5e-3
+
+
+def test_bases_are_found_from_grasps_and_joints(case):
+    found = start_bases(case.signals, case.shared, DESIGN)
+    np.testing.assert_allclose(found.R, case.bases.R, atol=1e-8)
+    np.testing.assert_allclose(found.p, case.bases.p, atol=1e-8)
+
+
+def test_pose_errors_by_hand(case):
+    """Robot 3 stands 2 mm off and turned; its grasp is 1 mm off: the errors follow from geometry."""
+    s = case.signals
+    step = np.array([0.002, -0.001, 0.0005])
+    bases = replace(case.bases, p=case.bases.p + np.array([np.zeros(3), np.zeros(3), step]))
+    x = pose_residual(s.phi, s.theta, case.shared, bases, DESIGN)
+    np.testing.assert_allclose(x[:, :9], 0.0, atol=3e-7)
+    np.testing.assert_allclose(x[:, 9:], np.tile(step, (len(x), 1)), atol=3e-7)
+
+    yaw = so3.exp(np.array([0.0, 0.0, 0.003]))
+    R = case.bases.R.copy()
+    R[1] = yaw @ R[1]
+    x = pose_residual(s.phi, s.theta, case.shared, replace(case.bases, R=R), DESIGN)
+    np.testing.assert_allclose(x[:, :3], np.tile([0.0, 0.0, 0.003], (len(x), 1)), atol=3e-7)
+
+    shift = np.array([0.0, 0.0, 0.0, 0.001, 0.0, 0.0, *np.zeros(6), *np.zeros(10)])
+    R_b1 = case.linear.data.R_bi[:, 0]
+    x = pose_residual(s.phi, s.theta, case.shared.moved(shift), case.bases, DESIGN)
+    np.testing.assert_allclose(x[:, 3:6], -R_b1[:, :, 0] * 0.001, atol=3e-7)
+
+
+def test_derivative_by_shared_unknowns(case, linear):
+    for k in range(linear.by_shared.shape[2]):
+        step = np.zeros(linear.by_shared.shape[2])
+        step[k] = 1e-4
+        ends = [unfiltered(case, shared=case.shared.moved(sign * step)) for sign in (1.0, -1.0)]
+        expected = (ends[0] - ends[1]) / 2e-4
+        scale = np.abs(expected).max()
+        np.testing.assert_allclose(linear.by_shared[:, :, k], expected, atol=2e-6 * scale)
+
+
+def test_derivative_by_bases(case, linear):
+    assert linear.by_bases.shape[2] == 8
+    for k in range(8):
+        step = np.zeros(8)
+        step[k] = 1e-4
+        ends = [unfiltered(case, bases=case.bases.moved(sign * step)) for sign in (1.0, -1.0)]
+        expected = (ends[0] - ends[1]) / 2e-4
+        np.testing.assert_allclose(linear.by_bases[:, :, k], expected, atol=1e-6 * np.abs(expected).max())
+        np.testing.assert_array_equal(linear.by_bases[:, 12:, k], 0.0)
+
+
+@pytest.mark.parametrize("robot", [0, 1, 2])
+@pytest.mark.parametrize("field", ["phi", "theta", "tau"])
+@pytest.mark.parametrize("kind", ["constant", "sway"])
+def test_derivative_by_readings(case, linear, robot, field, kind):
+    """Errors of one reading, constant and changing, against the full nonlinear residual."""
+    size = {"phi": 1e-4, "theta": 1e-4, "tau": 1e-2}[field]
+    time = case.signals.time
+    for joint in ((robot + (kind == "sway")) % 3,):
+        error = np.zeros((len(time), 3))
+        error[:, joint] = size * (1.0 if kind == "constant" else np.sin(2 * np.pi * 0.4 * time + joint))
+        full = np.zeros_like(case.signals.phi)
+        full[:, robot] = error
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = replace(case.signals, **{field: getattr(case.signals, field) + sign * full})
+            ends.append(unfiltered(case, moved))
+        expected = (ends[0] - ends[1]) / 2
+        argument = size * np.eye(3)[joint] if kind == "constant" else error
+        got = linear.of_signals(robot, **{field: argument})
+        for part in (slice(0, 12), slice(12, 15), slice(15, 18)):
+            scale = max(np.abs(expected[:, part]).max(), 1e-9)
+            np.testing.assert_allclose(got[:, part], expected[:, part], atol=6e-3 * scale)
+
+
+def test_errors_of_readings_add_up(linear):
+    rng = np.random.default_rng(3)
+    phi, theta, tau = rng.standard_normal((3, len(linear.signals.time), 3))
+    parts = linear.of_signals(1, phi=phi) + linear.of_signals(1, theta=theta) + linear.of_signals(1, tau=tau)
+    np.testing.assert_allclose(linear.of_signals(1, phi, theta, tau), parts, rtol=1e-9, atol=1e-9)
+
+
+def test_jacobian_is_one_of_filtered_signals(case, linear):
+    """By brute force at single samples: one of the 21 signals moved, all formulas again."""
+
+    def samples(s):
+        data = grasp_data(s, DESIGN, 100.0)
+        pose = pose_error(data.R_bi, data.p_bi, case.shared, case.bases)
+        return np.concatenate([pose, balance(data, case.shared)[0]], axis=1)
+
+    at = np.arange(200, len(linear.s) - 200, 100)  # every one a multiple of 4: no interpolation
+    for robot in range(3):
+        for k, step in zip(range(21), np.repeat([1e-5, 1e-4, 1e-3, 1e-5, 1e-4, 1e-3, 1e-3], 3), strict=True):
+            ends = []
+            for sign in (1.0, -1.0):
+                s = linear.s[at].copy()
+                s[:, robot, k] += sign * step
+                ends.append(samples(s))
+            expected = (ends[0] - ends[1]) / (2 * step)
+            scale = max(np.abs(expected).max(), 1e-9)
+            np.testing.assert_allclose(linear.J[robot, at][:, :, k], expected, atol=2e-4 * scale)
+
+
+def test_signals_are_value_rate_and_acceleration(case, linear):
+    np.testing.assert_array_equal(linear.s[:, 1, 0:3], with_rates(case.signals.phi, 100.0)[0][:, 1])
+    np.testing.assert_array_equal(linear.s[:, 2, 15:18], with_rates(case.signals.theta, 100.0)[2][:, 2])
+    np.testing.assert_array_equal(linear.s[:, 0, 18:21], with_rates(case.signals.tau, 100.0)[0][:, 0])
+
+
+def test_outside_wrench_takes_from_what_robots_exert(case, linear):
+    """With a force from outside the robots exert that much less, and their sum says so."""
+    samples = len(case.signals.time)
+    force = np.tile([1.0, -2.0, 0.5], (samples, 1))
+    moment = np.tile([0.1, 0.3, -0.2], (samples, 1))
+    x = linear.of_wrench(force, moment)
+    np.testing.assert_array_equal(x[:, :12], 0.0)
+    np.testing.assert_allclose(x[:, 12:], np.tile([-1.0, 2.0, -0.5, -0.1, -0.3, 0.2], (len(x), 1)), rtol=1e-9)
+
+
+@pytest.mark.parametrize("robot", [0, 1, 2])
+def test_moved_grasp_frames(case, linear, robot):
+    """The frame truly lies displaced by d, turned by r: recordings of the very same joints then contradict."""
+    samples = len(case.signals.time)
+    turn, shift = np.array([2e-4, -1e-4, 3e-4]), np.array([1e-4, 2e-4, -3e-4])
+    x = linear.of_pose(robot, np.tile(turn, (samples, 1)), np.tile(shift, (samples, 1)))
+    # The rigid payload puts the joints where the displaced frame meets the others'; seen from the joints alone,
+    # the assumed frame of robot i is then displaced the opposite way.
+    R, h = linear.data.R_bi.copy(), linear.data.p_bi.copy()
+    back = case.bases.R[robot].T
+    R[:, robot] = so3.exp(-back @ turn) @ R[:, robot]
+    h[:, robot] = h[:, robot] - back @ shift
+    expected = pose_error(R, h, case.shared, case.bases) - pose_error(
+        linear.data.R_bi, linear.data.p_bi, case.shared, case.bases
+    )
+    reduced = linear.reduction(expected)
+    if robot:
+        np.testing.assert_allclose(x[:, :12], reduced, atol=2e-7)
+    else:
+        # Robot 1's rotation turns its view of all other grasps too; ``of_pose`` leaves that to its caller.
+        got, expected = (y[:, :12].reshape(-1, 2, 6)[..., :3] for y in (x, reduced))
+        np.testing.assert_allclose(got, expected, atol=2e-7)
+        plain = linear.of_pose(0, None, np.tile(shift, (samples, 1)))[:, :12].reshape(-1, 2, 6)
+        np.testing.assert_allclose(plain[..., 3:], np.tile(shift, (len(x), 2, 1)), atol=1e-9)
+        np.testing.assert_array_equal(plain[..., :3], 0.0)
+    np.testing.assert_allclose(x[:, 12:], 0.0, atol=1e-12)
+
+
+def test_truth_is_the_truth():
+    """The unknowns of the case are those of the recording: grasps, inertia about {1}."""
+    shared = true_shared()
+    for i, (R_1i, p_1i) in enumerate(GRASPS):
+        np.testing.assert_allclose(shared.grasps.R_1i[i], R_1i)
+        np.testing.assert_allclose(shared.grasps.p_1i[i], p_1i)
+    bases = true_bases()
+    np.testing.assert_allclose(bases.R[2] @ bases.R[2].T, np.eye(3), atol=1e-12)

@@ -1,0 +1,186 @@
+"""Targets, options and numbers that nobody should give: one sentence on standard error, nothing lost."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimator.errors import InputError
+from estimator.estimate.payload import estimate_payload
+from estimator.recording.checks import check_recording
+from estimator.recording.metadata import RecordingMetadata
+from estimator.recording.model import Recording, write_recording
+from estimator.signals.process import process_recording
+from mocobot.cli import main
+from mocobot.files.writing import write_text
+from omnid_design import DESIGN
+from recordings import metadata, small_recording
+
+
+def resting(rows: int = 1500, **changes) -> Recording:
+    """Three robots that hold something still: a mass, and nothing else, can be had from it."""
+    recording = small_recording(rows, ref=False, **changes)
+    shape = recording.phi.shape
+    return dataclasses.replace(
+        recording, phi=np.full(shape, 0.6), theta=np.zeros(shape), tau=np.full(shape, 4.0)
+    )
+
+
+def turning() -> Recording:
+    """One robot that turns and lifts something."""
+    recording = resting(robots=1)
+    time = recording.time[:, None, None]
+    return dataclasses.replace(recording, theta=0.1 * np.sin(time * np.array([3.0, 4.0, 5.0])))
+
+
+@pytest.fixture
+def rec(tmp_path: Path) -> Path:
+    path = tmp_path / "rec.parquet"
+    write_recording(resting(), path)
+    return path
+
+
+def refusal(capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
+    """All of standard error, which must be one sentence, of a command that must exit with 2."""
+    with pytest.raises(SystemExit) as stop:
+        main([str(argument) for argument in arguments])
+    out, err = capsys.readouterr()
+    assert (stop.value.code, out) == (2, "")
+    assert err.startswith("mocobot: ")
+    assert err.endswith("\n")
+    assert err.count("\n") == 1
+    assert "\r" not in err
+    return err
+
+
+def test_targets_that_cannot_be_written(
+    rec: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for target, words in (
+        ("", "folder"),
+        ("/", "folder"),
+        ("..", "folder"),
+        (tmp_path, "folder"),
+        ("none/est.json", "no such folder"),
+        (rec / "est.json", "no such folder"),
+        ("x" * 300, "cannot be written"),
+    ):
+        assert words in refusal(capsys, "estimate", rec, "--out", target)
+        assert [path.name for path in tmp_path.iterdir()] == [rec.name]
+    assert "folder" in refusal(capsys, "simulate", "--out", _folder(tmp_path / "d.parquet"))
+
+
+def _folder(path: Path) -> Path:
+    path.mkdir()
+    return path
+
+
+def test_longest_allowed_name_is_written(tmp_path: Path) -> None:
+    path = tmp_path / ("x" * 255)
+    write_text(path, "text")
+    assert path.read_text() == "text"
+    assert len(list(tmp_path.iterdir())) == 1
+
+
+def test_interrupted_write_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupt(self: Path, target: Path) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "replace", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        write_text(tmp_path / "est.json", "{}")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_recording_is_never_overwritten(
+    rec: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = rec.read_bytes()
+    link = tmp_path / "link.json"
+    link.symlink_to(rec)
+    for target in (rec, tmp_path / ".." / tmp_path.name / rec.name, link):
+        assert "recording" in refusal(capsys, "estimate", rec, "--out", target)
+        assert rec.read_bytes() == before
+
+
+def test_the_same_file_twice(rec: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "twice" in refusal(capsys, "estimate", rec, rec.parent / "." / rec.name)
+
+
+@pytest.mark.parametrize("cutoff_hz", ["0", "-1", "nan", "60", "1e-6", "0.4"])
+def test_cutoffs_that_make_no_sense(rec: Path, capsys: pytest.CaptureFixture[str], cutoff_hz: str) -> None:
+    assert "cutoff_hz is" in refusal(capsys, "estimate", rec, "--cutoff-hz", cutoff_hz)
+
+
+def test_cutoff_goes_with_the_trimmed_ends() -> None:
+    recording = resting()
+    with pytest.raises(InputError, match=r"cutoff_hz is 0.9; .* at least 1 Hz"):
+        process_recording(recording, cutoff_hz=0.9, trim_s=1.0)
+    assert process_recording(recording, cutoff_hz=1.0, trim_s=1.0).samples == 1300
+    assert process_recording(recording, cutoff_hz=0.9, trim_s=0.0).samples == 1500
+
+
+def test_torques_in_another_unit() -> None:
+    good = small_recording()
+    for scale in (1e3, 1e200):
+        bad = dataclasses.replace(good, tau=scale * good.tau, name="trial.parquet")
+        with pytest.raises(InputError, match=r"trial.parquet: column 'omnid1.tau1' reaches .* N m"):
+            check_recording(bad)
+    limit = DESIGN.torque_limit_Nm
+    check_recording(dataclasses.replace(good, tau=np.full_like(good.tau, -2 * limit)))
+
+
+@pytest.mark.parametrize(
+    ("recording", "change"),
+    [(turning(), {"gravity_mps2": 1e-300}), (resting(), {"rod_mass_kg": 1e308})],
+)
+def test_design_beyond_arithmetic(recording: Recording, change: dict[str, float]) -> None:
+    design = dataclasses.replace(DESIGN, **change)
+    odd = dataclasses.replace(recording, metadata=dataclasses.replace(recording.metadata, design=design))
+    with pytest.raises(InputError, match="cannot be solved"):
+        estimate_payload([odd])
+
+
+def test_interrupted_before_anything_ran(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def interrupt(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tyro.cli", interrupt)
+    with pytest.raises(SystemExit) as stop:
+        main(["estimate"])
+    assert stop.value.code == 130
+    assert capsys.readouterr().err == "mocobot: interrupted\n"
+
+
+def test_labels_are_printable() -> None:
+    values = json.loads(metadata(payload="a").to_json())
+    for label in ("\ud800", "\x1b[31mred", "two\nlines", "nul\0"):
+        with pytest.raises(InputError, match=r"payload is .*; it must be text or null, all of it printable"):
+            RecordingMetadata.from_json(json.dumps({**values, "payload": label}))
+    assert RecordingMetadata.from_json(json.dumps({**values, "payload": "Träger 1"})).payload == "Träger 1"
+
+
+def test_output_that_cannot_take_the_text(tmp_path: Path) -> None:
+    rec = tmp_path / "rec.parquet"
+    write_recording(resting(payload="Träger"), rec)
+    command = [sys.executable, "-m", "mocobot", "estimate", str(rec)]
+    ascii_only = {"PYTHONIOENCODING": "ascii", "PATH": "/usr/bin:/bin"}
+    done = subprocess.run(command, capture_output=True, check=False, env=ascii_only)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert rb"(Tr\xe4ger)" in done.stdout
+    closed = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert closed.stdout is not None
+    closed.stdout.close()
+    assert closed.stderr is not None
+    assert closed.stderr.read() == b""
+    closed.stderr.close()
+    assert closed.wait() == 1

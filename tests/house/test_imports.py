@@ -1,0 +1,117 @@
+"""Imports run one way and without circles, and each package needs what the README says of it and nothing more."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from graphlib import CycleError, TopologicalSorter
+
+import pytest
+
+from source_tree import SRC, imported_modules, module_files, project_imports
+
+LOWER = {
+    "estimator": set(),
+    "mocobot_logs": {"estimator"},
+    "mocobot_inspect": {"estimator", "mocobot_logs"},
+    "mocobot_sim": {"estimator"},
+    "discrepancy": {"estimator", "mocobot_sim"},
+    "mocobot_view": {"estimator", "mocobot_sim", "discrepancy"},
+    "mocobot_report": {"estimator", "mocobot_sim", "discrepancy", "mocobot_view"},
+    "mocobot": {
+        "estimator", "mocobot_logs", "mocobot_inspect", "mocobot_sim", "discrepancy", "mocobot_view", "mocobot_report"
+    },
+}  # fmt: skip
+"""What each package may import of the others."""
+
+SIMULATOR = {"mujoco", "dm_control", "mocobot_sim"}
+
+
+def roots(modules: set[str]) -> set[str]:
+    return {name.split(".")[0] for name in modules}
+
+
+def test_every_package_has_its_layer() -> None:
+    assert {path.name for path in SRC.iterdir() if (path / "__init__.py").is_file()} == set(LOWER)
+
+
+@pytest.mark.parametrize("package", list(LOWER))
+def test_no_package_imports_a_later_one(package: str) -> None:
+    files = module_files(package)
+    assert files
+    for module, path in files.items():
+        assert roots(imported_modules(path)) & set(LOWER) <= LOWER[package] | {package}, module
+
+
+def test_no_module_imports_itself_through_others() -> None:
+    """Imports for type checkers count: who has to know whom is the same question."""
+    graph = project_imports()
+    assert len(graph) > 300
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        pytest.fail(f"a circle of imports: {' -> '.join(error.args[1])}")
+
+
+def test_estimator_needs_numpy_and_scipy_only() -> None:
+    """pyarrow serves the recording's files alone."""
+    allowed = {"estimator", "numpy", "scipy"} | set(sys.stdlib_module_names)
+    files = module_files("estimator")
+    assert len(files) > 10
+    for module, path in files.items():
+        more = {"pyarrow"} if module == "estimator.recording.parquet" else set()
+        assert roots(imported_modules(path)) <= allowed | more, module
+
+
+def walk_without(package: str, unwanted: set[str]) -> None:
+    """Import all of a package in a process of its own, and see what came along."""
+    code = (
+        f"import sys, pkgutil, importlib, {package}\n"
+        f"for m in pkgutil.walk_packages({package}.__path__, '{package}.'): importlib.import_module(m.name)\n"
+        f"assert sum(name.startswith('{package}.') for name in sys.modules) > 10\n"
+        f"assert not {unwanted!r} & set(sys.modules), {unwanted!r} & set(sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_estimator_runs_without_mujoco() -> None:
+    walk_without("estimator", SIMULATOR | {"numba"})
+
+
+@pytest.mark.parametrize("package", ["mocobot_logs", "mocobot_inspect"])
+def test_logs_are_read_without_the_simulator(package: str) -> None:
+    walk_without(package, SIMULATOR | {"numba", "discrepancy", "mocobot"})
+
+
+@pytest.mark.parametrize("package", ["discrepancy.engine", "discrepancy.least_squares"])
+def test_engine_of_the_diagnosis_knows_no_rig(package: str) -> None:
+    """What looks for causes works for any rig: it sees neither a machine nor the simulator."""
+    files = module_files(package)
+    assert len(files) > 3
+    for module, path in files.items():
+        names = imported_modules(path)
+        assert not roots(names) & SIMULATOR, module
+        assert not any(f"{name}.".startswith(("discrepancy.team.", "discrepancy.emps.")) for name in names), (
+            module
+        )
+
+
+def test_engine_of_the_diagnosis_runs_without_the_simulator() -> None:
+    walk_without("discrepancy.engine", SIMULATOR | {"discrepancy.team", "discrepancy.emps"})
+
+
+@pytest.mark.parametrize(("rig", "least"), [("team", 20), ("emps", 15)])
+def test_causes_need_no_simulator(rig: str, least: int) -> None:
+    """Traces of causes come from mechanics, not from the simulator that the diagnosis is tried on."""
+    files = module_files(f"discrepancy.{rig}.causes")
+    assert len(files) > least
+    for module, path in files.items():
+        assert not roots(imported_modules(path)) & SIMULATOR, module
+
+
+@pytest.mark.parametrize(("rig", "other"), [("team", "emps"), ("emps", "team")])
+def test_rigs_do_not_know_each_other(rig: str, other: str) -> None:
+    files = module_files(f"discrepancy.{rig}")
+    assert len(files) > 20
+    for module, path in files.items():
+        assert not any(name.startswith(f"discrepancy.{other}") for name in imported_modules(path)), module

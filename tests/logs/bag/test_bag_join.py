@@ -1,0 +1,291 @@
+"""Robots whose channels come from several topics."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.interpolate import CubicSpline
+
+import bags
+from bags import EPOCH_NS, raw_mcap, said
+from estimator.errors import InputError
+from mocobot_logs.bag.align import MAX_GAP_NS, Part, RowAligner
+from mocobot_logs.bag.read import open_bag
+from mocobot_logs.log import CHANNELS, REF, Samples, collect
+from mocobot_logs.map.parse import parse_map
+
+
+def part(stamps, values, columns):
+    stamps = np.asarray(stamps, np.int64)
+    values = np.asarray(values, float).reshape(len(stamps), len(columns))
+    return Part(stamps, stamps + 5, np.array(columns), values)
+
+
+def all_of(joiner, blocks):
+    found = [samples for block in blocks if (samples := joiner.push(block)) is not None]
+    found += [samples for samples in [joiner.finish()] if samples is not None]
+    return Samples(
+        np.concatenate([s.stamp_ns for s in found]),
+        np.concatenate([s.values for s in found]),
+        np.concatenate([s.log_ns for s in found]),
+    )
+
+
+@settings(max_examples=100, deadline=None, derandomize=True, database=None)
+@given(st.data())
+def test_equal_stamps_are_taken_bit_by_bit(data):
+    """Two topics stamped together, each of which lacks some messages, in blocks of any size, one of them late."""
+    stamps = EPOCH_NS + 10_000_000 * np.arange(60)
+    rng = np.random.default_rng(data.draw(st.integers(0, 999)))
+    values = rng.normal(size=(60, 3))
+    lost = data.draw(st.sets(st.integers(1, 58), max_size=8))
+    kept = np.array([k for k in range(60) if k not in lost])
+    late = data.draw(st.integers(0, 70))
+    size = data.draw(st.integers(1, 80))
+    blocks = []
+    for begin in range(0, 60 + late, size):
+        block = {}
+        for t, index, columns in ((0, np.arange(60), [0, 2]), (1, kept + late, [1])):
+            mine = index[(index >= begin) & (index < begin + size)] - late * t
+            if len(mine):
+                block[t] = part(stamps[mine], values[mine][:, columns], columns)
+        if block:
+            blocks.append(block)
+    rows = all_of(RowAligner("r", ("a", "b"), (1e7, 1e7), 3), blocks)
+    # What lacks for more than 60 ms has no row; all else is there.
+    alone = np.isin(stamps, rows.stamp_ns)
+    assert alone[kept].all()
+    places = np.searchsorted(rows.stamp_ns, stamps[kept])
+    np.testing.assert_array_equal(rows.values[places], values[kept])
+    np.testing.assert_array_equal(rows.values[:, [0, 2]], values[alone][:, [0, 2]])
+    assert not np.isnan(rows.values).any()
+    gaps = np.diff(kept, prepend=kept[0])
+    assert len(rows.stamp_ns) == 60 - sum(gap - 1 for gap in gaps if gap > 6)
+
+
+def test_what_is_not_a_number_does_not_spread():
+    stamps = uniform(100, 1)
+    values = np.zeros((100, 1))
+    values[50] = np.nan
+    rows = all_of(
+        RowAligner("r", ("a", "b"), (1e7, 1e7), 2),
+        [{0: part(stamps, values, [0]), 1: part(stamps, values, [1])}],
+    )
+    assert np.flatnonzero(np.isnan(rows.values).any(axis=1)).tolist() == [50]
+
+
+def wave(stamps, hz, columns):
+    time = (np.asarray(stamps) - EPOCH_NS) * 1e-9
+    return np.sin(2 * np.pi * hz * time[:, None] + np.arange(columns))
+
+
+def uniform(rate_hz, seconds, phase_s=0.0):
+    return EPOCH_NS + np.round((np.arange(round(seconds * rate_hz)) / rate_hz + phase_s) * 1e9).astype(
+        np.int64
+    )
+
+
+def blocks_of(streams, size=300):
+    """Messages of every topic by time, ``size`` of all to a block."""
+    every = np.concatenate([s for s, _, _ in streams])
+    number = np.repeat(np.arange(len(streams)), [len(s) for s, _, _ in streams])
+    index = np.concatenate([np.arange(len(s)) for s, _, _ in streams])
+    order = np.argsort(every, kind="stable")
+    for begin in range(0, len(order), size):
+        chosen = order[begin : begin + size]
+        block = {}
+        for t, (stamps, values, columns) in enumerate(streams):
+            mine = index[chosen[number[chosen] == t]]
+            if len(mine):
+                block[t] = part(stamps[mine], values[mine], columns)
+        yield block
+
+
+@pytest.mark.parametrize(("hz", "bound"), [(1.0, 4.1e-7), (5.0, 2.4e-4)])
+def test_interpolation_is_as_good_as_stated(hz, bound):
+    """A slow topic at the stamps of a fast one, worst error against the sine itself."""
+    fast, slow = uniform(1000, 12), uniform(100, 12, 0.0037)
+    streams = [(slow, wave(slow, hz, 2), [0, 1]), (fast, wave(fast, hz, 1), [2])]
+    rows = all_of(RowAligner("r", ("a", "b"), (1e7, 1e6), 3), blocks_of(streams))
+    # The fast topic sets the rows, from the slow one's first sample to its last.
+    inside = fast[(fast >= slow[0]) & (fast <= slow[-1])]
+    np.testing.assert_array_equal(rows.stamp_ns, inside)
+    np.testing.assert_array_equal(rows.log_ns, inside + 5)
+    np.testing.assert_array_equal(rows.values[:, 2], wave(inside, hz, 1)[:, 0])
+    error = np.abs(rows.values[:, :2] - wave(inside, hz, 2))
+    middle = (inside > slow[1]) & (inside < slow[-2])
+    assert bound / 3 < error[middle].max() < bound
+    # Between the first two samples, and the last two, by the straight line.
+    assert error.max() < 1.01 * (2 * np.pi * hz * 0.01) ** 2 / 8
+
+
+def test_interpolation_against_a_spline_with_jitter():
+    rng = np.random.default_rng(1)
+    fast, slow = uniform(500, 5), uniform(100, 5, 0.001) + rng.integers(-2_000_000, 2_000_000, 500)
+    streams = [(fast, wave(fast, 1.0, 1), [0]), (slow, wave(slow, 1.0, 2), [1, 2])]
+    rows = all_of(RowAligner("r", ("a", "b"), (2e6, 1e7), 3), blocks_of(streams, 37))
+    spline = CubicSpline((slow - EPOCH_NS) * 1e-9, wave(slow, 1.0, 2))
+    middle = slice(20, -20)
+    np.testing.assert_allclose(
+        rows.values[middle, 1:], spline((rows.stamp_ns[middle] - EPOCH_NS) * 1e-9), atol=1.5e-6
+    )
+
+
+def test_there_are_no_rows_where_a_topic_has_a_gap():
+    fast, slow = uniform(1000, 4), uniform(100, 4, 0.003)
+    gap = (slow > EPOCH_NS + 1_000_000_000) & (slow < EPOCH_NS + 1_100_000_000)
+    short = np.isin(np.arange(400), [250, 251])
+    kept = slow[~gap & ~short]
+    streams = [(fast, wave(fast, 1.0, 1), [0]), (kept, wave(kept, 1.0, 1), [1])]
+    rows = all_of(RowAligner("r", ("a", "b"), (1e6, 1e7), 2), blocks_of(streams))
+    steps = np.diff(rows.stamp_ns)
+    assert np.sum(steps > 1_000_000) == 1
+    assert 100_000_000 < steps.max() < 115_000_000
+    assert MAX_GAP_NS == 50_000_000  # which bridges two missing samples
+    assert np.abs(rows.values[:, 1] - wave(rows.stamp_ns, 1.0, 1)[:, 0]).max() < 0.005
+
+
+def test_a_topic_that_falls_silent_holds_nothing_up():
+    """Rows end where a topic ends, and what waits for it stays bounded."""
+    fast = uniform(1000, 200)
+    slow = uniform(100, 20)
+    aligner = RowAligner("r", ("a", "b"), (1e6, 1e7), 2)
+    count = held = 0
+    for block in blocks_of([(fast, wave(fast, 1.0, 1), [0]), (slow, wave(slow, 1.0, 1), [1])], 1000):
+        if (samples := aligner.push(block)) is not None:
+            count += len(samples.stamp_ns)
+            assert not np.isnan(samples.values).any()
+        held = max(held, *map(len, aligner._topics))
+    assert aligner.finish() is None
+    assert count == np.sum(fast <= slow[-1])
+    assert held < 70_000
+
+
+def test_repeated_stamps_of_a_slow_topic():
+    fast, slow = uniform(1000, 2), np.repeat(uniform(100, 2), 2)
+    streams = [(fast, wave(fast, 1.0, 1), [0]), (slow, wave(slow, 1.0, 1), [1])]
+    rows = all_of(RowAligner("r", ("a", "b"), (1e6, 1e7), 2), blocks_of(streams))
+    assert np.abs(rows.values[20:-20, 1] - wave(rows.stamp_ns, 1.0, 1)[20:-20, 0]).max() < 1e-6
+
+
+def test_crowded_samples_do_not_swing():
+    """Two noisy samples a moment apart: no cubic through both."""
+    fast = uniform(1000, 2)
+    slow = np.sort(np.concatenate([uniform(100, 2), uniform(100, 2)[50:60] + 1000]))
+    noise = np.random.default_rng(2).normal(scale=0.01, size=(len(slow), 1))
+    streams = [(fast, np.zeros((len(fast), 1)), [0]), (slow, noise, [1])]
+    rows = all_of(RowAligner("r", ("a", "b"), (1e6, 1e7), 2), blocks_of(streams))
+    assert np.abs(rows.values[:, 1]).max() < 1.3 * np.abs(noise).max()
+
+
+def test_stamps_that_run_back_cannot_be_aligned():
+    slow = uniform(100, 2)
+    slow[70] -= 35_000_000
+    aligner = RowAligner("bag: robot 2", ("/a", "/b"), (1e6, 1e7), 2)
+    aligner.push({1: part(slow[:70], np.zeros(70), [1])})
+    with pytest.raises(
+        InputError, match=r"bag: robot 2: the stamps of topic /b run back by 0.025 s; topics can be"
+    ):
+        aligner.push({1: part(slow[70:], np.zeros(130), [1])})
+
+
+WRENCH = "geometry_msgs/msg/WrenchStamped"
+MAP = {
+    "version": 1,
+    "level": "wrist",
+    "channels": {
+        **{f"h_{a}": {"topic": "/r{robot}/pose", "field": f"point.{a}", "unit": "m"} for a in "xyz"},
+        **{
+            f"theta_{a}": {"topic": "/r{robot}/gimbal", "joint": f"g{a}", "field": "position", "unit": "rad"}
+            for a in "xyz"
+        },
+        **{f"force_{a}": {"topic": "/r{robot}/ft", "field": f"wrench.force.{a}", "unit": "N"} for a in "xyz"},
+    },
+}
+
+
+def wrench(stamp, force):
+    vector = bags.TYPES.types["geometry_msgs/msg/Vector3"]
+    both = bags.TYPES.types["geometry_msgs/msg/Wrench"](vector(*map(float, force)), vector(0.0, 0.0, 0.0))
+    return bags.TYPES.types[WRENCH](header=bags.header(int(stamp)), wrench=both)
+
+
+@pytest.mark.parametrize("clock", ["header", "log"])
+def test_a_laboratory_with_a_topic_per_sensor(tmp_path, clock):
+    """Force-torque sensor at 500 Hz, gimbal at 200 Hz, wrist at 100 Hz, none in step with another."""
+    pose, gimbal, ft = uniform(100, 3, 0.0011), uniform(200, 3, 0.0023), uniform(500, 3)
+    messages = [
+        said("/r1/pose", int(t), bags.point(v, int(t))) for t, v in zip(pose, wave(pose, 1, 3), strict=True)
+    ]
+    messages += [
+        said("/r1/gimbal", int(t), bags.joint_state(v, [], int(t), names=["gz", "gy", "gx"]))
+        for t, v in zip(gimbal, wave(gimbal, 0.7, 3), strict=True)
+    ]
+    messages += [said("/r1/ft", int(t), wrench(t, v)) for t, v in zip(ft, wave(ft, 1.5, 3), strict=True)]
+    messages.sort(key=lambda s: s.log_ns)
+    path = raw_mcap(tmp_path / "a.mcap", messages)
+    log = collect(open_bag(path, parse_map({**MAP, "time": {"clock": clock}}, "test")))
+    (stream,) = log.streams
+    inside = ft[(ft >= gimbal[0]) & (ft <= pose[-1])]
+    np.testing.assert_array_equal(stream.stamp_ns, inside)
+    np.testing.assert_array_equal(stream.values[:, 6:], wave(inside, 1.5, 3))
+    np.testing.assert_allclose(stream.values[10:-10, :3], wave(inside, 1, 3)[10:-10], atol=1e-6)
+    np.testing.assert_allclose(stream.values[10:-10, 3:6], wave(inside, 0.7, 3)[10:-10], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    "sent",
+    [lambda stamps: stamps + 3_000_000, lambda stamps: stamps[::10], lambda stamps: stamps - 100_000_000_000],
+    ids=["in between", "seldom", "long ago"],
+)
+def test_commands_that_do_not_go_with_the_samples_are_left_out(tmp_path, sent):
+    """They may be missing, and must not cost the samples."""
+    team = bags.Team.draw(robots=1, rows=200)
+    messages = team.said()
+    messages += [
+        said("/omnid1/wrist/command", team.log_ns(0, k), bags.point([1, 2, 3], int(t)))
+        for k, t in enumerate(sent(team.stamps[0]))
+    ]
+    messages.sort(key=lambda s: s.log_ns)
+    log = collect(open_bag(raw_mcap(tmp_path / "a.mcap", messages)))
+    assert log.channels == CHANNELS["wrist"]
+    np.testing.assert_array_equal(log.streams[0].values, team.wrist(0))
+
+
+def test_commands_that_a_map_insists_on_are_interpolated(tmp_path):
+    team = bags.Team.draw(robots=1, rows=200)
+    messages = team.said()
+    messages += [
+        said("/omnid1/wrist/command", int(t), bags.point([1, 2, 3], int(t)))
+        for t in team.stamps[0] + 3_000_000
+    ]
+    messages.sort(key=lambda s: s.log_ns)
+    path = raw_mcap(tmp_path / "a.mcap", messages)
+    topic = "/omnid{robot}/wrist/command"
+    log_map = bags.wrist_map()
+    log_map["channels"] |= {f"ref_{a}": {"topic": topic, "field": f"point.{a}", "unit": "m"} for a in "xyz"}
+    log = collect(open_bag(path, parse_map(log_map, "test")))
+    assert log.channels == CHANNELS["wrist"] + REF
+    np.testing.assert_array_equal(log.streams[0].stamp_ns, team.stamps[0][1:])
+    np.testing.assert_allclose(log.streams[0].values[:, 9:], np.tile([1.0, 2, 3], (199, 1)), rtol=1e-12)
+
+
+def test_topics_with_one_stamp_only(tmp_path):
+    """Set once by a driver and never again: nothing to interpolate between."""
+    team = bags.Team.draw(robots=1)
+    messages = [
+        said("/r1/pose", s.log_ns, bags.point([0, 0, 0], int(team.stamps[0, 7]) + 1)) for s in team.said()
+    ]
+    messages += [
+        said("/r1/gimbal", s.log_ns, team.message(0, k, names=["gx", "gy", "gz", "a", "b", "c"]))
+        for k, s in enumerate(team.said())
+    ]
+    messages += [
+        said("/r1/ft", s.log_ns, wrench(t, [1, 2, 3]))
+        for s, t in zip(team.said(), team.stamps[0], strict=True)
+    ]
+    path = raw_mcap(tmp_path / "a.mcap", sorted(messages, key=lambda s: s.log_ns))
+    with pytest.raises(
+        InputError, match=r"topic /r1/pose has too few stamps to be brought onto one time with the other"
+    ):
+        collect(open_bag(path, parse_map(MAP, "test")))

@@ -1,0 +1,207 @@
+"""The released base as MuJoCo compiles it: rollers, masses, contact with the floor, and the files it is made from."""
+
+import dataclasses
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from estimator.errors import InputError
+from mocobot_sim.base.design import WHEELS, BaseDesign, base_design, load_base_design
+from mocobot_sim.base.index import BaseIndex
+from mocobot_sim.base.rollers import wheel_reach
+from mocobot_sim.base.solo import build_solo, compile_solo
+from mocobot_sim.scene.scene import build_team
+from mocobot_sim.scene.team_index import TeamIndex
+from payload_mjcf import TEAMS
+
+OMNID = Path(__file__).resolve().parents[3] / "models" / "omnid"
+DESIGN = base_design()
+HALF_PITCH = np.pi / DESIGN.rollers
+
+
+@pytest.fixture(scope="module")
+def parked() -> mujoco.MjModel:
+    return mujoco.MjModel.from_xml_path(str(OMNID / "omnid.xml"))
+
+
+@pytest.fixture(scope="module")
+def solo() -> mujoco.MjModel:
+    return compile_solo(build_solo())
+
+
+def test_design_file_and_robot_have_the_same_wheels(parked):
+    assert load_base_design(OMNID / "base.toml") == DESIGN
+    for wheel, (x, y) in zip(WHEELS, DESIGN.wheel_positions, strict=True):
+        np.testing.assert_allclose(
+            parked.body(f"wheel_{wheel}").pos, [x, y, DESIGN.wheel_radius_m], atol=1e-15
+        )
+        assert parked.geom(f"wheel_{wheel}").size[0] == DESIGN.wheel_radius_m
+        # Positive speed drives forward.
+        np.testing.assert_array_equal(parked.joint(f"wheel_{wheel}").axis, [0.0, 1.0, 0.0])
+
+
+def test_wheels_keep_their_mass_and_inertia(parked, solo):
+    data, before = mujoco.MjData(solo), mujoco.MjData(parked)
+    for model, state in ((solo, data), (parked, before)):
+        mujoco.mj_forward(model, state)
+    index = BaseIndex.of(solo)
+    for k, wheel in enumerate(WHEELS):
+        old = parked.body(f"wheel_{wheel}")
+        hub = solo.body(f"omnid1/wheel_{wheel}").id
+        assert solo.body_subtreemass[hub] == pytest.approx(old.subtreemass[0], rel=1e-12)
+        # The hub and its rollers, about the wheel's centre; nothing is left beside the axes.
+        parts = [hub, *np.flatnonzero(solo.body_parentid == hub)]
+        total = np.zeros((3, 3))
+        for body in parts:
+            R, arm = data.ximat[body].reshape(3, 3), data.xipos[body] - data.xpos[hub]
+            total += R @ np.diag(solo.body_inertia[body]) @ R.T
+            total += solo.body_mass[body] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+        np.testing.assert_allclose(total, np.diag(old.inertia), rtol=0, atol=1e-12)
+        unit, column = np.zeros(solo.nv), np.zeros(solo.nv)
+        unit[index.wheel_dof[0, k]] = 1.0
+        mujoco.mj_mulM(solo, data, column, unit)
+        assert unit @ column == pytest.approx(
+            old.inertia[1] + parked.joint(f"wheel_{wheel}").armature[0], rel=1e-9
+        )
+    assert solo.body_mass.sum() == pytest.approx(parked.body_mass.sum(), rel=1e-12)
+
+
+def test_every_roller_turns_about_its_long_axis_at_45_deg_to_the_wheels(solo):
+    data = mujoco.MjData(solo)
+    mujoco.mj_forward(solo, data)
+    lowest = {}
+    for k, wheel in enumerate(WHEELS):
+        hub = solo.body(f"omnid1/wheel_{wheel}").id
+        rollers = np.flatnonzero(solo.body_parentid == hub)
+        assert len(rollers) == DESIGN.rollers
+        for body in rollers:
+            joint, geom = solo.body_jntadr[body], solo.body_geomadr[body]
+            axle = data.xaxis[joint]
+            np.testing.assert_allclose(axle, data.geom_xmat[geom].reshape(3, 3)[:, 2], atol=1e-12)
+            assert abs(axle[1]) == pytest.approx(np.cos(DESIGN.roller_angle_rad), abs=1e-12)
+            # At right angles to the line from the wheel's centre.
+            assert abs(axle @ (data.xpos[body] - data.xpos[hub])) < 1e-12
+            if data.xpos[body][2] < DESIGN.roller_radius_m + 1e-9:
+                lowest[k] = axle[:2] * np.sign(axle[0])
+    # The rollers on the floor form a diamond: each axle passes left or right of the chassis' middle.
+    for k, sign in enumerate((-1, 1, 1, -1)):
+        np.testing.assert_allclose(lowest[k], np.sqrt(0.5) * np.array([1.0, sign]), atol=1e-12)
+
+
+def test_wheels_are_round_as_far_as_mujoco_is_concerned(solo):
+    """Depth of MuJoCo's own contact against the closed form, over a whole pitch."""
+    data, index = mujoco.MjData(solo), BaseIndex.of(solo)
+    sunk = 0.5e-3
+    data.qpos[index.free_qpos[0] + 2] = -sunk
+    angles = np.linspace(-HALF_PITCH, HALF_PITCH, 31)
+    reach = []
+    for angle in angles:
+        data.qpos[index.wheel_qpos] = angle
+        mujoco.mj_forward(solo, data)
+        deepest = min(contact.dist for contact in data.contact if index.geom_wheel[contact.geom].max() == 0)
+        reach.append(DESIGN.wheel_radius_m - sunk - deepest)
+    np.testing.assert_allclose(reach, wheel_reach(DESIGN, angles), rtol=0, atol=1e-9)
+    assert np.ptp(wheel_reach(DESIGN, np.linspace(-HALF_PITCH, HALF_PITCH, 1001))) < 0.075e-3
+    assert np.abs(wheel_reach(DESIGN, angles) - DESIGN.wheel_radius_m).max() < 0.05e-3
+
+
+def test_poses_are_read_off_the_free_joints(solo):
+    """A chassis that is tilted, too; yaw as scipy has it."""
+    data, index = mujoco.MjData(solo), BaseIndex.of(solo)
+    for turn in Rotation.random(20, np.random.default_rng(9)):
+        at = index.free_qpos[0]
+        data.qpos[at : at + 7] = [0.4, -1.2, 0.1, *turn.as_quat(scalar_first=True)]
+        R = turn.as_matrix()
+        np.testing.assert_allclose(index.poses(data), [[0.4, -1.2, np.arctan2(R[1, 0], R[0, 0])]], atol=1e-12)
+
+
+def test_neighbouring_rollers_clear_each_other(solo):
+    data = mujoco.MjData(solo)
+    mujoco.mj_forward(solo, data)
+    first = solo.geom("omnid1/wheel_front_left_roller1").id
+    for other in ("roller2", f"roller{DESIGN.rollers}"):
+        geom = solo.geom(f"omnid1/wheel_front_left_{other}").id
+        assert 0 < mujoco.mj_geomDistance(solo, data, first, geom, 0.1, None) < 0.02
+
+
+def test_released_teams_stand_on_their_wheels_and_parked_ones_have_none():
+    released, parked = build_team("a", released=True).compile(), build_team("a").compile()
+    assert BaseIndex.of(released).robots == 3
+    assert len(TeamIndex.of(released).base_dof) == 3 * (6 + 4 + 4 * DESIGN.rollers)
+    assert released.nv == parked.nv + 3 * (6 + 4 + 4 * DESIGN.rollers)
+    assert len(TeamIndex.of(parked).base_dof) == 0
+    assert parked.opt.disableflags & mujoco.mjtDisableBit.mjDSBL_CONTACT
+    assert not [parked.body(i).name for i in range(parked.nbody) if "roller" in parked.body(i).name]
+    with pytest.raises(InputError, match="omnid1 is parked; a base that is to drive must be released"):
+        BaseIndex.of(parked)
+    with pytest.raises(InputError, match="has no Omnid"):
+        BaseIndex.of(mujoco.MjModel.from_xml_string("<mujoco/>"))
+
+
+def test_nothing_but_rollers_touches_the_floor(tmp_path):
+    """Even a payload whose geoms may collide, and reach down to the floor."""
+    text = (
+        TEAMS[5].xml().replace("</body>", '<geom name="skirt" type="sphere" size="0.9" mass="0"/></body>', 1)
+    )
+    path = tmp_path / "skirt.xml"
+    path.write_text(text, encoding="utf-8")
+    model = build_team(path, released=True).compile()
+    data, index = mujoco.MjData(model), BaseIndex.of(model)
+    data.qpos[index.free_qpos + 2] = -1e-4
+    mujoco.mj_forward(model, data)
+    assert data.ncon == 20
+    touching = {tuple(sorted(contact.geom)) for contact in data.contact}
+    floor = model.geom("floor").id
+    assert all(a == floor and index.geom_wheel[b] >= 0 for a, b in touching)
+
+
+NUMBERS = dataclasses.asdict(DESIGN)
+BAD = {
+    "rollers": ({"rollers": 2}, "rollers is 2; it must be a whole number from 3 to 60"),
+    "half a roller": ({"rollers": 12.0}, "rollers is 12.0; it must be a whole number"),
+    "angle": ({"roller_angle_rad": 0.0}, "roller_angle_rad is 0.0; it must be a number from 0.1 to 1.47"),
+    "negative": ({"friction": -0.1}, "friction is -0.1; it must be a finite number greater than 0"),
+    "nan": ({"wheel_radius_m": float("nan")}, "wheel_radius_m is nan; it must be a finite number"),
+    "text": ({"half_track_m": "wide"}, "half_track_m is 'wide'; it must be a finite number"),
+    "true": ({"half_track_m": True}, "half_track_m is True; it must be a finite number"),
+    "thick": (
+        {"roller_radius_m": 0.05},
+        "roller_radius_m is 0.05; it must be less than half of wheel_radius_m",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_designs_are_refused(case):
+    change, sentence = BAD[case]
+    with pytest.raises(InputError, match=sentence):
+        BaseDesign(**(NUMBERS | change))
+
+
+def test_rollers_heavier_than_their_wheel_are_refused():
+    with pytest.raises(InputError, match=r"12 rollers of 0\.1 kg leave no hub in a wheel of 0\.8 kg"):
+        build_solo(dataclasses.replace(DESIGN, roller_mass_kg=0.1))
+
+
+@pytest.mark.parametrize(
+    ("edit", "sentence"),
+    [
+        (
+            lambda text: text.replace("friction", "grip"),
+            r"base\.toml: unknown key 'grip'; the keys are wheel_radius_m",
+        ),
+        (lambda text: text.replace("friction = 0.7", ""), r"base\.toml: missing key 'friction'"),
+        (lambda text: text.replace("= 12 ", '= "many" '), r"base\.toml: base design: rollers is 'many'"),
+        (lambda text: "wheels, four", r"base\.toml: not a readable design file"),
+    ],
+)
+def test_bad_design_files_are_refused(tmp_path, edit, sentence):
+    path = tmp_path / "base.toml"
+    path.write_text(edit((OMNID / "base.toml").read_text(encoding="utf-8")), encoding="utf-8")
+    with pytest.raises(InputError, match=sentence):
+        load_base_design(path)
+    with pytest.raises(InputError, match="nowhere"):
+        load_base_design(tmp_path / "nowhere.toml")

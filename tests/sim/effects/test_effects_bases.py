@@ -1,0 +1,173 @@
+"""Tilted, creeping and yielding bases, yielding and loose grasps, against MuJoCo's forces and closed forms."""
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from closed_loop import BASE_HEIGHT_M, ClosedLoop
+from effect_cases import example, team_with
+from mocobot_sim.scene.scene import build_team
+from mocobot_sim.scene.soft import spring_parameters
+from mocobot_sim.trial.trajectories import random_vias
+from mocobot_sim.trial.trial import run_trial
+from payload_mjcf import FIVE
+
+ROBOT = pytest.mark.parametrize("robot", [1, 2])
+
+
+def _gap(loop: ClosedLoop, robot: int) -> np.ndarray:
+    """Payload's grasp minus flange in the world [m]."""
+    return loop.data.site(f"omnid1/payload/grasp{robot}").xpos - loop.data.site(f"omnid{robot}/grasp").xpos
+
+
+@ROBOT
+def test_a_tilted_base_turns_about_its_place_on_the_floor(robot):
+    tilt = [0.03, -0.02]
+    effect = example("base_tilt", robot, roll_rad=tilt[0], pitch_rad=tilt[1])
+    loop, level = ClosedLoop(team_with("d", effect)), ClosedLoop(build_team("d"))
+    for i in (1, 2, 3):
+        before, after = (one.data.body(f"omnid{i}/base").xmat.reshape(3, 3) for one in (level, loop))
+        foot, old_foot = (one.data.body(f"omnid{i}/chassis").xpos for one in (loop, level))
+        np.testing.assert_allclose(foot, old_foot, rtol=0, atol=1e-12)
+        turn = Rotation.from_matrix(before.T @ after).as_rotvec()
+        np.testing.assert_allclose(turn, [*tilt, 0.0] if i == robot else 0, rtol=0, atol=1e-9)
+        up = loop.data.body(f"omnid{i}/base").xpos - foot
+        np.testing.assert_allclose(up, BASE_HEIGHT_M * after[:, 2], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("payload", ["a", "c", FIVE])
+def test_a_team_on_a_tilted_base_starts_at_rest(payload, tmp_path):
+    payload = payload if isinstance(payload, str) else payload.write(tmp_path)
+    loop = ClosedLoop(team_with(payload, example("base_tilt", 2, roll_rad=0.02, pitch_rad=0.02)))
+    for i in range(1, loop.index.robots + 1):
+        assert np.abs(_gap(loop, i)).max() < 1e-9
+    force = loop.forces_on_payload().sum(axis=0)
+    weight = 9.81 * loop.model.body_mass[loop.index.payload_body]
+    np.testing.assert_allclose(force, [0, 0, weight], rtol=0, atol=5e-4 * weight)
+    start = loop.data.site_xpos.copy()
+    for _ in range(500):
+        mujoco.mj_step(loop.model, loop.data)
+    assert np.abs(loop.data.site_xpos - start).max() < 0.02e-3
+
+
+@ROBOT
+def test_creep_is_velocity_times_time(robot):
+    velocity = np.array([3e-6, -5e-6])
+    effects = [
+        example("base_creep", robot, x_mps=velocity[0], y_mps=velocity[1]),
+        example("base_tilt", robot),
+    ]
+    loop = ClosedLoop(team_with("b", *effects))
+    R_Wb = loop.scene.X_Wb.rotation[robot - 1].as_matrix()
+    start = loop.data.body(f"omnid{robot}/chassis").xpos.copy()
+    home = loop.scene.wrist_home_b
+    for seconds in (1, 2, 3):
+        loop.run(1.0, home + 0.01 * np.array([seconds % 2, 0, 1]))
+        moved = R_Wb.T @ (loop.data.body(f"omnid{robot}/chassis").xpos - start)
+        np.testing.assert_allclose(moved, [*(velocity * (seconds - 0.01)), 0.0], rtol=0, atol=2e-9)
+
+
+@pytest.mark.parametrize("timestep_s", [1e-3, 0.25e-3])
+@pytest.mark.parametrize("compliance", [1e-7, 1e-6, 1e-5, 1e-4])
+@pytest.mark.parametrize("mass", [0.03, 3.0, 40.0])
+def test_a_spring_row_hangs_a_weight_by_its_compliance(timestep_s, compliance, mass):
+    solref, solimp = spring_parameters(compliance, 1.0 / mass)
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="{timestep_s}" integrator="implicitfast"/><worldbody><body>
+        <joint name="j" type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass="{mass}" diaginertia="1 1 1"/>
+        </body></worldbody><equality><joint joint1="j" solref="{solref[0]} {solref[1]}"
+        solimp="{" ".join(map(repr, solimp))}"/></equality></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    lowest = 0.0
+    for _ in range(round(3.0 / timestep_s)):
+        mujoco.mj_step(model, data)
+        lowest = min(lowest, data.qpos[0])
+    sag = -compliance * mass * 9.81
+    assert data.qpos[0] == pytest.approx(sag, rel=1e-6)
+    assert lowest > 1.06 * sag, "well damped"
+
+
+def _held(loop: ClosedLoop, i: int) -> np.ndarray:
+    loop.run(2.0, loop.scene.wrist_home_b + np.array([0.01, -0.02, 0.015]) * [[1], [-1], [1]])
+    return loop.forces_on_payload()[i - 1]
+
+
+@ROBOT
+@pytest.mark.parametrize("compliance", [1e-7, 1e-6, 1e-5])
+def test_a_flexible_grasp_gives_way_by_compliance_times_force(robot, compliance):
+    """In all directions alike: the payload sags relative to the flange along the force of payload on robot."""
+    loop = ClosedLoop(team_with("a", example("grasp_flex", robot, compliance_m_per_N=compliance)))
+    force = _held(loop, robot)
+    assert np.abs(force[:2]).max() > 3.0
+    np.testing.assert_allclose(
+        _gap(loop, robot), -compliance * force, rtol=0, atol=0.015 * compliance * 40 + 0.2e-6
+    )
+
+
+@ROBOT
+def test_a_yielding_base_gives_way_by_compliance_times_horizontal_force(robot):
+    """The floor's force on the base is all that acts on the robot sideways: payload's reaction, at rest."""
+    compliance = 1e-5
+    loop = ClosedLoop(team_with("a", example("base_compliance", robot, compliance_m_per_N=compliance)))
+    start = loop.scene.mounts.translation[robot - 1]
+    force = _held(loop, robot)
+    moved = loop.data.body(f"omnid{robot}/chassis").xpos - start
+    assert np.abs(force[:2]).max() > 3.0
+    np.testing.assert_allclose(moved[:2], -compliance * force[:2], rtol=0, atol=0.01 * compliance * 30)
+    assert moved[2] == 0
+
+
+@ROBOT
+@pytest.mark.parametrize("timestep_s", [1e-3, 0.25e-3])
+@pytest.mark.parametrize(
+    ("cause", "size"), [("grasp_flex", 1e-7), ("grasp_flex", 1e-5), ("base_compliance", 1e-5)]
+)
+def test_what_yields_is_stable_and_leaves_the_rods_closed(robot, timestep_s, cause, size):
+    scene = team_with("a", example(cause, robot, compliance_m_per_N=size), timestep_s=timestep_s)
+    log = run_trial(scene, random_vias(scene.wrist_home_b, np.random.default_rng(0), 1))
+    assert log.rod_error_m < 2e-6
+    assert log.weld_error_rad < 1e-6
+    assert log.weld_error_m < (200.0 * size if cause == "grasp_flex" else 1e-6) + 1e-6
+    wiggle = np.diff(log.phi[:, robot - 1], n=2, axis=0)
+    assert np.abs(wiggle).max() < 2e-3, "no oscillation from row to row"
+
+
+@ROBOT
+@pytest.mark.parametrize("play", [5e-6, 2e-4])
+def test_a_loose_grasp_uses_its_gap_and_no_more(robot, play):
+    """Impacts may go a few micrometres deep; limits are constraints of MuJoCo's."""
+    loop = ClosedLoop(team_with("a", example("grasp_play", robot, play_m=play)))
+    home, gaps = loop.scene.wrist_home_b, []
+    for tick in range(3000):
+        t = tick / 1000
+        loop.controller.update(
+            home + 0.03 * np.sin(2 * np.pi * np.array([0.9, 1.1, 0.7]) * t), np.zeros((3, 3))
+        )
+        mujoco.mj_step(loop.model, loop.data)
+        R_Wi = loop.data.site(f"omnid{robot}/grasp").xmat.reshape(3, 3)
+        gaps.append(R_Wi.T @ _gap(loop, robot))
+    gaps = np.array(gaps)[10:]
+    assert np.abs(gaps).max() < play + 40e-6
+    assert np.median(np.abs(gaps), axis=0).max() > 0.98 * play, "the weight lies on one side"
+    mujoco.mj_forward(loop.model, loop.data)
+
+
+def test_play_and_flex_in_one_grasp_add_up():
+    loop = ClosedLoop(team_with("a", example("grasp_play", 2, play_m=1e-4), example("grasp_flex", 2)))
+    loop.run(2.0, loop.scene.wrist_home_b)
+    force = loop.forces_on_payload()[1]
+    assert force[2] > 20
+    assert _gap(loop, 2)[2] == pytest.approx(-1e-4 - 1e-6 * force[2], abs=2e-6)
+
+
+@ROBOT
+def test_the_gimbal_keeps_its_mass_and_inertia(robot):
+    """The pad of a yielding grasp is cut out of the flange."""
+    for effect in (example("grasp_flex", robot), example("grasp_play", robot)):
+        yielding, clean = team_with("a", effect).compile(), build_team("a").compile()
+        assert yielding.body_mass.sum() == pytest.approx(clean.body_mass.sum(), rel=1e-14)
+        parts = [f"omnid{robot}/flange"] + ([f"omnid{robot}/pad"] if robot > 1 else [])
+        inertia = sum(yielding.body(part).inertia for part in parts)
+        np.testing.assert_allclose(inertia, clean.body(parts[0]).inertia, rtol=1e-12)

@@ -1,0 +1,173 @@
+"""Friction against Coulomb's law and closed forms, from MuJoCo's own constraint forces."""
+
+import mujoco
+import numpy as np
+import pytest
+
+from closed_loop import ClosedLoop
+from effect_cases import example, one_robot, team_with
+from mocobot_sim.scene.soft import damper_parameters
+from mocobot_sim.trial.trajectories import random_vias
+from mocobot_sim.trial.trial import run_trial
+
+FRICTION = (
+    int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF),
+    int(mujoco.mjtConstraint.mjCNSTR_FRICTION_TENDON),
+)
+EQUALITY = (int(mujoco.mjtConstraint.mjCNSTR_EQUALITY),)
+
+
+def _row(loop: ClosedLoop, kinds: tuple[int, ...], of: int) -> int:
+    data = loop.data
+    rows = [k for k in range(data.nefc) if int(data.efc_type[k]) in kinds and data.efc_id[k] == of]
+    assert len(rows) == 1
+    return rows[0]
+
+
+def _move(
+    loop: ClosedLoop, seconds: float, row_of, amplitude_m: float = 0.03
+) -> tuple[np.ndarray, np.ndarray]:
+    """Constraint force and velocity of a row in every step of a motion in all directions."""
+    home, force, velocity = loop.scene.wrist_home_b, [], []
+    omega = 2 * np.pi * np.array([0.7, 0.9, 0.6])
+    for tick in range(round(1000 * seconds)):
+        t = tick / 1000
+        ref = home + amplitude_m * np.sin(omega * t)
+        loop.controller.update(ref, np.tile(amplitude_m * omega * np.cos(omega * t), (len(home), 1)))
+        mujoco.mj_step(loop.model, loop.data)
+        row = row_of()
+        force.append(loop.data.efc_force[row])
+        velocity.append(loop.data.efc_vel[row])
+    return np.array(force), np.array(velocity)
+
+
+@pytest.mark.parametrize(("cause", "limit"), [("joint_friction", 0.05), ("sea_hysteresis", 0.05)])
+def test_coulomb_friction_of_leg_2_opposes_the_motion_at_its_limit(tmp_path, cause, limit):
+    changes = {"viscous_Nms_per_rad": 0.0} if cause == "joint_friction" else {}
+    loop = ClosedLoop(one_robot(tmp_path, example(cause, **changes)))
+    model = loop.model
+    of = 0 if cause == "joint_friction" else int(model.joint("omnid1/spring2").dofadr[0])
+    force, velocity = _move(loop, 4.0, lambda: _row(loop, FRICTION, of))
+    assert np.abs(force).max() <= limit * (1 + 1e-9)
+    # Fast enough that it does not stop within a step.
+    sliding = np.abs(velocity) > (0.05 if cause == "joint_friction" else 0.005)
+    assert sliding.mean() > 0.3
+    np.testing.assert_allclose(force[sliding], -limit * np.sign(velocity[sliding]), rtol=1e-6)
+
+
+def test_joint_friction_acts_on_phi_and_not_on_the_reading(tmp_path):
+    """Its row is the rate of motor plus spring: the link against the chassis."""
+    loop = ClosedLoop(one_robot(tmp_path, example("joint_friction")))
+    _move(loop, 0.5, lambda: _row(loop, FRICTION, 0))
+    row = _row(loop, FRICTION, 0)
+    rates = loop.data.qvel[[loop.index.motor_dof[0, 1], loop.index.spring_dof[0, 1]]]
+    mujoco.mj_forward(loop.model, loop.data)
+    assert loop.data.efc_vel[row] == pytest.approx(rates.sum(), rel=1e-12)
+    assert loop.data.ten_length[0] == pytest.approx(loop.phi()[0, 1] - 0.6230299772752583, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("cause", "joint"), [("joint_friction", 2), ("gimbal_friction", 2), ("gimbal_friction", 3)]
+)
+@pytest.mark.parametrize("viscous", [1e-4, 0.02, 0.2])
+def test_viscous_friction_is_proportional_to_the_rate(tmp_path, cause, joint, viscous):
+    """Constraint force over rate, in motion; the row's own inertia may add 3 % of it, or 2e-4 of the joint's."""
+    effect = example(cause, joint=joint, coulomb_Nm=0.0, viscous_Nms_per_rad=viscous)
+    loop = ClosedLoop(one_robot(tmp_path, effect))
+    name = "friction1_2" if cause == "joint_friction" else f"damping1_gimbal_{'zyx'[joint - 1]}"
+    equality = loop.model.equality(name).id
+    force, rate = _move(loop, 3.0, lambda: _row(loop, EQUALITY, equality))
+    assert np.abs(rate).max() > 0.05
+    error = force + viscous * rate
+    on = loop.model.eq_obj1id[equality]
+    tendon = cause == "joint_friction"
+    inverse = (
+        loop.model.tendon_invweight0[on] if tendon else loop.model.dof_invweight0[loop.model.jnt_dofadr[on]]
+    )
+    own = 2e-4 / inverse * np.sqrt(np.mean(np.gradient(rate, 1e-3) ** 2))
+    assert np.sqrt(np.mean(error**2)) < 0.03 * viscous * np.sqrt(np.mean(rate**2)) + own
+
+
+@pytest.mark.parametrize("damping", [1e-6, 1e-3, 1.0, 50.0])
+@pytest.mark.parametrize("inertia", [1e-4, 0.1, 10.0])
+def test_damper_slows_a_flywheel_exponentially(damping, inertia):
+    solref, solimp = damper_parameters(damping, 1.0 / inertia)
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="0.001" integrator="implicitfast" gravity="0 0 0"/><worldbody><body>
+        <joint name="j" type="hinge"/><inertial pos="0 0 0" mass="1" diaginertia="{inertia} {inertia} {inertia}"/>
+        </body></worldbody><equality><joint joint1="j" solref="{solref[0]} {solref[1]}"
+        solimp="{" ".join(map(repr, solimp))}"/></equality></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    data.qvel[0] = 1.0
+    steps = 1000
+    mujoco.mj_step(model, data, nstep=steps)
+    time_constant = inertia / damping
+    expected = np.exp(-1.0 / time_constant)
+    # A damper faster than a step stops the wheel; otherwise the row's inertia and the step's length count.
+    slack = 0.5 * damping * 1e-3 / inertia + damping / 1000 / inertia + 1e-3
+    assert -1e-3 < data.qvel[0] < 1.0
+    assert (
+        abs(np.log(max(data.qvel[0], 1e-9)) + 1.0 / time_constant) < slack / time_constant + 1e-4
+        or expected < 1e-3
+    )
+
+
+def _turn(tmp_path, torque: float, coulomb: float, seconds: float) -> tuple[np.ndarray, float]:
+    """Angles of the hanging payload's yaw joint under a constant torque, and its inertia about that axis."""
+    scene = one_robot(
+        tmp_path, example("gimbal_friction", joint=1, coulomb_Nm=coulomb, viscous_Nms_per_rad=0.0)
+    )
+    loop = ClosedLoop(scene)
+    dof = int(loop.model.joint("omnid1/gimbal_z").dofadr[0])
+    full = np.zeros((loop.model.nv, loop.model.nv))
+    mujoco.mj_fullM(loop.model, loop.data, full)
+    loop.data.qfrc_applied[dof] = torque
+    angles = []
+    for _ in range(round(1000 * seconds)):
+        loop.controller.update(scene.wrist_home_b, np.zeros((1, 3)))
+        mujoco.mj_step(loop.model, loop.data)
+        angles.append(loop.data.joint("omnid1/gimbal_z").qpos[0])
+    return np.array(angles), float(full[dof, dof])
+
+
+@pytest.mark.parametrize("coulomb", [5e-3, 0.1])
+def test_stiction_holds_below_the_limit(tmp_path, coulomb):
+    """Creep at 90 % of the limit is under 1e-6 rad per second."""
+    angles, _ = _turn(tmp_path, 0.9 * coulomb, coulomb, 2.0)
+    assert np.abs(angles).max() < 1e-5
+    assert abs(angles[-1] - angles[-1001]) < 1e-6
+
+
+@pytest.mark.parametrize("coulomb", [5e-3, 0.1])
+def test_it_slides_above_the_limit(tmp_path, coulomb):
+    """Uniform acceleration by what is left of the torque: I a = 0.2 F."""
+    seconds = 0.3
+    angles, inertia = _turn(tmp_path, 1.2 * coulomb, coulomb, seconds)
+    assert angles[-1] == pytest.approx(0.5 * 0.2 * coulomb / inertia * seconds**2, rel=0.01)
+
+
+@pytest.mark.parametrize("cause", ["joint_friction", "sea_hysteresis"])
+def test_stuck_joints_creep_little(cause):
+    """At rest under load for three seconds after a motion."""
+    loop = ClosedLoop(team_with("a", example(cause)))
+    home = loop.scene.wrist_home_b
+    loop.run(1.5, home + np.array([0.02, 0.01, 0.02]))
+    loop.run(3.0, home)
+    at = loop.index.spring_qpos if cause == "sea_hysteresis" else loop.index.motor_qpos
+    before = loop.data.qpos[at].copy()
+    loop.run(3.0, home)
+    assert np.abs(loop.data.qpos[at] - before)[0, 1] < 3e-5
+
+
+@pytest.mark.parametrize("robot", [1, 2])
+@pytest.mark.parametrize("size", [5e-3, 0.1])
+def test_gimbal_friction_leaves_the_welds_closed(robot, size):
+    effects = [
+        example("gimbal_friction", robot, joint, coulomb_Nm=size, viscous_Nms_per_rad=size)
+        for joint in (1, 2, 3)
+    ]
+    scene = team_with("a", *effects)
+    log = run_trial(scene, random_vias(scene.wrist_home_b, np.random.default_rng(0), 2))
+    assert log.weld_error_m < 3e-6
+    assert np.rad2deg(log.weld_error_rad) < 5e-4

@@ -1,0 +1,162 @@
+"""What acts on the payload: drag, tether, pendulum, pushes; against Newton and closed forms."""
+
+import itertools
+
+import mujoco
+import numpy as np
+import pytest
+
+from closed_loop import ClosedLoop, base_poses
+from effect_cases import SIZES, example, one_robot, team_with
+from mocobot_sim.scene.scene import build_team
+from mocobot_sim.trial.trajectories import Trajectory
+from mocobot_sim.trial.trial import between_commands, run_trial
+from mocobot_sim.trial.truth import GroundTruth
+
+
+def _still(scene, samples: int) -> Trajectory:
+    return Trajectory("static", np.tile(scene.wrist_home_b, (samples, 1, 1)))
+
+
+def test_drag_is_minus_c_v():
+    """MuJoCo's actuator force against the path of the centre of mass."""
+    c = 7.0
+    loop = ClosedLoop(team_with("a", example("drag", coefficient_Ns_per_m=c)))
+    ids = [loop.model.actuator(f"drag_{axis}").id for axis in "xyz"]
+    home, path, force = loop.scene.wrist_home_b, [], []
+    for tick in range(1500):
+        t = tick / 1000
+        loop.controller.update(
+            home + 0.03 * np.sin(2 * np.pi * np.array([0.9, 1.1, 0.7]) * t), np.zeros((3, 3))
+        )
+        mujoco.mj_step(loop.model, loop.data)
+        path.append(loop.data.xipos[loop.index.payload_body].copy())
+        force.append(loop.data.actuator_force[ids].copy())
+    # A step moves by its last velocity, so the difference to the state before is the velocity of a state.
+    velocity = np.diff(path, axis=0) / 1e-3
+    assert np.abs(velocity).max() > 0.03
+    np.testing.assert_allclose(force[2:], -c * velocity[1:], rtol=0, atol=1e-3 * c * np.abs(velocity).max())
+
+
+@pytest.mark.parametrize("robot", [1, 3])
+def test_a_tether_pulls_with_stiffness_times_distance(robot):
+    """At rest the robots hold weight and tether; Newton's balance is MuJoCo's, the tether's force is Hooke's."""
+    k, anchor = 40.0, np.array([0.3, -0.2, 0.9])
+    names = ("anchor_x_m", "anchor_y_m", "anchor_z_m")
+    changes = dict(zip(names, anchor.tolist(), strict=True)) | {"stiffness_N_per_m": k}
+    effects = [example("tether", robot, **changes), example("base_tilt", robot, roll_rad=1e-3, pitch_rad=0.0)]
+    loop = ClosedLoop(team_with("b", *effects))
+    p_Wb, R_Wb = base_poses(loop.scene)
+    at = p_Wb[robot - 1] + R_Wb[robot - 1] @ anchor
+    pull = k * (at - loop.data.site(f"omnid1/payload/grasp{robot}").xpos)
+    assert np.linalg.norm(pull) > 10.0
+    weight = np.array([0, 0, 9.81 * loop.model.body_mass[loop.index.payload_body]])
+    total = loop.forces_on_payload().sum(axis=0) + pull - weight
+    np.testing.assert_allclose(total, 0, rtol=0, atol=5e-4 * weight[2])
+    start = loop.data.site_xpos.copy()
+    for _ in range(500):
+        mujoco.mj_step(loop.model, loop.data)
+    assert np.abs(loop.data.site_xpos - start).max() < 0.02e-3
+
+
+@pytest.mark.parametrize(("length", "damping"), [(0.05, 0.0), (0.2, 0.02), (0.4, 0.1)])
+def test_a_pendulum_swings_with_its_own_period_and_damping(length, damping):
+    """Light against a heavy payload: 2 pi sqrt(l / g) / sqrt(1 - zeta^2), and the logarithmic decrement."""
+    effect = example(
+        "slosh",
+        mass_kg=1e-3,
+        length_m=length,
+        damping_ratio=damping,
+        point_x_m=0.5,
+        point_y_m=0.2,
+        point_z_m=0.0,
+    )
+    loop = ClosedLoop(team_with("a", effect))
+    for axis in "xy":
+        angle = []
+        joint = loop.data.joint(f"omnid1/payload/slosh_{axis}")
+        joint.qpos[0] = 0.05
+        for _ in range(4000):
+            loop.controller.update(loop.scene.wrist_home_b, np.zeros((3, 3)))
+            mujoco.mj_step(loop.model, loop.data)
+            angle.append(joint.qpos[0])
+        angle = np.array(angle)
+        falling = np.flatnonzero((angle[:-1] > 0) & (angle[1:] <= 0))
+        crossings = falling + angle[falling] / (angle[falling] - angle[falling + 1])
+        period = 2e-3 * np.pi * np.sqrt(length / 9.81) * 1e3 / np.sqrt(1 - damping**2)
+        np.testing.assert_allclose(np.diff(crossings[:4]), 1e3 * period, rtol=3e-3)
+        peaks = [angle[a:b].max() for a, b in itertools.pairwise(falling)]
+        expected = 2 * np.pi * damping / np.sqrt(1 - damping**2)
+        assert np.log(peaks[0] / peaks[1]) == pytest.approx(expected, abs=0.01 + 0.02 * expected)
+        joint.qpos[0] = joint.qvel[0] = 0.0
+
+
+def test_a_pendulum_hangs_at_the_start_and_weighs_what_it_does():
+    scene = team_with("a", example("base_tilt", 2), example("slosh", point_x_m=0.5, point_y_m=0.2))
+    loop = ClosedLoop(scene)
+    model, data = loop.model, loop.data
+    body = model.body("omnid1/payload/slosh").id
+    bob = data.xipos[body] - data.xpos[body]
+    np.testing.assert_allclose(bob, [0, 0, -0.1], rtol=0, atol=1e-9)
+    # forces_on_payload counts robot 1's share with the pendulum that hangs from the payload.
+    weight = 9.81 * (model.body_mass[loop.index.payload_body] + 0.3)
+    np.testing.assert_allclose(
+        loop.forces_on_payload().sum(axis=0), [0, 0, weight], rtol=0, atol=5e-4 * weight
+    )
+    truth, clean = GroundTruth.of(scene), GroundTruth.of(build_team("a"))
+    assert truth.mass_kg == clean.mass_kg
+    np.testing.assert_array_equal(truth.principal_kgm2, clean.principal_kgm2)
+    assert [effect.cause for effect in truth.effects] == ["base_tilt", "slosh"]
+
+
+PUSH = SIZES["push"] | {
+    "trial": 2, "start_s": 1.2, "duration_s": 2.0, "force_x_N": 2.0, "force_y_N": -1.0, "force_z_N": 3.0,
+    "point_x_m": 0.6, "point_y_m": 0.1, "point_z_m": 0.05,
+}  # fmt: skip
+
+
+def test_a_push_is_carried_by_the_wrists_springs():
+    """Settled, the wrists have given way until K times their shifts add up to the force; nothing moves before."""
+    scene = team_with("c", example("push", **PUSH))
+    clean = run_trial(build_team("c"), _still(scene, 450))
+    log = run_trial(scene, _still(scene, 450), trial_number=2)
+    np.testing.assert_array_equal(log.phi[:121], clean.phi[:121])
+    assert np.any(log.phi[122] != clean.phi[122])
+    other = run_trial(scene, _still(scene, 450), trial_number=1)
+    np.testing.assert_array_equal(other.tau, clean.tau)
+    any_number = run_trial(scene, _still(scene, 450))
+    np.testing.assert_array_equal(any_number.tau, log.tau)
+    p_1i = scene.X_1i.translation
+    grasps, before = (one.p_W1[318] + p_1i @ one.R_W1[318].T for one in (log, clean))
+    shift = 400.0 * (grasps - before).sum(axis=0)
+    np.testing.assert_allclose(shift, base_poses(scene)[1][0] @ [2.0, -1.0, 3.0], rtol=0, atol=0.1)
+    assert np.linalg.norm(log.p_W1[449] - clean.p_W1[449]) < 0.1e-3, "let go"
+
+
+def test_a_push_is_force_and_moment_about_the_centre_of_mass():
+    effect = example("push", **PUSH | {"start_s": 0.4})
+    scene = team_with("c", effect)
+    loop = ClosedLoop(scene)
+    ref, rate = between_commands(scene.wrist_home_b + np.linspace(0, 0.02, 60)[:, None, None], 10)
+    body = loop.index.payload_body
+    R_Wb1 = scene.X_Wb.rotation[0].as_matrix()
+    np.testing.assert_allclose(R_Wb1, base_poses(scene)[1][0], rtol=0, atol=1e-12)
+    for tick in range(500):
+        loop.controller.update(ref[tick], rate[tick])
+        mujoco.mj_step(loop.model, loop.data)
+        loop.data.xfrc_applied[:] = 0
+        effect.act(loop.model, loop.data, body, R_Wb1)
+        assert np.any(loop.data.xfrc_applied != 0) == (loop.data.time > 0.3995)
+    mujoco.mj_kinematics(loop.model, loop.data)
+    force = R_Wb1 @ [2.0, -1.0, 3.0]
+    site = loop.data.site("omnid1/payload/grasp1")
+    point = site.xpos + site.xmat.reshape(3, 3) @ [0.6, 0.1, 0.05]
+    np.testing.assert_allclose(loop.data.xfrc_applied[body, :3], force, rtol=1e-12)
+    moment = np.cross(point - loop.data.xipos[body], force)
+    np.testing.assert_allclose(loop.data.xfrc_applied[body, 3:], moment, rtol=0, atol=1e-9)
+
+
+def test_one_hanging_payload_takes_drag_and_tether(tmp_path):
+    scene = one_robot(tmp_path, example("drag"), example("tether"))
+    log = run_trial(scene, _still(scene, 150))
+    assert np.abs(log.phi - log.phi[0]).max() < 1e-4

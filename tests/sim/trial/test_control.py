@@ -1,0 +1,234 @@
+"""The wrist controller against MuJoCo's state and against statics on paper."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from closed_loop import ClosedLoop
+from estimator.errors import InputError
+from mocobot_sim.control.control import ControlGains, TeamController, home_phi, wrist
+from mocobot_sim.scene.as_built import AsBuilt
+from mocobot_sim.scene.models import omnid_design
+from mocobot_sim.scene.scene import TeamScene, build_team
+from payload_mjcf import ONE, Grasp, Payload
+
+REACH, PROXIMAL, ROD = 0.18 - 0.062, 0.200, 0.368
+FEATHER = Payload((Grasp(),), mass_kg=1e-3, com_m=(0.0, 0.0, -0.01), inertia_kgm2=(1e-6, 1e-6, 1e-6))
+
+
+@pytest.fixture(scope="module")
+def feather(tmp_path_factory) -> TeamScene:
+    """One robot that carries next to nothing."""
+    return build_team(FEATHER.write(tmp_path_factory.mktemp("feather")))
+
+
+@pytest.fixture
+def one(teams) -> TeamScene:
+    return teams[1]
+
+
+def _jacobian(phi) -> np.ndarray:
+    _, s, lever, _ = wrist(np.asarray(phi), REACH, PROXIMAL, ROD)
+    return np.linalg.solve(np.array(s), np.diag(lever))
+
+
+def test_kinematics_agree_with_the_simulated_mechanism_in_motion(teams):
+    """Five robots, thrown about: wrist from phi against the platform's slides, its rate against their speeds."""
+    loop = ClosedLoop(teams[5])
+    rng = np.random.default_rng(8)
+    seen_h, seen_v = [], []
+    for _ in range(12):
+        loop.run(0.15, teams[5].wrist_home_b + rng.uniform(-0.06, 0.06, (5, 3)))
+        phi_dot = loop.data.qvel[loop.index.motor_dof] + loop.data.qvel[loop.index.spring_dof]
+        for i, phi in enumerate(loop.phi()):
+            h, s, lever, cos_phi = wrist(phi, REACH, PROXIMAL, ROD)
+            np.testing.assert_allclose(h, loop.wrist()[i], rtol=0, atol=0.01e-3)
+            h_dot = np.linalg.solve(np.array(s), lever * phi_dot[i])
+            # The steps of the command shake the loops: the constraints' rates close to 0.1 %.
+            np.testing.assert_allclose(h_dot, loop.data.qvel[loop.index.slide_dof[i]], rtol=0, atol=1e-3)
+            np.testing.assert_array_equal(cos_phi, np.cos(phi))
+            np.testing.assert_allclose(np.linalg.norm(s, axis=1), ROD, rtol=1e-14)
+            seen_h.append(h)
+            seen_v.append(h_dot)
+    assert len(seen_h) == 60
+    assert np.ptp(np.array(seen_h), axis=0).min() > 0.03
+    assert np.abs(seen_v).max() > 0.1
+
+
+def test_kinematics_invert_the_closed_form_over_the_whole_workspace():
+    """The inverse is a triangle in each leg's plane."""
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(500, 3))
+    points *= (0.13 * rng.uniform(0, 1, (500, 1)) ** (1 / 3)) / np.linalg.norm(points, axis=1, keepdims=True)
+    for point in points + np.array([0, 0, 0.355]):
+        phi = np.empty(3)
+        for k in range(3):
+            c, s = np.cos(2 * np.pi * k / 3), np.sin(2 * np.pi * k / 3)
+            # In the leg's plane: x outward from the driven axis to the wrist, y sideways, z up.
+            x, y, z = c * point[0] + s * point[1] - REACH, -s * point[0] + c * point[1], point[2]
+            # |(x - L cos phi, y, z - L sin phi)| = rod, the knee outside.
+            need = (x * x + y * y + z * z + PROXIMAL**2 - ROD**2) / (2 * PROXIMAL)
+            phi[k] = np.arctan2(z, x) - np.arccos(need / np.hypot(x, z))
+        np.testing.assert_allclose(wrist(phi, REACH, PROXIMAL, ROD)[0], point, rtol=0, atol=1e-12)
+
+
+def test_home_angle_is_where_the_model_stands(one):
+    assert abs(home_phi(omnid_design()) - 0.6230299772752583) < 1e-15
+    np.testing.assert_allclose(ClosedLoop(one).phi(), home_phi(omnid_design()), rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["a", "b", "c"])
+def test_feed_forward_takes_up_the_static_load(name):
+    """Grasps at one height: three moment balances give the vertical loads, whatever the internal forces."""
+    mass, com, grasps = {
+        "a": (11.672, (0.537, 0.156), ((0, 0), (0.647, 0.533), (1.105, -0.305))),
+        "b": (11.672, (0.034, 0.535), ((0, 0), (-0.686, 0.572), (0.419323, 0.761554))),
+        "c": (10.478, (0.547, -0.670), ((0, 0), (-0.115, -1.143), (0.685894, -0.914996))),
+    }[name]
+    loop = ClosedLoop(build_team(name))
+    loop.run(1.5, loop.scene.wrist_home_b)
+    moments = np.vstack([np.ones(3), np.array(grasps).T])
+    vertical = np.linalg.solve(moments, mass * 9.81 * np.array([1.0, *com]))
+    np.testing.assert_allclose(loop.controller.feed_forward[:, 2], vertical, rtol=0, atol=0.05)
+    np.testing.assert_allclose(loop.controller.feed_forward[:, 2].sum(), mass * 9.81, rtol=1e-5)
+    # The same as MuJoCo's own forces between robots and payload, in each robot's base frame.
+    force_W = loop.forces_on_payload()
+    for i in range(3):
+        R_Wb = loop.data.body(f"omnid{i + 1}/base").xmat.reshape(3, 3)
+        np.testing.assert_allclose(loop.controller.feed_forward[i], R_Wb.T @ force_W[i], rtol=0, atol=0.01)
+
+
+def test_feed_forward_freezes_after_the_take_up(teams):
+    loop = ClosedLoop(teams[2])
+    home = teams[2].wrist_home_b
+    loop.run(0.9, home)
+    before = loop.controller.feed_forward
+    loop.run(0.09, home + 0.02)
+    assert np.abs(loop.controller.feed_forward - before).max() > 0.1
+    loop.run(0.02, home + 0.02)
+    frozen = loop.controller.feed_forward
+    loop.run(0.5, home - 0.02)
+    np.testing.assert_array_equal(loop.controller.feed_forward, frozen)
+
+
+def test_gravity_compensation_floats_the_bare_arm_anywhere(feather):
+    """With no load the wrist reaches every command: 1 % of the arm's 8.3 N would show as 0.2 mm."""
+    loop = ClosedLoop(feather)
+    loop.run(1.2, feather.wrist_home_b)
+    weight = np.array([[0, 0, 9.81e-3]])
+    np.testing.assert_allclose(loop.controller.feed_forward, weight, rtol=0, atol=2e-3)
+    for offset in ([0.08, 0, 0], [-0.05, 0.08, 0], [0, -0.05, 0.08], [0.03, 0.03, -0.10], [0, 0, 0.12]):
+        loop.run(2.0, feather.wrist_home_b + offset)
+        np.testing.assert_allclose(loop.wrist(), feather.wrist_home_b + offset, rtol=0, atol=0.01e-3)
+
+
+@pytest.mark.parametrize("stiffness", [400.0, 900.0])
+def test_a_push_displaces_the_wrist_like_a_spring(feather, stiffness):
+    """At rest K (ref - h) + F_ff balances the load and the push: h - ref = push / K on every axis."""
+    gains = ControlGains(stiffness_N_per_m=stiffness)
+    loop = ClosedLoop(feather, gains)
+    ref = feather.wrist_home_b + np.array([0.02, -0.03, 0.01])
+    loop.run(1.2, feather.wrist_home_b)
+    loop.run(1.0, ref)
+    push = np.array([8.0, -5.0, 12.0])
+    loop.data.xfrc_applied[loop.model.body("omnid1/platform").id, :3] = push
+    loop.run(2.5, ref)
+    # 0.01 N: no steady error in the torque loop either.
+    np.testing.assert_allclose(loop.wrist() - ref, [push / stiffness], rtol=0, atol=0.01 / stiffness)
+
+
+def test_damping_resists_the_rate_of_the_command_error(feather):
+    """A wrist at rest that is told to move feels D times the commanded rate: read off the motor torques."""
+    home, rate = feather.wrist_home_b, np.array([[0.3, -0.2, 0.1]])
+    torques = []
+    for ref_dot in (np.zeros((1, 3)), rate):
+        loop = ClosedLoop(feather)
+        loop.controller.update(home, ref_dot)
+        torques.append(loop.data.ctrl[loop.index.actuator[0]].copy())
+    gains = ControlGains()
+    wanted = (1 + gains.torque_gain) * _jacobian(np.full(3, home_phi(omnid_design()))).T @ (50.0 * rate[0])
+    np.testing.assert_allclose(torques[1] - torques[0], wanted, rtol=1e-9)
+
+
+def test_motor_torque_saturates(feather):
+    loop = ClosedLoop(feather, ControlGains(motor_torque_limit_Nm=1.5))
+    loop.controller.update(feather.wrist_home_b + np.array([0, 0, 0.1]), np.zeros((1, 3)))
+    np.testing.assert_array_equal(loop.data.ctrl[loop.index.actuator[0]], 1.5)
+
+
+def test_starts_without_a_jolt(teams):
+    """The first command is the static torque: what MuJoCo needs to stand still."""
+    loop = ClosedLoop(teams[5])
+    loop.controller.update(teams[5].wrist_home_b, np.zeros((5, 3)))
+    np.testing.assert_allclose(loop.data.ctrl[loop.index.actuator], loop.torque, rtol=0, atol=1e-9)
+
+
+def test_encoder_zeros_displace_the_true_wrist_not_the_believed_one(one):
+    zero = np.array([0.02, -0.01, 0.015])
+    loop = ClosedLoop(one, as_built=[AsBuilt(phi_zero_rad=zero)])
+    ref = one.wrist_home_b
+    loop.run(5.0, ref)
+    believed = wrist(loop.phi()[0] + zero, REACH, PROXIMAL, ROD)[0]
+    np.testing.assert_allclose(believed, ref[0], rtol=0, atol=0.5e-3)
+    shift = -_jacobian(loop.phi()[0] + zero) @ zero
+    assert np.linalg.norm(shift) > 2e-3
+    np.testing.assert_allclose(loop.wrist()[0] - believed, shift, rtol=0.03, atol=0.05e-3)
+
+
+def test_torque_zeros_are_taken_up_as_load(one):
+    zero = np.array([0.3, -0.1, 0.2])
+    forces = []
+    for units in ([], [AsBuilt(tau_zero_Nm=zero)]):
+        loop = ClosedLoop(one, as_built=units)
+        loop.controller.update(one.wrist_home_b, np.zeros((1, 3)))
+        forces.append(loop.controller.feed_forward[0])
+    np.testing.assert_allclose(forces[0], [0, 0, 9.81 * ONE.mass_kg], rtol=0, atol=1e-9)
+    J = _jacobian(np.full(3, home_phi(omnid_design())))
+    np.testing.assert_allclose(forces[1] - forces[0], np.linalg.solve(J.T, zero), rtol=1e-9)
+
+
+def test_theta_zeros_do_not_reach_the_controller(one):
+    loops = [ClosedLoop(one, as_built=u) for u in ([], [AsBuilt(theta_zero_rad=np.full(3, 0.1))])]
+    for loop in loops:
+        loop.run(0.1, one.wrist_home_b + np.array([0.01, 0.02, 0.03]))
+    np.testing.assert_array_equal(loops[0].data.qpos, loops[1].data.qpos)
+
+
+def test_each_robot_hears_only_its_own_sensors(teams):
+    units = [AsBuilt(), AsBuilt(phi_zero_rad=np.full(3, 0.01), tau_zero_Nm=np.full(3, 0.1))]
+    plain, zeroed = ClosedLoop(teams[2]), ClosedLoop(teams[2], as_built=units)
+    for loop in (plain, zeroed):
+        loop.controller.update(teams[2].wrist_home_b, np.zeros((2, 3)))
+    first, second = plain.index.actuator
+    np.testing.assert_array_equal(plain.data.ctrl[first], zeroed.data.ctrl[first])
+    assert np.all(plain.data.ctrl[second] != zeroed.data.ctrl[second])
+
+
+def test_gains_survive_a_round_trip():
+    gains = ControlGains(stiffness_N_per_m=321.0, rate_hz=500.0)
+    values = gains.to_dict()
+    assert ControlGains.from_dict(values | {"feed_forward_N": [[0, 0, 1]]}) == gains
+    assert ControlGains.from_dict({k: int(v) if v >= 1 else v for k, v in values.items()}) == gains
+    assert list(values) == [entry.name for entry in dataclasses.fields(ControlGains)]
+
+
+@pytest.mark.parametrize("bad", [0.0, -1.0, float("nan"), float("inf"), True, "400", None, 10**400])
+def test_bad_gain_is_named(bad):
+    values = ControlGains().to_dict() | {"damping_Ns_per_m": bad}
+    with pytest.raises(
+        InputError, match=r"control\.damping_Ns_per_m is .*; it must be a number greater than 0"
+    ):
+        ControlGains.from_dict(values)
+
+
+def test_missing_gain_is_named():
+    with pytest.raises(InputError, match=r"control\.rate_hz is None"):
+        ControlGains.from_dict({k: v for k, v in ControlGains().to_dict().items() if k != "rate_hz"})
+
+
+def test_wrong_number_of_units_is_refused(teams):
+    """Also one unit for several robots: it must not be read past its end, nor be everybody's."""
+    loop = ClosedLoop(teams[2])
+    with pytest.raises(InputError, match="as_built has 1 units; the payload has 2 grasps"):
+        TeamController(loop.index, omnid_design(), ControlGains(), loop.data, [AsBuilt()])

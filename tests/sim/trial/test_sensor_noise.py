@@ -1,0 +1,170 @@
+"""Resolution of the sensors from their recordings, and draws of their errors against really rounded signals."""
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfiltfilt
+
+from discrepancy.team.linear.noise import ANGLE_FLOOR_RAD, TORQUE_FLOOR_NM, Noise
+from discrepancy.team.linear.signals import Signals
+
+RATE = 100.0
+SAMPLES = 3000
+TIME = np.arange(SAMPLES) / RATE
+
+
+def sway(rng, amplitude, low=0.1, high=0.7):
+    """Smooth motion of two robots, shape (Q, 2, 3)."""
+    out = np.zeros((SAMPLES, 2, 3))
+    for _ in range(4):
+        frequency, phase = rng.uniform(low, high, (2, 3)), rng.uniform(0, 2 * np.pi, (2, 3))
+        out += amplitude / 2 * np.sin(2 * np.pi * frequency * TIME[:, None, None] + phase)
+    return out
+
+
+def read(x, step, sigma, rng, grid=0.0):
+    """A sensor that adds white noise and rounds, on a grid of its own."""
+    noisy = x + sigma * rng.standard_normal(x.shape)
+    return noisy if step == 0 else np.round((noisy - grid) / step) * step + grid
+
+
+def trial(rng, angle=(0.0, 0.0), torque=(0.0, 0.0)):
+    phi, theta, tau = (sway(rng, a) for a in (0.3, 0.2, 3.0))
+    grid = rng.uniform(-1e-3, 1e-3)
+    return Signals(
+        TIME,
+        read(phi, *angle, rng, grid),
+        read(theta, *angle, rng, grid),
+        read(tau, *torque, rng, grid),
+        RATE,
+    )
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(77)
+
+
+@pytest.mark.parametrize("bits", [12, 14, 16])
+@pytest.mark.parametrize("sigma_steps", [0.0, 0.5])
+def test_step_and_noise_of_rounded_angles(rng, bits, sigma_steps):
+    step = 2 * np.pi / 2**bits
+    noise = Noise.of([trial(rng, (step, sigma_steps * step)) for _ in range(2)])
+    np.testing.assert_allclose(noise.step[:2], step, rtol=1e-6)
+    # White noise above 25 Hz tells noise and rounding errors together; the latter are taken off again.
+    total = np.sqrt(noise.sigma[:2] ** 2 + step**2 / 12)
+    expected = max(np.hypot(sigma_steps * step, step / np.sqrt(12)), ANGLE_FLOOR_RAD)
+    np.testing.assert_allclose(total, expected, rtol=0.3)
+    np.testing.assert_array_equal(noise.step[2], 0.0)
+
+
+@pytest.mark.parametrize("sigma", [5e-5, 1e-3])
+def test_continuous_angles(rng, sigma):
+    noise = Noise.of([trial(rng, (0.0, sigma), (0.0, 0.05))])
+    np.testing.assert_array_equal(noise.step, 0.0)
+    for found, expected in ((noise.sigma[:2], sigma), (noise.sigma[2], 0.05)):
+        np.testing.assert_allclose(found, expected, rtol=0.15)
+        assert np.mean(found) == pytest.approx(expected, rel=0.07)
+
+
+def test_grid_finer_than_motion_shows_at_rest_only(rng):
+    """Of 20 bits hardly two samples in motion agree: as good as continuous, unless the joints rest for a while."""
+    step = 2 * np.pi / 2**20
+    moving = trial(rng, (step, 0.0))
+    noise = Noise.of([moving])
+    np.testing.assert_array_equal(noise.step[:2], 0.0)
+    np.testing.assert_allclose(noise.sigma[:2], ANGLE_FLOOR_RAD)
+    phi, theta = moving.phi.copy(), moving.theta.copy()
+    for x in (phi, theta):
+        x[1000:2500] = x[1000]
+    np.testing.assert_allclose(
+        Noise.of([Signals(TIME, phi, theta, moving.tau, RATE)]).step[:2], step, rtol=1e-6
+    )
+
+
+def test_exact_sensors_get_the_floor(rng):
+    noise = Noise.of([trial(rng)])
+    np.testing.assert_allclose(noise.sigma[:2], ANGLE_FLOOR_RAD, rtol=1e-9)
+    np.testing.assert_allclose(noise.sigma[2], TORQUE_FLOOR_NM, rtol=1e-9)
+
+
+def test_torques_may_be_rounded_too(rng):
+    noise = Noise.of([trial(rng, (2 * np.pi / 2**16, 0.0), (0.02, 0.02))])
+    np.testing.assert_allclose(noise.step[2], 0.02, rtol=1e-6)
+    np.testing.assert_allclose(
+        np.sqrt(noise.sigma[2] ** 2 + 0.02**2 / 12), np.hypot(0.02, 0.02 / np.sqrt(12)), rtol=0.1
+    )
+
+
+def test_every_trial_may_have_a_grid_of_its_own(rng):
+    step = 2 * np.pi / 2**14
+    noise = Noise.of([trial(rng, (step, 0.0)) for _ in range(5)])
+    np.testing.assert_allclose(noise.step[:2], step, rtol=1e-6)
+
+
+def smoothed(x):
+    """The rows' band: below 5 Hz."""
+    return sosfiltfilt(butter(3, 5.0, fs=RATE, output="sos"), x, axis=0)
+
+
+@pytest.mark.parametrize("sigma_steps", [0.0, 0.4])
+def test_draws_have_the_variance_of_real_rounding_in_motion(rng, sigma_steps):
+    step = 2 * np.pi / 2**16
+    true = sway(rng, 0.3)
+    real, drawn = [], []
+    noise = Noise(np.full((3, 2, 3), step), np.full((3, 2, 3), sigma_steps * step))
+    for _ in range(12):
+        recorded = read(true, step, sigma_steps * step, rng, rng.uniform(0, step, (2, 3)))
+        real.append(recorded - true)
+        errors = noise.draw(Signals(TIME, recorded, recorded, recorded, RATE), rng)
+        drawn += [errors.phi, errors.tau]
+    for part in (lambda x: x, smoothed):
+        a, b = (np.std([part(x)[200:-200] for x in group]) for group in (real, drawn))
+        assert b == pytest.approx(a, rel=0.1)
+
+
+@pytest.mark.parametrize("sigma_steps", [0.0, 0.4])
+def test_draws_have_the_variance_of_real_rounding_at_rest(rng, sigma_steps):
+    """A resting encoder repeats one rounding error: its mean over a hold varies by step / sqrt(12)."""
+    step = 2 * np.pi / 2**14
+    noise = Noise(np.full((3, 2, 3), step), np.full((3, 2, 3), sigma_steps * step))
+    real, drawn = [], []
+    for _ in range(60):
+        true = np.tile(rng.uniform(0.2, 0.9, (2, 3)), (SAMPLES, 1, 1))
+        recorded = read(true, step, sigma_steps * step, rng)
+        real.append(recorded - true)
+        errors = noise.draw(Signals(TIME, recorded, recorded, recorded, RATE), rng)
+        drawn += [errors.phi, errors.theta]
+    means = [np.std([x.mean(axis=0) for x in group]) for group in (real, drawn)]
+    whole = [np.std(group) for group in (real, drawn)]
+    if sigma_steps == 0.0:
+        assert means[0] == pytest.approx(step / np.sqrt(12), rel=0.1)
+        assert means[1] == pytest.approx(means[0], rel=0.12)
+        assert whole[1] == pytest.approx(whole[0], rel=0.12)
+    else:
+        assert whole[1] == pytest.approx(whole[0], rel=0.12)
+
+
+def test_draws_of_continuous_channels_are_white(rng):
+    noise = Noise(np.zeros((3, 2, 3)), np.full((3, 2, 3), 0.01))
+    errors = noise.draw(trial(rng), rng)
+    assert np.std(errors.tau) == pytest.approx(0.01, rel=0.05)
+    x = errors.phi.reshape(SAMPLES, 6)
+    assert np.max(np.abs(np.mean(x[1:] * x[:-1], axis=0))) < 0.1 * 0.01**2
+    assert np.corrcoef(errors.phi.ravel(), errors.theta.ravel())[0, 1] == pytest.approx(0.0, abs=0.05)
+
+
+def test_channels_have_resolutions_of_their_own(rng):
+    x = trial(rng)
+    step = 2 * np.pi / 2**14
+    phi = x.phi.copy()
+    phi[:, 1, 2] = np.round(phi[:, 1, 2] / step) * step
+    phi[:, 0, 0] += 1e-3 * rng.standard_normal(SAMPLES)
+    noise = Noise.of([Signals(TIME, phi, x.theta, x.tau, RATE)])
+    expected = np.zeros((2, 3))
+    expected[1, 2] = step
+    np.testing.assert_allclose(noise.step[0], expected, rtol=1e-6)
+    assert noise.sigma[0, 0, 0] == pytest.approx(1e-3, rel=0.1)
+    assert noise.sigma[0, 0, 1] == pytest.approx(ANGLE_FLOOR_RAD)
+    errors = noise.draw(Signals(TIME, phi, x.theta, x.tau, RATE), rng)
+    assert np.std(errors.phi[:, 0, 0]) == pytest.approx(1e-3, rel=0.1)
+    assert np.std(errors.phi[:, 0, 1]) == pytest.approx(ANGLE_FLOOR_RAD, rel=0.1)

@@ -1,0 +1,86 @@
+"""Pictures where the machine can render, one sentence where it cannot; and the scenarios that make them."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from estimator.errors import InputError
+from mocobot_sim.base.solo import build_solo, compile_solo
+from mocobot_view.pictures.camera import Camera
+from mocobot_view.pictures.marks import Marks
+from mocobot_view.pictures.render import make_folder, render
+from rendering import made
+
+SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
+VIEW = Camera((0.0, 0.0, 0.3), 2.0, 215.0, -30.0)
+
+
+def test_without_a_renderer_there_is_a_sentence(monkeypatch):
+    monkeypatch.setenv("MUJOCO_GL", "disabled")
+    words = render(compile_solo(build_solo()), [np.zeros(0)], VIEW)
+    assert isinstance(words, str)
+    assert words.startswith("pictures are skipped: MuJoCo cannot render without a screen here (disabled: ")
+    assert "\n" not in words
+
+
+def test_pictures_show_the_states_and_the_marks():
+    model = compile_solo(build_solo())
+    aside = model.qpos0.copy()
+    aside[0] += 0.3
+    marks = Marks()
+    marks.path([[-0.5, -0.5, 0.01], [0.5, -0.5, 0.01], [0.5, 0.5, 0.01]], 0.02, (0.0, 0.8, 0.0, 1.0))
+    marks.arrow([0.0, 0.0, 0.9], [0.0, 0.5, 0.9], 0.03, (0.0, 0.0, 1.0, 1.0))
+    states = [model.qpos0, aside, model.qpos0]
+    plain, moved, marked = made(render(model, states, VIEW, [Marks(), Marks(), marks], 320, 240))
+    assert plain.shape == (240, 320, 3)
+    assert np.abs(plain - moved).max() > 50
+    for colour in (1, 2):
+        others = [k for k in range(3) if k != colour]
+        pure = lambda p, k=colour, o=others: (p[..., k] > 120) & (p[..., o].max(axis=-1) < 80)  # noqa: E731
+        assert pure(marked).sum() > 50
+        assert not pure(plain).any()
+
+
+def test_a_folder_that_cannot_be_is_refused(tmp_path):
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(InputError, match="file: cannot be made a folder for pictures"):
+        make_folder(tmp_path / "file")
+    make_folder(tmp_path / "a" / "b")
+    assert (tmp_path / "a" / "b").is_dir()
+
+
+def _scenario(name: str, *options: str, gl: str | None = None) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, str(SCENARIOS / name), *options],
+        env=os.environ | ({"MUJOCO_GL": gl} if gl else {}), capture_output=True, text=True, check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_the_square_is_driven_without_any_opengl(tmp_path):
+    done = _scenario("drive_square.py", "--out", str(tmp_path), "--pace", "1", gl="disabled")
+    assert done.returncode == 0, done.stderr
+    assert "kinematics with rollers" in done.stdout
+    assert done.stdout.count("turn 360 deg") == 3
+    assert "pictures are skipped" in done.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["drive_square.png"]
+
+
+@pytest.mark.parametrize(
+    ("name", "options", "sentence"),
+    [
+        ("carry_sideways.py", ("--payload", "z"), "payload 'z' does not exist"),
+        ("guided_by_hand.py", ("--estimate", "nowhere.json"), "nowhere.json: not a usable estimate"),
+        ("drive_square.py", ("--pace", "0"), "must last longer than 0 s"),
+    ],
+)
+def test_scenarios_refuse_bad_input_in_one_sentence(tmp_path, name, options, sentence):
+    out = () if "--out" in options else ("--out", str(tmp_path))
+    done = _scenario(name, *options, *out)
+    assert done.returncode == 2
+    assert sentence in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,292 @@
+"""Pictures of teams: bodies where MuJoCo has them, marks where the payload's truth is, and words for all of it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from dataclasses import replace
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from estimator.errors import InputError
+from estimator.estimate.result import PayloadEstimate
+from estimator.estimate.statics import MassEstimate
+from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.trial.truth import GroundTruth
+from mocobot_view import colours
+from mocobot_view.facts.body_facts import BodyFacts
+from mocobot_view.facts.diagnosis import Cause
+from mocobot_view.facts.placement import Grasps
+from mocobot_view.pictures import render as render_module
+from mocobot_view.pictures.camera import pixels
+from mocobot_view.pictures.measured_team import MeasuredTeam, measured_team
+from mocobot_view.pictures.render import Shot, render_shots
+from mocobot_view.pictures.shots import FOVY, axis_shot, diagnosis_shot, estimate_shot, team_shot
+from mocobot_view.pictures.views import diagnosis_view, emps_view, estimate_view, team_view
+from rendering import made
+from replay_case import BODIES, Placed, payload_body, placed_trial, robot_body, true_estimate
+
+FRICTION = Cause("joint_friction", 2, "proximal3", "It rubs.")
+ASPECT, WIDTH, HEIGHT = 1.6, 480, 300
+
+
+@pytest.fixture(scope="module")
+def placed_a(team_a: TeamScene) -> Placed:
+    return placed_trial(team_a)
+
+
+def truth_of(placed: Placed) -> BodyFacts:
+    true = GroundTruth.of(placed.scene)
+    return BodyFacts(Grasps(true.R_1i, true.p_1i), true.mass_kg, true.p_1c, true.R_1c, true.principal_kgm2)
+
+
+def whole_estimate(placed: Placed) -> PayloadEstimate:
+    """True grasps, mass and centre of mass; no inertia."""
+    true = GroundTruth.of(placed.scene)
+    return replace(
+        true_estimate(placed.scene),
+        mass=MassEstimate(true.mass_kg, 0.01, 0.1),
+        p_1c=np.array(true.p_1c),
+        p_1c_covariance=np.eye(3) * 1e-8,
+    )
+
+
+def poses(team: MeasuredTeam) -> tuple[RigidTransform, list[str]]:
+    data = mujoco.MjData(team.model)
+    data.qpos[:] = team.qpos
+    mujoco.mj_kinematics(team.model, data)
+    turns = Rotation.from_quat(data.xquat, scalar_first=True)
+    names = [team.model.body(b).name for b in range(team.model.nbody)]
+    return RigidTransform.from_components(data.xpos, turns), names
+
+
+def check_bodies(placed: Placed, team: MeasuredTeam, sample: int, within_m: float) -> None:
+    """Every body against robot 1's base, as MuJoCo had it in the trial."""
+    found, names = poses(team)
+    home = robot_body(placed, 1, "base")[sample].inv(), found[names.index("omnid1/base")].inv()
+    pairs = [
+        (robot_body(placed, i, body), f"omnid{i}/{body}")
+        for i in range(1, placed.scene.robots + 1)
+        for body in BODIES
+    ]
+    if team.has_cad:
+        pairs.append((payload_body(placed), "payload/payload"))
+    for true, name in pairs:
+        apart = (home[0] * true[sample]).inv() * (home[1] * found[names.index(name)])
+        assert np.linalg.norm(apart.translation) < within_m, name
+        assert apart.rotation.magnitude() < 5.0 * within_m, name
+
+
+@pytest.mark.parametrize("share", [0.0, 0.37, 1.0])
+def test_bodies_are_where_mujoco_had_them(placed_a: Placed, share: float) -> None:
+    recording = placed_a.recording(payload="a")
+    sample = round(share * (len(recording.time) - 1))
+    time_s = float(recording.time[sample] - recording.time[0])
+    team = measured_team(recording, true_estimate(placed_a.scene), time_s=time_s)
+    assert team.has_cad
+    assert team.notes == ()
+    assert team.time_s == pytest.approx(time_s)
+    check_bodies(placed_a, team, sample, 3e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robots", [1, 2, 5])
+def test_any_number_of_robots(teams: dict[int, TeamScene], robots: int) -> None:
+    placed = placed_trial(teams[robots], vias=1)
+    team = measured_team(placed.recording(), true_estimate(placed.scene))
+    assert (team.robots, team.has_cad) == (robots, False)
+    check_bodies(placed, team, len(placed.log.time) // 2, 2e-5)
+
+
+def test_marks_are_at_the_payloads_truth(placed_a: Placed) -> None:
+    """Centre of mass and grasp frames against MuJoCo's own sites of the payload in the model."""
+    truth = truth_of(placed_a)
+    recording = placed_a.recording(payload="a")
+    shot = estimate_shot(recording, whole_estimate(placed_a), truth)
+    data = mujoco.MjData(shot.model)
+    data.qpos[:] = shot.qpos
+    mujoco.mj_kinematics(shot.model, data)
+    centres = [row[:3] for row in shot.marks.ellipsoids]
+    assert len(centres) == 2
+    for centre in centres:
+        assert centre == pytest.approx(data.site("payload/com").xpos, abs=2e-6)
+    arrows = np.array(shot.marks.arrows).reshape(2, 3, 3, 11)  # estimate and truth, grasp, axis
+    for i in range(3):
+        site = data.site(f"payload/grasp{i + 1}")
+        for k in range(3):
+            start, end = arrows[0, i, k, :3], arrows[0, i, k, 3:6]
+            assert start == pytest.approx(site.xpos, abs=2e-5)
+            along = (end - start) / np.linalg.norm(end - start)
+            assert along == pytest.approx(site.xmat.reshape(3, 3)[:, k], abs=2e-5)
+    assert len(shot.marks.lines) == 3 * 72
+    # The ellipsoid's three ellipses: where they cross its axes they are as far out as a solid body's of that inertia.
+    ends = np.array(shot.marks.lines)[:, :3] - data.site("payload/com").xpos
+    axes = data.site("payload/com").xmat.reshape(3, 3)
+    a, b, c = np.abs(ends @ axes).max(axis=0)
+    mass, inertia = truth.mass_kg, truth.principal_kgm2
+    assert mass / 5.0 * np.array([b**2 + c**2, a**2 + c**2, a**2 + b**2]) == pytest.approx(inertia, rel=1e-3)
+
+
+def test_words_say_what_is_shown_and_what_is_not_known(placed_a: Placed) -> None:
+    recording = placed_a.recording(payload="a")
+    whole = estimate_shot(recording, whole_estimate(placed_a), truth_of(placed_a))
+    assert "centre of mass." in whole.says
+    assert "Green and thin: the truth." in whole.says
+    assert "bars" not in whole.says
+    other = estimate_shot(placed_a.recording(payload="mine"), true_estimate(placed_a.scene))
+    assert "bars stand for the payload" in other.says
+    assert "Magenta" not in other.says
+    assert len(other.marks.lines) == 3
+    wrong = estimate_shot(placed_a.recording(payload="c"), true_estimate(placed_a.scene))
+    assert "The geometry of payload 'c' is not drawn: grasp" in wrong.says
+    unknown = replace(true_estimate(placed_a.scene), grasps=None)
+    row = estimate_shot(recording, unknown)
+    assert "drawn in a row, without a payload" in row.says
+    assert not row.marks.arrows
+    assert diagnosis_shot(recording, whole_estimate(placed_a), [FRICTION]).says.endswith(
+        "Red: joint_friction (omnid2, proximal3)."
+    )
+
+
+def test_causes_are_red_where_they_sit(placed_a: Placed) -> None:
+    recording, estimate = placed_a.recording(payload="a"), whole_estimate(placed_a)
+    causes = [FRICTION, Cause("sea_bias", 2, "proximal3", ""), Cause("payload_mass", None, None, ""),
+              Cause("base_tilt", 3, None, "")]  # fmt: skip
+    shot = diagnosis_shot(recording, estimate, causes)
+    data = mujoco.MjData(shot.model)
+    data.qpos[:] = shot.qpos
+    mujoco.mj_kinematics(shot.model, data)
+    where = [data.body("omnid2/proximal3").xpos, data.site("payload/com").xpos, data.body("omnid3/base").xpos]
+    assert [row[:3] for row in shot.marks.ellipsoids] == [pytest.approx(p, abs=2e-6) for p in where]
+    assert [label.text for label in shot.marks.labels] == [
+        "omnid1", "omnid2", "omnid3", "joint_friction, sea_bias", "payload_mass", "base_tilt"
+    ]  # fmt: skip
+    red = np.array(colours.FAULT) / 255.0
+    is_red = np.abs(shot.model.geom_rgba[:, :3] - red).max(axis=1) < 1e-6
+    guilty = {shot.model.body(b).name for b in shot.model.geom_bodyid[is_red]}
+    assert guilty == {"omnid2/proximal3", "payload/payload", "omnid3/base"}
+    bars = diagnosis_shot(placed_a.recording(payload=None), estimate, causes)
+    assert np.array(bars.marks.lines)[:, 7:10] == pytest.approx(np.tile(red, (3, 1)))
+
+
+def test_refusals(placed_a: Placed, teams: dict[int, TeamScene]) -> None:
+    recording = placed_a.recording()
+    with pytest.raises(InputError, match="the estimate is of 2 robots; rec is of 3 robots"):
+        estimate_shot(recording, true_estimate(teams[2]))
+    with pytest.raises(InputError, match="the diagnosis names robot 4; rec is of 3 robots"):
+        diagnosis_shot(recording, true_estimate(placed_a.scene), [replace(FRICTION, robot=4)])
+    with pytest.raises(InputError, match="payload 'z' does not exist"):
+        estimate_shot(recording, true_estimate(placed_a.scene), payload="z")
+    with pytest.raises(InputError, match="payload 'z' does not exist"):
+        team_view("z")
+
+
+def test_everything_is_in_the_picture(placed_a: Placed) -> None:
+    for shot in (
+        *(team_shot(payload, ASPECT) for payload in "abcd"),
+        estimate_shot(placed_a.recording(payload="a"), whole_estimate(placed_a), truth_of(placed_a)),
+        axis_shot(ASPECT),
+    ):
+        data = mujoco.MjData(shot.model)
+        data.qpos[:] = shot.qpos
+        mujoco.mj_kinematics(shot.model, data)
+        marks = shot.marks.points()
+        at = pixels(shot.camera, np.concatenate([data.geom_xpos, marks]), ASPECT, 1.0, FOVY)
+        planes = shot.model.geom_type == mujoco.mjtGeom.mjGEOM_PLANE
+        inside = ((at > 0) & (at < [ASPECT, 1.0])).all(axis=1)
+        assert inside[: shot.model.ngeom][~planes].all()
+        assert inside[shot.model.ngeom :].all()
+
+
+def pictures_or_skip(shots: list[Shot]) -> list[np.ndarray]:
+    return made(render_shots(shots, WIDTH, HEIGHT))
+
+
+@pytest.mark.slow
+def test_pictures_show_it_all_and_are_made_in_one_process(
+    placed_a: Placed, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recording, estimate = placed_a.recording(payload=None), whole_estimate(placed_a)
+    shots = [
+        team_shot("a"), estimate_shot(recording, estimate), diagnosis_shot(recording, estimate, [FRICTION]), axis_shot()
+    ]  # fmt: skip
+    calls = []
+    run = subprocess.run
+    monkeypatch.setattr(render_module.subprocess, "run", lambda *a, **k: (calls.append(a), run(*a, **k))[1])
+    team, estimated, diagnosed, axis = pictures_or_skip(shots)
+    assert len(calls) == 1
+    for picture in (team, estimated, diagnosed, axis):
+        assert picture.shape == (HEIGHT, WIDTH, 3)
+        assert picture.std() > 20.0
+        assert picture.min() < 60
+        assert picture.max() > 200
+
+    def near(picture: np.ndarray, shot: Shot, which: int, colour: colours.Colour) -> int:
+        """Pixels of about a colour within 12 pixels of an ellipsoid's centre."""
+        x, y = pixels(shot.camera, shot.marks.ellipsoids[which][:3], WIDTH, HEIGHT, FOVY)[0]
+        part = picture[max(0, int(y) - 12) : int(y) + 12, max(0, int(x) - 12) : int(x) + 12]
+        # Light changes a colour's strength, not which of its parts leads.
+        target = np.array(colour) / max(colour)
+        shown = part / np.maximum(part.max(axis=-1, keepdims=True), 1)
+        return int((np.abs(shown - target).max(axis=-1) < 0.25).sum())
+
+    assert near(estimated, shots[1], 0, colours.ESTIMATE) > 10
+    assert near(estimated, shots[1], 0, colours.FAULT) < near(estimated, shots[1], 0, colours.ESTIMATE)
+    assert near(diagnosed, shots[2], 0, colours.FAULT) > 30
+    assert near(estimated, shots[2], 0, colours.FAULT) < 5
+
+
+def test_marks_throw_no_shadow(placed_a: Placed) -> None:
+    """What a mark does not cover stays as it was: a disc over the floor leaves the floor under it lit."""
+    plain = team_shot("a")
+    marked = replace(plain, marks=type(plain.marks)())
+    marked.marks.ellipsoid([0.5, 0.1, 0.95], [0.2, 0.2, 0.01], (0.0, 1.0, 0.0, 1.0))
+    before, after, again = pictures_or_skip([plain, marked, plain])
+    changed = np.abs(before - after).max(axis=-1) > 10
+    green = after[..., 1] > 1.5 * after[..., [0, 2]].max(axis=-1)
+    assert green.sum() > 100
+    assert (changed & ~green).sum() < 0.1 * green.sum()
+    assert np.abs(before - again).max() < 10, "the next picture has its shadows again"
+
+
+@pytest.mark.slow
+def test_views_are_pictures_or_one_sentence(placed_a: Placed, monkeypatch: pytest.MonkeyPatch) -> None:
+    recording, estimate = placed_a.recording(payload="a"), whole_estimate(placed_a)
+
+    def views() -> list[np.ndarray | str]:
+        return [
+            team_view("b", 160, 100),
+            estimate_view(recording, estimate, 160, 100, truth=truth_of(placed_a), time_s=1.0),
+            diagnosis_view(recording, estimate, [FRICTION], 160, 100),
+            emps_view(160, 100),
+        ]
+
+    for view in views():
+        assert made(view if isinstance(view, str) else [view])[0].shape == (100, 160, 3)
+    monkeypatch.setenv("MUJOCO_GL", "disabled")
+    for view in views():
+        assert isinstance(view, str)
+        assert view.startswith("pictures are skipped: MuJoCo cannot render without a screen here (disabled: ")
+        assert view.endswith("unset MUJOCO_GL to have EGL and OSMesa tried")
+
+
+def test_without_any_renderer_the_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    monkeypatch.setattr(render_module, "RENDERERS", ("disabled", "nonsense"))
+    view = team_view("a", 160, 100)
+    assert isinstance(view, str)
+    assert "\n" not in view
+    assert "disabled: " in view
+    assert "nonsense: " in view
+    assert view.endswith("install EGL (Debian and Ubuntu: libegl1) or OSMesa (libosmesa6)")
+
+
+def test_pictures_need_no_rerun() -> None:
+    code = (
+        "import sys, mocobot_view.pictures.views\n"
+        "assert not {'rerun', 'OpenGL'} & set(sys.modules), 'pictures load more than they need'\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
