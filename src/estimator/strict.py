@@ -1,0 +1,196 @@
+"""Files of numbers, read strictly: what is unknown, missing or of the wrong kind is named, and nothing is guessed.
+
+A library would do where it may be installed; the estimator needs numpy and scipy alone, and the sentences are the
+project's own: which file, which key, which value, and what is allowed.
+"""
+
+from __future__ import annotations
+
+import difflib
+import json
+import math
+import tomllib
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.errors import InputError
+
+_LARGEST = 1e300
+
+
+def read_toml(path: Path, what: str) -> dict[str, Any]:
+    """Tables of a TOML file.
+
+    Args:
+        path: the file.
+        what: what it should be, with its article, for the message.
+
+    Raises:
+        InputError: it cannot be read, or is not TOML.
+    """
+    try:
+        return tomllib.loads(Path(path).read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path}: not a readable {what} ({error})") from error
+
+
+def parse_json(text: str | bytes, where: str) -> dict[str, Any]:
+    """A JSON object; no key twice, no NaN.
+
+    Raises:
+        InputError: it is not one.
+    """
+    try:
+        values = json.loads(text, object_pairs_hook=_unique, parse_constant=_no_constant)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{where}: not valid JSON ({error})") from error
+    if not isinstance(values, dict):
+        raise InputError(f"{where}: must be a JSON object, not {values!r:.60}")
+    return values
+
+
+def is_number(value: object) -> bool:
+    """Whether it is a finite number, and no truth value."""
+    return isinstance(value, int | float) and not isinstance(value, bool) and abs(value) <= _LARGEST
+
+
+def check_known(keys: Iterable[str], valid: Sequence[str], where: str, what: str = "key") -> None:
+    """Refuse a key that does not exist, with the nearest one that does.
+
+    Raises:
+        InputError: there is one.
+    """
+    for key in keys:
+        if key not in valid:
+            close = difflib.get_close_matches(str(key), valid, n=1)
+            hint = f" (did you mean {close[0]!r}?)" if close else ""
+            raise InputError(f"{where}: unknown {what} {key!r:.60}{hint}; the {what}s are {', '.join(valid)}")
+
+
+@dataclass(frozen=True)
+class Fields:
+    """An object with certain keys, read by type; every reader raises ``InputError`` with the key's path.
+
+    Attributes:
+        values: the object.
+        required: keys that it must have.
+        where: how messages call it, such as the file's name.
+        optional: keys that it may have besides.
+    """
+
+    values: Mapping[str, Any]
+    required: Sequence[str]
+    where: str
+    optional: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        """Check the keys."""
+        if not isinstance(self.values, Mapping):
+            raise InputError(f"{self.where} is {self.values!r:.60}; it must be an object")
+        keys = [*self.required, *self.optional]
+        check_known(self.values, keys, self.where)
+        for key in self.required:
+            if key not in self.values:
+                raise InputError(f"{self.where}: missing key {key!r}; the keys are {', '.join(keys)}")
+
+    def __contains__(self, key: str) -> bool:
+        """Whether an optional key is given."""
+        return key in self.values
+
+    def refuse(self, key: str, allowed: str) -> NoReturn:
+        """Say what a key's value must be.
+
+        Raises:
+            InputError: always.
+        """
+        raise InputError(f"{self.where}: {key} is {self.values[key]!r:.60}; it must be {allowed}")
+
+    def within(self, key: str, required: Sequence[str], optional: Sequence[str] = ()) -> Fields:
+        """The object inside this one."""
+        return Fields(self.object(key), required, f"{self.where}: {key}", optional)
+
+    def number(self, key: str, least: float = -math.inf, *, above: float = -math.inf) -> float:
+        """A finite number, of at least ``least`` and greater than ``above``."""
+        value = self.values[key]
+        if not is_number(value):
+            self.refuse(key, "a finite number")
+        if value < least:
+            self.refuse(key, f"a number of at least {least:g}")
+        if value <= above:
+            self.refuse(key, f"greater than {above:g}")
+        return float(value)
+
+    def whole(self, key: str, least: int = 1) -> int:
+        """A whole number."""
+        value = self.values[key]
+        if type(value) is not int or value < least:
+            self.refuse(key, f"a whole number of at least {least}")
+        return value
+
+    def flag(self, key: str) -> bool:
+        """True or false."""
+        value = self.values[key]
+        if type(value) is not bool:
+            self.refuse(key, "true or false")
+        return value
+
+    def text(self, key: str) -> str:
+        """Printable text: control characters and half surrogates are not for terminals."""
+        value = self.values[key]
+        if not isinstance(value, str) or not value or not value.isprintable():
+            self.refuse(key, "printable text")
+        return value
+
+    def one_of(self, key: str, allowed: Iterable[str]) -> Any:
+        """One of a few words."""
+        value, allowed = self.values[key], tuple(allowed)
+        if not isinstance(value, str) or value not in allowed:
+            self.refuse(key, f"one of {', '.join(map(repr, allowed))}")
+        return value
+
+    def object(self, key: str) -> dict[str, Any]:
+        """An object."""
+        value = self.values[key]
+        if not isinstance(value, dict):
+            self.refuse(key, "an object")
+        return value
+
+    def list(self, key: str, length: int | None = None) -> list[Any]:
+        """A list, of a certain length if one is given."""
+        value = self.values[key]
+        if not isinstance(value, list) or length not in (None, len(value)):
+            self.refuse(key, "a list" if length is None else f"a list of {length} entries")
+        return value
+
+    def array(self, key: str, shape: tuple[int, ...]) -> NDArray[np.float64]:
+        """Finite numbers in nested lists of a shape."""
+        value = self.values[key]
+        if not _is_array(value, shape):
+            self.refuse(key, f"{' x '.join(map(str, shape))} finite numbers")
+        return np.array(value, dtype=float)
+
+
+def _is_array(value: Any, shape: tuple[int, ...]) -> bool:
+    if not shape:
+        return is_number(value)
+    return (
+        isinstance(value, list | tuple)
+        and len(value) == shape[0]
+        and all(_is_array(v, shape[1:]) for v in value)
+    )
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    names = [name for name, _ in pairs]
+    if len(set(names)) != len(names):
+        raise ValueError(f"key {max(names, key=names.count)!r} appears twice")
+    return dict(pairs)
+
+
+def _no_constant(name: str) -> None:
+    raise ValueError(f"{name} is not a JSON number")
