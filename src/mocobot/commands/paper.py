@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
-from estimator.recording.model import write_recording
+from estimator.recording.parquet import write_recording
 from mocobot.files.provenance import NAME, folder_provenance, provenance
 from mocobot.files.writing import make_folder, write_json, write_text
 from mocobot.progress import bar

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
-from estimator.recording.model import read_recording
+from estimator.recording.parquet import read_recording
 from mocobot.files.given import check_recordings
 from mocobot.files.writing import check_target
 from mocobot.progress import bar
