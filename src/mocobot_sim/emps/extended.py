@@ -62,9 +62,10 @@ def load_plant(folder: Path) -> Plant:
     if (file.values["format"], file.values["version"]) != (FORMAT, VERSION):
         file.refuse("format", f"{FORMAT!r}, with version {VERSION}")
     plant = file.within("plant", [entry.name for entry in fields(Plant)])
-    values = {name: _items(plant, name, kind) for name, kind in NESTED.items()}
+    values: dict[str, Any] = {name: _items(plant, name, kind) for name, kind in NESTED.items()}
     values |= {name: tuple(plant.array(name, (2,)).tolist()) for name in ("coulomb_N", "viscous_Ns_per_m")}
-    return Plant(**values, **{name: plant.number(name) for name in plant.required if name not in values})
+    values |= {name: plant.number(name) for name in plant.required if name not in values}
+    return Plant(**values)
 
 
 def _items(plant: Fields, name: str, kind: type) -> tuple[Any, ...]:
