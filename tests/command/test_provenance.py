@@ -110,7 +110,9 @@ def test_commit_of_others_is_not_ours(checkout: Path, monkeypatch: pytest.Monkey
     head = git(checkout, "rev-parse", "HEAD")
     inside = checkout / "lib" / "site"  # a package that was installed below somebody's repository
     (inside / "src" / "mocobot" / "files").mkdir(parents=True)
-    shutil.copy(checkout / "src" / "mocobot" / "files" / "provenance.py", inside / "src" / "mocobot" / "files")
+    shutil.copy(
+        checkout / "src" / "mocobot" / "files" / "provenance.py", inside / "src" / "mocobot" / "files"
+    )
     assert module._commit(inside) is None
     shutil.rmtree(checkout / "lib")
     monkeypatch.setenv("GIT_DIR", str(checkout / "nowhere"))  # as a hook of another repository sets it

@@ -24,7 +24,8 @@ from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import CONTRADICTION
 from estimator.files import whole_folder
-from estimator.recording.model import Recording, read_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import read_recording
 from mocobot.commands.diagnose_folder import check_options, write_diagnosis
 from mocobot.files.provenance import file_facts, provenance
 from mocobot.progress import bar, stages

@@ -10,7 +10,8 @@ from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.text import format_estimate
 from estimator.files import write_json
-from estimator.recording.model import Recording, read_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import read_recording
 from mocobot.files.provenance import provenance
 from mocobot.files.targets import check_recordings
 from mocobot.progress import stages

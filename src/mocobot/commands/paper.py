@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
-from estimator.recording.model import write_recording
+from estimator.recording.parquet import write_recording
 from mocobot.files.provenance import NAME, folder_provenance, provenance
 from mocobot.files.targets import make_folder
 from mocobot.progress import bar

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
-from estimator.recording.model import read_recording
+from estimator.recording.parquet import read_recording
 from mocobot.files.targets import check_recordings, check_target
 from mocobot.progress import bar
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
-from estimator.recording.model import write_recording
+from estimator.recording.parquet import write_recording
 from mocobot.files.targets import check_target
 from mocobot.progress import bar
 from mocobot_sim.extended.extended import load_extended
