@@ -37,7 +37,7 @@ class PairGrasp:
     @property
     def axis_angle_rad(self) -> Array:
         """Rotation vector of R_ij [rad], shape (3,)."""
-        return so3.log(self.R_ij)
+        return Rotation.from_matrix(self.R_ij).as_rotvec()
 
     @property
     def axis_angle_se_rad(self) -> Array:
@@ -130,7 +130,7 @@ class GraspEstimate:
         x = np.asarray(x).reshape(-1, 6)
         R, p = self.R_1i.copy(), self.p_1i.copy()
         if len(x):
-            R[1:], p[1:] = so3.exp(x[:, :3]) @ R[1:], p[1:] + x[:, 3:]
+            R[1:], p[1:] = Rotation.from_rotvec(x[:, :3]).as_matrix() @ R[1:], p[1:] + x[:, 3:]
         return replace(self, R_1i=R, p_1i=p)
 
     def to_dict(self) -> dict[str, Any]:

@@ -41,7 +41,7 @@ class PrincipalInertia:
     @property
     def axis_angle_rad(self) -> Array | None:
         """Rotation vector of R_1c [rad], shape (3,), or None."""
-        return None if self.R_1c is None else so3.log(self.R_1c)
+        return None if self.R_1c is None else Rotation.from_matrix(self.R_1c).as_rotvec()
 
     @property
     def axis_angle_se_rad(self) -> Array | None:
