@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
@@ -293,7 +294,7 @@ def start_bases(signals: Signals, shared: Shared, design: OmnidDesign) -> Bases:
     for i in range(1, N):
         mean = so3.chordal_mean(R[:, 0] @ shared.grasps.R_1i[i] @ np.swapaxes(R[:, i], -1, -2))
         yaw = np.arctan2(mean[1, 0] - mean[0, 1], mean[0, 0] + mean[1, 1])
-        turns.append(so3.exp(np.array([0.0, 0.0, yaw])))
+        turns.append(Rotation.from_rotvec([0.0, 0.0, yaw]).as_matrix())
         places.append(np.mean(h[:, 0] + R[:, 0] @ shared.grasps.p_1i[i] - h[:, i] @ turns[i].T, axis=0))
     return Bases(np.array(turns), np.array(places))
 
