@@ -1,4 +1,4 @@
-"""Run a recording's reference again, block by block from where each began."""
+"""Resimulate a recording's reference, block by block from where each began."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ def start_of(signals: Signals, sample: int) -> Start:
     )
 
 
-def errors_of_rerun(
+def resimulation_errors(
     plant: Plant,
     time: Array,
     reference: Array,

@@ -15,7 +15,7 @@ from discrepancy.emps.blocks import blocks, period_of
 from discrepancy.emps.catalogue import DEFAULTS, Tolerances, candidate_of, hidden_by_rounding, remainder
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.causes.base import Hints
-from discrepancy.emps.closed_loop import effects_of, errors_of_rerun, nominal_plant, plant_of, start_of
+from discrepancy.emps.closed_loop import effects_of, nominal_plant, plant_of, resimulation_errors, start_of
 from discrepancy.emps.hints import hints_of
 from discrepancy.emps.noise import Noise, from_remainder, from_repeats, repeated
 from discrepancy.emps.pushes import intervals_near, push, worst_intervals
@@ -213,21 +213,21 @@ class EmpsRig:
         """None: shapes are chosen from a grid."""
         return []
 
-    def can_run_again(self) -> str | None:
+    def can_resimulate(self) -> str | None:
         """Nothing stands against it: every recording has its reference and the loop's gains."""
         return None
 
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
     ) -> Callable[[], dict[str, Array] | None]:
-        """What runs one block's reference again, with causes in the axis.
+        """What resimulates one block's reference, with causes in the axis.
 
         It returns recorded minus simulated ``position`` [m] and ``voltage`` [V], shape (Q,) each.
         """
         here, log = self.blocks[trial], self.log
         acting = [(c, v) for c, v in active if c.acts_in(trial)]
         return partial(
-            errors_of_rerun,
+            resimulation_errors,
             plant_of(self.nominal, acting),
             log.time[here],
             log.reference[here],

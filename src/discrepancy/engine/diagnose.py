@@ -81,7 +81,7 @@ def diagnose(
 
     Args:
         rig: recordings and causes.
-        closed_loop: whether to run the recorded commands again.
+        closed_loop: whether to resimulate the recorded commands.
         most: largest number of causes; more than the default where the nominal model leaves out much on purpose.
         jobs: parallel processes of the simulations.
         say: called with what is being done.
@@ -95,7 +95,7 @@ def diagnose(
     ):
         explanation, note = _without_transient(rig, explanation)
         notes.append(note)
-    why_not = rig.can_run_again() if closed_loop else "the closed loop was left out on request"
+    why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"
     alternatives: list[tuple[Alternative, ...]] = [_unsimulated(found) for found in explanation.found]
     gain: Gain | None = None
     if why_not is None and explanation.found:

@@ -1,4 +1,4 @@
-"""Run the recorded commands again, with the estimated payload and bases, with or without causes."""
+"""Resimulate recorded commands with the estimated payload and bases, with or without causes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.models import base_height_m
 from mocobot_sim.scene.payload_mjcf import payload_mjcf
 from mocobot_sim.scene.scene import TeamScene, build_team
-from mocobot_sim.trial.resimulate import predicted, rerun
+from mocobot_sim.trial.resimulate import predicted, resimulate
 
 Array = NDArray[np.float64]
 
@@ -86,7 +86,7 @@ def physical_inertia(inertia: Array) -> Array:
     return (axes * moments) @ axes.T
 
 
-def errors_of_rerun(
+def resimulation_errors(
     recording: Recording, shared: Shared, bases: Bases, effects: Sequence[Effect], number: int, keep: slice
 ) -> dict[str, Array] | None:
     """Recorded minus simulated phi, theta [rad] and tau [N m] of one trial, shape (Q, N, 3) each.
@@ -95,7 +95,7 @@ def errors_of_rerun(
     """
     try:
         scene = team_of(shared, bases, effects, (recording.phi[0], recording.theta[0]))
-        log = rerun(recording, replace(scene), timestep_s=TIMESTEP_S, trial_number=number)
+        log = resimulate(recording, replace(scene), timestep_s=TIMESTEP_S, trial_number=number)
     except (TrialError, InputError):
         return None
     simulated = predicted(log)

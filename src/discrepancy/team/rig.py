@@ -24,7 +24,7 @@ from discrepancy.team.candidates import (
 )
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
-from discrepancy.team.closed_loop import errors_of_rerun, team_of
+from discrepancy.team.closed_loop import resimulation_errors, team_of
 from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.imitators import wrong_torques
 from discrepancy.team.linear.adjust import with_adjusted_torques
@@ -195,8 +195,8 @@ class TeamRig:
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return CAUSES[candidate.cause].possible(values, se, candidate.shape)
 
-    def can_run_again(self) -> str | None:
-        """Why the recordings cannot be simulated again, or None."""
+    def can_resimulate(self) -> str | None:
+        """Why the recordings cannot be resimulated, or None."""
         for recording in self.recordings:
             if recording.ref is None:
                 return f"{recording.name} has no commands (ref_x, ref_y, ref_z)"
@@ -209,7 +209,7 @@ class TeamRig:
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
     ) -> Callable[[], dict[str, Array] | None]:
-        """What runs one trial's commands again, with the unknowns moved and causes in the simulation.
+        """What resimulates one trial's commands, with the unknowns moved and causes in the simulation.
 
         It returns recorded minus simulated ``phi``, ``theta`` [rad] and ``tau`` [N m], shape (Q, N, 3), or None if
         that cannot be simulated. It carries the recording and numbers only, so that processes can take it.
@@ -219,7 +219,7 @@ class TeamRig:
         if any(effect is None for effect in effects):
             return _impossible
         return partial(
-            errors_of_rerun,
+            resimulation_errors,
             self.recordings[trial],
             linear.shared.moved(shared),
             linear.bases.moved(local),

@@ -10,7 +10,6 @@ from typing import ClassVar
 
 from estimator.errors import InputError
 from mocobot_sim.scene.scene import TeamScene
-from mocobot_sim.scene.soft import tuned
 
 PLACE = ("robot", "joint")
 JOINTS = 3
@@ -70,7 +69,7 @@ class Effect(ABC):
         robot = getattr(self, "robot", 1)
         if robot > scene.robots:
             raise InputError(f"{self.cause}: robot is {robot}; the team has robots 1 .. {scene.robots}")
-        return tuned(self._edit(scene))
+        return self._edit(scene).tuned()
 
     @abstractmethod
     def _edit(self, scene: TeamScene) -> TeamScene:

@@ -29,6 +29,7 @@ from mocobot_sim.effects.tether import Tether
 from mocobot_sim.effects.theta_zero import ThetaZero
 from mocobot_sim.effects.torque_lag import TorqueLag
 from mocobot_sim.effects.torque_skew import TorqueSkew
+from mocobot_sim.scene.applied import Applied, Pushing
 from mocobot_sim.scene.scene import TeamScene
 
 EFFECTS: dict[str, type[Effect]] = {
@@ -85,7 +86,7 @@ def _has_default(entry: Any) -> bool:
     return isinstance(entry.default, float)
 
 
-def effect_to_dict(effect: Effect) -> dict[str, Any]:
+def effect_to_dict(effect: Applied) -> dict[str, Any]:
     """Plain JSON values: ``cause``, ``robot`` and ``joint`` where there are, ``parameters``."""
     place = {name: getattr(effect, name) for name in effect.place_names()}
     parameters = {name: getattr(effect, name) for name in effect.parameter_names()}
@@ -123,7 +124,7 @@ def apply_effects(scene: TeamScene, effects: Sequence[Effect]) -> TeamScene:
     ]
     for effect in effects:
         place = (effect.cause, *(getattr(effect, name) for name in effect.place_names()))
-        if place in places and not isinstance(effect, Push):
+        if place in places and not isinstance(effect, Pushing):
             where = " ".join(f"{name} {at}" for name, at in zip(effect.place_names(), place[1:], strict=True))
             raise InputError(
                 f"{effect.cause} is given twice{where and f' for {where}'}; each place takes it once"
