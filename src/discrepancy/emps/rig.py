@@ -15,8 +15,7 @@ from discrepancy.emps.blocks import blocks, period_of
 from discrepancy.emps.catalogue import DEFAULTS, Tolerances, candidate_of, hidden_by_rounding, remainder
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.causes.base import Hints
-from discrepancy.emps.closed_loop import errors_of_rerun, plant_of, start_of
-from discrepancy.emps.extended import write_extended
+from discrepancy.emps.closed_loop import effects_of, errors_of_rerun, nominal_plant, plant_of, start_of
 from discrepancy.emps.hints import hints_of
 from discrepancy.emps.noise import Noise, from_remainder, from_repeats, repeated
 from discrepancy.emps.pushes import intervals_near, push, worst_intervals
@@ -29,6 +28,7 @@ from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rows
 from estimator.errors import InputError
+from mocobot_sim.emps.extended import write_extended
 from mocobot_sim.emps.plant import Plant
 
 Array = NDArray[np.float64]
@@ -118,7 +118,7 @@ class EmpsRig:
     @property
     def nominal(self) -> Plant:
         """The axis as assumed."""
-        return Plant.nominal(self.log)
+        return nominal_plant(self.log)
 
     def candidates(self) -> list[Candidate]:
         """Every cause of the catalogue; pushes come from ``transients``."""
@@ -281,7 +281,7 @@ class EmpsRig:
             InputError: the folder cannot be written.
         """
         active = [(found.candidate, found.values) for found in explanation.found]
-        write_extended(plant_of(self.nominal, active), active, folder, list(self.trials))
+        write_extended(self.nominal, effects_of(active), folder, self.trials)
 
     def undecidable(self) -> list[dict[str, Any]]:
         """What recordings of one axis cannot decide."""
