@@ -15,10 +15,10 @@ from estimator.estimate.principal import inertia_matrix
 from estimator.recording.model import Recording
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.catalogue import apply_effects
+from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.payload_mjcf import payload_mjcf
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.resimulate import predicted, rerun
-from mocobot_sim.trial.trial import TrialError
 
 Array = NDArray[np.float64]
 
