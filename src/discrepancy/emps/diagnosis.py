@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from discrepancy.causes.words import number
+from discrepancy.causes.numbers import number
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.engine.diagnose import Diagnosis, diagnose
 from discrepancy.engine.explanation import Explanation

@@ -17,10 +17,10 @@ from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rows
 from discrepancy.team.candidates import (
     every_candidate,
-    nearby_pushes,
+    nearby_events,
     other_shapes,
     shape_steps,
-    worst_pushes,
+    worst_events,
 )
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
@@ -182,9 +182,8 @@ class TeamRig:
         """The simulator's effect, or None where the values are none that it can have (a negative friction)."""
         k = len(values)
         parameters = self.effect_parameters(candidate, values, np.zeros((k, k)))[0]
-        for name in ("coulomb_Nm", "viscous_Nms_per_rad"):
-            if name in parameters:
-                parameters[name] = max(parameters[name], 0.0)
+        for name in CAUSES[candidate.cause].clipped:
+            parameters[name] = max(parameters[name], 0.0)
         try:
             return make_effect(candidate.cause, parameters, candidate.robot, candidate.joint)
         except InputError:
@@ -290,7 +289,8 @@ class TeamRig:
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a transient with its interval moved."""
         if candidate.transient:
-            return nearby_pushes(candidate.transient, self.tolerances.get("push", {}))
+            tolerance = self.tolerances.get(candidate.cause, {})
+            return nearby_events(candidate.cause, candidate.transient, tolerance)
         return other_shapes(candidate, finer=finer)
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
@@ -299,10 +299,8 @@ class TeamRig:
         Args:
             remaining: whitened residual of every trial, shape (n, C).
         """
-        if "push" in self.excluded:
-            return []
         reductions = [linear.reduction for linear in self.linear]
-        return worst_pushes(reductions, remaining, self.tolerances.get("push", {}))
+        return worst_events(reductions, remaining, self.tolerances, self.excluded)
 
     def imitators(self, candidate: Candidate) -> list[list[Array]]:
         """One joint's torque wrong by a constant for as long as a push lasts, every joint in turn."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from discrepancy.causes.free_while import free_while
 from discrepancy.team.causes.base import Cause, stack
-from discrepancy.team.causes.free_while import free_while
 
 KNOTS_S = 0.2
 
@@ -17,10 +17,14 @@ class GraspPlay(Cause):
     name = "grasp_play"
     family = "compliance"
     parameters = ("play_m",)
-    per = "robot"
+    tolerances = (3e-6,)
+    at = "grasp"
     shapes = ({"force_N": 0.4},)
     positive = ("play_m",)
     separate = "Internal forces of both signs at rest separate play from flexibility."
+
+    def sentence(self, n):
+        return f"the grasp is loose by +-({n('play_m', 'um', 1e6)}) along each axis"
 
     def columns(self, trial, robot, joint, shape):
         at_end = -np.clip(trial.data.wrench[:, robot, 3:] / shape["force_N"], -1.0, 1.0)

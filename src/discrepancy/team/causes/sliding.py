@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.team.causes.free_while import free_while
+from discrepancy.causes.free_while import free_while
 from discrepancy.team.linear.noise import SMOOTH_HZ
 from estimator.filtering import differentiate, low_pass
 

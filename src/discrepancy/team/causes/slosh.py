@@ -27,7 +27,7 @@ class Slosh(Cause):
     family = "slosh"
     parameters = ("mass_kg", "moment_x_kgm", "moment_y_kgm", "moment_z_kgm")
     scales = (0.01, 0.005, 0.005, 0.005)
-    per = "payload"
+    at = "payload"
     shapes = tuple(
         {"length_m": length, "damping_ratio": damping}
         for length in (0.2, 0.05, 0.065, 0.085, 0.11, 0.145, 0.27, 0.37, 0.5, 0.7)
@@ -35,6 +35,12 @@ class Slosh(Cause):
     )
     determined: ClassVar = {"length_m": 0.02, "damping_ratio": 0.1}
     separate = "Motion near the pendulum's own frequency."
+
+    def sentence(self, n):
+        return (
+            f"a mass of {n('mass_kg', 'kg', signed=True)} swings in the payload on {n('length_m', 'm')} below "
+            f"{n.vector('point', 'm')} in {{1}} (damping ratio {n('damping_ratio', '')})"
+        )
 
     def columns(self, trial, robot, joint, shape):
         motion = fuse(trial.data, trial.shared.grasps)
