@@ -16,11 +16,6 @@ from mocobot_sim.emps.plant import Plant
 Array = NDArray[np.float64]
 Shape = Mapping[str, float]
 
-GIVEN_TO = 1e-4
-"""Share by which a gain may be off for the digits it is given with."""
-SHORTEST_RIPPLE_M = 1e-3
-"""Shorter ripples are faster than the rows at most speeds."""
-
 
 @dataclass(frozen=True, eq=False)
 class Hints:
