@@ -14,12 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
+from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG
 from discrepancy.emps.recording.preflight import resolution
 from discrepancy.emps.recording.signals import Signals, smooth
 from discrepancy.emps.reduction import Reduction
 from discrepancy.least_squares.whitening import Whitening
 from estimator.filtering import differentiate
-from mocobot_sim.emps.plant import FIRST_GUESS_KG
 
 Array = NDArray[np.float64]
 

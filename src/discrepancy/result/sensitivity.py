@@ -39,7 +39,7 @@ def blind_spots(explanation: Explanation) -> list[dict[str, Any]]:
 def _judged(explanation: Explanation) -> Iterator[tuple[Candidate, dict[str, Any]]]:
     limits = explanation.fit.limits(rules.NOTICED_CHI2)
     for index, (candidate, sizes) in enumerate(zip(explanation.problem.candidates, limits, strict=True)):
-        if index in explanation.fit.free or candidate.detail:
+        if index in explanation.fit.free or candidate.transient:
             continue
         parameters = {
             p.name: float(size) if size < rules.ABSURD_UNITS * p.unit else None

@@ -1,7 +1,5 @@
 """The position loop's gain is not its nominal value."""
 
-from dataclasses import replace
-
 from discrepancy import rules
 from discrepancy.emps.causes.base import Cause, voltage
 
@@ -21,6 +19,3 @@ class PositionGain(Cause):
 
     def visible(self, signals, hints, values):
         return abs(values[0]) > rules.GIVEN_TO_SHARE * signals.log.kp_per_s
-
-    def apply(self, plant, values, shape):
-        return replace(plant, kp_per_s=plant.kp_per_s + values[0])

@@ -1,7 +1,5 @@
 """The velocity loop's gain is not its nominal value."""
 
-from dataclasses import replace
-
 from discrepancy import rules
 from discrepancy.emps.causes.base import Cause, voltage
 
@@ -21,6 +19,3 @@ class VelocityGain(Cause):
 
     def visible(self, signals, hints, values):
         return abs(values[0]) > rules.GIVEN_TO_SHARE * signals.log.kv_Vs_per_m
-
-    def apply(self, plant, values, shape):
-        return replace(plant, kv_Vs_per_m=plant.kv_Vs_per_m + values[0])
