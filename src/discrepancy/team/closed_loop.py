@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from discrepancy import rules
 from discrepancy.team.linear.residual import Bases, Shared
 from estimator.errors import InputError
 from estimator.estimate.principal import inertia_matrix
@@ -21,10 +22,6 @@ from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.resimulate import predicted, resimulate
 
 Array = NDArray[np.float64]
-
-TIMESTEP_S = 1e-3
-SMALLEST = 1e-3
-"""Least principal moment of a simulated payload over the largest: a body needs some."""
 
 
 def team_of(
@@ -50,14 +47,14 @@ def team_of(
     X_1i = RigidTransform.from_components(grasps.p_1i, Rotation.from_matrix(grasps.R_1i))
     payload = payload_mjcf(mass, p_1c, physical_inertia(about_c), X_1i)
     mounts = RigidTransform.from_components(p, Rotation.from_matrix(bases.R))
-    scene = build_team(payload, mounts=mounts, initial=initial, timestep_s=TIMESTEP_S)
+    scene = build_team(payload, mounts=mounts, initial=initial, timestep_s=rules.TEAM_TIMESTEP_S)
     return apply_effects(scene, effects)
 
 
 def physical_inertia(inertia: Array) -> Array:
     """The nearest inertia that a rigid body can have: principal moments positive, none above the others' sum."""
     moments, axes = np.linalg.eigh(inertia)
-    moments = np.maximum(moments, SMALLEST * max(moments[-1], 1e-9))
+    moments = np.maximum(moments, rules.LEAST_MOMENT_RATIO * max(moments[-1], 1e-9))
     excess = moments[2] - moments[0] - moments[1]
     if excess > 0:  # moved to the sum of the others in equal parts
         moments = moments + np.array([1.0, 1.0, -1.0]) * excess / 3.0 * 1.001
@@ -73,7 +70,7 @@ def resimulation_errors(
     """
     try:
         scene = team_of(shared, bases, effects, (recording.phi[0], recording.theta[0]))
-        log = resimulate(recording, replace(scene), timestep_s=TIMESTEP_S, trial_number=number)
+        log = resimulate(recording, replace(scene), timestep_s=rules.TEAM_TIMESTEP_S, trial_number=number)
     except (TrialError, InputError):
         return None
     simulated = predicted(log)

@@ -12,6 +12,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rows
@@ -43,9 +44,6 @@ from mocobot_sim.extended.extended import write_extended
 from mocobot_sim.scene.models import omnid_design
 
 Array = NDArray[np.float64]
-
-# What the integrator does to the closed loop at 1 ms (docs/diagnosis.md).
-PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -231,7 +229,7 @@ class TeamRig:
         """Standard deviation of the noise and of the motion, by channel, shape (N, 3) each."""
         linear, floor = (
             self.linear[trial],
-            {"phi": PHI_FLOOR_RAD, "theta": THETA_FLOOR_RAD, "tau": TAU_FLOOR_NM},
+            {"phi": rules.PHI_FLOOR_RAD, "theta": rules.THETA_FLOOR_RAD, "tau": rules.TAU_FLOOR_NM},
         )
         out = {}
         for k, name in enumerate(("phi", "theta", "tau")):
