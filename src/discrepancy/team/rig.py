@@ -44,7 +44,7 @@ from mocobot_sim.scene.models import omnid_design
 
 Array = NDArray[np.float64]
 
-# What the integrator does to the closed loop at 1 ms (docs/diagnosis.md).
+# What the integrator does to the closed loop at 1 ms (docs/diagnosis/validation.md).
 PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4
 
 
