@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from fractions import Fraction
 from functools import cache
 from pathlib import Path
 from urllib.parse import unquote
@@ -119,6 +120,18 @@ def test_pages_that_the_code_mentions_exist() -> None:
                     f"{file.relative_to(ROOT)}: {n}" for n in named if points_nowhere(n, ROOT / "README.md")
                 ]
     assert wrong == []
+
+
+def test_method_states_the_rules_as_they_are() -> None:
+    from discrepancy import rules
+
+    text = (ROOT / "docs" / "diagnosis" / "method.md").read_text(encoding="utf-8")
+    stated = dict(re.findall(r"^\| `([A-Z_0-9]+)` \| ([-\d./]+) \|", text, re.MULTILINE))
+    assert len(stated) > 20
+    assert set(re.findall(r"`([A-Z]+_[A-Z_0-9]+)`", text)) <= set(stated)
+    assert {name: float(Fraction(value)) for name, value in stated.items()} == {
+        name: getattr(rules, name) for name in stated
+    }
 
 
 def test_readme_lists_every_package_and_no_other() -> None:
