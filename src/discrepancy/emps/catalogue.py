@@ -36,7 +36,7 @@ def candidate_of(name: str, hints: Hints, tolerances: Tolerances) -> Candidate:
         for p, scale in zip(cause.parameters, cause.scales, strict=True)
     )
     return Candidate(
-        name, cause.family, None, None, parameters, dict(cause.shapes(hints)[0]), {}, cause.where
+        name, cause.family, None, None, parameters, dict(cause.shapes(hints)[0]), where=cause.where
     )
 
 

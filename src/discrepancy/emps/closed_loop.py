@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.emps.causes import CAUSES
+from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG, LIMIT_V, AxisLog
 from discrepancy.emps.recording.signals import Signals
 from discrepancy.rig import Candidate
+from mocobot_sim.emps.effects import AxisEffect, apply_effects
 from mocobot_sim.emps.loop import Start, run
 from mocobot_sim.emps.plant import Plant
 
@@ -19,11 +20,26 @@ REMEMBERED = 16
 """Samples before a block that the loop may still remember."""
 
 
+def nominal_plant(log: AxisLog) -> Plant:
+    """As assumed before anything was measured: first guess of the mass, no friction, nominal gains of the loop."""
+    return Plant(FIRST_GUESS_KG, log.gain_N_per_V, log.kp_per_s, log.kv_Vs_per_m, log.period_s, LIMIT_V)
+
+
+def effects_of(active: Sequence[tuple[Candidate, Array]]) -> list[AxisEffect]:
+    """Causes as the simulator's effects: values and shape by name."""
+    return [
+        AxisEffect(
+            candidate.cause,
+            {p.name: float(v) for p, v in zip(candidate.parameters, values, strict=True)}
+            | {name: float(v) for name, v in candidate.shape.items()},
+        )
+        for candidate, values in active
+    ]
+
+
 def plant_of(nominal: Plant, active: Sequence[tuple[Candidate, Array]]) -> Plant:
     """The plant with causes in it."""
-    for candidate, values in active:
-        nominal = CAUSES[candidate.cause].apply(nominal, values, candidate.shape)
-    return nominal
+    return apply_effects(nominal, effects_of(active))
 
 
 def start_of(signals: Signals, sample: int) -> Start:

@@ -55,7 +55,7 @@ def also_fitted(
         causes: names; those of the catalogue's that are left out are missing in the answer.
     """
     problem = explanation.problem
-    by_name = {c.cause: k for k, c in enumerate(problem.candidates) if not c.detail}
+    by_name = {c.cause: k for k, c in enumerate(problem.candidates) if not c.transient}
     wanted = {name: by_name[name] for name in causes if name in by_name}
     fit = problem.fit(tuple(dict.fromkeys([*explanation.fit.free, *wanted.values()])))
     covariance = block_covariance(fit, block_rows(rig))

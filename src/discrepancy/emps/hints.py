@@ -11,7 +11,6 @@ from discrepancy.emps.causes.sliding import direction
 from discrepancy.emps.pulse_search import pulse_train, rectangle
 from discrepancy.emps.recording.signals import Signals, smooth
 from discrepancy.emps.reduction import Reduction
-from mocobot_sim.emps.plant import PulseTrain
 
 Array = NDArray[np.float64]
 
@@ -41,7 +40,7 @@ def _spread(
     signals: Signals, reduction: Reduction, channel: int, known: Array, train: dict[str, float]
 ) -> float:
     """Standard deviation of the rows of a channel that known columns and a train of rectangles leave."""
-    on = rectangle(signals.log.time, PulseTrain(**train, size=1.0))
+    on = rectangle(signals.log.time, **train)
     columns = np.column_stack([signals.residual[:, channel], known, smooth(on, signals.log.rate_hz)])
     rows = np.concatenate(reduction(columns))
     fitted = np.linalg.lstsq(rows[:, 1:], rows[:, 0], rcond=None)[0]

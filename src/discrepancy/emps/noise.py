@@ -13,12 +13,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG
 from discrepancy.emps.recording.preflight import resolution
 from discrepancy.emps.recording.signals import Signals, smooth
 from discrepancy.emps.reduction import Reduction
 from discrepancy.least_squares.whitening import Whitening
 from estimator.filtering import differentiate
-from mocobot_sim.emps.plant import FIRST_GUESS_KG
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.emps.causes import CAUSES
-from discrepancy.rig import Candidate, Parameter
+from discrepancy.rig import Candidate, Parameter, Transient
 
 Array = NDArray[np.float64]
 
@@ -21,10 +21,8 @@ def push(trial: int, start_s: float, duration_s: float, tolerance: float) -> Can
     """A push in one block (index from 0)."""
     cause = CAUSES["push"]
     parameters = (Parameter(cause.parameters[0], tolerance, cause.scales[0]),)
-    interval = {"start_s": start_s, "duration_s": duration_s}
-    return Candidate(
-        "push", cause.family, None, None, parameters, interval, {"trial": trial, **interval}, cause.where
-    )
+    when = Transient(trial, start_s, duration_s)
+    return Candidate("push", cause.family, None, None, parameters, when.shape, when, cause.where)
 
 
 def worst_intervals(time: Array, residual: Array) -> list[tuple[float, float]]:

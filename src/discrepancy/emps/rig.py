@@ -15,8 +15,7 @@ from discrepancy.emps.blocks import blocks, period_of
 from discrepancy.emps.catalogue import DEFAULTS, Tolerances, candidate_of, hidden_by_rounding, remainder
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.causes.base import Hints
-from discrepancy.emps.closed_loop import errors_of_rerun, plant_of, start_of
-from discrepancy.emps.extended import write_extended
+from discrepancy.emps.closed_loop import effects_of, errors_of_rerun, nominal_plant, plant_of, start_of
 from discrepancy.emps.hints import hints_of
 from discrepancy.emps.noise import Noise, from_remainder, from_repeats, repeated
 from discrepancy.emps.pushes import intervals_near, push, worst_intervals
@@ -29,6 +28,7 @@ from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rows
 from estimator.errors import InputError
+from mocobot_sim.emps.extended import write_extended
 from mocobot_sim.emps.plant import Plant
 
 Array = NDArray[np.float64]
@@ -118,7 +118,7 @@ class EmpsRig:
     @property
     def nominal(self) -> Plant:
         """The axis as assumed."""
-        return Plant.nominal(self.log)
+        return nominal_plant(self.log)
 
     def candidates(self) -> list[Candidate]:
         """Every cause of the catalogue; pushes come from ``transients``."""
@@ -131,14 +131,11 @@ class EmpsRig:
     def physical(self, candidate: Candidate) -> list[Array]:
         """Columns of one candidate in N and V, rows (n, 2, k) of every block."""
         columns = self.reduction(CAUSES[candidate.cause].columns(self.signals, candidate.shape))
-        return [c * self._present(candidate, t) for t, c in enumerate(columns)]
+        return [c * candidate.acts_in(t) for t, c in enumerate(columns)]
 
     def columns(self, candidate: Candidate) -> list[Array]:
         """Whitened columns of one candidate, shape (n, 2, k) per block."""
         return [white(c) for white, c in zip(self.whitening, self.physical(candidate), strict=True)]
-
-    def _present(self, candidate: Candidate, trial: int) -> float:
-        return float(not candidate.detail or candidate.detail["trial"] == trial)
 
     def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
         """Whitened rows of every block; there are no unknowns but the causes."""
@@ -163,9 +160,7 @@ class EmpsRig:
         out = self.reduction(self.signals.residual)
         for candidate, values in active:
             taken = self.reduction(CAUSES[candidate.cause].exact(self.signals, values, candidate.shape))
-            out = [
-                r - x * self._present(candidate, t) for t, (r, x) in enumerate(zip(out, taken, strict=True))
-            ]
+            out = [r - x * candidate.acts_in(t) for t, (r, x) in enumerate(zip(out, taken, strict=True))]
         return out
 
     def unknowns(self, candidate: Candidate) -> list[Array]:
@@ -203,11 +198,12 @@ class EmpsRig:
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a push with its interval moved."""
-        if candidate.detail:
-            near = intervals_near(candidate.shape["start_s"], candidate.shape["duration_s"])
+        at = candidate.transient
+        if at:
             tolerance = candidate.parameters[0].tolerance
             return [
-                push(int(candidate.detail["trial"]), start, duration, tolerance) for start, duration in near
+                push(at.trial, start, duration, tolerance)
+                for start, duration in intervals_near(at.start_s, at.duration_s)
             ]
         cause = CAUSES[candidate.cause]
         shapes = cause.finer(candidate.shape) if finer else cause.shapes(self.hints)
@@ -229,7 +225,7 @@ class EmpsRig:
         It returns recorded minus simulated ``position`` [m] and ``voltage`` [V], shape (Q,) each.
         """
         here, log = self.blocks[trial], self.log
-        acting = [(c, v) for c, v in active if self._present(c, trial)]
+        acting = [(c, v) for c, v in active if c.acts_in(trial)]
         return partial(
             errors_of_rerun,
             plant_of(self.nominal, acting),
@@ -285,7 +281,7 @@ class EmpsRig:
             InputError: the folder cannot be written.
         """
         active = [(found.candidate, found.values) for found in explanation.found]
-        write_extended(plant_of(self.nominal, active), active, folder, list(self.trials))
+        write_extended(self.nominal, effects_of(active), folder, self.trials)
 
     def undecidable(self) -> list[dict[str, Any]]:
         """What recordings of one axis cannot decide."""

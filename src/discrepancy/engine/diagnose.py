@@ -89,7 +89,10 @@ def diagnose(
     """
     explanation = search(rig, most, progress=say)
     notes: list[str] = []
-    if _add_up(explanation) and sum(bool(found.candidate.detail) for found in explanation.found) == 1:
+    if (
+        _add_up(explanation)
+        and sum(found.candidate.transient is not None for found in explanation.found) == 1
+    ):
         explanation, note = _without_transient(rig, explanation)
         notes.append(note)
     why_not = rig.can_run_again() if closed_loop else "the closed loop was left out on request"
@@ -144,9 +147,9 @@ def _add_up(explanation: Explanation) -> bool:
 
 def _without_transient(rig: Rig, explanation: Explanation) -> tuple[Explanation, str]:
     """Two causes at one place are believed without the event that took what they left."""
-    gone = [found.candidate for found in explanation.found if found.candidate.detail]
+    gone = [found.candidate for found in explanation.found if found.candidate.transient]
     both = zip(explanation.found, explanation.fit.free, strict=True)
-    kept = [(found, index) for found, index in both if not found.candidate.detail]
+    kept = [(found, index) for found, index in both if not found.candidate.transient]
     rest = replace(explanation, found=tuple(found for found, _ in kept))
     labels = ", ".join(candidate.label for candidate in gone)
     note = f"{labels}: takes what the other causes leave at one place, so it is not named."
@@ -178,7 +181,7 @@ def _confirm(
     for place, found in enumerate(explanation.found):
         for rival, gap in found.rivals:
             index = problem.index_of(rival)
-            if index is None or index in free or gap > CLOSE_NATS or rival.detail:
+            if index is None or index in free or gap > CLOSE_NATS or rival.transient:
                 continue
             problem = problem.with_columns(index, rival, rig.columns(rival))
             trials.append((place, rival, gap))

@@ -86,7 +86,7 @@ def responses(
     for free in hypotheses:
         for t in trials:
             others = [k for k in trials if k != t] or [t]
-            used = [i for i in free if not problem.candidates[i].detail]
+            used = [i for i in free if not problem.candidates[i].transient]
             # A push says nothing about other trials; its own trial has to tell it.
             if len(used) < len(free):
                 others = list(trials)

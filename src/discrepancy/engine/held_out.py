@@ -30,8 +30,8 @@ def confirmed(folds: Sequence[float]) -> bool:
 
 def held_out_gains(problem: Problem, free: Sequence[int], index: int, candidate: Candidate) -> list[float]:
     """How much rather every trial has a cause as the other trials fitted it than all within its tolerance."""
-    if candidate.detail:
-        return _interleaved(problem, free, index, int(candidate.detail["trial"]))
+    if candidate.transient:
+        return _interleaved(problem, free, index, candidate.transient.trial)
     trials = range(len(problem.rows))
     if len(problem.rows) < 2:
         return []
@@ -55,7 +55,7 @@ def shares(problem: Problem, free: Sequence[int], index: int) -> tuple[float, fl
     trials = range(len(problem.rows))
     floor = sum(full.held_out(t) for t in trials)
     in_sample = (nominal.misfit - with_it.misfit) / max(nominal.misfit - floor, 1e-9)
-    if len(trials) < 2 or problem.candidates[index].detail:
+    if len(trials) < 2 or problem.candidates[index].transient:
         return float(np.clip(in_sample, 0.0, 1.0)), None
     gained, room = 0.0, 0.0
     for t in trials:

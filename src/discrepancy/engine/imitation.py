@@ -18,7 +18,7 @@ def imitated(rig: Rig, leader: Leader, free: Sequence[int]) -> bool:
     time; but then its torque alone accounts for it, and a push has six numbers for the same.
     """
     candidate, problem = leader.candidate, leader.problem
-    if not candidate.detail:
+    if not candidate.transient:
         return False
     without = problem.fit(free, fixed=(leader.evidence.index, np.zeros(len(candidate.parameters))))
     price = COMPLEXITY * np.log(problem.samples)

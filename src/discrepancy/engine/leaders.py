@@ -71,7 +71,7 @@ def _sharpened(
 ) -> Leader | None:
     """A candidate in its best shape: the catalogue's first, then ever finer around the best."""
     start = problem.candidates[index]
-    if not start.detail and any(u.shape[2] for u in rig.unknowns(start)):
+    if not start.transient and any(u.shape[2] for u in rig.unknowns(start)):
         return _best_with_unknowns(rig, problem, free, index, inflation)
     # What it would add to a model without it: no need to build the problem anew for every shape.
     without = problem.fit(free, fixed=(index, np.zeros(len(start.parameters))))
@@ -144,7 +144,7 @@ def in_best_shapes(rig: Rig, problem: Problem, fit: Fit) -> Problem:
     A cause with a tolerance keeps its shape, since it is in the model.
     """
     for index, candidate in enumerate(problem.candidates):
-        if index in fit.free or candidate.detail or any(p.tolerance > 0 for p in candidate.parameters):
+        if index in fit.free or candidate.transient or any(p.tolerance > 0 for p in candidate.parameters):
             continue
         best = fit.evidence_of(index)
         chosen: tuple[Candidate, list[Array]] | None = None
@@ -164,7 +164,7 @@ def with_transients(
     """Add the best transient to the problem."""
     best: tuple[float, Problem] | None = None
     for candidate in rig.transients([fit.remaining(t) for t in range(len(problem.rows))]):
-        if any(c.detail and dict(c.detail) == dict(candidate.detail) for c in problem.candidates):
+        if any(c.transient and c.transient == candidate.transient for c in problem.candidates):
             continue
         wider = problem.extended(candidate, rig.columns(candidate))
         last = len(wider.candidates) - 1
@@ -178,5 +178,5 @@ def with_transients(
 
 def log10_p(problem: Problem, evidence: Evidence) -> float:
     """Of so much evidence by chance; that of a transient also pays for the intervals searched."""
-    transient = bool(problem.candidates[evidence.index].detail)
+    transient = problem.candidates[evidence.index].transient is not None
     return evidence.log10_p + (INTERVALS_LOG10 if transient else 0.0)

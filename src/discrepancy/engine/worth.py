@@ -22,7 +22,7 @@ def worth_naming(rig: Rig, fit: Fit, leader: Leader, *, first: bool) -> bool:
     Of a further cause only the channels count that it mostly acts on: what a loose grasp leaves in the poses says
     nothing against a torque's zero.
     """
-    transient = bool(leader.candidate.detail)
+    transient = leader.candidate.transient is not None
     if first and not transient:
         return True
     excess = max(fit.misfit - CLEAN * fit.problem.samples, 0.0)

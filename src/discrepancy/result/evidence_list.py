@@ -57,8 +57,8 @@ def place_of(candidate: Candidate) -> dict[str, Any]:
 
 def _when(candidate: Candidate) -> list[float] | None:
     """Trial (from 1) and start [s] of an event."""
-    detail = candidate.detail
-    return [int(detail["trial"]) + 1, float(detail["start_s"])] if detail else None
+    at = candidate.transient
+    return [at.trial + 1, float(at.start_s)] if at else None
 
 
 def label(entry: Mapping[str, Any]) -> str:

@@ -43,7 +43,7 @@ def blind_spots(explanation: Explanation) -> list[dict[str, Any]]:
 def _judged(explanation: Explanation) -> Iterator[tuple[Candidate, dict[str, Any]]]:
     limits = explanation.fit.limits(NOTICED)
     for index, (candidate, sizes) in enumerate(zip(explanation.problem.candidates, limits, strict=True)):
-        if index in explanation.fit.free or candidate.detail:
+        if index in explanation.fit.free or candidate.transient:
             continue
         parameters = {
             p.name: float(size) if size < ABSURD * p.unit else None

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.rig import Candidate, Parameter
+from discrepancy.rig import Candidate, Parameter, Transient
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Cause
 from discrepancy.team.linear.reduction import Reduction
@@ -71,10 +71,12 @@ def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]
     return steps
 
 
-def nearby_pushes(candidate: Candidate, tolerance: Tolerances) -> list[Candidate]:
-    """A push with its interval moved."""
-    near = intervals_near(candidate.shape["start_s"], candidate.shape["duration_s"])
-    return [push(int(candidate.detail["trial"]), start, duration, tolerance) for start, duration in near]
+def nearby_pushes(at: Transient, tolerance: Tolerances) -> list[Candidate]:
+    """Pushes with their interval moved."""
+    return [
+        push(at.trial, start, duration, tolerance)
+        for start, duration in intervals_near(at.start_s, at.duration_s)
+    ]
 
 
 def worst_pushes(

@@ -17,11 +17,11 @@ from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.base_tilt import BaseTilt
 from mocobot_sim.effects.catalogue import apply_effects
 from mocobot_sim.effects.slosh import Slosh
+from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.models import base_height_m
 from mocobot_sim.scene.payload_mjcf import payload_mjcf
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.resimulate import predicted, rerun
-from mocobot_sim.trial.trial import TrialError
 
 Array = NDArray[np.float64]
 

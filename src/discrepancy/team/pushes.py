@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.rig import Candidate, Parameter
+from discrepancy.rig import Candidate, Parameter, Transient
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.tolerances import DEFAULTS
 
@@ -22,8 +22,8 @@ def push(trial: int, start_s: float, duration_s: float, tolerances: Mapping[str,
     cause = CAUSES["push"]
     scales = DEFAULTS["push"]
     parameters = tuple(Parameter(n, tolerances.get(n, 0.0), scales[n]) for n in cause.parameters)
-    interval = {"start_s": start_s, "duration_s": duration_s}
-    return Candidate("push", cause.family, None, None, parameters, interval, {"trial": trial, **interval})
+    when = Transient(trial, start_s, duration_s)
+    return Candidate("push", cause.family, None, None, parameters, when.shape, when)
 
 
 def worst_intervals(time: Array, square: Array) -> list[tuple[float, float]]:

@@ -159,7 +159,7 @@ class TeamRig:
 
     def _columns(self, trial: int, candidate: Candidate) -> Array:
         linear = self.linear[trial]
-        if candidate.detail and candidate.detail["trial"] != trial:
+        if not candidate.acts_in(trial):
             return np.zeros((*linear.residual.shape, len(candidate.parameters)))
         cause = CAUSES[candidate.cause]
         robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
@@ -174,7 +174,7 @@ class TeamRig:
             pi[1:4] / pi[0],
             self.linear[0].design.home_height_m,
             candidate.shape,
-            int(candidate.detail["trial"]) + 1 if candidate.detail else None,
+            candidate.transient.trial + 1 if candidate.transient else None,
         )
         return CAUSES[candidate.cause].report(values, covariance, context)
 
@@ -272,7 +272,7 @@ class TeamRig:
         for t, (linear, x) in enumerate(zip(self.linear, local, strict=True)):
             signals, modelled = linear.signals, np.zeros_like(linear.residual)
             for candidate, values in active:
-                if candidate.detail and candidate.detail["trial"] != t:
+                if not candidate.acts_in(t):
                     continue
                 cause = CAUSES[candidate.cause]
                 robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
@@ -289,8 +289,8 @@ class TeamRig:
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a transient with its interval moved."""
-        if candidate.detail:
-            return nearby_pushes(candidate, self.tolerances.get("push", {}))
+        if candidate.transient:
+            return nearby_pushes(candidate.transient, self.tolerances.get("push", {}))
         return other_shapes(candidate, finer=finer)
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:

@@ -23,15 +23,16 @@ from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import CONTRADICTION
-from estimator.recording.model import Recording, read_recording
+from estimator.files import whole_folder
+from estimator.recording.model import Recording
+from estimator.recording.parquet import read_recording
 from mocobot.commands.diagnose_folder import check_options, write_diagnosis
-from mocobot.files.folders import whole_folder
 from mocobot.files.provenance import file_facts, provenance
 from mocobot.progress import bar, stages
 from mocobot_sim.trial.truth import truth_path
 
 if TYPE_CHECKING:
-    from mocobot.cli import Diagnose
+    from mocobot.options import Diagnose
 
 LEAST_S, GOOD_S = 5.0, 30.0
 """Length of all recordings together below which nothing is diagnosed, and with which it starts to be of use."""

@@ -17,13 +17,13 @@ from discrepancy.emps.words import EmpsWords
 from discrepancy.result.json import diagnosis_to_dict
 from discrepancy.result.text import format_diagnosis
 from estimator.errors import InputError
+from estimator.files import whole_folder
 from mocobot.commands.diagnose_folder import check_options, write_diagnosis
-from mocobot.files.folders import whole_folder
 from mocobot.files.provenance import provenance
 from mocobot.progress import stages
 
 if TYPE_CHECKING:
-    from mocobot.cli import Diagnose
+    from mocobot.options import Diagnose
 
 
 def run(options: Diagnose) -> None:

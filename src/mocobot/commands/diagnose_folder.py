@@ -17,12 +17,11 @@ from discrepancy.result.traces_file import NAME as RESIDUALS
 from discrepancy.result.traces_file import save_traces
 from discrepancy.rig import Rig
 from estimator.errors import InputError
-from mocobot.files.folders import check_folder
-from mocobot.files.given import check_recordings
-from mocobot.files.writing import write_json, write_text
+from estimator.files import write_json, write_text
+from mocobot.files.targets import check_folder, check_recordings
 
 if TYPE_CHECKING:
-    from mocobot.cli import Diagnose
+    from mocobot.options import Diagnose
 
 JSON, REPORT, EXTENDED, PAGE = "diagnosis.json", "report.txt", "extended", "report.html"
 

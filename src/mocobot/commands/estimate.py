@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.text import format_estimate
-from estimator.recording.model import Recording, read_recording
-from mocobot.files.given import check_recordings
+from estimator.files import write_json
+from estimator.recording.model import Recording
+from estimator.recording.parquet import read_recording
 from mocobot.files.provenance import provenance
-from mocobot.files.writing import write_json
+from mocobot.files.targets import check_recordings
 from mocobot.progress import stages
 
 if TYPE_CHECKING:
-    from mocobot.cli import Estimate
+    from mocobot.options import Estimate
 
 
 def run(options: Estimate) -> None:

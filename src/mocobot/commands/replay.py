@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
-from estimator.recording.model import read_recording
-from mocobot.files.given import check_recordings
-from mocobot.files.writing import check_target
+from estimator.recording.parquet import read_recording
+from mocobot.files.targets import check_recordings, check_target
 from mocobot.progress import bar
 
 if TYPE_CHECKING:
-    from mocobot.cli import Replay
+    from mocobot.options import Replay
     from mocobot_view.replay.replay_trial import ReplayTrial
 
 INSTALL = "pip install 'rerun-sdk>=0.41,<0.42'"

@@ -7,8 +7,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
-from estimator.recording.model import write_recording
-from mocobot.files.writing import check_target
+from estimator.recording.parquet import write_recording
+from mocobot.files.targets import check_target
 from mocobot.progress import bar
 from mocobot_sim.extended.extended import load_extended
 from mocobot_sim.trial.sensors import sensor_preset
@@ -16,7 +16,7 @@ from mocobot_sim.trial.simulate import TrialRequest, simulate
 from mocobot_sim.trial.truth import write_truth
 
 if TYPE_CHECKING:
-    from mocobot.cli import Simulate
+    from mocobot.options import Simulate
 
 
 def run(options: Simulate) -> None:

@@ -155,7 +155,7 @@ def test_short_transient_with_a_tolerance_is_tested_inside_its_interval():
             return columns
 
         def transients(self, remaining):
-            return [cause("push", None, 0.2, 2, "push", super().transients(remaining)[0].detail)]
+            return [cause("push", None, 0.2, 2, "push", super().transients(remaining)[0].transient)]
 
     rig = ShortRig({}, burst=(1, 0.0, 2))
     push = rig.transients([])[0]

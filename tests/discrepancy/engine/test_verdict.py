@@ -9,6 +9,7 @@ from discrepancy.engine.diagnose import _verdict, diagnose
 from discrepancy.engine.explanation import CLEAN
 from discrepancy.engine.search import search
 from discrepancy.least_squares.problem import Problem
+from discrepancy.rig import Transient
 from fake_rig import CATALOGUE, FakeRig, names
 
 
@@ -106,7 +107,7 @@ def test_strained_tolerances_are_not_clean():
 
 def test_three_transients_are_not_dropped_into_silence():
     """Only one among lasting causes goes; three events stay a verdict of their own, never ``consistent``."""
-    three = [replace(c, detail={"trial": float(k)}) for k, c in enumerate(CATALOGUE[1:4])]
+    three = [replace(c, transient=Transient(k, 0.0, 1.0)) for k, c in enumerate(CATALOGUE[1:4])]
     rig = FakeRig({k: 30.0 for k in (1, 2, 3)})
     explanation = search(rig)
     assert len(explanation.found) == 3

@@ -8,7 +8,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from effect_cases import example, team_with
 from estimator.errors import InputError
-from estimator.recording.model import read_recording, write_recording
+from estimator.recording.parquet import read_recording, write_recording
 from mocobot_sim.scene.models import base_height_m
 from mocobot_sim.scene.payload_mjcf import payload_mjcf
 from mocobot_sim.scene.scene import build_team

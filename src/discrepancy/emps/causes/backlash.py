@@ -1,13 +1,11 @@
 """Play between the motor, where the encoder is, and the carriage."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from discrepancy.emps.causes.base import Cause, force
+from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG
 from discrepancy.emps.recording.preflight import resolution
 from estimator.filtering import differentiate, low_pass
-from mocobot_sim.emps.plant import FIRST_GUESS_KG
 
 CARRIAGE = 0.5
 """Share of the moving mass behind the play: assumed."""
@@ -38,6 +36,3 @@ class Backlash(Cause):
     def visible(self, signals, hints, values):
         # Rounding by whole steps has a hysteresis of its own.
         return abs(values[0]) > STEPS * resolution(signals.log.position).step_m
-
-    def apply(self, plant, values, shape):
-        return replace(plant, play_m=max(plant.play_m + values[0], 0.0))

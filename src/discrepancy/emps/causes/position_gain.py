@@ -1,7 +1,5 @@
 """The position loop's gain is not its nominal value."""
 
-from dataclasses import replace
-
 from discrepancy.emps.causes.base import GIVEN_TO, Cause, voltage
 
 
@@ -20,6 +18,3 @@ class PositionGain(Cause):
 
     def visible(self, signals, hints, values):
         return abs(values[0]) > GIVEN_TO * signals.log.kp_per_s
-
-    def apply(self, plant, values, shape):
-        return replace(plant, kp_per_s=plant.kp_per_s + values[0])

@@ -1,7 +1,5 @@
 """Dry friction at low speed is another than in fast motion."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from discrepancy.emps.causes.base import Cause, filtered, force
@@ -23,9 +21,6 @@ class Stribeck(Cause):
     def columns(self, signals, shape):
         fade = np.exp(-np.abs(signals.v) / shape["speed_mps"])
         return force(filtered(signals, direction(signals, SLOW_MPS) * fade))
-
-    def apply(self, plant, values, shape):
-        return replace(plant, stribeck_N=plant.stribeck_N + values[0], stribeck_mps=shape["speed_mps"])
 
     def shapes(self, hints):
         return [{"speed_mps": speed} for speed in SPEEDS_MPS]

@@ -1,7 +1,5 @@
 """The velocity loop's gain is not its nominal value."""
 
-from dataclasses import replace
-
 from discrepancy.emps.causes.base import GIVEN_TO, Cause, voltage
 
 
@@ -20,6 +18,3 @@ class VelocityGain(Cause):
 
     def visible(self, signals, hints, values):
         return abs(values[0]) > GIVEN_TO * signals.log.kv_Vs_per_m
-
-    def apply(self, plant, values, shape):
-        return replace(plant, kv_Vs_per_m=plant.kv_Vs_per_m + values[0])

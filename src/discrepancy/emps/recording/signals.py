@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from discrepancy.emps.recording.axis_log import AxisLog
+from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG, AxisLog
 from estimator.filtering import differentiate, low_pass
-from mocobot_sim.emps.plant import FIRST_GUESS_KG
 
 Array = NDArray[np.float64]
 
