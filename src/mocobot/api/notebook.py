@@ -17,7 +17,7 @@ Values = Mapping[str, Any]
 STYLE = (
     ".mocobot table{border-collapse:collapse;margin:.5em 0}.mocobot caption{text-align:left;font-weight:600}"
     ".mocobot caption .note{font-weight:400;opacity:.75;display:block}"
-    ".mocobot th,.mocobot td{text-align:left;padding:.15em .8em .15em 0}.mocobot td.num{text-align:right}"
+    ".mocobot th,.mocobot td{text-align:left;padding:.15em .8em .15em 0}.mocobot .num{text-align:right}"
 )
 
 
@@ -58,9 +58,9 @@ def diagnosis_html(values: Values) -> str:
             first = (cause["cause"], cause["place"]) if k == 0 else ("", "")
             rows.append([*first, name, measurement(entry["value"], entry["se"])])
     residual = values["residual"]
-    misfit: list[list[Entry]] = [["as simulated", Num(plain(residual["nominal"]["chi2_per_n"]))]]
+    misfit: list[list[Entry]] = [["chi²/n as simulated", Num(plain(residual["nominal"]["chi2_per_n"]))]]
     if rows:
-        misfit.append(["with the named causes", Num(plain(residual["chi2_per_n"]))])
+        misfit.append(["chi²/n with the named causes", Num(plain(residual["chi2_per_n"]))])
     removed = (values["gain"] or {}).get("removed")
     if removed is not None and rows:
         misfit.append(["excess error of the response removed", Num(percent(removed["share"]))])
@@ -74,7 +74,9 @@ def diagnosis_html(values: Values) -> str:
         table("Named causes", ["cause", "place", "parameter", "value ± standard error"], rows)
         if rows
         else None,
-        table("Misfit", ["", "chi²/n"], misfit, note=f"of {len(values['recordings'])} trials; 1 is clean"),
+        table(
+            "Misfit", ["", ""], misfit, note=f"of {len(values['recordings'])} trials; chi²/n of 1 is clean"
+        ),
     )
 
 
