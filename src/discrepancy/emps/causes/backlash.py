@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy.emps.causes.base import Cause, force
-from discrepancy.emps.recording.preflight import resolution
 from estimator.filtering import differentiate, low_pass
 from mocobot_sim.emps.plant import FIRST_GUESS_KG
 
@@ -37,7 +36,7 @@ class Backlash(Cause):
 
     def visible(self, signals, hints, values):
         # Rounding by whole steps has a hysteresis of its own.
-        return abs(values[0]) > STEPS * resolution(signals.log.position).step_m
+        return abs(values[0]) > STEPS * signals.log.step_m
 
     def apply(self, plant, values, shape):
         return replace(plant, play_m=max(plant.play_m + values[0], 0.0))
