@@ -11,6 +11,7 @@ from scipy.signal import welch
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
+from estimator.statistics import rms_length
 from mocobot_report.blocks.blocks import Entry, bullets, paragraph, table, tabs, value, verdict
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.charts import Json, Key, chart, layout, log_axis, numbers, paint, shared
@@ -74,7 +75,7 @@ def signal_sections(book: Book, found: list[Source], e: PayloadEstimate) -> list
             missing.append(f"{source.name}: nothing can be said without grasps and a centre of mass")
             continue
         head = ["recording", *(f"{one.name} [{one.unit}]" for one in left)]
-        rows.append([source.name, *(value(rms(one.values), 2) for one in left)])
+        rows.append([source.name, *(value(rms_length(one.values), 2) for one in left)])
         panels.append((source.name, _plots(book, recording, left, list(trial.notes))))
     out: list[Node] = []
     if panels:
@@ -94,11 +95,6 @@ def signal_sections(book: Book, found: list[Source], e: PayloadEstimate) -> list
         out.append(verdict("warn", "Not all recordings could be shown"))
         out[-1].append(bullets([f"{text}." for text in missing]))
     return out
-
-
-def rms(values: Array) -> float:
-    """Root mean square of the rows' lengths."""
-    return float(np.sqrt(np.mean(np.sum(values**2, axis=1))))
 
 
 def _left(trial: ReplayTrial) -> list[Left]:
