@@ -23,7 +23,8 @@ from pathlib import Path
 import numpy as np
 
 from estimator.recording.metadata import RecordingMetadata
-from estimator.recording.model import Recording, write_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import write_recording
 from mocobot_logs.bag.read import open_bag
 from mocobot_logs.bag.write import write_bag
 from mocobot_sim.scene.models import omnid_design

@@ -12,7 +12,8 @@ import time
 from pathlib import Path
 
 from estimator.estimate.payload import estimate_payload
-from estimator.recording.model import Recording, read_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import read_recording
 from mocobot_sim.trial.sensors import sensor_preset
 from mocobot_sim.trial.simulate import TrialRequest, simulate
 from mocobot_view.replay.outputs import save_replay

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from diagnose_run import BIAS_NM, Edit
-from estimator.recording.model import write_recording
+from estimator.recording.parquet import write_recording
 from mocobot_sim.effects import apply_effects, make_effect
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.sensors import PRESETS, measure

@@ -13,7 +13,8 @@ import pyarrow.parquet as pq
 
 from estimator.arm.design import load_design
 from estimator.recording.metadata import RecordingMetadata
-from estimator.recording.model import Recording, write_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import write_recording
 from mocobot_logs.bag.write import write_bag
 from mocobot_logs.map.files import MAPS, builtin_map_text
 

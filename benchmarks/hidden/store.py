@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from estimator.recording.model import Recording, read_recording, write_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import read_recording, write_recording
 from hidden.generator import HiddenSet, generate
 from hidden.sealed import Sealed
 

@@ -11,7 +11,8 @@ from typing import Literal
 from estimator.arm.design import OmnidDesign
 from estimator.errors import InputError
 from estimator.recording.checks import check_recording
-from estimator.recording.model import Recording, write_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import write_recording
 from mocobot_logs.bag.write import write_bag
 from mocobot_logs.log import Level, LogSource
 from mocobot_logs.one_clock import ClockReport, to_recording

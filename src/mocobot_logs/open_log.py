@@ -7,7 +7,7 @@ from pathlib import Path
 
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
-from estimator.recording.model import METADATA_KEY
+from estimator.recording.parquet import METADATA_KEY
 from mocobot_logs.faults import detail_of
 from mocobot_logs.log import LogSource
 from mocobot_logs.map.files import LogMap, builtin_map

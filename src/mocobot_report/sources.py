@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from estimator.errors import InputError
-from estimator.recording.model import Recording, read_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import read_recording
 
 SUFFIX = ".parquet"
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from effect_cases import example
-from estimator.recording.model import Recording, write_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import write_recording
 from mocobot_inspect.findings import findings
 from mocobot_inspect.inspection import Inspection, inspect_log
 from mocobot_logs.open_log import open_log

@@ -12,7 +12,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from estimator.recording.model import Recording, write_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import write_recording
 from log_files import write_text
 from miswired import miswire
 from mocobot.cli import main

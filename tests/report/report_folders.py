@@ -14,7 +14,7 @@ from discrepancy.result.traces_file import save_traces
 from discrepancy.rig import Channel
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
-from estimator.recording.model import write_recording
+from estimator.recording.parquet import write_recording
 from mocobot.files.provenance import provenance
 from mocobot_sim.paper.published import published_errors
 from recorded_team import COM, GRASPS, INERTIA, MASS, Sines, carry

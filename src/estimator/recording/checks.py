@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +10,7 @@ from numpy.typing import NDArray
 from estimator.arm.delta import is_reachable, leg_geometry
 from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES, trim_slice
-
-if TYPE_CHECKING:
-    from estimator.recording.model import Recording
+from estimator.recording.model import Recording
 
 Array = NDArray[np.float64]
 

@@ -1,28 +1,18 @@
-"""Recordings: joint angles and spring torques of one trial, and their Parquet file (docs/recording.md)."""
+"""Recordings: joint angles and spring torques of one trial; their columns are those of docs/recording.md."""
 
 from __future__ import annotations
 
-import contextlib
-import difflib
-import os
-import uuid
-from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from estimator.arm.wrist_level import joints_of, wrist_fault, wrist_of
+from estimator.arm.wrist_level import wrist_of
 from estimator.errors import InputError
-from estimator.recording.checks import check_finite, check_recording
 from estimator.recording.metadata import Level, RecordingMetadata
 
 Array = NDArray[np.float64]
 
-METADATA_KEY = b"mocobot"
 # Column suffixes in array order: one (Q, N, 3) array per field.
 _THETA, _REF = ("theta_z", "theta_y", "theta_x"), ("ref_x", "ref_y", "ref_z")
 CHANNELS: dict[Level, dict[str, tuple[str, ...]]] = {
@@ -107,164 +97,3 @@ class Recording:
                 if (array := fields[field]) is not None:
                     columns |= {f"omnid{robot + 1}.{s}": array[:, robot, k] for k, s in enumerate(suffixes)}
         return columns
-
-
-def write_recording(recording: Recording, path: Path | str) -> None:
-    """Write a recording as Parquet; an existing file is replaced only once the new one is complete.
-
-    Raises:
-        InputError: the target cannot be written, the metadata is not valid, or the level is "wrist" and some
-            driven angles have no wrist position.
-    """
-    path = Path(path)
-    metadata = {METADATA_KEY: recording.metadata.to_json().encode()}
-    table = pa.table(
-        {name: np.ascontiguousarray(values) for name, values in recording.file_columns().items()}
-    )
-    temporary = path.parent / f".{uuid.uuid4().hex}.tmp"
-    try:
-        # Measured samples hardly repeat, so dictionaries only cost space; checksums catch damaged pages.
-        pq.write_table(
-            table.replace_schema_metadata(metadata),
-            temporary,
-            use_dictionary=False,
-            write_page_checksum=True,
-        )
-        os.replace(temporary, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
-
-
-def read_recording(path: Path | str) -> Recording:
-    """Read and check a recording (see ``check_recording`` for what is checked in the samples).
-
-    Raises:
-        InputError: the file cannot be read, is not a recording, or its content is not plausible.
-    """
-    path = Path(path)
-    with _opened(path) as file:
-        schema = file.schema_arrow
-        text = (schema.metadata or {}).get(METADATA_KEY)
-        if text is None:
-            raise InputError(
-                f"{path}: not a recording, the schema metadata has no key {METADATA_KEY.decode()!r}"
-            )
-        metadata = RecordingMetadata.from_json(text, where=f"{path}: metadata")
-        _check_column_names(schema.names, metadata, path)
-        if file.metadata.num_rows == 0:
-            raise InputError(f"{path}: the file has no rows")
-        for field in schema:
-            _check_type(field, path)
-        time, arrays = _read_columns(file, metadata)
-    if metadata.level == "wrist":
-        named = {
-            f"omnid{robot + 1}.{name}": arrays[field][:, robot, k]
-            for field, names in CHANNELS["wrist"].items()
-            for k, name in enumerate(names)
-            for robot in range(metadata.robots if field in arrays else 0)
-        }
-        check_finite(str(path), {"time": time} | named)
-        arrays["phi"], arrays["tau"] = _joints(arrays.pop("h"), arrays.pop("force"), metadata, path)
-    ref = arrays.pop("ref", None)
-    recording = Recording(time=time, ref=ref, metadata=metadata, name=str(path), **arrays)
-    check_recording(recording)
-    return recording
-
-
-def _read_columns(file: pq.ParquetFile, metadata: RecordingMetadata) -> tuple[Array, dict[str, Array]]:
-    """Time (Q,) and the fields, each (Q, N, 3); one column after the other, so that nothing is in memory twice."""
-    rows, names = file.metadata.num_rows, set(file.schema_arrow.names)
-
-    def column(name: str) -> Array:
-        read = file.read(columns=[name], use_threads=False).column(name)
-        # Empty cells become NaN, which the checks report with their row.
-        return read.cast(pa.float64(), safe=False).to_numpy()
-
-    arrays: dict[str, Array] = {}
-    for field, suffixes in CHANNELS[metadata.level].items():
-        if f"omnid1.{suffixes[0]}" in names:
-            arrays[field] = np.empty((rows, metadata.robots, 3))
-            for robot in range(metadata.robots):
-                for k, suffix in enumerate(suffixes):
-                    arrays[field][:, robot, k] = column(f"omnid{robot + 1}.{suffix}")
-    return column("time").copy(), arrays
-
-
-def _joints(h: Array, force: Array, metadata: RecordingMetadata, path: Path) -> tuple[Array, Array]:
-    """Driven angles and torques in the place of wrist positions and forces, robot by robot for the sake of memory."""
-    for robot in range(metadata.robots):
-        fault = wrist_fault(h[:, robot], metadata.design)
-        if fault is not None:
-            (row,), sentence = fault
-            in_mm = np.abs(h).max() > 2.0 and wrist_fault(1e-3 * h[:, robot], metadata.design) is None
-            hint = (
-                "the values look like millimetres"
-                if in_mm
-                else "are zero, signs and order of its axes right?"
-            )
-            raise InputError(f"{path}: omnid{robot + 1}.h_x, .h_y, .h_z in row {row}: {sentence} - {hint}")
-        h[:, robot], force[:, robot] = joints_of(h[:, robot], force[:, robot], metadata.design)
-    return h, force
-
-
-@contextlib.contextmanager
-def _opened(path: Path) -> Iterator[pq.ParquetFile]:
-    """The file; whatever goes wrong with it inside the block becomes one sentence."""
-    try:
-        exists, is_file = path.exists(), path.is_file()
-    except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL in it
-        raise InputError(f"{str(path)!r:.80}: not a usable file name ({error})") from error
-    if not exists:
-        raise InputError(f"{path}: there is no such file")
-    if not is_file:
-        what = "a directory" if path.is_dir() else "not a regular file"
-        raise InputError(f"{path}: is {what}; it must be a recording file")
-    try:
-        # ParquetFile, not read_table: the latter turns folder names such as a=1 into extra columns. Not pre-buffered:
-        # that keeps whole row groups.
-        with pq.ParquetFile(path, page_checksum_verification=True, pre_buffer=False) as file:
-            yield file
-    except InputError:
-        raise
-    except PermissionError as error:
-        raise InputError(f"{path}: cannot be read (permission denied)") from error
-    except Exception as error:  # on damaged bytes pyarrow raises many types, not all of them its own
-        detail = (str(error).splitlines() or [type(error).__name__])[0]
-        raise InputError(f"{path}: not a readable Parquet file, or a damaged one ({detail})") from error
-
-
-def _check_column_names(names: list[str], metadata: RecordingMetadata, path: Path) -> None:
-    robots, channels = metadata.robots, CHANNELS[metadata.level]
-
-    def of_robots(*fields: str) -> list[str]:
-        # No need to spell out an absurd number of robots: each has more columns than one.
-        spelled = range(1, min(robots, len(names)) + 1)
-        return [f"omnid{i}.{s}" for i in spelled for field in fields for s in channels[field]]
-
-    required = ["time", *of_robots(*(field for field in channels if field != "ref"))]
-    optional = of_robots("ref")
-    valid = {*required, *optional}
-    if any(name in optional for name in names):
-        required += optional
-    suffixes = ", ".join(s for group in channels.values() for s in group)
-    of_level = f" at {metadata.level} level" if metadata.level != "joint" else ""
-    rule = f"the columns{of_level} are time and, for i = 1..{robots}, omnid{{i}}. followed by {suffixes}"
-    for name in names:
-        if name not in valid:
-            close = difflib.get_close_matches(name, sorted(valid), n=1)
-            hint = f" (did you mean {close[0]!r}?)" if close else ""
-            raise InputError(f"{path}: unknown column {name!r}{hint}; {rule}")
-        if names.count(name) > 1:
-            raise InputError(f"{path}: column {name!r} appears {names.count(name)} times; {rule}")
-    for name in required:
-        if name not in names:
-            raise InputError(f"{path}: missing column {name!r}; {rule} (ref_* for all robots or for none)")
-
-
-def _check_type(field: pa.Field, path: Path) -> None:
-    kind = field.type
-    if not (pa.types.is_floating(kind) or pa.types.is_integer(kind) or pa.types.is_decimal(kind)):
-        raise InputError(f"{path}: column {field.name!r} holds {kind}; it must hold numbers (float64)")

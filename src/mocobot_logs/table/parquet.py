@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
-from estimator.recording.model import METADATA_KEY
+from estimator.recording.parquet import METADATA_KEY
 from mocobot_logs.claims import check_claim
 from mocobot_logs.faults import detail_of
 from mocobot_logs.log import Stamps

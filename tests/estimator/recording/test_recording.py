@@ -10,7 +10,8 @@ import pytest
 from estimator.arm.design import OmnidDesign
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
-from estimator.recording.model import Recording, read_recording, write_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import read_recording, write_recording
 from omnid_design import DESIGN
 from recordings import metadata, small_recording
 

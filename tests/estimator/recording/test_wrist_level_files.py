@@ -13,7 +13,8 @@ import pytest
 from estimator.arm.delta import forward_kinematics
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
-from estimator.recording.model import Recording, read_recording, write_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import read_recording, write_recording
 from omnid_design import DESIGN
 from recorded_team import MASS, Sines, carry
 from recordings import small_recording

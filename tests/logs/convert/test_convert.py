@@ -13,7 +13,8 @@ import pytest
 
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
-from estimator.recording.model import Recording, read_recording, write_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import read_recording, write_recording
 from log_files import write_lerobot, write_text
 from mocobot.cli import main
 from mocobot_logs.table.write import write_csv, write_npz

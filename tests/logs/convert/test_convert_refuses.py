@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import command
-from estimator.recording.model import Recording, write_recording
+from estimator.recording.model import Recording
+from estimator.recording.parquet import write_recording
 from log_files import write_lerobot, write_text
 from mocobot_logs.bag.write import write_bag
 from mocobot_logs.map.files import builtin_map_text

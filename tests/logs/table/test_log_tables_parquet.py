@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from estimator.recording.model import write_recording
+from estimator.recording.parquet import write_recording
 from log_files import assert_same, channels_of, column, read_log, refused
 from mocobot_logs import claims
 from mocobot_logs.map.files import TimeMap, builtin_map
