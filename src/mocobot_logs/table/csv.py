@@ -24,7 +24,9 @@ MAX_LINE_BYTES = 1 << 20
 DELIMITERS = (",", ";", "\t", "|", " ")
 EMPTY = ["", " ", "NA", "N/A", "n/a", "NULL", "null", "None", "-"]
 """Cells that stand for no value."""
-_NUMBER = re.compile(r"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf(inity)?|nan(\(\w*\))?)", re.ASCII | re.IGNORECASE)
+_NUMBER = re.compile(
+    r"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf(inity)?|nan(\(\w*\))?)", re.ASCII | re.IGNORECASE
+)
 """As pyarrow reads them."""
 
 
