@@ -7,16 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from discrepancy.causes.words import number
+from discrepancy import rules
+from discrepancy.causes.numbers import number
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.engine.diagnose import Diagnosis, diagnose
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.block_errors import block_covariance, part_of, with_block_errors
-
-MOST_CAUSES = 10
-"""The nominal axis is a bare mass: mass, friction of several kinds and the loop's details are all left out of it."""
-BLOCK_S = 1.0
-"""Blocks of the standard errors: what is left is correlated over a few tenths of a second."""
 
 
 def diagnose_axis(
@@ -33,7 +29,9 @@ def diagnose_axis(
         rig: the recording.
         closed_loop, jobs, say, simulated: as of ``diagnose``.
     """
-    found = diagnose(rig, closed_loop=closed_loop, most=MOST_CAUSES, jobs=jobs, say=say, simulated=simulated)
+    found = diagnose(
+        rig, closed_loop=closed_loop, most=rules.EMPS_MOST_CAUSES, jobs=jobs, say=say, simulated=simulated
+    )
     explanation = with_block_errors(found.explanation, block_rows(rig))
     notes = (*rig.log.notes, *found.notes, _noise(rig), *_loop(rig, found.explanation))
     return replace(found, explanation=explanation, notes=notes)
@@ -41,7 +39,7 @@ def diagnose_axis(
 
 def block_rows(rig: EmpsRig) -> int:
     """Rows in a block of the standard errors."""
-    return round(BLOCK_S * rig.row_rate_hz(0))
+    return round(rules.ERROR_BLOCK_S * rig.row_rate_hz(0))
 
 
 def also_fitted(

@@ -9,12 +9,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from discrepancy import rules
 from discrepancy.engine.diagnose import Diagnosis, diagnose
 from discrepancy.result.json import diagnosis_to_dict
 from discrepancy.result.text import format_diagnosis
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.estimates import errors, estimates
-from discrepancy.team.linear.signals import TRIM_S
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.traces import traces
@@ -33,11 +33,6 @@ from mocobot_sim.trial.truth import truth_path
 
 if TYPE_CHECKING:
     from mocobot.options import Diagnose
-
-LEAST_S, GOOD_S = 5.0, 30.0
-"""Length of all recordings together below which nothing is diagnosed, and with which it starts to be of use."""
-MASS_TOLERANCE = 0.05
-"""Trials whose masses differ by more than this share are not of one payload."""
 
 
 def run(options: Diagnose) -> None:
@@ -87,12 +82,13 @@ def _check_recordings(recordings: Sequence[Recording]) -> None:
             f"{first.name} has one robot; without a second one nothing tells where the payload really is, so there is "
             "nothing to diagnose"
         )
-    used = [max(0.0, recording.time[-1] - recording.time[0] - 2.0 * TRIM_S) for recording in recordings]
-    if sum(used) < LEAST_S:
+    ends = 2.0 * rules.TEAM_TRIM_S
+    used = [max(0.0, recording.time[-1] - recording.time[0] - ends) for recording in recordings]
+    if sum(used) < rules.LEAST_S:
         names = ", ".join(recording.name for recording in recordings)
         raise InputError(
-            f"{names}: {sum(used):.1f} s are left when {TRIM_S:g} s are dropped at both ends; a diagnosis needs at "
-            f"least {LEAST_S:g} s, and {GOOD_S:g} s of motion to be worth much"
+            f"{names}: {sum(used):.1f} s are left when {rules.TEAM_TRIM_S:g} s are dropped at both ends; a diagnosis "
+            f"needs at least {rules.LEAST_S:g} s, and {rules.GOOD_S:g} s of motion to be worth much"
         )
     for other in recordings[1:]:
         if other.metadata.robots != first.metadata.robots:
@@ -129,7 +125,7 @@ def _check_masses(recordings: Sequence[Recording]) -> None:
     if not masses:
         return
     (low, low_se, light), (high, high_se, heavy) = min(masses), max(masses)
-    if high - low > max(MASS_TOLERANCE * high, 6.0 * (low_se + high_se)):
+    if high - low > max(rules.MASS_TOLERANCE_SHARE * high, rules.MASS_TOLERANCE_SE * (low_se + high_se)):
         raise InputError(
             f"{light} says {low:.2f} kg and {heavy} says {high:.2f} kg; recordings must be of one payload"
         )
