@@ -54,7 +54,9 @@ def points_nowhere(target: str, page: Path) -> bool:
 def names_of(module: str) -> frozenset[str]:
     """Names that a module defines or imports at its top level."""
     found: set[str] = set()
-    for node in ast.parse(module_files()[module].read_text(encoding="utf-8")).body:
+    todo: list[ast.stmt] = ast.parse(module_files()[module].read_text(encoding="utf-8")).body
+    todo += [node for branch in todo if isinstance(branch, ast.If) for node in branch.body]
+    for node in todo:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             found.add(node.name)
         elif isinstance(node, ast.Import | ast.ImportFrom):
