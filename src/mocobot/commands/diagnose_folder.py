@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 from discrepancy.causes.words import Words
 from discrepancy.engine.diagnose import Diagnosis
-from discrepancy.result.json import FORMAT
 from discrepancy.result.plots import PLOTS, save_plots
+from discrepancy.result.read import FORMAT
 from discrepancy.result.text import format_diagnosis
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import NAME as RESIDUALS

@@ -97,7 +97,7 @@ def _check_rerun() -> None:
 
 
 def _trials(options: Replay) -> list[ReplayTrial]:
-    from mocobot_view.facts.diagnosis import read_diagnosis
+    from discrepancy.result.read import read_diagnosis
     from mocobot_view.facts.fact_files import read_estimate, read_truth
     from mocobot_view.replay.replay_trial import distinct_names, replay_trial
 
