@@ -21,6 +21,7 @@ class Push(Effect):
     """
 
     cause = "push"
+    repeats = True
     ranges: ClassVar = {"start_s": (0.0, 1e9), "duration_s": (0.0, 1e9)}
     trial: int
     start_s: float

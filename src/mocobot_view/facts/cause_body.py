@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 from discrepancy.result.read import NamedCause
+from discrepancy.team.causes import CAUSES
 from mocobot_view.bodies.robot import GIMBAL
-
-GIMBAL_CAUSES = ("theta_zero", "gimbal_friction")
-AT_GRASP = ("grasp_flex", "grasp_play", "tether")
-"""Causes of a whole robot that act where it holds the payload; those of other robots are marked at the base."""
 
 
 def body_of(cause: NamedCause) -> str | None:
     """The robot's body, such as ``proximal1``; None for the base, or the payload."""
+    at = CAUSES[cause.name].at if cause.name in CAUSES else None
     if cause.robot is not None and cause.joint is not None:
-        return GIMBAL[cause.joint - 1] if cause.name in GIMBAL_CAUSES else f"proximal{cause.joint}"
-    return "flange" if cause.robot is not None and cause.name in AT_GRASP else None
+        return GIMBAL[cause.joint - 1] if at == "gimbal joint" else f"proximal{cause.joint}"
+    return "flange" if cause.robot is not None and at == "grasp" else None

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from estimator import so3
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.strict import Fields, read_json
@@ -40,12 +40,14 @@ def read_truth(recording: Path, robots: int) -> BodyFacts:
     ]
     return BodyFacts(
         grasps=Grasps(
-            np.array([so3.exp(np.deg2rad(entry.array("R_1i_rotvec_deg", (3,)))) for entry in each]),
+            Rotation.from_rotvec(
+                [entry.array("R_1i_rotvec_deg", (3,)) for entry in each], degrees=True
+            ).as_matrix(),
             np.array([entry.array("p_1i_m", (3,)) for entry in each]),
         ),
         mass_kg=truth.number("mass_kg"),
         p_1c=truth.array("p_1c_m", (3,)),
-        R_1c=so3.exp(np.deg2rad(truth.array("R_1c_rotvec_deg", (3,)))),
+        R_1c=Rotation.from_rotvec(truth.array("R_1c_rotvec_deg", (3,)), degrees=True).as_matrix(),
         principal_kgm2=truth.array("principal_inertia_kgm2", (3,)),
     )
 
