@@ -53,11 +53,11 @@ from discrepancy.engine.diagnose import Alternative, Diagnosis
 from discrepancy.engine.explanation import Explanation, Found
 from discrepancy.engine.gain import Gain, Response
 from discrepancy.result.evidence_list import evidence_list, place_of
+from discrepancy.result.read import FORMAT, VERSION
 from discrepancy.result.sensitivity import blind_spots, detection_limits
 from discrepancy.result.signature import signature
 from discrepancy.rig import Rig
 
-FORMAT, VERSION = "mocobot-diagnosis", 1
 LEAST_LOG10_P = -1e6
 
 
