@@ -1,9 +1,13 @@
 """Hide friction in one joint of a simulated team, and let the recordings tell: what is wrong, where, and how much.
 
 python scenarios/hidden_effect.py
+python scenarios/hidden_effect.py FOLDER    # keeps the recordings, for `mocobot diagnose`
 """
 
 from __future__ import annotations
+
+import sys
+from pathlib import Path
 
 import numpy as np
 
@@ -11,7 +15,7 @@ import mocobot
 from mocobot.trajectories import random_vias, sphere_motion
 
 
-def main() -> None:
+def main(folder: Path | None = None) -> None:
     """Two trials of payload (b) with 16-bit encoders and noisy torques; nobody tells the diagnosis what is hidden."""
     rng, nominal = np.random.default_rng(5), mocobot.PRESETS["nominal"]
     friction = mocobot.make_effect(
@@ -28,8 +32,12 @@ def main() -> None:
         log = mocobot.run_trial(faulty, motion, trial_number=number)
         recordings.append(mocobot.measure(log, nominal, rng, name=f"trial {number}"))
 
+    if folder is not None:
+        folder.mkdir(parents=True, exist_ok=True)
+        for recording in recordings:
+            mocobot.write_recording(recording, folder / f"{recording.name.replace(' ', '')}.parquet")
     print(mocobot.diagnose(recordings))
 
 
 if __name__ == "__main__":
-    main()
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else None)

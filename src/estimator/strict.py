@@ -39,6 +39,19 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         raise InputError(f"{path}: not a readable {what} ({error})") from error
 
 
+def read_json(path: Path, what: str) -> dict[str, Any]:
+    """The object of a JSON file (arguments as in ``read_toml``).
+
+    Raises:
+        InputError: it cannot be read, or is not one.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a readable {what} ({error})") from error
+    return parse_json(text, str(path))
+
+
 def parse_json(text: str | bytes, where: str) -> dict[str, Any]:
     """A JSON object; no key twice, no NaN.
 
@@ -96,7 +109,8 @@ class Fields:
         check_known(self.values, keys, self.where)
         for key in self.required:
             if key not in self.values:
-                raise InputError(f"{self.where}: missing key {key!r}; the keys are {', '.join(keys)}")
+                rule = "required are" if self.optional else "the keys are"
+                raise InputError(f"{self.where}: missing key {key!r}; {rule} {', '.join(self.required)}")
 
     def __contains__(self, key: str) -> bool:
         """Whether an optional key is given."""

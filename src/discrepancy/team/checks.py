@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from discrepancy.team.linear.signals import TRIM_S
+from discrepancy import rules
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import CONTRADICTION
 from estimator.recording.model import Recording
-
-LEAST_S, GOOD_S = 5.0, 30.0
-"""Length of all recordings together below which nothing is diagnosed, and with which it starts to be of use."""
-MASS_TOLERANCE = 0.05
-"""Trials whose masses differ by more than this share are not of one payload."""
 
 
 def check_recordings(recordings: Sequence[Recording]) -> None:
@@ -31,12 +26,14 @@ def check_recordings(recordings: Sequence[Recording]) -> None:
             f"{first.name} has one robot; without a second one nothing tells where the payload really is, so there is "
             "nothing to diagnose"
         )
-    used = [max(0.0, recording.time[-1] - recording.time[0] - 2.0 * TRIM_S) for recording in recordings]
-    if sum(used) < LEAST_S:
+    used = [
+        max(0.0, recording.time[-1] - recording.time[0] - 2.0 * rules.TEAM_TRIM_S) for recording in recordings
+    ]
+    if sum(used) < rules.LEAST_S:
         names = ", ".join(recording.name for recording in recordings)
         raise InputError(
-            f"{names}: {sum(used):.1f} s are left when {TRIM_S:g} s are dropped at both ends; a diagnosis needs at "
-            f"least {LEAST_S:g} s, and {GOOD_S:g} s of motion to be worth much"
+            f"{names}: {sum(used):.1f} s are left when {rules.TEAM_TRIM_S:g} s are dropped at both ends; a diagnosis "
+            f"needs at least {rules.LEAST_S:g} s, and {rules.GOOD_S:g} s of motion to be worth much"
         )
     for other in recordings[1:]:
         if other.metadata.robots != first.metadata.robots:
@@ -67,7 +64,7 @@ def check_masses(recordings: Sequence[Recording]) -> None:
     if not masses:
         return
     (low, low_se, light), (high, high_se, heavy) = min(masses), max(masses)
-    if high - low > max(MASS_TOLERANCE * high, 6.0 * (low_se + high_se)):
+    if high - low > max(rules.MASS_TOLERANCE_SHARE * high, rules.MASS_TOLERANCE_SE * (low_se + high_se)):
         raise InputError(
             f"{light} says {low:.2f} kg and {heavy} says {high:.2f} kg; recordings must be of one payload"
         )

@@ -7,10 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.quantisation import quantisation_step
+
 Array = NDArray[np.float64]
 
 LIMIT_V = 10.0
 """The drive saturates there (Janot, Gautier, Brunot)."""
+FIRST_GUESS_KG = 100.0
+"""Moving mass as assumed; ``models/emps/README.md`` says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,3 +59,8 @@ class AxisLog:
     def period_s(self) -> float:
         """Sampling period [s]."""
         return 1.0 / self.rate_hz
+
+    @property
+    def step_m(self) -> float:
+        """Step in which the position is read [m]; 0 where none shows."""
+        return quantisation_step(self.position) or 0.0
