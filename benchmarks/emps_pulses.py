@@ -11,7 +11,6 @@ import numpy as np
 from scipy.io import loadmat
 
 from discrepancy.emps.diagnosis import also_fitted, diagnose_axis
-from discrepancy.emps.pulse_search import rectangle
 from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.engine.diagnose import Diagnosis
@@ -40,7 +39,7 @@ def scored(path: Path, train: PulseTrain) -> dict[str, float]:
     on = pulses > 0
     rising = time[1:][np.diff(on.astype(int)) == 1]
     falling = time[1:][np.diff(on.astype(int)) == -1]
-    mine = rectangle(time, train) > 0.5
+    mine = train.on(time) > 0.5
     return {
         "start_error_s": train.start_s - float(rising[0]),
         "period_error_s": train.period_s - float(np.mean(np.diff(rising))),

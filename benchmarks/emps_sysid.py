@@ -5,7 +5,7 @@
 
 ``mujoco.sysid`` fits the closed loop of the MJCF by non-linear least squares on position and voltage; the diagnosis'
 problem is linear in the force, whitened as in a diagnosis or plain. All are judged alike: by force, and by the digital
-loop run again.
+loop, resimulated.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def ours(rig: EmpsRig) -> tuple[np.ndarray, np.ndarray, float]:
 
 def theirs(rig: EmpsRig) -> tuple[np.ndarray, np.ndarray, float, int]:
     """The same from ``mujoco.sysid``, with 95 % half widths over 1.96, and the number of residuals it computed."""
-    guess = Plant.nominal(rig.log)
+    guess = rig.nominal
     # Both one-way dampers must be there before anything is compiled; what they are to begin with does not matter.
     spec = axis_spec(
         Plant(**{**guess.__dict__, "coulomb_N": (10.0, 10.0), "viscous_Ns_per_m": (100.0, 101.0)})

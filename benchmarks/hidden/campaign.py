@@ -16,7 +16,7 @@ from hidden.parts import Task
 from hidden.score import score
 from hidden.store import append_result, read_results, recordings_of
 from hidden.verdict import verdict_on
-from mocobot_sim.trial.trial import TrialError
+from mocobot_sim.errors import TrialError
 
 
 def run_tasks(tasks: Sequence[Task], folder: Path, jobs: int, *, again: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""What the diagnosis needs to know of a rig: rows, unknowns, causes, and how to run it again."""
+"""What the diagnosis needs to know of a rig: rows, unknowns, causes, and how to resimulate it."""
 
 from __future__ import annotations
 
@@ -34,6 +34,25 @@ class Parameter:
 
 
 @dataclass(frozen=True)
+class Transient:
+    """When an event acts.
+
+    Attributes:
+        trial: index of its trial, from 0.
+        start_s, duration_s: its interval on the trial's clock [s].
+    """
+
+    trial: int
+    start_s: float
+    duration_s: float
+
+    @property
+    def shape(self) -> dict[str, float]:
+        """The interval as the shape of a candidate."""
+        return {"start_s": self.start_s, "duration_s": self.duration_s}
+
+
+@dataclass(frozen=True)
 class Candidate:
     """One cause at one place.
 
@@ -43,7 +62,7 @@ class Candidate:
         robot, joint: where, counted from 1; None where the cause has no such place.
         parameters: its numbers, in the order of its columns.
         shape: further numbers that change the columns themselves, by name.
-        detail: for a transient, when and in which trial.
+        transient: when it acts, of an event; None of what lasts.
         where: the place in words, of what sits at no robot and no joint.
     """
 
@@ -53,8 +72,12 @@ class Candidate:
     joint: int | None
     parameters: tuple[Parameter, ...]
     shape: Mapping[str, float] = field(default_factory=dict)
-    detail: Mapping[str, float] = field(default_factory=dict)
+    transient: Transient | None = None
     where: str = "payload"
+
+    def acts_in(self, trial: int) -> bool:
+        """Whether it can act in a trial (index from 0)."""
+        return self.transient is None or self.transient.trial == trial
 
     @property
     def units(self) -> Array:
@@ -166,14 +189,14 @@ class Rig(Protocol):
         """For every number of its shape that the data determine: a little less, a little more, and the difference."""
         ...
 
-    def can_run_again(self) -> str | None:
-        """Why the recordings cannot be simulated again, or None."""
+    def can_resimulate(self) -> str | None:
+        """Why the recordings cannot be resimulated, or None."""
         ...
 
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
     ) -> Callable[[], dict[str, Array] | None]:
-        """What runs one trial's commands again, in any process.
+        """What resimulates one trial's commands, in any process.
 
         It returns recorded minus simulated response by channel, or None where that cannot be simulated.
         """

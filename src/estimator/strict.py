@@ -39,6 +39,19 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
         raise InputError(f"{path}: not a readable {what} ({error})") from error
 
 
+def read_json(path: Path, what: str) -> dict[str, Any]:
+    """The object of a JSON file (arguments as in ``read_toml``).
+
+    Raises:
+        InputError: it cannot be read, or is not one.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: not a readable {what} ({error})") from error
+    return parse_json(text, str(path))
+
+
 def parse_json(text: str | bytes, where: str) -> dict[str, Any]:
     """A JSON object; no key twice, no NaN.
 

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from estimator.errors import InputError
-from mocobot.files.folders import check_folder, whole_folder
+from estimator.files import whole_folder
+from mocobot.files.targets import check_folder
 
 
 def test_a_folder_appears_when_all_is_written(tmp_path: Path) -> None:

@@ -32,9 +32,9 @@ def git(folder: Path, *arguments: str) -> str:
 def checkout(tmp_path: Path) -> Path:
     """A repository laid out like ours, with one commit."""
     root = tmp_path / "checkout"
-    (root / "src" / "mocobot").mkdir(parents=True)
+    (root / "src" / "mocobot" / "files").mkdir(parents=True)
     (root / "docs").mkdir()
-    (root / "src" / "mocobot" / "provenance.py").write_text("")
+    (root / "src" / "mocobot" / "files" / "provenance.py").write_text("")
     (root / "docs" / "page.md").write_text("")
     git(tmp_path, "init", "--quiet", "checkout")
     git(root, "add", ".")
@@ -109,8 +109,10 @@ def test_commit_is_gits_and_changes_of_sources_show(checkout: Path) -> None:
 def test_commit_of_others_is_not_ours(checkout: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     head = git(checkout, "rev-parse", "HEAD")
     inside = checkout / "lib" / "site"  # a package that was installed below somebody's repository
-    (inside / "src" / "mocobot").mkdir(parents=True)
-    shutil.copy(checkout / "src" / "mocobot" / "provenance.py", inside / "src" / "mocobot")
+    (inside / "src" / "mocobot" / "files").mkdir(parents=True)
+    shutil.copy(
+        checkout / "src" / "mocobot" / "files" / "provenance.py", inside / "src" / "mocobot" / "files"
+    )
     assert module._commit(inside) is None
     shutil.rmtree(checkout / "lib")
     monkeypatch.setenv("GIT_DIR", str(checkout / "nowhere"))  # as a hook of another repository sets it

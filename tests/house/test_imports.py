@@ -107,6 +107,7 @@ def test_causes_need_no_simulator(rig: str, least: int) -> None:
     assert len(files) > least
     for module, path in files.items():
         assert not roots(imported_modules(path)) & SIMULATOR, module
+    walk_without(f"discrepancy.{rig}.causes", SIMULATOR)
 
 
 @pytest.mark.parametrize(("rig", "other"), [("team", "emps"), ("emps", "team")])

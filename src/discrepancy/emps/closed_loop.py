@@ -1,4 +1,4 @@
-"""Run a recording's reference again, block by block from where each began."""
+"""Resimulate a recording's reference, block by block from where each began."""
 
 from __future__ import annotations
 
@@ -7,28 +7,42 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.emps.causes import CAUSES
+from discrepancy import rules
+from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG, LIMIT_V, AxisLog
 from discrepancy.emps.recording.signals import Signals
 from discrepancy.rig import Candidate
+from mocobot_sim.emps.effects import AxisEffect, apply_effects
 from mocobot_sim.emps.loop import Start, run
 from mocobot_sim.emps.plant import Plant
 
 Array = NDArray[np.float64]
 
-REMEMBERED = 16
-"""Samples before a block that the loop may still remember."""
+
+def nominal_plant(log: AxisLog) -> Plant:
+    """As assumed before anything was measured: first guess of the mass, no friction, nominal gains of the loop."""
+    return Plant(FIRST_GUESS_KG, log.gain_N_per_V, log.kp_per_s, log.kv_Vs_per_m, log.period_s, LIMIT_V)
+
+
+def effects_of(active: Sequence[tuple[Candidate, Array]]) -> list[AxisEffect]:
+    """Causes as the simulator's effects: values and shape by name."""
+    return [
+        AxisEffect(
+            candidate.cause,
+            {p.name: float(v) for p, v in zip(candidate.parameters, values, strict=True)}
+            | {name: float(v) for name, v in candidate.shape.items()},
+        )
+        for candidate, values in active
+    ]
 
 
 def plant_of(nominal: Plant, active: Sequence[tuple[Candidate, Array]]) -> Plant:
     """The plant with causes in it."""
-    for candidate, values in active:
-        nominal = CAUSES[candidate.cause].apply(nominal, values, candidate.shape)
-    return nominal
+    return apply_effects(nominal, effects_of(active))
 
 
 def start_of(signals: Signals, sample: int) -> Start:
     """State at one sample of a recording, from its smoothed signals."""
-    before = slice(max(sample - REMEMBERED, 0), sample)
+    before = slice(max(sample - rules.REMEMBERED, 0), sample)
     return Start(
         float(signals.x[sample]),
         float(signals.v[sample]),
@@ -37,7 +51,7 @@ def start_of(signals: Signals, sample: int) -> Start:
     )
 
 
-def errors_of_rerun(
+def resimulation_errors(
     plant: Plant,
     time: Array,
     reference: Array,

@@ -6,28 +6,35 @@ algorithm in the search for periodic transits", A&A 391, 2002), then its edges a
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from mocobot_sim.emps.plant import PulseTrain
+from discrepancy import rules
 
 Array = NDArray[np.float64]
 
-SHORTEST_S, LONGEST_S = 0.2, 6.0
-BINS = 50
-FOLD_HZ = 100.0
-WIDTHS = np.arange(2, BINS - 1)
+
+class Train(NamedTuple):
+    """Rectangular pulses from ``start_s`` on: on for ``width_s`` every ``period_s``."""
+
+    start_s: float
+    period_s: float
+    width_s: float
+    size: float
 
 
-def pulse_train(residual: Array, rate_hz: float) -> PulseTrain:
+def pulse_train(residual: Array, rate_hz: float) -> Train:
     """The rectangular train that explains most of a residual, shape (Q,); there always is one, meaningful or not."""
-    step = max(1, round(rate_hz / FOLD_HZ))
+    step = max(1, round(rate_hz / rules.PULSE_FOLD_HZ))
     count = len(residual) // step
     coarse = residual[: count * step].reshape(count, step).mean(axis=1)
     time = (np.arange(count) + 0.5) * step / rate_hz
     level = coarse - np.median(coarse)
     duration = count * step / rate_hz
-    frequencies = np.arange(1.0 / min(LONGEST_S, duration / 2.0), 1.0 / SHORTEST_S, 0.1 / duration)
+    shortest, longest = rules.PULSE_PERIODS_S
+    frequencies = np.arange(1.0 / min(longest, duration / 2.0), 1.0 / shortest, 0.1 / duration)
     best = (-np.inf, 1.0, 0.0, 0.5)
     for frequency in frequencies:
         power, phase, width = _box(level, time * frequency % 1.0)
@@ -37,52 +44,53 @@ def pulse_train(residual: Array, rate_hz: float) -> PulseTrain:
     start %= period
     if start + width > period:  # on already when the recording begins
         start -= period
-    found = _sharpened(residual, rate_hz, PulseTrain(start, period, width, 0.0))
+    found = _sharpened(residual, rate_hz, Train(start, period, width, 0.0))
     return _from_zero(residual, rate_hz, found)
 
 
-def _from_zero(residual: Array, rate_hz: float, train: PulseTrain) -> PulseTrain:
+def _from_zero(residual: Array, rate_hz: float, train: Train) -> Train:
     """The train, or what is between its pulses if that is further from zero."""
-    on = rectangle(np.arange(len(residual)) / rate_hz, train) > 0.5
+    on = rectangle(np.arange(len(residual)) / rate_hz, *train[:3]) > 0.5
     if not on.any() or on.all() or abs(np.median(residual[on])) >= abs(np.median(residual[~on])):
         return train
     start, width = train.start_s + train.width_s, train.period_s - train.width_s
     if start > train.period_s or (start - train.period_s + width > 0.0 and start - train.period_s < 0.0):
         start -= train.period_s  # one was on already when the recording began
-    return PulseTrain(start, train.period_s, width, -train.size)
+    return Train(start, train.period_s, width, -train.size)
 
 
-def rectangle(time: Array, train: PulseTrain) -> Array:
+def rectangle(time: Array, start_s: float, period_s: float, width_s: float) -> Array:
     """1 while a pulse is on, else 0, shape (Q,); nothing before the start."""
-    since = time - train.start_s
+    since = time - start_s
     # Stamps are on a grid, and so are edges: what is a rounding error before an edge is on it.
     slack = 1e-6
-    return ((since > -slack) & ((since + slack) % train.period_s < train.width_s)).astype(float)
+    return ((since > -slack) & ((since + slack) % period_s < width_s)).astype(float)
 
 
 def _box(level: Array, phase: Array) -> tuple[float, float, float]:
     """The best box in a folded series: power, start and width in shares of the period."""
-    bins = np.minimum((phase * BINS).astype(int), BINS - 1)
-    sums = np.bincount(bins, level, BINS)
-    counts = np.bincount(bins, minlength=BINS)
+    bins = np.minimum((phase * rules.PULSE_BINS).astype(int), rules.PULSE_BINS - 1)
+    sums = np.bincount(bins, level, rules.PULSE_BINS)
+    counts = np.bincount(bins, minlength=rules.PULSE_BINS)
     total, number = sums.sum(), counts.sum()
     doubled = np.concatenate([[0.0], np.cumsum(np.tile(sums, 2))])
     many = np.concatenate([[0.0], np.cumsum(np.tile(counts, 2))])
-    start = np.arange(BINS)
-    stop = start + WIDTHS[:, None]
+    start = np.arange(rules.PULSE_BINS)
+    widths = np.arange(2, rules.PULSE_BINS - 1)
+    stop = start + widths[:, None]
     inside, n = doubled[stop] - doubled[start], many[stop] - many[start]
     spread = np.maximum(n * (number - n) / number, 1e-9)
     power = (inside - total * n / number) ** 2 / spread
     k, at = np.unravel_index(int(np.argmax(power)), power.shape)
-    return float(power[k, at]), at / BINS, WIDTHS[k] / BINS
+    return float(power[k, at]), at / rules.PULSE_BINS, widths[k] / rules.PULSE_BINS
 
 
-def _sharpened(residual: Array, rate_hz: float, train: PulseTrain) -> PulseTrain:
+def _sharpened(residual: Array, rate_hz: float, train: Train) -> Train:
     """Edges to the sample, from where the residual crosses half of the pulses' size; unchanged where they are none."""
     time = np.arange(len(residual)) / rate_hz
-    on = rectangle(time + train.period_s, train) > 0.5
+    on = rectangle(time + train.period_s, *train[:3]) > 0.5
     low, high = np.median(residual[~on]), np.median(residual[on])
-    train = PulseTrain(train.start_s, train.period_s, train.width_s, float(high - low))
+    train = Train(train.start_s, train.period_s, train.width_s, float(high - low))
     above = (residual - low) / (high - low) > 0.5 if high != low else on
     rising, falling = _edges(above, True), _edges(above, False)
     ups, ranks = _matched(time, rising, train.start_s, train.period_s)
@@ -96,7 +104,7 @@ def _sharpened(residual: Array, rate_hz: float, train: PulseTrain) -> PulseTrain
     start, width = np.round(start / grid) * grid, np.round((ends - start) / grid) * grid
     if abs(period / grid - np.round(period / grid)) * len(ups) < 1.0:
         period = np.round(period / grid) * grid
-    return PulseTrain(float(start), float(period), float(width), train.size)
+    return Train(float(start), float(period), float(width), train.size)
 
 
 def _edges(above: NDArray[np.bool_], rising: bool) -> NDArray[np.intp]:

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.emps.blocks import blocks, period_of
 from discrepancy.emps.catalogue import DEFAULTS, Tolerances, candidate_of, hidden_by_rounding, remainder
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.causes.base import Hints
-from discrepancy.emps.closed_loop import errors_of_rerun, plant_of, start_of
-from discrepancy.emps.extended import write_extended
+from discrepancy.emps.closed_loop import effects_of, nominal_plant, plant_of, resimulation_errors, start_of
 from discrepancy.emps.hints import hints_of
 from discrepancy.emps.noise import Noise, from_remainder, from_repeats, repeated
 from discrepancy.emps.pushes import intervals_near, push, worst_intervals
@@ -29,14 +29,10 @@ from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rows
 from estimator.errors import InputError
+from mocobot_sim.emps.extended import write_extended
 from mocobot_sim.emps.plant import Plant
 
 Array = NDArray[np.float64]
-
-AR_ORDER = 8
-"""More does not whiten the benchmark's noise better (by Akaike's criterion)."""
-LEAST_ROWS = 100
-"""Rows that a block must have to be one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +80,10 @@ class EmpsRig:
         hints = hints_of(signals, reduction)
         left = remainder(signals, reduction, hints)
         if period is not None and repeated(signals, period):
-            noise = from_repeats(left, signals, reduction, period, AR_ORDER)
+            noise = from_repeats(left, signals, reduction, period, rules.EMPS_AR_ORDER)
         else:
             noise = from_remainder(left, signals, reduction)
-        shared = Whitening.of(noise.draws, noise.draws.shape[1], AR_ORDER)
+        shared = Whitening.of(noise.draws, noise.draws.shape[1], rules.EMPS_AR_ORDER)
         whitening = tuple(replace(shared, moving=len(rows)) for rows in reduction.samples)
         known = DEFAULTS if tolerances is None else tolerances
         hidden = hidden_by_rounding(signals, reduction, hints, shared)
@@ -118,7 +114,7 @@ class EmpsRig:
     @property
     def nominal(self) -> Plant:
         """The axis as assumed."""
-        return Plant.nominal(self.log)
+        return nominal_plant(self.log)
 
     def candidates(self) -> list[Candidate]:
         """Every cause of the catalogue; pushes come from ``transients``."""
@@ -131,14 +127,11 @@ class EmpsRig:
     def physical(self, candidate: Candidate) -> list[Array]:
         """Columns of one candidate in N and V, rows (n, 2, k) of every block."""
         columns = self.reduction(CAUSES[candidate.cause].columns(self.signals, candidate.shape))
-        return [c * self._present(candidate, t) for t, c in enumerate(columns)]
+        return [c * candidate.acts_in(t) for t, c in enumerate(columns)]
 
     def columns(self, candidate: Candidate) -> list[Array]:
         """Whitened columns of one candidate, shape (n, 2, k) per block."""
         return [white(c) for white, c in zip(self.whitening, self.physical(candidate), strict=True)]
-
-    def _present(self, candidate: Candidate, trial: int) -> float:
-        return float(not candidate.detail or candidate.detail["trial"] == trial)
 
     def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
         """Whitened rows of every block; there are no unknowns but the causes."""
@@ -163,9 +156,7 @@ class EmpsRig:
         out = self.reduction(self.signals.residual)
         for candidate, values in active:
             taken = self.reduction(CAUSES[candidate.cause].exact(self.signals, values, candidate.shape))
-            out = [
-                r - x * self._present(candidate, t) for t, (r, x) in enumerate(zip(out, taken, strict=True))
-            ]
+            out = [r - x * candidate.acts_in(t) for t, (r, x) in enumerate(zip(out, taken, strict=True))]
         return out
 
     def unknowns(self, candidate: Candidate) -> list[Array]:
@@ -203,11 +194,12 @@ class EmpsRig:
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a push with its interval moved."""
-        if candidate.detail:
-            near = intervals_near(candidate.shape["start_s"], candidate.shape["duration_s"])
+        at = candidate.transient
+        if at:
             tolerance = candidate.parameters[0].tolerance
             return [
-                push(int(candidate.detail["trial"]), start, duration, tolerance) for start, duration in near
+                push(at.trial, start, duration, tolerance)
+                for start, duration in intervals_near(at.start_s, at.duration_s)
             ]
         cause = CAUSES[candidate.cause]
         shapes = cause.finer(candidate.shape) if finer else cause.shapes(self.hints)
@@ -217,21 +209,21 @@ class EmpsRig:
         """None: shapes are chosen from a grid."""
         return []
 
-    def can_run_again(self) -> str | None:
+    def can_resimulate(self) -> str | None:
         """Nothing stands against it: every recording has its reference and the loop's gains."""
         return None
 
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
     ) -> Callable[[], dict[str, Array] | None]:
-        """What runs one block's reference again, with causes in the axis.
+        """What resimulates one block's reference, with causes in the axis.
 
         It returns recorded minus simulated ``position`` [m] and ``voltage`` [V], shape (Q,) each.
         """
         here, log = self.blocks[trial], self.log
-        acting = [(c, v) for c, v in active if self._present(c, trial)]
+        acting = [(c, v) for c, v in active if c.acts_in(trial)]
         return partial(
-            errors_of_rerun,
+            resimulation_errors,
             plant_of(self.nominal, acting),
             log.time[here],
             log.reference[here],
@@ -285,7 +277,7 @@ class EmpsRig:
             InputError: the folder cannot be written.
         """
         active = [(found.candidate, found.values) for found in explanation.found]
-        write_extended(plant_of(self.nominal, active), active, folder, list(self.trials))
+        write_extended(self.nominal, effects_of(active), folder, self.trials)
 
     def undecidable(self) -> list[dict[str, Any]]:
         """What recordings of one axis cannot decide."""
@@ -294,7 +286,7 @@ class EmpsRig:
 
 def _long_enough(log: AxisLog, cut: list[slice], reduction: Reduction) -> tuple[list[slice], Reduction]:
     """Only blocks with rows enough."""
-    keep = [k for k, rows in enumerate(reduction.samples) if len(rows) >= LEAST_ROWS]
+    keep = [k for k, rows in enumerate(reduction.samples) if len(rows) >= rules.LEAST_ROWS]
     if not keep:
         raise InputError(f"{log.name}: no part of it is long enough to diagnose")
     return [cut[k] for k in keep], replace(reduction, samples=tuple(reduction.samples[k] for k in keep))

@@ -1,4 +1,4 @@
-"""What a cause is worth: recorded commands run again, with and without it, on trials it was not fitted to."""
+"""What a cause is worth: recorded commands resimulated, with and without it, on trials it was not fitted to."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def responses(
     for free in hypotheses:
         for t in trials:
             others = [k for k in trials if k != t] or [t]
-            used = [i for i in free if not problem.candidates[i].detail]
+            used = [i for i in free if not problem.candidates[i].transient]
             # A push says nothing about other trials; its own trial has to tell it.
             if len(used) < len(free):
                 others = list(trials)

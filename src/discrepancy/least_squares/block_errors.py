@@ -28,7 +28,7 @@ def with_block_errors(explanation: Explanation, rows_per_block: int) -> Explanat
     for index, item in zip(explanation.fit.free, explanation.found, strict=True):
         units = explanation.problem.candidates[index].units
         part = part_of(explanation.fit, covariance, index)
-        if item.candidate.detail:
+        if item.candidate.transient:
             part = inflation * explanation.fit.part(index)[1]
         found.append(replace(item, covariance=part * np.outer(units, units)))
     return replace(explanation, found=tuple(found))

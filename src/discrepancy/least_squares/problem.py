@@ -78,7 +78,7 @@ class Problem:
     def index_of(self, candidate: Candidate) -> int | None:
         """Where a candidate of the same cause and place (and interval) is, or None."""
         for index, other in enumerate(self.candidates):
-            if other.key == candidate.key and dict(other.detail) == dict(candidate.detail):
+            if other.key == candidate.key and other.transient == candidate.transient:
                 return index
         return None
 

@@ -20,7 +20,9 @@ def wrong_torques(
     linear: Sequence[TrialLinear], whitening: Sequence[Whitening], push: Candidate
 ) -> list[list[Array]]:
     """Every joint's torque in turn, wrong by 1 N m while a push lasts: whitened columns (n, C, 1) per trial."""
-    at = int(push.detail["trial"])
+    if push.transient is None:
+        return []
+    at = push.transient.trial
     window = during(linear[at], push.shape)
     none = [np.zeros((*trial.residual.shape, 1)) for trial in linear]
     found = []

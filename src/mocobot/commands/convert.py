@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from estimator.arm.design import load_design
 from estimator.errors import InputError
-from mocobot.files.writing import check_target
+from mocobot.files.targets import check_target
 from mocobot.progress import bar
 from mocobot_logs.convert import Labels, convert, output_kind, write_converted
 from mocobot_logs.convert_report import format_conversion
@@ -17,7 +17,7 @@ from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design
 
 if TYPE_CHECKING:
-    from mocobot.cli import Convert
+    from mocobot.options import Convert
 
 SLOWEST_HZ, FASTEST_HZ = 20.0, 2000.0
 """Bounds of the recording's rate: the estimator's filter passes 5 Hz."""

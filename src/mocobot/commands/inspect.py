@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from estimator.arm.design import load_design
 from estimator.errors import InputError
-from mocobot.files.writing import check_target, write_json
+from estimator.files import write_json
+from mocobot.files.targets import check_target
 from mocobot.progress import bar
 from mocobot_inspect.inspection import inspect_log
 from mocobot_inspect.json import inspection_dict
@@ -17,7 +18,7 @@ from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design
 
 if TYPE_CHECKING:
-    from mocobot.cli import Inspect
+    from mocobot.options import Inspect
 
 
 def run(options: Inspect) -> None:

@@ -7,9 +7,10 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
+from estimator.files import write_json, write_text
 from estimator.recording.parquet import write_recording
 from mocobot.files.provenance import NAME, folder_provenance, provenance
-from mocobot.files.writing import make_folder, write_json, write_text
+from mocobot.files.targets import make_folder
 from mocobot.progress import bar
 from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
 from mocobot_sim.paper.plots import save_plots
@@ -22,7 +23,7 @@ from mocobot_sim.trial.truth import GroundTruth, truth_path, write_truth
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from mocobot.cli import Paper
+    from mocobot.options import Paper
 
 
 def run(options: Paper) -> None:

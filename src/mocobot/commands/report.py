@@ -8,7 +8,7 @@ from mocobot.progress import stages
 from mocobot_report.page import write_report
 
 if TYPE_CHECKING:
-    from mocobot.cli import Report
+    from mocobot.options import Report
 
 
 def run(options: Report) -> None:

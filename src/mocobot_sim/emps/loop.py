@@ -10,7 +10,6 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.emps.pulse_search import rectangle
 from mocobot_sim.emps.mjcf import DRIVE, JOINT, LOAD_JOINT, axis_spec
 from mocobot_sim.emps.plant import Plant
 
@@ -67,7 +66,7 @@ def run(plant: Plant, time: Array, reference: Array, start: Start) -> tuple[Arra
     data.qvel[:] = start.velocity_mps
     acting = _acting(plant.delay_s, plant.period_s, steps)
     extra = _extra(plant, time)
-    pulses = sum((p.size * rectangle(time, p) for p in plant.voltage_pulses), np.zeros(len(time)))
+    pulses = sum((p.size * p.on(time) for p in plant.voltage_pulses), np.zeros(len(time)))
     lag = plant.velocity_lag_s / plant.period_s
     voltages, velocities = _history(start, acting.shape[1], lag)
     kp, kv, limit = plant.kp_per_s, plant.kv_Vs_per_m, plant.limit_V
@@ -120,7 +119,7 @@ def _extra(plant: Plant, time: Array):
         return None
     given = np.zeros(len(time))
     for train in plant.force_pulses:
-        given -= train.size * rectangle(time, train)
+        given -= train.size * train.on(time)
     for push in plant.pushes:
         given += push.force_N * ((time >= push.start_s) & (time < push.start_s + push.duration_s))
 

@@ -15,9 +15,11 @@ ONE_WAY_MPS = 3e-4
 """Speed at which dry friction of one direction has grown to its full size, where it differs from the other's."""
 LARGE_N = 1e9
 CARRIAGE_SHARE = 0.5
-"""Share of the moving mass behind a play, as in ``causes/backlash.py``."""
-LACKS = ("stribeck", "position_force", "delay", "velocity_lag", "injected_voltage", "injected_force", "push")
-"""Causes that MJCF has no words for; ``loop.py`` adds them."""
+"""Share of the moving mass behind a play: assumed."""
+LACKS = frozenset({
+    "stribeck_N", "stribeck_mps", "ripples", "delay_s", "velocity_lag_s", "voltage_pulses", "force_pulses", "pushes"
+})  # fmt: skip
+"""Numbers of a plant that MJCF has no words for; ``loop.py`` adds them."""
 
 
 def axis_spec(plant: Plant) -> mujoco.MjSpec:

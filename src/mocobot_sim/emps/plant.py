@@ -1,13 +1,14 @@
-"""All numbers that the simulated axis and its loop have; causes change them."""
+"""All numbers that the simulated axis and its loop have; effects change them."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-from discrepancy.emps.recording.axis_log import LIMIT_V, AxisLog
+import numpy as np
+from numpy.typing import NDArray
 
-FIRST_GUESS_KG = 100.0
-"""Moving mass as assumed; ``models/emps/README.md`` says why."""
+SLACK_S = 1e-6
+"""Samples and edges are on a grid: what is a rounding error before an edge is on it."""
 
 
 @dataclass(frozen=True)
@@ -18,6 +19,11 @@ class PulseTrain:
     period_s: float
     width_s: float
     size: float
+
+    def on(self, time: NDArray[np.float64]) -> NDArray[np.float64]:
+        """1 while a pulse is on, else 0, shape (Q,) like ``time`` [s]."""
+        since = time - self.start_s + SLACK_S
+        return ((since > 0.0) & (since % self.period_s < self.width_s)).astype(float)
 
 
 @dataclass(frozen=True)
@@ -46,8 +52,8 @@ class Plant:
         mass_kg: all that moves, seen from the carriage.
         gain_N_per_V: of the drive.
         kp_per_s, kv_Vs_per_m: V = kv (kp (q_ref - q) - dq).
-        limit_V: saturation of the drive.
         period_s: of the loop.
+        limit_V: saturation of the drive.
         coulomb_N: dry friction in forward and backward motion.
         viscous_Ns_per_m: viscous friction in forward and backward motion.
         stribeck_N, stribeck_mps: further dry friction at low speed, fading with exp(-|v| / stribeck_mps).
@@ -66,7 +72,7 @@ class Plant:
     kp_per_s: float
     kv_Vs_per_m: float
     period_s: float
-    limit_V: float = LIMIT_V
+    limit_V: float
     coulomb_N: tuple[float, float] = (0.0, 0.0)
     viscous_Ns_per_m: tuple[float, float] = (0.0, 0.0)
     stribeck_N: float = 0.0
@@ -79,8 +85,3 @@ class Plant:
     voltage_pulses: tuple[PulseTrain, ...] = ()
     force_pulses: tuple[PulseTrain, ...] = ()
     pushes: tuple[ForcePush, ...] = ()
-
-    @classmethod
-    def nominal(cls, log: AxisLog) -> Plant:
-        """As assumed before anything was measured: first guess of the mass, no friction, nominal gains of the loop."""
-        return cls(FIRST_GUESS_KG, log.gain_N_per_V, log.kp_per_s, log.kv_Vs_per_m, log.period_s)

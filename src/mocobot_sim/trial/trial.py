@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 from estimator.arm.design import OmnidDesign
 from estimator.errors import InputError
 from mocobot_sim.control.control import ControlGains, TeamController, home_phi
+from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import TeamIndex
@@ -19,7 +20,6 @@ from mocobot_sim.trial.actors import Actor, Stage
 from mocobot_sim.trial.assemble import assemble_at_home
 from mocobot_sim.trial.sensed import SensedLog
 from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
-from mocobot_sim.trial.trial_log import TrialError as TrialError
 from mocobot_sim.trial.trial_log import TrialLog as TrialLog
 
 Array = NDArray[np.float64]

@@ -16,10 +16,6 @@ from mocobot_sim.trial.sensed import SensedLog
 Array = NDArray[np.float64]
 
 
-class TrialError(RuntimeError):
-    """The physics of a trial cannot be trusted; the sentence says what broke, where and when."""
-
-
 @dataclass(frozen=True)
 class TrialLog:
     """What truly happened, at ``RATE_HZ``; nothing here has passed a sensor.

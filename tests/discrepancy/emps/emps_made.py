@@ -24,7 +24,7 @@ FINE_S = 2.5e-4
 
 def nominal() -> Plant:
     """The axis as the diagnosis assumes it."""
-    return Plant(100.0, GAIN, KP, KV, 1.0 / RATE_HZ)
+    return Plant(100.0, GAIN, KP, KV, 1.0 / RATE_HZ, 10.0)
 
 
 def reference(cycles: int = CYCLES) -> np.ndarray:

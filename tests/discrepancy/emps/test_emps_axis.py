@@ -12,13 +12,16 @@ from scipy.integrate import solve_ivp
 
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.causes.base import Hints
-from discrepancy.emps.extended import load_plant, write_extended
-from discrepancy.emps.pulse_search import rectangle
+from discrepancy.emps.closed_loop import plant_of
+from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG
+from discrepancy.rig import Candidate, Parameter
 from emps_made import GAIN, KP, KV, nominal
 from estimator.errors import InputError
+from mocobot_sim.emps.effects import CHANGES
+from mocobot_sim.emps.extended import load_plant, write_extended
 from mocobot_sim.emps.loop import Start, run
 from mocobot_sim.emps.mjcf import DRIVE, JOINT, axis_spec
-from mocobot_sim.emps.plant import FIRST_GUESS_KG, ForcePush, Plant, PulseTrain, Ripple
+from mocobot_sim.emps.plant import ForcePush, Plant, PulseTrain, Ripple
 from mocobot_sim.scene.models import models_dir
 
 SPEED = 0.1
@@ -84,7 +87,7 @@ def test_injected_voltage_adds_to_the_law() -> None:
     train = PulseTrain(0.2, 0.5, 0.2, 0.7)
     start = Start(q[0] - SPEED / KP, SPEED, np.full(9, SPEED), np.zeros(9))
     x, volts = run(replace(nominal(), voltage_pulses=(train,)), time, q, start)
-    on = rectangle(time, train)
+    on = train.on(time)
     v = np.gradient(x, 1e-3)
     inside = np.r_[150:190, 260:390, 460:690]  # away from edges, where v is smooth
     law = KV * (KP * (q - x) - v)
@@ -213,10 +216,13 @@ def test_every_cause_changes_the_plant() -> None:
     touched = set()
     for name, cause in CAUSES.items():
         shape = {"start_s": 0.1, "duration_s": 0.4} if name == "push" else dict(cause.shapes(hints)[-1])
-        changed = cause.apply(nominal(), np.full(len(cause.parameters), 1e-3), shape)
+        parameters = tuple(Parameter(p, 0.0, 1.0) for p in cause.parameters)
+        candidate = Candidate(name, cause.family, None, None, parameters, shape)
+        changed = plant_of(nominal(), [(candidate, np.full(len(parameters), 1e-3))])
         different = {f.name for f in fields(Plant) if getattr(changed, f.name) != getattr(nominal(), f.name)}
         assert different, name
         touched |= different
+    assert list(CHANGES) == list(CAUSES)
     assert {f.name for f in fields(Plant)} - touched == {"gain_N_per_V", "period_s", "limit_V"}
 
 

@@ -13,13 +13,13 @@ import pytest
 from diagnose_run import refused, run
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.diagnosis import also_fitted, diagnose_axis
-from discrepancy.emps.extended import load_plant
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.staircase import format_staircase, staircase
 from discrepancy.emps.words import SENTENCES, EmpsWords
 from discrepancy.engine.diagnose import Diagnosis
 from discrepancy.result.traces_file import load_traces
 from emps_made import nominal, recorded, written
+from mocobot_sim.emps.extended import load_plant
 from mocobot_sim.emps.plant import Plant, PulseTrain
 
 RUBBING = replace(nominal(), mass_kg=95.0, coulomb_N=(20.0, 20.0), viscous_Ns_per_m=(160.0, 240.0))

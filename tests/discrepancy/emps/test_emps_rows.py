@@ -23,7 +23,8 @@ from discrepancy.rig import Candidate, Parameter, Rows
 from emps_errors import bootstrap
 from emps_made import CYCLE_S, CYCLES, GAIN, RATE_HZ, nominal, recorded, reference
 from estimator.errors import InputError
-from mocobot_sim.emps.plant import PulseTrain, Ripple
+from mocobot_sim.emps.effects import AxisEffect, apply_effects
+from mocobot_sim.emps.plant import Plant, PulseTrain, Ripple
 
 PERIOD = round(CYCLE_S * RATE_HZ)
 
@@ -126,20 +127,25 @@ def test_a_recording_without_long_enough_parts_is_refused(clean: EmpsRig) -> Non
 def test_pulses_are_found_to_the_sample(train: PulseTrain) -> None:
     time = np.arange(12000) / RATE_HZ
     rng = np.random.default_rng(1)
-    residual = train.size * rectangle(time, train) + 0.05 * rng.standard_normal(len(time))
+    residual = train.size * train.on(time) + 0.05 * rng.standard_normal(len(time))
     residual += 0.05 * np.sin(2 * np.pi * time / 3.1)
     found = pulse_train(residual, RATE_HZ)
-    np.testing.assert_array_equal(rectangle(time, found), rectangle(time, train))
+    np.testing.assert_array_equal(rectangle(time, *found[:3]), train.on(time))
     assert found.period_s == pytest.approx(train.period_s, abs=1e-6)
     assert found.size == pytest.approx(train.size, abs=0.05)
 
 
 def test_rectangle_counts_samples_exactly() -> None:
-    on = rectangle(np.arange(3000) / RATE_HZ, PulseTrain(0.344, 1.0, 0.5, 1.0))
+    on = rectangle(np.arange(3000) / RATE_HZ, 0.344, 1.0, 0.5)
     assert np.flatnonzero(np.diff(on)).tolist() == [343, 843, 1343, 1843, 2343, 2843]
 
 
 # Traces.
+
+
+def with_cause(plant: Plant, name: str, values: np.ndarray, shape: dict[str, float]) -> Plant:
+    named = dict(zip(CAUSES[name].parameters, values.tolist(), strict=True))
+    return apply_effects(plant, [AxisEffect(name, named | shape)])
 
 
 def test_shift_of_a_signal() -> None:
@@ -177,7 +183,7 @@ def test_trace_takes_out_what_the_simulation_puts_in(name: str) -> None:
     values, shape = CASES[name]
     friction = name in ("asymmetric_coulomb", "stribeck")
     start = replace(nominal(), coulomb_N=(15.0, 15.0)) if friction else nominal()
-    signals = Signals.of(recorded(CAUSES[name].apply(start, values, shape)))
+    signals = Signals.of(recorded(with_cause(start, name, values, shape)))
     reduction = Reduction.of(RATE_HZ, blocks(signals, PERIOD), signals.log.usable)
     residual = signals.residual
     if friction:
@@ -300,7 +306,7 @@ def test_block_errors_are_those_of_a_bootstrap() -> None:
 
 
 def test_a_transient_keeps_an_error() -> None:
-    rig = EmpsRig.of(recorded(CAUSES["push"].apply(nominal(), *CASES["push"])))
+    rig = EmpsRig.of(recorded(with_cause(nominal(), "push", *CASES["push"])))
     explanation = with_block_errors(search(rig, 3), 100)
     (found,) = explanation.found
     assert found.candidate.cause == "push"

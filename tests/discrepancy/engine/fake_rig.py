@@ -4,14 +4,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from discrepancy.rig import Candidate, Channel, Parameter, Rows
+from discrepancy.rig import Candidate, Channel, Parameter, Rows, Transient
 
 ROWS, CHANNELS, RATE_HZ = 120, 4, 12.5
 
 
-def cause(name, robot=1, tolerance=1.0, parameters=1, family="made up", detail=None):
+def cause(name, robot=1, tolerance=1.0, parameters=1, family="made up", transient=None):
     listed = tuple(Parameter(f"p{k}", tolerance, 1.0) for k in range(parameters))
-    return Candidate(name, family, robot, None, listed, {}, detail or {})
+    return Candidate(name, family, robot, None, listed, {}, transient)
 
 
 CATALOGUE = tuple(cause(f"cause {k}", parameters=2 if k == 5 else 1) for k in range(8))
@@ -90,15 +90,15 @@ class FakeRig:
         ]
 
     def columns(self, candidate):
-        if candidate.detail:
+        if candidate.transient:
             return [self._burst_columns(t, candidate) for t in range(len(self.trials))]
         return self.columns_of[candidate.key]
 
     def _burst_columns(self, t, candidate):
         """One column per channel during the interval, a random pattern each."""
         out = np.zeros((ROWS, CHANNELS, len(candidate.parameters)))
-        if t == candidate.detail["trial"]:
-            rng = np.random.default_rng(int(100 * candidate.detail["start_s"]))
+        if t == candidate.transient.trial:
+            rng = np.random.default_rng(int(100 * candidate.transient.start_s))
             out[40:90] = rng.standard_normal((50, CHANNELS, len(candidate.parameters)))
         return out
 
@@ -121,8 +121,8 @@ class FakeRig:
     def transients(self, remaining):
         if not self.burst:
             return []
-        detail = {"trial": self.burst[0], "start_s": 3.2, "duration_s": 4.0}
-        return [cause("push", None, 0.0, self.burst[2], "push", detail)]
+        when = Transient(self.burst[0], 3.2, 4.0)
+        return [cause("push", None, 0.0, self.burst[2], "push", when)]
 
     def steps(self, candidate):
         return []
@@ -133,7 +133,7 @@ class FakeRig:
     def refinements(self, candidate, *, finer=False):
         return []
 
-    def can_run_again(self):
+    def can_resimulate(self):
         return None if self.loop else "it is made up"
 
     def simulation(self, trial, shared, local, active):

@@ -7,10 +7,10 @@ import numpy as np
 from discrepancy.rig import Candidate, Parameter, Rows
 
 
-def candidate(name, *parameters, detail=None):
+def candidate(name, *parameters, transient=None):
     """Parameters as (tolerance, scale)."""
     listed = tuple(Parameter(f"{name}{k}_x", t, s) for k, (t, s) in enumerate(parameters))
-    return Candidate(name, name, 1, None, listed, {}, detail or {})
+    return Candidate(name, name, 1, None, listed, {}, transient)
 
 
 CANDIDATES = (

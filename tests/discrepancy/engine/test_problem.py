@@ -5,6 +5,7 @@ import pytest
 from scipy.stats import chi2, kstest, ncx2
 
 from discrepancy.least_squares.problem import Problem
+from discrepancy.rig import Transient
 from linear_problem import CANDIDATES, brute, candidate, random_rows, with_residuals
 
 
@@ -195,7 +196,7 @@ def test_values_of_no_own_unknowns(rng):
 
 
 def test_index_tells_places_and_intervals_apart(rows):
-    pushes = [candidate("push", (0.0, 1.0), detail={"trial": 0, "start_s": s}) for s in (1.0, 2.0)]
+    pushes = [candidate("push", (0.0, 1.0), transient=Transient(0, s, 1.0)) for s in (1.0, 2.0)]
     problem = Problem.of(rows, CANDIDATES)
     for push in pushes:
         columns = [np.ones((*r.residual.shape, 1)) for r in rows]

@@ -13,13 +13,13 @@ import pytest
 
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
+from estimator.files import write_text
 from estimator.recording.checks import check_recording
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
 from estimator.signals.process import process_recording
 from mocobot.cli import main
-from mocobot.files.writing import write_text
 from omnid_design import DESIGN
 from recordings import metadata, small_recording
 

@@ -1,7 +1,5 @@
 """Dry friction that differs between the directions."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from discrepancy.emps.causes.base import Cause, filtered, force
@@ -22,10 +20,6 @@ class AsymmetricCoulomb(Cause):
 
     def columns(self, signals, shape):
         return force(filtered(signals, np.abs(direction(signals, shape["slow_mps"]))))
-
-    def apply(self, plant, values, shape):
-        forward, backward = plant.coulomb_N
-        return replace(plant, coulomb_N=(forward + values[0], backward - values[0]))
 
     def shapes(self, hints):
         return SLOW

@@ -1,7 +1,5 @@
 """Viscous friction that differs between the directions."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from discrepancy.emps.causes.base import Cause, filtered, force
@@ -20,7 +18,3 @@ class AsymmetricViscous(Cause):
 
     def columns(self, signals, shape):
         return force(filtered(signals, np.abs(signals.v)))
-
-    def apply(self, plant, values, shape):
-        forward, backward = plant.viscous_Ns_per_m
-        return replace(plant, viscous_Ns_per_m=(forward + values[0], backward - values[0]))

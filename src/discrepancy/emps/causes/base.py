@@ -11,15 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.emps.recording.signals import Signals, smooth
-from mocobot_sim.emps.plant import Plant
 
 Array = NDArray[np.float64]
 Shape = Mapping[str, float]
-
-GIVEN_TO = 1e-4
-"""Share by which a gain may be off for the digits it is given with."""
-SHORTEST_RIPPLE_M = 1e-3
-"""Shorter ripples are faster than the rows at most speeds."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +34,7 @@ class Hints:
 
 
 class Cause(ABC):
-    """One physical cause: what it adds to the nominal residual per unit of each parameter, and to the simulated axis.
+    """One physical cause: what it adds to the nominal residual per unit of each parameter.
 
     Attributes:
         name: as in the verdict.
@@ -63,10 +57,6 @@ class Cause(ABC):
     @abstractmethod
     def columns(self, signals: Signals, shape: Shape) -> Array:
         """What one unit of each parameter adds to force [N] and voltage [V], shape (Q, 2, k)."""
-
-    @abstractmethod
-    def apply(self, plant: Plant, values: Array, shape: Shape) -> Plant:
-        """The simulated axis with the cause in it."""
 
     def exact(self, signals: Signals, values: Array, shape: Shape) -> Array:
         """What the given values add, shape (Q, 2), where that is not linear in them."""

@@ -1,7 +1,5 @@
 """Dry friction, the same in both directions."""
 
-from dataclasses import replace
-
 from discrepancy.emps.causes.base import Cause, filtered, force
 from discrepancy.emps.causes.sliding import SLOW, direction, rests
 
@@ -18,10 +16,6 @@ class CoulombFriction(Cause):
 
     def columns(self, signals, shape):
         return force(filtered(signals, direction(signals, shape["slow_mps"])))
-
-    def apply(self, plant, values, shape):
-        forward, backward = plant.coulomb_N
-        return replace(plant, coulomb_N=(forward + values[0], backward + values[0]))
 
     def shapes(self, hints):
         return SLOW

@@ -1,7 +1,5 @@
 """The drive acts late."""
 
-from dataclasses import replace
-
 from discrepancy.emps.causes.base import Cause, force
 from discrepancy.emps.recording.signals import at_delay
 from estimator.filtering import differentiate
@@ -23,6 +21,3 @@ class Delay(Cause):
     def exact(self, signals, values, shape):
         late = at_delay(signals.force, signals.log.rate_hz, values[0])
         return force(signals.force - late)[..., 0]
-
-    def apply(self, plant, values, shape):
-        return replace(plant, delay_s=max(plant.delay_s + values[0], 0.0))

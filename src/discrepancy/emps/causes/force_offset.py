@@ -1,7 +1,5 @@
 """A constant force on the axis, or an offset of the drive's current."""
 
-from dataclasses import replace
-
 import numpy as np
 
 from discrepancy.emps.causes.base import Cause, force
@@ -21,6 +19,3 @@ class ForceOffset(Cause):
 
     def columns(self, signals, shape):
         return force(np.ones(len(signals.x)))
-
-    def apply(self, plant, values, shape):
-        return replace(plant, resisting_N=plant.resisting_N + values[0])

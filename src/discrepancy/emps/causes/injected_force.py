@@ -1,10 +1,7 @@
 """Rectangular pulses of force on the carriage, past the drive."""
 
-from dataclasses import replace
-
 from discrepancy.emps.causes.base import Cause, filtered, force
 from discrepancy.emps.pulse_search import rectangle
-from mocobot_sim.emps.plant import PulseTrain
 
 
 class InjectedForce(Cause):
@@ -17,12 +14,7 @@ class InjectedForce(Cause):
     separate = "The law's inputs and its output, logged separately."
 
     def columns(self, signals, shape):
-        train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], 1.0)
-        return force(filtered(signals, rectangle(signals.log.time, train)))
-
-    def apply(self, plant, values, shape):
-        train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], float(values[0]))
-        return replace(plant, force_pulses=(*plant.force_pulses, train))
+        return force(filtered(signals, rectangle(signals.log.time, **shape)))
 
     def visible(self, signals, hints, values):
         # Of all rectangles that were tried, the best always fits something.

@@ -1,10 +1,7 @@
 """Rectangular pulses that someone adds to the loop's voltage."""
 
-from dataclasses import replace
-
 from discrepancy.emps.causes.base import Cause, filtered, voltage
 from discrepancy.emps.pulse_search import rectangle
-from mocobot_sim.emps.plant import PulseTrain
 
 
 class InjectedVoltage(Cause):
@@ -18,12 +15,7 @@ class InjectedVoltage(Cause):
     separate = "The law's inputs and its output, logged separately."
 
     def columns(self, signals, shape):
-        train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], 1.0)
-        return voltage(filtered(signals, rectangle(signals.log.time, train)))
-
-    def apply(self, plant, values, shape):
-        train = PulseTrain(shape["start_s"], shape["period_s"], shape["width_s"], float(values[0]))
-        return replace(plant, voltage_pulses=(*plant.voltage_pulses, train))
+        return voltage(filtered(signals, rectangle(signals.log.time, **shape)))
 
     def visible(self, signals, hints, values):
         # Of all rectangles that were tried, the best always fits something.

@@ -1,7 +1,5 @@
 """The moving mass is not the first guess."""
 
-from dataclasses import replace
-
 from discrepancy.emps.causes.base import Cause, force
 
 
@@ -16,6 +14,3 @@ class Mass(Cause):
 
     def columns(self, signals, shape):
         return force(signals.a)
-
-    def apply(self, plant, values, shape):
-        return replace(plant, mass_kg=max(plant.mass_kg + values[0], 1.0))

@@ -1,11 +1,9 @@
 """A force that repeats along the way, as the screw or the motor turns."""
 
-from dataclasses import replace
-
 import numpy as np
 
-from discrepancy.emps.causes.base import SHORTEST_RIPPLE_M, Cause, force
-from mocobot_sim.emps.plant import Ripple
+from discrepancy import rules
+from discrepancy.emps.causes.base import Cause, force
 
 
 class PositionForce(Cause):
@@ -21,13 +19,9 @@ class PositionForce(Cause):
         angle = 2.0 * np.pi * signals.x / shape["wavelength_m"]
         return force(np.cos(angle), np.sin(angle))
 
-    def apply(self, plant, values, shape):
-        ripple = Ripple(shape["wavelength_m"], float(values[0]), float(values[1]))
-        return replace(plant, ripples=(*plant.ripples, ripple))
-
     def shapes(self, hints):
         lengths = (factor * hints.wavelength_m for factor in (1.0, 0.5, 2.0))
-        return [{"wavelength_m": length} for length in lengths if length >= SHORTEST_RIPPLE_M]
+        return [{"wavelength_m": length} for length in lengths if length >= rules.SHORTEST_RIPPLE_M]
 
     def finer(self, shape):
         return [

@@ -1,9 +1,6 @@
 """Something pushed the carriage for a while."""
 
-from dataclasses import replace
-
 from discrepancy.emps.causes.base import Cause, force
-from mocobot_sim.emps.plant import ForcePush
 
 
 class Push(Cause):
@@ -19,7 +16,3 @@ class Push(Cause):
         time = signals.log.time
         inside = (time >= shape["start_s"]) & (time < shape["start_s"] + shape["duration_s"])
         return force(-inside.astype(float))
-
-    def apply(self, plant, values, shape):
-        push = ForcePush(shape["start_s"], shape["duration_s"], float(values[0]))
-        return replace(plant, pushes=(*plant.pushes, push))

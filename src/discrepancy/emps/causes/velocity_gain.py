@@ -1,8 +1,7 @@
 """The velocity loop's gain is not its nominal value."""
 
-from dataclasses import replace
-
-from discrepancy.emps.causes.base import GIVEN_TO, Cause, voltage
+from discrepancy import rules
+from discrepancy.emps.causes.base import Cause, voltage
 
 
 class VelocityGain(Cause):
@@ -19,7 +18,4 @@ class VelocityGain(Cause):
         return voltage(signals.log.kp_per_s * signals.error - signals.v)
 
     def visible(self, signals, hints, values):
-        return abs(values[0]) > GIVEN_TO * signals.log.kv_Vs_per_m
-
-    def apply(self, plant, values, shape):
-        return replace(plant, kv_Vs_per_m=plant.kv_Vs_per_m + values[0])
+        return abs(values[0]) > rules.GIVEN_TO_SHARE * signals.log.kv_Vs_per_m

@@ -1,7 +1,5 @@
 """The loop's velocity is old: it is a difference of past positions, or filtered."""
 
-from dataclasses import replace
-
 from discrepancy.emps.causes.base import Cause, voltage
 from discrepancy.emps.recording.signals import at_delay
 
@@ -23,6 +21,3 @@ class VelocityLag(Cause):
         log = signals.log
         change = signals.v - at_delay(signals.v, log.rate_hz, values[0])
         return voltage(log.kv_Vs_per_m * change)[..., 0]
-
-    def apply(self, plant, values, shape):
-        return replace(plant, velocity_lag_s=max(plant.velocity_lag_s + values[0], 0.0))

@@ -1,7 +1,5 @@
 """Friction that grows with the speed, the same in both directions."""
 
-from dataclasses import replace
-
 from discrepancy.emps.causes.base import Cause, force
 
 
@@ -17,7 +15,3 @@ class ViscousFriction(Cause):
 
     def columns(self, signals, shape):
         return force(signals.v)
-
-    def apply(self, plant, values, shape):
-        forward, backward = plant.viscous_Ns_per_m
-        return replace(plant, viscous_Ns_per_m=(forward + values[0], backward + values[0]))

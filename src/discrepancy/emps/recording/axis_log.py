@@ -13,6 +13,8 @@ Array = NDArray[np.float64]
 
 LIMIT_V = 10.0
 """The drive saturates there (Janot, Gautier, Brunot)."""
+FIRST_GUESS_KG = 100.0
+"""Moving mass as assumed; ``models/emps/README.md`` says why."""
 
 
 @dataclass(frozen=True, eq=False)

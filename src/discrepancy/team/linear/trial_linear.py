@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from discrepancy import rules
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.residual import (
@@ -28,9 +29,6 @@ from estimator.estimate.principal import inertia_matrix
 from estimator.signals.grasp_data import GraspData
 
 Array = NDArray[np.float64]
-
-NOISE_DRAWS = 24
-JACOBIAN_HZ = 25.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +204,7 @@ def _by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, design:
     Central differences through one robot's own formulas, then by hand through what is linear in the robots;
     evaluated at 25 Hz.
     """
-    samples, every = len(s), max(1, round(data.rate_hz / JACOBIAN_HZ))
+    samples, every = len(s), max(1, round(data.rate_hz / rules.TEAM_JACOBIAN_HZ))
     knots = np.arange(0, samples, every)
     s = s[knots]
     data = _thinned(data, knots)
@@ -300,7 +298,7 @@ def start_bases(signals: Signals, shared: Shared, design: OmnidDesign) -> Bases:
 
 
 def noise_rows(
-    trial: TrialLinear, noise: Noise, rng: np.random.Generator, draws: int = NOISE_DRAWS
+    trial: TrialLinear, noise: Noise, rng: np.random.Generator, draws: int = rules.NOISE_DRAWS
 ) -> tuple[Array, Array]:
     """What the sensors' errors alone would leave: residuals (draws, n, C), and the torques' own (draws, n, N, 3)."""
     out, torques = [], []

@@ -1,16 +1,45 @@
-"""Result folders that appear whole or not at all."""
+"""What a user names to be read and written, checked before any work is done."""
 
 from __future__ import annotations
 
-import contextlib
 import os
-import shutil
-import uuid
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from estimator.errors import InputError
+
+
+def check_recordings(recordings: Sequence[Path], out: Path | None = None) -> None:
+    """Each recording once, and an output that overwrites none of them.
+
+    Raises:
+        InputError: one is given twice, or the output is one of them or cannot be written.
+    """
+    seen: set[str] = set()
+    for path in recordings:
+        real = os.path.realpath(path)
+        if real in seen:
+            raise InputError(f"{path} is given twice, and would count twice")
+        seen.add(real)
+    if out is not None:
+        if os.path.realpath(out) in seen:
+            raise InputError(f"{out}: is one of the recordings; write the estimate to another file")
+        check_target(out)
+
+
+def check_target(path: Path) -> None:
+    """Find out that a file cannot be written before the work is done whose result it would hold.
+
+    Raises:
+        InputError: the target is a folder, or its folder does not exist.
+    """
+    try:
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; name the file to write")
+        if not path.parent.is_dir():
+            raise InputError(f"{path.parent}: there is no such folder")
+    except OSError as error:  # a name too long for the system
+        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
 def check_folder(path: Path, inputs: Sequence[Path], is_ours: Callable[[Path], bool], what: str) -> None:
@@ -43,36 +72,14 @@ def check_folder(path: Path, inputs: Sequence[Path], is_ours: Callable[[Path], b
         raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
-@contextmanager
-def whole_folder(path: Path) -> Iterator[Path]:
-    """A temporary folder that takes the place of ``path`` (with all it held) when the block ends without an error.
+def make_folder(path: Path) -> Path:
+    """Create a folder and its parents.
 
     Raises:
-        InputError: it cannot be created or put in place.
+        InputError: it cannot be created.
     """
-    real = Path(os.path.realpath(path))
-    mark = uuid.uuid4().hex
-    temporary, old = real.parent / f".{mark}.tmp", real.parent / f".{mark}.old"
     try:
-        with _as_input_error(path):
-            temporary.mkdir()
-        yield temporary
-        with _as_input_error(path):
-            if real.exists():
-                real.rename(old)
-            temporary.rename(real)
-    finally:
-        if old.exists() and not real.exists():
-            with contextlib.suppress(OSError):
-                old.rename(real)
-        shutil.rmtree(temporary, ignore_errors=True)
-        if real.exists():
-            shutil.rmtree(old, ignore_errors=True)
-
-
-@contextmanager
-def _as_input_error(path: Path) -> Iterator[None]:
-    try:
-        yield
+        path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+        raise InputError(f"{path}: cannot be created ({error.strerror or error})") from error
+    return path

@@ -1,0 +1,163 @@
+"""Options of every command, as the command line shows them: data only, so that the help needs nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+
+@dataclass(frozen=True)
+class Paper:
+    """Run the paper's experiment and print Tables II-V, published figures beside ours."""
+
+    payload: tuple[str, ...] = ("a", "b", "c", "d")
+    """Payload configurations."""
+    preset: tuple[str, ...] = ("ideal", "nominal", "uncalibrated")
+    """Sensor presets."""
+    trials: int = 6
+    """Random trials per payload; half as many are periodic."""
+    jobs: int = 2
+    """Parallel processes."""
+    seed: int = 0
+    """Seed of trajectories, noise and calibration errors."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for paper.json, tables.txt, the estimates and plots."""
+    recordings: bool = False
+    """Write the recordings, too (needs --out)."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Estimate grasps, mass, centre of mass and inertia from recordings of one payload."""
+
+    rec: tyro.conf.Positional[tuple[Path, ...]]
+    """Recordings (Parquet), all of one payload."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
+    """Write the estimate as JSON, too."""
+    method: Literal["auto", "staged", "joint"] = "auto"
+    """The paper's stages, one joint least squares, or stages where static holds allow."""
+    cutoff_hz: float = 5.0
+    """Cut-off of the low-pass filter [Hz]."""
+
+
+@dataclass(frozen=True)
+class Diagnose:
+    """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth."""
+
+    rec: tyro.conf.Positional[tuple[Path, ...]]
+    """Recordings (Parquet), all of one payload; several, so that what is named can be validated. One MAT file with
+    --rig emps."""
+    rig: Literal["team", "emps"] = "team"
+    """What was recorded: a team of mocobots, or the EMPS benchmark's axis (docs/emps.md)."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for diagnosis.json, report.txt, the extended model and plots; an earlier diagnosis is replaced."""
+    jobs: int = 2
+    """Parallel processes."""
+    tolerances: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """How far a healthy robot may be off; see docs/diagnosis/guide.md."""
+    exclude: Annotated[tuple[str, ...], tyro.conf.arg(metavar="CAUSE...")] = ()
+    """Causes not to consider."""
+    closed_loop: bool = True
+    """Run the recorded commands again, without and with what is found."""
+
+
+@dataclass(frozen=True)
+class Convert:
+    """Convert a measured log (ROS 2 bag, CSV, NPZ, Parquet, LeRobot) to a recording, or a recording to one of these."""
+
+    log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="IN")]
+    """Log: a rosbag2 folder, .mcap, .db3, .csv, .npz or .parquet file, or a LeRobot dataset."""
+    out: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="OUT")]
+    """Recording to write: .parquet; .csv, .npz, .mcap or .db3; or a rosbag2 folder if it has no suffix."""
+    map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
+    """Where the log has which channel, by file or built-in name (docs/measured-data.md); found out if not given."""
+    trial: Literal["random", "periodic", "static"] | None = None
+    """Kind of trial, if neither log nor map says; "random" else."""
+    payload: str | None = None
+    """Name of the payload."""
+    design: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """Numbers of the robots, if not the log's own or those of the Omnid."""
+    level: Literal["joint", "wrist"] | None = None
+    """What to write: driven angles and torques, or wrist positions and forces; that of the log if not given."""
+    clock: Literal["keep", "correct"] = "keep"
+    """Believe the robots' stamps, or take out what their clocks differ by. It is estimated and reported either way."""
+    rate: Annotated[float, tyro.conf.arg(metavar="HZ")] = 100.0
+    """Rate of the recording [Hz]."""
+    max_gap: Annotated[float, tyro.conf.arg(metavar="S")] = 0.05
+    """Longest time without samples that is filled in [s]."""
+    episode: int | None = None
+    """Episode of a LeRobot dataset that holds several."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Watch recordings: the scene moving from the measured angles, estimate against truth, all signals (Rerun)."""
+
+    rec: tyro.conf.Positional[tuple[Path, ...]]
+    """Recordings (Parquet); several are shown side by side."""
+    estimate: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
+    """Estimate to show, as `mocobot estimate --out` writes it; made from each recording if not given."""
+    truth: bool = False
+    """Show the truth beside each recording, too (REC.truth.json)."""
+    diagnosis: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Mark what a diagnosis names, as `mocobot diagnose --out` writes it."""
+    payload: Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE.xml")] = None
+    """Geometry of the payload; that of the recording's label, or bars between the grasps, if not given."""
+    save: Annotated[Path | None, tyro.conf.arg(metavar="OUT.rrd")] = None
+    """Write a file for the Rerun viewer instead of opening it."""
+    web: bool = False
+    """Serve to a browser instead of opening the viewer."""
+
+
+@dataclass(frozen=True)
+class Inspect:
+    """Look at a log before anyone trusts a number of it: stamps, channels, clocks, wiring, excitation."""
+
+    rec: tyro.conf.Positional[Path]
+    """Recording or log of any format that ``convert`` reads; broken ones are looked at, too."""
+    map: Annotated[str | None, tyro.conf.arg(metavar="MAP")] = None
+    """Map file or the name of a built-in one; see docs/measured-data.md."""
+    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
+    """Write the report as JSON, too."""
+    design: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
+    """Numbers of the robots, where the log does not say; the Omnid's if not given."""
+    episode: int | None = None
+    """Episode of a LeRobot dataset."""
+
+
+@dataclass(frozen=True)
+class Report:
+    """Make one HTML page of what `paper`, `estimate` or `diagnose` wrote: tables, plots, pictures, provenance."""
+
+    dir: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
+    """Folder of `mocobot paper --out` or `mocobot diagnose --out`, or one with files of `mocobot estimate --out`."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.html")] = None
+    """Page to write; DIR/report.html if not given. An earlier report is replaced."""
+
+
+@dataclass(frozen=True)
+class Simulate:
+    """Simulate one trial and write its recording, with the ground truth in a sidecar."""
+
+    out: Annotated[Path, tyro.conf.arg(metavar="REC.parquet")]
+    """Recording to write; the truth goes beside it as REC.truth.json."""
+    payload: str | None = None
+    """Payload configuration, or the path of a payload MJCF (body 'payload', sites grasp1 .. graspN); 'a' if neither
+    this nor a model is given."""
+    model: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Extended model to simulate in place of a payload on robots as designed."""
+    trajectory: Literal["random", "periodic", "static"] = "random"
+    """Kind of motion."""
+    vias: int | None = None
+    """Vias of a random trial; 80 if not given."""
+    duration: float | None = None
+    """Length of a periodic motion [s]; 60 if not given."""
+    preset: str = "nominal"
+    """Sensors: ideal, nominal or uncalibrated."""
+    seed: int = 0
+    """Seed of trajectory, noise and calibration errors."""
+    level: Literal["joint", "wrist"] = "joint"
+    """What the file holds: driven angles and spring torques, or wrist positions and forces."""
