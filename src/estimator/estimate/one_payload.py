@@ -15,9 +15,10 @@ from estimator.signals.grasp_data import GraspData
 from estimator.signals.holds import Hold
 
 MASS_TOLERANCE = 0.05
-"""Recordings whose masses differ by more than this share are not of one payload."""
+"""Recordings whose masses differ by more than this share are not of one payload, if beyond ``MASS_SIGMAS`` as well.
+Chosen: no calibration error explains more."""
 MASS_SIGMAS = 6.0
-"""... and by more than so many standard errors of both."""
+"""The same in sums of both standard errors. Chosen."""
 
 
 def mass_alone(
