@@ -101,10 +101,6 @@ LEAST_S = 5.0
 """Of all recordings together below which nothing is diagnosed. Chosen."""
 GOOD_S = 30.0
 """With which a diagnosis starts to be of use; only said. Chosen."""
-MASS_TOLERANCE_SHARE = 0.05
-"""Trials whose masses differ by more are not of one payload, if beyond ``MASS_TOLERANCE_SE`` as well. Chosen."""
-MASS_TOLERANCE_SE = 6.0
-"""The same in sums of both standard errors. Chosen."""
 
 # A team: filters and rows.
 

@@ -9,6 +9,7 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from estimator.files import whole_file
 from mocobot_sim.paper.published import published_errors
 
 COLOURS = {"paper": "#6b7280", "ideal": "#2a9d8f", "nominal": "#2f6fd0", "uncalibrated": "#e07b39"}
@@ -96,7 +97,6 @@ def _dots(
 def _save(figure: Figure, legend_of: Axes, path: Path) -> Path:
     handles, labels = legend_of.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper right", ncols=len(labels), frameon=False, fontsize=9)
-    temporary = path.with_name(f".{path.name}.tmp")
-    figure.savefig(temporary, dpi=130, format="png")
-    temporary.replace(path)
+    with whole_file(path) as temporary:
+        figure.savefig(temporary, dpi=130, format="png")
     return path
