@@ -6,7 +6,7 @@ from itertools import product
 
 import numpy as np
 
-from discrepancy.team.tolerances import DEFAULTS
+from discrepancy.team.tolerances import default_tolerances
 from hidden.draw import signed
 from mocobot_sim.effects import EFFECTS, Effect, make_effect
 
@@ -17,7 +17,7 @@ def draw_background(robots: int, rng: np.random.Generator) -> list[Effect]:
     Magnitudes where a parameter cannot be negative. Pushes are left out: their tolerance stands for friction at rest.
     """
     out = []
-    for cause, deviations in DEFAULTS.items():
+    for cause, deviations in default_tolerances().items():
         if cause == "push":
             continue
         names = EFFECTS[cause].place_names()

@@ -9,9 +9,10 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from discrepancy.least_squares.problem import Problem
-from discrepancy.team.pushes import push
+from discrepancy.rig import Transient
+from discrepancy.team.causes import CAUSES
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.tolerances import DEFAULTS, read_tolerances
+from discrepancy.team.tolerances import default_tolerances, read_tolerances
 from estimator.estimate.payload import estimate_payload
 from hidden.generator import PAYLOADS, HiddenSet, generate
 from hidden.limits import GAIN, PENDULUM_LENGTHS_M, PUSH_S
@@ -38,8 +39,9 @@ def _limits(payload: str) -> tuple[list[tuple[str, tuple[str, ...], list[float]]
     recordings, _ = generate(HiddenSet("clean", 0, payload=payload))
     rig = TeamRig.of(recordings, estimate_payload(recordings), read_tolerances(None))
     candidates = rig.candidates()
+    tolerance = default_tolerances()["push"]
     candidates += [
-        push(trial, start, PUSH_S, DEFAULTS["push"])
+        CAUSES["push"].event(tolerance, Transient(trial, start, PUSH_S))
         for trial in range(3)
         for start in np.arange(5.0, 35.0, 5.0)
     ]

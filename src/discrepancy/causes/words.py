@@ -3,42 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import ClassVar
 
-import numpy as np
-
+from discrepancy.causes.base import Cause
+from discrepancy.causes.numbers import Numbers
 from discrepancy.rig import Candidate
 
 
-class Words(Protocol):
-    """Sentences about one rig's causes and channels."""
+class Words:
+    """Sentences about one rig's causes and channels.
+
+    Attributes:
+        causes: the rig's catalogue.
+        units: of closed-loop channels, and of quantities that a misfit may depend on.
+    """
+
+    causes: ClassVar[Mapping[str, Cause]]
+    units: ClassVar[Mapping[str, str]]
 
     def describe(self, candidate: Candidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
         """What a cause does at its place, one sentence with its numbers; standard errors may be NaN."""
-        ...
+        cause = self.causes[candidate.cause]
+        return f"{cause.place(candidate)}: {cause.sentence(Numbers(values, se))}."
 
     def separate(self, cause: str) -> str:
         """Which experiment would tell a cause from its look-alikes, one sentence, or nothing."""
-        ...
+        return self.causes[cause].separate
 
     def unit(self, name: str) -> str:
         """Unit of a closed-loop channel, or of a quantity that a misfit may depend on."""
-        ...
-
-
-def number(value: float, se: float | None, unit: str, scale: float = 1.0) -> str:
-    """``0.0500 +- 0.0012 N m``: as many digits as the standard error has meaning; without one, three digits.
-
-    Args:
-        value: in the parameter's own unit.
-        se: its standard error, or None or NaN where it has none.
-        unit: to be shown.
-        scale: shown units per own unit.
-    """
-    value *= scale
-    unit = f" {unit}" if unit else ""
-    if se is None or not np.isfinite(se) or se <= 0:
-        return f"{value:.3g}{unit}"
-    se *= scale
-    digits = int(np.clip(1 - np.floor(np.log10(se)), 0, 9))
-    return f"{value:.{digits}f} +- {se:.{digits}f}{unit}"
+        return self.units[name]

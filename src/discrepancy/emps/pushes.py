@@ -5,16 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.emps.causes import CAUSES
 from discrepancy.rig import Candidate, Parameter, Transient
 
 Array = NDArray[np.float64]
-
-DURATIONS_S = (0.2, 0.4, 0.8, 1.6)
-WORST = 2
-SHORTEST_S = 0.15
-"""Anything shorter cannot be told from what friction does when the axis turns round."""
-MOVES = (-0.4, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2, 0.4)
 
 
 def push(trial: int, start_s: float, duration_s: float, tolerance: float) -> Candidate:
@@ -30,13 +25,13 @@ def worst_intervals(time: Array, residual: Array) -> list[tuple[float, float]]:
     rate = (len(time) - 1) / (time[-1] - time[0])
     total = np.concatenate([[0.0], np.cumsum(residual - np.median(residual))])
     best = []
-    for duration in DURATIONS_S:
+    for duration in rules.EMPS_PUSH_S:
         width = max(2, round(duration * rate))
         if width < len(time):
             sums = np.abs(total[width:] - total[:-width]) / np.sqrt(width)
             at = int(np.argmax(sums))
             best.append((float(sums[at]), float(time[at]), duration))
-    return [(start, duration) for _, start, duration in sorted(best)[-WORST:]]
+    return [(start, duration) for _, start, duration in sorted(best)[-rules.WORST_INTERVALS :]]
 
 
 def intervals_near(start_s: float, duration_s: float) -> list[tuple[float, float]]:
@@ -44,7 +39,7 @@ def intervals_near(start_s: float, duration_s: float) -> list[tuple[float, float
     end = start_s + duration_s
     return [
         (start_s + a * duration_s, duration_s + (b - a) * duration_s)
-        for a in MOVES
-        for b in MOVES
-        if (a or b) and end + b * duration_s - start_s - a * duration_s > SHORTEST_S
+        for a in rules.PUSH_MOVES
+        for b in rules.PUSH_MOVES
+        if (a or b) and end + b * duration_s - start_s - a * duration_s > rules.EMPS_SHORTEST_PUSH_S
     ]

@@ -11,11 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.emps.blocks import blocks, period_of
 from discrepancy.emps.catalogue import DEFAULTS, Tolerances, candidate_of, hidden_by_rounding, remainder
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.causes.base import Hints
-from discrepancy.emps.closed_loop import effects_of, errors_of_rerun, nominal_plant, plant_of, start_of
+from discrepancy.emps.closed_loop import effects_of, nominal_plant, plant_of, resimulation_errors, start_of
 from discrepancy.emps.hints import hints_of
 from discrepancy.emps.noise import Noise, from_remainder, from_repeats, repeated
 from discrepancy.emps.pushes import intervals_near, push, worst_intervals
@@ -32,11 +33,6 @@ from mocobot_sim.emps.extended import write_extended
 from mocobot_sim.emps.plant import Plant
 
 Array = NDArray[np.float64]
-
-AR_ORDER = 8
-"""More does not whiten the benchmark's noise better (by Akaike's criterion)."""
-LEAST_ROWS = 100
-"""Rows that a block must have to be one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,10 +80,10 @@ class EmpsRig:
         hints = hints_of(signals, reduction)
         left = remainder(signals, reduction, hints)
         if period is not None and repeated(signals, period):
-            noise = from_repeats(left, signals, reduction, period, AR_ORDER)
+            noise = from_repeats(left, signals, reduction, period, rules.EMPS_AR_ORDER)
         else:
             noise = from_remainder(left, signals, reduction)
-        shared = Whitening.of(noise.draws, noise.draws.shape[1], AR_ORDER)
+        shared = Whitening.of(noise.draws, noise.draws.shape[1], rules.EMPS_AR_ORDER)
         whitening = tuple(replace(shared, moving=len(rows)) for rows in reduction.samples)
         known = DEFAULTS if tolerances is None else tolerances
         hidden = hidden_by_rounding(signals, reduction, hints, shared)
@@ -213,21 +209,21 @@ class EmpsRig:
         """None: shapes are chosen from a grid."""
         return []
 
-    def can_run_again(self) -> str | None:
+    def can_resimulate(self) -> str | None:
         """Nothing stands against it: every recording has its reference and the loop's gains."""
         return None
 
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
     ) -> Callable[[], dict[str, Array] | None]:
-        """What runs one block's reference again, with causes in the axis.
+        """What resimulates one block's reference, with causes in the axis.
 
         It returns recorded minus simulated ``position`` [m] and ``voltage`` [V], shape (Q,) each.
         """
         here, log = self.blocks[trial], self.log
         acting = [(c, v) for c, v in active if c.acts_in(trial)]
         return partial(
-            errors_of_rerun,
+            resimulation_errors,
             plant_of(self.nominal, acting),
             log.time[here],
             log.reference[here],
@@ -290,7 +286,7 @@ class EmpsRig:
 
 def _long_enough(log: AxisLog, cut: list[slice], reduction: Reduction) -> tuple[list[slice], Reduction]:
     """Only blocks with rows enough."""
-    keep = [k for k, rows in enumerate(reduction.samples) if len(rows) >= LEAST_ROWS]
+    keep = [k for k, rows in enumerate(reduction.samples) if len(rows) >= rules.LEAST_ROWS]
     if not keep:
         raise InputError(f"{log.name}: no part of it is long enough to diagnose")
     return [cut[k] for k in keep], replace(reduction, samples=tuple(reduction.samples[k] for k in keep))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from discrepancy.causes.words import number
+from discrepancy.causes.numbers import number
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG
 from discrepancy.rig import Candidate

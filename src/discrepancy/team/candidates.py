@@ -8,12 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.rig import Candidate, Parameter, Transient
+from discrepancy import rules
+from discrepancy.causes.intervals import intervals_near, worst_intervals
+from discrepancy.rig import Candidate, Transient
 from discrepancy.team.causes import CAUSES
-from discrepancy.team.causes.base import Cause
 from discrepancy.team.linear.reduction import Reduction
-from discrepancy.team.pushes import intervals_near, push, worst_intervals
-from discrepancy.team.tolerances import DEFAULTS
 
 Array = NDArray[np.float64]
 Tolerances = Mapping[str, float]
@@ -31,25 +30,13 @@ def every_candidate(
     """
     out = []
     for cause in CAUSES.values():
-        if cause.name in excluded or cause.name == "push":
+        if cause.name in excluded or cause.transient:
             continue
         joints = cause.joints if cause.per == "joint" else (None,)
         places = (None,) if cause.per == "payload" else range(1, robots + 1)
-        out += [
-            _candidate(cause, tolerances.get(cause.name, {}), robot, joint)
-            for robot in places
-            for joint in joints
-        ]
+        given = tolerances.get(cause.name, {})
+        out += [cause.candidate(given, cause.shapes[0], robot, joint) for robot in places for joint in joints]
     return out
-
-
-def _candidate(cause: Cause, given: Tolerances, robot: int | None, joint: int | None) -> Candidate:
-    scales = cause.scales or tuple(given.get(name) or DEFAULTS[cause.name][name] for name in cause.parameters)
-    parameters = tuple(
-        Parameter(name, given.get(name, 0.0), scale)
-        for name, scale in zip(cause.parameters, scales, strict=True)
-    )
-    return Candidate(cause.name, cause.family, robot, joint, parameters, dict(cause.shapes[0]))
 
 
 def other_shapes(candidate: Candidate, *, finer: bool) -> list[Candidate]:
@@ -71,27 +58,29 @@ def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]
     return steps
 
 
-def nearby_pushes(at: Transient, tolerance: Tolerances) -> list[Candidate]:
-    """Pushes with their interval moved."""
-    return [
-        push(at.trial, start, duration, tolerance)
-        for start, duration in intervals_near(at.start_s, at.duration_s)
-    ]
+def nearby_events(cause: str, when: Transient, tolerance: Tolerances) -> list[Candidate]:
+    """A transient cause with its interval moved."""
+    return [CAUSES[cause].event(tolerance, near) for near in intervals_near(when, rules.TEAM_SHORTEST_PUSH_S)]
 
 
-def worst_pushes(
-    reductions: Sequence[Reduction], remaining: Sequence[Array], tolerance: Tolerances
+def worst_events(
+    reductions: Sequence[Reduction],
+    remaining: Sequence[Array],
+    tolerances: Mapping[str, Tolerances],
+    excluded: Collection[str],
 ) -> list[Candidate]:
-    """Pushes at the intervals of every trial where the wrench balance is worst.
+    """Transient causes at the intervals of every trial where the wrench balance is worst.
 
     Args:
         reductions: of every trial.
         remaining: whitened residual of every trial, shape (n, C); its last six channels are the wrench balance.
-        tolerance: of a push.
+        tolerances: standard deviations by cause and parameter.
+        excluded: causes left out.
     """
     out = []
-    for t, (reduction, z) in enumerate(zip(reductions, remaining, strict=True)):
-        moving = reduction.moving
-        found = worst_intervals(reduction.time[:moving], np.sum(z[:moving, -6:] ** 2, axis=1))
-        out += [push(t, start, duration, tolerance) for start, duration in found]
+    causes = [cause for cause in CAUSES.values() if cause.transient and cause.name not in excluded]
+    for t, (reduction, z) in enumerate(zip(reductions, remaining, strict=True) if causes else ()):
+        time, square = reduction.time[: reduction.moving], np.sum(z[: reduction.moving, -6:] ** 2, axis=1)
+        worst = worst_intervals(t, time, square, rules.TEAM_PUSH_S, two_sided=False)
+        out += [cause.event(tolerances.get(cause.name, {}), when) for cause in causes for when in worst]
     return out

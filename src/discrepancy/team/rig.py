@@ -12,19 +12,20 @@ import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rows
 from discrepancy.team.candidates import (
     every_candidate,
-    nearby_pushes,
+    nearby_events,
     other_shapes,
     shape_steps,
-    worst_pushes,
+    worst_events,
 )
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
-from discrepancy.team.closed_loop import errors_of_rerun, team_of
+from discrepancy.team.closed_loop import resimulation_errors, team_of
 from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.imitators import wrong_torques
 from discrepancy.team.linear.adjust import with_adjusted_torques
@@ -43,9 +44,6 @@ from mocobot_sim.extended.extended import write_extended
 from mocobot_sim.scene.models import omnid_design
 
 Array = NDArray[np.float64]
-
-# What the integrator does to the closed loop at 1 ms (docs/diagnosis.md).
-PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,9 +180,8 @@ class TeamRig:
         """The simulator's effect, or None where the values are none that it can have (a negative friction)."""
         k = len(values)
         parameters = self.effect_parameters(candidate, values, np.zeros((k, k)))[0]
-        for name in ("coulomb_Nm", "viscous_Nms_per_rad"):
-            if name in parameters:
-                parameters[name] = max(parameters[name], 0.0)
+        for name in CAUSES[candidate.cause].clipped:
+            parameters[name] = max(parameters[name], 0.0)
         try:
             return make_effect(candidate.cause, parameters, candidate.robot, candidate.joint)
         except InputError:
@@ -195,8 +192,8 @@ class TeamRig:
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return CAUSES[candidate.cause].possible(values, se, candidate.shape)
 
-    def can_run_again(self) -> str | None:
-        """Why the recordings cannot be simulated again, or None."""
+    def can_resimulate(self) -> str | None:
+        """Why the recordings cannot be resimulated, or None."""
         for recording in self.recordings:
             if recording.ref is None:
                 return f"{recording.name} has no commands (ref_x, ref_y, ref_z)"
@@ -209,7 +206,7 @@ class TeamRig:
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
     ) -> Callable[[], dict[str, Array] | None]:
-        """What runs one trial's commands again, with the unknowns moved and causes in the simulation.
+        """What resimulates one trial's commands, with the unknowns moved and causes in the simulation.
 
         It returns recorded minus simulated ``phi``, ``theta`` [rad] and ``tau`` [N m], shape (Q, N, 3), or None if
         that cannot be simulated. It carries the recording and numbers only, so that processes can take it.
@@ -219,7 +216,7 @@ class TeamRig:
         if any(effect is None for effect in effects):
             return _impossible
         return partial(
-            errors_of_rerun,
+            resimulation_errors,
             self.recordings[trial],
             linear.shared.moved(shared),
             linear.bases.moved(local),
@@ -232,7 +229,7 @@ class TeamRig:
         """Standard deviation of the noise and of the motion, by channel, shape (N, 3) each."""
         linear, floor = (
             self.linear[trial],
-            {"phi": PHI_FLOOR_RAD, "theta": THETA_FLOOR_RAD, "tau": TAU_FLOOR_NM},
+            {"phi": rules.PHI_FLOOR_RAD, "theta": rules.THETA_FLOOR_RAD, "tau": rules.TAU_FLOOR_NM},
         )
         out = {}
         for k, name in enumerate(("phi", "theta", "tau")):
@@ -290,7 +287,8 @@ class TeamRig:
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a transient with its interval moved."""
         if candidate.transient:
-            return nearby_pushes(candidate.transient, self.tolerances.get("push", {}))
+            tolerance = self.tolerances.get(candidate.cause, {})
+            return nearby_events(candidate.cause, candidate.transient, tolerance)
         return other_shapes(candidate, finer=finer)
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
@@ -299,10 +297,8 @@ class TeamRig:
         Args:
             remaining: whitened residual of every trial, shape (n, C).
         """
-        if "push" in self.excluded:
-            return []
         reductions = [linear.reduction for linear in self.linear]
-        return worst_pushes(reductions, remaining, self.tolerances.get("push", {}))
+        return worst_events(reductions, remaining, self.tolerances, self.excluded)
 
     def imitators(self, candidate: Candidate) -> list[list[Array]]:
         """One joint's torque wrong by a constant for as long as a push lasts, every joint in turn."""

@@ -18,11 +18,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
 
 from estimator import so3
 from estimator.arm.gimbal import rate_matrix
 from estimator.estimate.grasps import pair_rotation
 from estimator.filtering import differentiate
+from estimator.statistics import rms
 
 Array = NDArray[np.float64]
 
@@ -138,13 +140,13 @@ def fit_clock(
         shift, stretch = step[3], step[4] if with_drift else 0.0
         if not abs(here + shift - guess) + abs(stretch) < STEP_LIMIT_S:
             return None
-        R = so3.exp(step[:3]) @ R
+        R = Rotation.from_rotvec(step[:3]).as_matrix() @ R
         here, drift = here + shift, drift + stretch / half_s
         q_i, q_dot = moved()
         if abs(shift) + abs(stretch) < _CONVERGED_S:
             break
     residual = q_1 - q_i @ R.T
-    rms_q = float(np.sqrt(np.mean(q_1**2)))
+    rms_q = rms(q_1)
     return ClockFit(
         offset_s=float(here + drift * (middle_s - centre)),
         drift=float(drift),
@@ -154,7 +156,7 @@ def fit_clock(
         residual=residual,
         rotated_rate=_determined(_turning(q_i @ R.T)),
         change=q_dot @ R.T,
-        mismatch=float(np.sqrt(np.mean(residual**2))) / rms_q if rms_q > 0 else np.inf,
+        mismatch=rms(residual) / rms_q if rms_q > 0 else np.inf,
     )
 
 

@@ -13,8 +13,8 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from estimator import so3
 from estimator.errors import InputError
 from estimator.estimate.fusion import fuse
 from estimator.estimate.grasp_estimate import GraspEstimate
@@ -23,6 +23,7 @@ from estimator.estimate.inertia import InertiaEstimate, inertia_regressor
 from estimator.estimate.principal import inertia_parameters
 from estimator.signals.grasp_data import GraspData
 from estimator.signals.holds import STILL_RATE_RADPS, STILL_SPEED_MPS
+from estimator.statistics import rms_length
 
 Array = NDArray[np.float64]
 
@@ -163,10 +164,10 @@ def wrench_balance(
     force = motion.force - mass * (motion.acceleration + lever + data.gravity_mps2 * motion.up)
     weight = mass * data.gravity_mps2
     if inertia is None:
-        return _rms(force) / weight, None
+        return rms_length(force) / weight, None
     X = inertia_regressor(motion.omega, motion.alpha)
     moment = motion.moment - np.cross(p_1c, motion.force) - X @ inertia_parameters(inertia.inertia)
-    return _rms(force) / weight, _rms(moment) / weight
+    return rms_length(force) / weight, rms_length(moment) / weight
 
 
 def balance_flags(name: str, force: float, moment_m: float | None, grasps: GraspEstimate) -> list[str]:
@@ -186,15 +187,11 @@ def balance_flags(name: str, force: float, moment_m: float | None, grasps: Grasp
     return flags
 
 
-def _rms(vectors: Array) -> float:
-    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))
-
-
 def _disagreement(a: GraspEstimate, b: GraspEstimate) -> str | None:
     for j in range(1, a.robots):
         part = slice(6 * (j - 1), 6 * j)
         variance = np.diag(a.covariance)[part] + np.diag(b.covariance)[part]
-        angle = float(np.linalg.norm(so3.log(a.R_1i[j].T @ b.R_1i[j])))
+        angle = float(Rotation.from_matrix(a.R_1i[j].T @ b.R_1i[j]).magnitude())
         shift = float(np.linalg.norm(a.p_1i[j] - b.p_1i[j]))
         allowed = POSITION_TOLERANCE * (1 + float(np.linalg.norm(a.p_1i[j])))
         if angle > max(ANGLE_TOLERANCE_RAD, 5 * np.sqrt(variance[:3].sum())):

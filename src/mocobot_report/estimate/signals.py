@@ -10,6 +10,7 @@ from scipy.signal import welch
 
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
+from estimator.statistics import rms_length
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.charts import chart, figure, line, log_axis
 from mocobot_report.blocks.html import Node, el
@@ -67,7 +68,7 @@ def signal_sections(book: Book, found: list[Source], e: PayloadEstimate) -> list
             missing.append(f"{source.name}: nothing can be said without grasps and a centre of mass.")
             continue
         head = ["recording", *(f"{one.name} [{one.unit}]" for one in left)]
-        rows.append([source.name, *(value(rms(one.values), 2) for one in left)])
+        rows.append([source.name, *(value(rms_length(one.values), 2) for one in left)])
         panels.append((source.name, _plots(book, source.name, left, list(trial.notes))))
     out: list[Node] = []
     if panels:
@@ -83,11 +84,6 @@ def signal_sections(book: Book, found: list[Source], e: PayloadEstimate) -> list
     if missing:
         out.append(verdict("warn", "Not all recordings could be shown", bullets(missing)))
     return out
-
-
-def rms(values: Array) -> float:
-    """Root mean square of the rows' lengths."""
-    return float(np.sqrt(np.mean(np.sum(values**2, axis=1))))
 
 
 def _left(trial: ReplayTrial) -> list[Left]:

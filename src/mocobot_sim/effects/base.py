@@ -8,9 +8,13 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 from typing import ClassVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 from estimator.errors import InputError
 from mocobot_sim.scene.scene import TeamScene
-from mocobot_sim.scene.soft import tuned
+
+Array = NDArray[np.float64]
 
 PLACE = ("robot", "joint")
 JOINTS = 3
@@ -23,10 +27,12 @@ class Effect(ABC):
     Attributes:
         cause: name of the cause, as in the catalogue.
         ranges: allowed range (low, high) of the parameters that may not be any finite number, both ends included.
+        repeats: whether one place takes several.
     """
 
     cause: ClassVar[str]
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
+    repeats: ClassVar[bool] = False
 
     def __post_init__(self) -> None:
         """Check every number.
@@ -70,7 +76,15 @@ class Effect(ABC):
         robot = getattr(self, "robot", 1)
         if robot > scene.robots:
             raise InputError(f"{self.cause}: robot is {robot}; the team has robots 1 .. {scene.robots}")
-        return tuned(self._edit(scene))
+        return self._edit(scene).tuned()
+
+    def carried(self) -> Array:
+        """Inertial parameters (m, m c, J about {1}) that it adds to the payload's in an estimate, shape (10,)."""
+        return np.zeros(10)
+
+    def base_shift(self) -> Array:
+        """By how much it moves the origin of its robot's {b}, in the axes of {b} without it [m], shape (3,)."""
+        return np.zeros(3)
 
     @abstractmethod
     def _edit(self, scene: TeamScene) -> TeamScene:

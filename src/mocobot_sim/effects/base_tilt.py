@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mocobot_sim.effects.base import Effect
+from mocobot_sim.effects.base import Array, Effect
 from mocobot_sim.effects.slides import level_slides
+from mocobot_sim.scene.models import base_height_m
 from mocobot_sim.scene.scene import TeamScene
 
 
@@ -25,9 +27,18 @@ class BaseTilt(Effect):
     roll_rad: float
     pitch_rad: float
 
+    @property
+    def tilt(self) -> Rotation:
+        """From the level axes to the tilted ones."""
+        return Rotation.from_rotvec([self.roll_rad, self.pitch_rad, 0.0])
+
+    def base_shift(self) -> Array:
+        """It turns about the mount, below {b}."""
+        height = np.array([0.0, 0.0, base_height_m()])
+        return np.asarray(self.tilt.apply(height) - height)
+
     def _edit(self, scene: TeamScene) -> TeamScene:
-        tilt = Rotation.from_rotvec([self.roll_rad, self.pitch_rad, 0.0])
         chassis = scene.root.find("body", f"omnid{self.robot}/chassis")
-        chassis.quat = tilt.as_quat(scalar_first=True)
+        chassis.quat = self.tilt.as_quat(scalar_first=True)
         level_slides(chassis)
         return scene

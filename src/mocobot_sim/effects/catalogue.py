@@ -4,41 +4,44 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
+from importlib import import_module
 from typing import Any
 
 from estimator.errors import InputError
 from mocobot_sim.effects.base import PLACE, Effect
-from mocobot_sim.effects.base_compliance import BaseCompliance
-from mocobot_sim.effects.base_creep import BaseCreep
-from mocobot_sim.effects.base_tilt import BaseTilt
-from mocobot_sim.effects.clock_delay import ClockDelay
-from mocobot_sim.effects.drag import Drag
-from mocobot_sim.effects.gimbal_friction import GimbalFriction
-from mocobot_sim.effects.grasp_flex import GraspFlex
-from mocobot_sim.effects.grasp_play import GraspPlay
-from mocobot_sim.effects.joint_friction import JointFriction
-from mocobot_sim.effects.link_length import LinkLength
-from mocobot_sim.effects.phi_zero import PhiZero
-from mocobot_sim.effects.push import Push
-from mocobot_sim.effects.sea_bias import SeaBias
-from mocobot_sim.effects.sea_hardening import SeaHardening
-from mocobot_sim.effects.sea_hysteresis import SeaHysteresis
-from mocobot_sim.effects.sea_scale import SeaScale
-from mocobot_sim.effects.slosh import Slosh
-from mocobot_sim.effects.tether import Tether
-from mocobot_sim.effects.theta_zero import ThetaZero
-from mocobot_sim.effects.torque_lag import TorqueLag
-from mocobot_sim.effects.torque_skew import TorqueSkew
+from mocobot_sim.scene.applied import Applied
 from mocobot_sim.scene.scene import TeamScene
 
+NAMES = (
+    "phi_zero",
+    "theta_zero",
+    "link_length",
+    "base_tilt",
+    "base_creep",
+    "base_compliance",
+    "grasp_flex",
+    "grasp_play",
+    "sea_bias",
+    "sea_scale",
+    "sea_hardening",
+    "sea_hysteresis",
+    "joint_friction",
+    "gimbal_friction",
+    "torque_skew",
+    "torque_lag",
+    "clock_delay",
+    "tether",
+    "push",
+    "drag",
+    "slosh",
+)
+"""One file of this folder each; the class in ``sea_bias.py`` is ``SeaBias``."""
+
 EFFECTS: dict[str, type[Effect]] = {
-    kind.cause: kind
-    for kind in (
-        PhiZero, ThetaZero, LinkLength, BaseTilt, BaseCreep, BaseCompliance, GraspFlex, GraspPlay, SeaBias, SeaScale,
-        SeaHardening, SeaHysteresis, JointFriction, GimbalFriction, TorqueSkew, TorqueLag, ClockDelay, Tether, Push,
-        Drag, Slosh,
-    )
-}  # fmt: skip
+    name: getattr(import_module(f"mocobot_sim.effects.{name}"), name.title().replace("_", ""))
+    for name in NAMES
+}
+"""Every effect's class by the name of its cause."""
 
 
 def make_effect(
@@ -85,7 +88,7 @@ def _has_default(entry: Any) -> bool:
     return isinstance(entry.default, float)
 
 
-def effect_to_dict(effect: Effect) -> dict[str, Any]:
+def effect_to_dict(effect: Applied) -> dict[str, Any]:
     """Plain JSON values: ``cause``, ``robot`` and ``joint`` where there are, ``parameters``."""
     place = {name: getattr(effect, name) for name in effect.place_names()}
     parameters = {name: getattr(effect, name) for name in effect.parameter_names()}
@@ -123,7 +126,7 @@ def apply_effects(scene: TeamScene, effects: Sequence[Effect]) -> TeamScene:
     ]
     for effect in effects:
         place = (effect.cause, *(getattr(effect, name) for name in effect.place_names()))
-        if place in places and not isinstance(effect, Push):
+        if place in places and not effect.repeats:
             where = " ".join(f"{name} {at}" for name, at in zip(effect.place_names(), place[1:], strict=True))
             raise InputError(
                 f"{effect.cause} is given twice{where and f' for {where}'}; each place takes it once"

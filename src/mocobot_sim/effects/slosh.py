@@ -7,7 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from mocobot_sim.effects.base import Effect
+from estimator.estimate.principal import inertia_parameters
+from mocobot_sim.effects.base import Array, Effect
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 
@@ -28,6 +29,12 @@ class Slosh(Effect):
     point_x_m: float
     point_y_m: float
     point_z_m: float
+
+    def carried(self) -> Array:
+        """The mass at its pivot, which is where small swings leave it."""
+        at = np.array([self.point_x_m, self.point_y_m, self.point_z_m])
+        about_1 = inertia_parameters(at @ at * np.eye(3) - np.outer(at, at))
+        return self.mass_kg * np.concatenate([[1.0], at, about_1])
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         if not self.mass_kg:

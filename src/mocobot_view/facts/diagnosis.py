@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from discrepancy.team.causes import CAUSES
 from estimator.errors import InputError
 from mocobot_view.bodies.robot import GIMBAL
 from mocobot_view.facts.fact_files import read_json
@@ -17,9 +18,6 @@ VERDICTS = {
     "partly_explained": "Partly explained",
     "unexplained": "Unexplained",
 }
-GIMBAL_CAUSES = ("theta_zero", "gimbal_friction")
-AT_GRASP = ("grasp_flex", "grasp_play", "tether")
-"""Causes of a whole robot that act where it holds the payload; those of other robots are marked at the base."""
 
 
 @dataclass(frozen=True)
@@ -87,10 +85,10 @@ def _cause(values: dict[str, Any]) -> Cause:
     for what, number, most in (("robot", robot, None), ("joint", joint, 3)):
         if number is not None and (type(number) is not int or number < 1 or (most and number > most)):
             raise ValueError(f"{what} is {number!r:.40}")
-    body = None
+    body, at = None, CAUSES[name].at if name in CAUSES else None
     if robot is not None:
         if joint is not None:
-            body = GIMBAL[joint - 1] if name in GIMBAL_CAUSES else f"proximal{joint}"
-        elif name in AT_GRASP:
+            body = GIMBAL[joint - 1] if at == "gimbal joint" else f"proximal{joint}"
+        elif at == "grasp":
             body = "flange"
     return Cause(name, robot, body, str(values["sentence"]))

@@ -133,7 +133,7 @@ class FakeRig:
     def refinements(self, candidate, *, finer=False):
         return []
 
-    def can_run_again(self):
+    def can_resimulate(self):
         return None if self.loop else "it is made up"
 
     def simulation(self, trial, shared, local, active):

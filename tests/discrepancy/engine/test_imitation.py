@@ -7,9 +7,9 @@ import pytest
 
 from discrepancy.engine.search import search
 from discrepancy.least_squares.problem import Problem
+from discrepancy.rig import Transient
+from discrepancy.team.causes import CAUSES
 from discrepancy.team.imitators import wrong_torques
-from discrepancy.team.pushes import push
-from discrepancy.team.tolerances import DEFAULTS
 from fake_rig import FakeRig
 from team_case import exact, residual_of
 
@@ -75,7 +75,8 @@ def test_wrong_torque_lasts_as_long_as_the_push():
     tau[(time >= start) & (time < start + lasting), 1, 2] += 0.2
     changed = residual_of(case, replace(case.signals, tau=tau)) - case.linear.residual
     unwhitened = [lambda x: x] * 2
-    found = wrong_torques([case.linear] * 2, unwhitened, push(1, start, lasting, DEFAULTS["push"]))
+    push = CAUSES["push"].event({}, Transient(1, start, lasting))
+    found = wrong_torques([case.linear] * 2, unwhitened, push)
     assert len(found) == 9
     for columns in found:
         assert not columns[0].any()

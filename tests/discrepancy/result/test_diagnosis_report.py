@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from diagnosed import small_diagnosis
-from discrepancy.causes.words import number
+from discrepancy.causes.numbers import number
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.result.json import plain
 from discrepancy.result.plots import file_names
@@ -19,6 +19,7 @@ from discrepancy.result.text import WIDTH, format_diagnosis
 from discrepancy.result.traces import groups
 from discrepancy.rig import Candidate, Channel
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes.base import Cause
 from discrepancy.team.estimates import errors
 from discrepancy.team.traces import unwhitened
 from discrepancy.team.words import TeamWords
@@ -101,8 +102,11 @@ def test_every_cause_has_a_sentence_with_its_numbers(cause: str) -> None:
 
 
 def test_a_cause_of_ones_own_gets_its_docstring(monkeypatch: pytest.MonkeyPatch) -> None:
-    class Mine(type(CAUSES["drag"])):
+    class Mine(Cause):
         """A ghost holds the payload back."""
+
+        at = "payload"
+        columns = type(CAUSES["drag"]).columns
 
     monkeypatch.setitem(CAUSES, "ghost", Mine())
     text = TeamWords().describe(Candidate("ghost", "f", None, None, ()), {"c_N": 2.0}, {"c_N": 0.1})

@@ -8,15 +8,15 @@ from scipy.interpolate import make_interp_spline
 from scipy.optimize import brentq
 from scipy.signal import lfilter
 
+from discrepancy.rig import Transient
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.residual import Bases, Shared
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import linearise
-from discrepancy.team.pushes import push
 from discrepancy.team.rig import TeamRig
-from discrepancy.team.tolerances import DEFAULTS
+from discrepancy.team.tolerances import default_tolerances
 from estimator.arm.delta import LEG_DIRECTIONS, forward_kinematics, jacobian
 from estimator.estimate.grasp_estimate import GraspEstimate
 from mocobot_sim.effects.catalogue import EFFECTS, make_effect
@@ -261,13 +261,13 @@ def team_of(case, robots):
     bases = Bases(case.bases.R[which], case.bases.p[which])
     shared = Shared(held, case.shared.pi)
     linear = linearise(signals, shared, bases, DESIGN, Reduction.of(signals), full=True)
-    return TeamRig((), None, None, (linear,), (lambda x: x,), DEFAULTS, frozenset())
+    return TeamRig((), None, None, (linear,), (lambda x: x,), default_tolerances(), frozenset())
 
 
 @pytest.mark.parametrize("robots", [1, 2, 5])
 def test_every_cause_has_finite_columns_and_an_effect(case, robots):
     rig = team_of(case, robots)
-    candidates = [*rig.candidates(), push(0, 5.0, 1.0, {})]
+    candidates = [*rig.candidates(), CAUSES["push"].event({}, Transient(0, 5.0, 1.0))]
     per = {"joint": 3 * robots, "robot": robots, "payload": 1}
     undecidable = robots  # the zero of every last gimbal axis
     assert len(candidates) == sum(per[CAUSES[name].per] for name in CAUSES) - undecidable
@@ -304,8 +304,8 @@ def test_catalogue_is_complete():
         assert cause.separate
         place = set(EFFECTS[name].place_names())
         assert place == {"joint": {"robot", "joint"}, "robot": {"robot"}, "payload": set()}[cause.per]
-        if name in DEFAULTS:
-            assert tuple(DEFAULTS[name]) == cause.parameters
+        if cause.tolerances:
+            assert len(cause.tolerances) == len(cause.parameters)
             assert not cause.scales
         else:
             assert len(cause.scales) == len(cause.parameters)

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.emps.recording.signals import Signals
 
 Array = NDArray[np.float64]
 
-SLOW = tuple({"slow_mps": s} for s in (1e-3, 1e-4, 3e-4, 3e-3))
+SLOW = tuple({"slow_mps": s} for s in rules.SLOWER_MPS)
 """Speeds below which the direction of friction fades; the first is the catalogue's."""
-SHORTEST_REST_S = 0.1
 
 
 def direction(signals: Signals, slow: float) -> Array:
@@ -25,7 +25,7 @@ def rests(signals: Signals, slow: float) -> list[Array]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int))).reshape(-1, 2)
     out = []
     for start, stop in edges:
-        if stop - start >= SHORTEST_REST_S * signals.log.rate_hz:
+        if stop - start >= rules.EMPS_SHORTEST_REST_S * signals.log.rate_hz:
             indicator = np.zeros(len(signals.v))
             indicator[start:stop] = 1.0
             out.append(indicator)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
@@ -10,11 +10,16 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.causes import base
+from discrepancy.causes.base import Shape
+from discrepancy.rig import Candidate
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 
 Array = NDArray[np.float64]
-Shape = Mapping[str, float]
+At = Literal["driven joint", "gimbal joint", "robot", "grasp", "payload"]
+
+GIMBAL_AXES = {1: "z (first)", 2: "y (middle)", 3: "x (last)"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,32 +39,32 @@ class Context:
     trial: int | None
 
 
-class Cause(ABC):
+class Cause(base.Cause):
     """One physical cause: the trace that one unit of each of its parameters leaves in the residual.
 
+    The simulator's effect has the same name. Tolerances are those of a well-kept Omnid: assumed, like its masses, for a
+    calibrated unit with 16-bit encoders; a lab replaces them by its own (``--tolerances``).
+
     Attributes:
-        name: as in the verdict; the simulator's effect has the same.
-        family: causes of one family look alike.
-        parameters: names of the columns' parameters, units as suffix.
-        scales: typical sizes, for causes that have no tolerance.
-        per: ``joint``, ``robot`` or ``payload``: where it can sit.
+        at: what it can sit at; every robot has its own but for the payload.
         joints: those that it can sit at, from 1.
         shapes: alternatives of what changes the columns themselves; the first is the catalogue's.
         determined: numbers of the shape that the data determine, with the share by which to change them for slopes.
-        positive: parameters that cannot be negative.
-        separate: what experiment would tell it from its look-alikes.
+        clipped: the effect's parameters that are zero where the fit has them below.
     """
 
-    name: ClassVar[str]
-    family: ClassVar[str]
-    parameters: ClassVar[tuple[str, ...]]
-    scales: ClassVar[tuple[float, ...]] = ()
-    per: ClassVar[Literal["joint", "robot", "payload"]] = "joint"
+    at: ClassVar[At] = "driven joint"
     joints: ClassVar[tuple[int, ...]] = (1, 2, 3)
     shapes: ClassVar[tuple[Shape, ...]] = ({},)
     determined: ClassVar[Mapping[str, float]] = {}
-    positive: ClassVar[tuple[str, ...]] = ()
-    separate: ClassVar[str] = ""
+    clipped: ClassVar[tuple[str, ...]] = ()
+
+    @property
+    def per(self) -> Literal["joint", "robot", "payload"]:
+        """What has one of it at most."""
+        if self.at == "payload":
+            return "payload"
+        return "joint" if self.at.endswith("joint") else "robot"
 
     @abstractmethod
     def columns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Array:
@@ -87,7 +92,13 @@ class Cause(ABC):
 
     def possible(self, values: Array, se: Array, shape: Shape) -> bool:
         """Whether such values (standard errors ``se``) can be: nothing negative beyond two standard errors."""
-        return all(values[k] > -2.0 * se[k] for k, n in enumerate(self.parameters) if n in self.positive)
+        return self.never_negative(values, se)
+
+    def place(self, candidate: Candidate) -> str:
+        """Robot and joint, of a gimbal its axis, too."""
+        if self.at != "gimbal joint" or candidate.joint is None:
+            return super().place(candidate)
+        return f"Robot {candidate.robot}, gimbal joint {candidate.joint}, axis {GIMBAL_AXES[candidate.joint]}"
 
     def physical(self, values: Array, context: Context) -> dict[str, float]:
         """The effect's parameters (names as in the simulator) from the columns' values."""

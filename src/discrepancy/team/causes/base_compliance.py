@@ -12,11 +12,15 @@ class BaseCompliance(Cause):
     name = "base_compliance"
     family = "compliance"
     parameters = ("compliance_m_per_N",)
-    per = "robot"
+    tolerances = (1e-7,)
+    at = "robot"
     positive = ("compliance_m_per_N",)
     separate = (
         "Vertical forces (lifting against each other) separate a base, which yields sideways, from a grasp."
     )
+
+    def sentence(self, n):
+        return f"the base gives way horizontally, by {n('compliance_m_per_N', 'um/N', 1e6)}"
 
     def columns(self, trial, robot, joint, shape):
         design, s = trial.design, trial.s[:, robot]

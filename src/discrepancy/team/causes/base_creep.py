@@ -11,8 +11,15 @@ class BaseCreep(Cause):
     name = "base_creep"
     family = "base_creep"
     parameters = ("x_mps", "y_mps")
-    per = "robot"
+    tolerances = (2e-8, 2e-8)
+    at = "robot"
     separate = "A longer recording at rest."
+
+    def sentence(self, n):
+        return (
+            f"the base creeps over the floor, by {n('x_mps', 'um/min', 6e7, signed=True)} along its x axis and "
+            f"{n('y_mps', 'um/min', 6e7, signed=True)} along its y axis"
+        )
 
     def columns(self, trial, robot, joint, shape):
         time = trial.signals.time - trial.signals.time[0]

@@ -12,8 +12,15 @@ class BaseTilt(Cause):
     name = "base_tilt"
     family = "base_tilt"
     parameters = ("roll_rad", "pitch_rad")
-    per = "robot"
+    tolerances = (1e-4, 1e-4)
+    at = "robot"
     separate = "Larger tilts of the payload, and holds."
+
+    def sentence(self, n):
+        return (
+            f"the base does not stand level: turned by {n('roll_rad', 'mrad', 1e3, signed=True)} about its x axis and "
+            f"{n('pitch_rad', 'mrad', 1e3, signed=True)} about its y axis"
+        )
 
     def columns(self, trial, robot, joint, shape):
         return stack([self._column(trial, robot, np.eye(3)[k]) for k in range(2)])

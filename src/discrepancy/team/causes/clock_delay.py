@@ -11,8 +11,12 @@ class ClockDelay(Cause):
     name = "clock_delay"
     family = "clock"
     parameters = ("delay_s",)
-    per = "robot"
+    tolerances = (1e-5,)
+    at = "robot"
     separate = "Fast motion of all robots at once."
+
+    def sentence(self, n):
+        return f"all that it logs is {n('delay_s', 'ms', 1e3)} {n.either('delay_s', 'late', 'early')}"
 
     def columns(self, trial, robot, joint, shape):
         s, rate = trial.signals, trial.signals.rate_hz

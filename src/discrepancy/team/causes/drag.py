@@ -12,9 +12,13 @@ class Drag(Cause):
     name = "drag"
     family = "dissipation"
     parameters = ("coefficient_Ns_per_m",)
-    per = "payload"
+    tolerances = (0.05,)
+    at = "payload"
     positive = ("coefficient_Ns_per_m",)
     separate = "Translation at constant attitude separates drag of the payload from friction of the gimbals."
+
+    def sentence(self, n):
+        return f"the payload's motion is resisted by {n('coefficient_Ns_per_m', 'N s/m', signed=True)}"
 
     def columns(self, trial, robot, joint, shape):
         motion = fuse(trial.data, trial.shared.grasps)

@@ -16,9 +16,18 @@ class GimbalFriction(Cause):
     name = "gimbal_friction"
     family = "dissipation"
     parameters = ("coulomb_Nm", "viscous_Nms_per_rad")
+    tolerances = (2e-3, 2e-3)
+    clipped = ("coulomb_Nm", "viscous_Nms_per_rad")
+    at = "gimbal joint"
     shapes = ({"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3})
     positive = ("coulomb_Nm",)
     separate = "Which robot's gimbal rubs shows only with one robot released at a time."
+
+    def sentence(self, n):
+        return (
+            f"the {self.at} rubs with {n('coulomb_Nm', 'N m')} (Coulomb, while it moves) and "
+            f"{n('viscous_Nms_per_rad', 'N m s/rad')} (viscous)"
+        )
 
     def columns(self, trial, robot, joint, shape):
         rate = trial.signals.rate_hz

@@ -2,10 +2,9 @@
 
 import numpy as np
 
+from discrepancy import rules
+from discrepancy.causes.free_while import free_while
 from discrepancy.team.causes.base import Cause, stack
-from discrepancy.team.causes.free_while import free_while
-
-KNOTS_S = 0.2
 
 
 class GraspPlay(Cause):
@@ -17,10 +16,14 @@ class GraspPlay(Cause):
     name = "grasp_play"
     family = "compliance"
     parameters = ("play_m",)
-    per = "robot"
+    tolerances = (3e-6,)
+    at = "grasp"
     shapes = ({"force_N": 0.4},)
     positive = ("play_m",)
     separate = "Internal forces of both signs at rest separate play from flexibility."
+
+    def sentence(self, n):
+        return f"the grasp is loose by +-({n('play_m', 'um', 1e6)}) along each axis"
 
     def columns(self, trial, robot, joint, shape):
         at_end = -np.clip(trial.data.wrench[:, robot, 3:] / shape["force_N"], -1.0, 1.0)
@@ -30,7 +33,7 @@ class GraspPlay(Cause):
         between = np.abs(trial.data.wrench[:, robot, 3:]) < shape["force_N"]
         columns = []
         for axis, unit in enumerate(np.eye(3)):
-            for place in free_while(between[:, axis], trial.signals.rate_hz, KNOTS_S):
+            for place in free_while(between[:, axis], trial.signals.rate_hz, rules.PLAY_KNOTS_S):
                 column = _moved(trial, robot, place[:, None] * unit)
                 if column.any():  # not before the first row or after the last
                     columns.append(column)

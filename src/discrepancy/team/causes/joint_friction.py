@@ -10,9 +10,17 @@ class JointFriction(Cause):
     name = "joint_friction"
     family = "dissipation"
     parameters = ("coulomb_Nm", "viscous_Nms_per_rad")
+    tolerances = (2e-3, 2e-3)
+    clipped = ("coulomb_Nm", "viscous_Nms_per_rad")
     shapes = ({"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3})
     positive = ("coulomb_Nm",)
     separate = "An arm-only run (payload released) shows friction of the joint alone."
+
+    def sentence(self, n):
+        return (
+            f"the {self.at} rubs with {n('coulomb_Nm', 'N m')} (Coulomb, while it moves) and "
+            f"{n('viscous_Nms_per_rad', 'N m s/rad')} (viscous)"
+        )
 
     def columns(self, trial, robot, joint, shape):
         errors = _errors(trial.signals, robot, joint, shape)

@@ -17,7 +17,19 @@ class LinkLength(Cause):
     name = "link_length"
     family = "arm_geometry"
     parameters = ("proximal_m", "rod_m", "base_radius_m")
+    tolerances = (2e-5, 2e-5, 2e-5)
     separate = "Poses spread over the whole workspace separate a wrong length from an encoder's zero."
+
+    def sentence(self, n):
+        parts = zip(
+            self.parameters, ("the driven link is", "the rods are", "the base radius is"), strict=True
+        )
+        words = [
+            f"{what} {n(name, 'mm', 1e3)} {n.either(name, 'too long', 'too short')}"
+            for name, what in parts
+            if n.values.get(name)
+        ]
+        return "the leg deviates from its design: " + (", ".join(words) or "by nothing that shows")
 
     def columns(self, trial, robot, joint, shape):
         phi, tau = trial.s[:, robot, :3], trial.s[:, robot, 18:]

@@ -11,7 +11,12 @@ class PhiZero(Cause):
     name = "phi_zero"
     family = "arm_geometry"
     parameters = ("zero_rad",)
+    tolerances = (1e-4,)
     separate = "Poses spread over the whole workspace separate a zero from a wrong length."
+
+    def sentence(self, n):
+        much = n.either("zero_rad", "too much", "too little")
+        return f"the encoder of the driven joint reads {n('zero_rad', 'mrad', 1e3)} {much}"
 
     def columns(self, trial, robot, joint, shape):
         return stack([trial.of_signals(robot, phi=np.eye(3)[joint])])

@@ -18,8 +18,24 @@ class Push(Cause):
     name = "push"
     family = "push"
     parameters = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nm", "moment_y_Nm", "moment_z_Nm")
-    per = "payload"
+    tolerances = (
+        0.02,
+        0.02,
+        0.02,
+        0.02,
+        0.02,
+        0.02,
+    )  # friction that rests anew is a small push while it lasts
+    transient = True
+    at = "payload"
     separate = "Another trial: a push does not repeat."
+
+    def sentence(self, n):
+        return (
+            f"something pushed the payload in trial {n.values['trial']:.0f} from {n.values['start_s']:.2f} s on for "
+            f"{n.values['duration_s']:.2f} s, with {n.vector('force', 'N')} along a line "
+            f"through {n.vector('point', 'm')} in {{1}}"
+        )
 
     def columns(self, trial, robot, joint, shape):
         window = during(trial, shape)

@@ -11,7 +11,13 @@ class SeaBias(Cause):
     name = "sea_bias"
     family = "sea_torque"
     parameters = ("bias_Nm",)
+    tolerances = (3e-3,)
     separate = "Loads of both signs on the joint (a known added weight) separate bias, scale and hardening."
+
+    def sentence(self, n):
+        return (
+            f"the torque sensor reads {n('bias_Nm', 'N m')} {n.either('bias_Nm', 'too much', 'too little')}"
+        )
 
     def columns(self, trial, robot, joint, shape):
         return stack([trial.of_signals(robot, tau=np.eye(3)[joint])])

@@ -9,7 +9,12 @@ class SeaHardening(Cause):
     name = "sea_hardening"
     family = "sea_torque"
     parameters = ("cubic_Nm_per_rad3",)
+    tolerances = (3.0,)
     separate = "Loads of both signs on the joint (a known added weight) separate bias, scale and hardening."
+
+    def sentence(self, n):
+        hardens = n.either("cubic_Nm_per_rad3", "hardens", "softens")
+        return f"the spring {hardens} with its deflection, by {n('cubic_Nm_per_rad3', 'N m/rad^3')} (cubic)"
 
     def columns(self, trial, robot, joint, shape):
         return stack(

@@ -13,11 +13,15 @@ class SeaHysteresis(Cause):
     name = "sea_hysteresis"
     family = "dissipation"
     parameters = ("friction_Nm",)
+    tolerances = (2e-3,)
     shapes = ({"slow_Nm_per_s": 0.2}, {"slow_Nm_per_s": 0.6})
     positive = ("friction_Nm",)
     separate = (
         "Motion with load reversals at rest separates friction in the spring from friction in the joint."
     )
+
+    def sentence(self, n):
+        return f"the spring rubs inside, with {n('friction_Nm', 'N m')}"
 
     def columns(self, trial, robot, joint, shape):
         return stack(

@@ -12,7 +12,12 @@ class SeaScale(Cause):
     name = "sea_scale"
     family = "sea_torque"
     parameters = ("scale",)
+    tolerances = (1e-3,)
     separate = "Loads of both signs on the joint (a known added weight) separate bias, scale and hardening."
+
+    def sentence(self, n):
+        stiffer, small = n.either("scale", "stiffer", "softer"), n.either("scale", "too small", "too large")
+        return f"the spring is {n('scale', '%', 1e2)} {stiffer} than assumed, so the torque is read {small}"
 
     def columns(self, trial, robot, joint, shape):
         return stack([trial.of_signals(robot, tau=one_joint(-trial.s[:, robot, 18 + joint], joint))])

@@ -5,15 +5,9 @@ from typing import ClassVar, cast
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
+from discrepancy import rules
 from discrepancy.team.causes.base import Array, Cause, stack
 from estimator.estimate.fusion import fuse
-
-LENGTHS_M, MOST_DAMPED = (0.04, 1.0), 0.3
-"""Pendulums of 0.5 to 2.5 Hz that swing; what is slower, faster or damped more looks like drag or play."""
-SWINGS = 0.25
-"""A best fit that is damped more leans on the bound: it is something else, such as drag."""
-REACH_M = 1.5
-"""From the centre of mass to where it hangs at most: a payload that three robots carry is no larger."""
 
 
 class Slosh(Cause):
@@ -27,7 +21,7 @@ class Slosh(Cause):
     family = "slosh"
     parameters = ("mass_kg", "moment_x_kgm", "moment_y_kgm", "moment_z_kgm")
     scales = (0.01, 0.005, 0.005, 0.005)
-    per = "payload"
+    at = "payload"
     shapes = tuple(
         {"length_m": length, "damping_ratio": damping}
         for length in (0.2, 0.05, 0.065, 0.085, 0.11, 0.145, 0.27, 0.37, 0.5, 0.7)
@@ -35,6 +29,12 @@ class Slosh(Cause):
     )
     determined: ClassVar = {"length_m": 0.02, "damping_ratio": 0.1}
     separate = "Motion near the pendulum's own frequency."
+
+    def sentence(self, n):
+        return (
+            f"a mass of {n('mass_kg', 'kg', signed=True)} swings in the payload on {n('length_m', 'm')} below "
+            f"{n.vector('point', 'm')} in {{1}} (damping ratio {n('damping_ratio', '')})"
+        )
 
     def columns(self, trial, robot, joint, shape):
         motion = fuse(trial.data, trial.shared.grasps)
@@ -68,13 +68,13 @@ class Slosh(Cause):
         return [
             {"length_m": x, "damping_ratio": y}
             for x, y in shapes
-            if LENGTHS_M[0] <= x <= LENGTHS_M[1] and y <= MOST_DAMPED
+            if rules.SLOSH_LENGTHS_M[0] <= x <= rules.SLOSH_LENGTHS_M[1] and y <= rules.SLOSH_MOST_DAMPED
         ]
 
     def possible(self, values, se, shape):
         """A mass that is there, swings, and hangs within the payload's reach."""
-        within = np.abs(values[1:]) <= REACH_M * max(values[0], 0.0) + 2.0 * se[1:]
-        return bool(values[0] > 2.0 * se[0] and within.all() and shape["damping_ratio"] <= SWINGS)
+        within = np.abs(values[1:]) <= rules.SLOSH_REACH_M * max(values[0], 0.0) + 2.0 * se[1:]
+        return bool(values[0] > 2.0 * se[0] and within.all() and shape["damping_ratio"] <= rules.SLOSH_SWINGS)
 
     def physical(self, values, context):
         mass = values[0] if abs(values[0]) > 1e-6 else 1e-6

@@ -15,9 +15,15 @@ class Tether(Cause):
     family = "sea_torque"
     parameters = ("force_x_N", "force_y_N", "force_z_N", "stiffness_N_per_m")
     scales = (0.1, 0.1, 0.1, 1.0)
-    per = "robot"
+    at = "grasp"
     positive = ("stiffness_N_per_m",)
     separate = "A run without payload, or a second payload at the same place, separates an outside force from a sensor."
+
+    def sentence(self, n):
+        return (
+            f"something like a cable pulls at the grasp with {n('stiffness_N_per_m', 'N/m')} towards "
+            f"{n.vector('anchor', 'm')} in its base frame"
+        )
 
     def columns(self, trial, robot, joint, shape):
         data, grasps = trial.data, trial.shared.grasps

@@ -11,10 +11,16 @@ class ThetaZero(Cause):
     name = "theta_zero"
     family = "gimbal_zero"
     parameters = ("zero_rad",)
+    tolerances = (1e-4,)
+    at = "gimbal joint"
     joints = (1, 2)  # no recording shows the last one's
     separate = (
         "The zero of the last gimbal axis is part of the grasp frame; only a known grasp would show it."
     )
+
+    def sentence(self, n):
+        much = n.either("zero_rad", "too much", "too little")
+        return f"the encoder of the gimbal joint reads {n('zero_rad', 'mrad', 1e3)} {much}"
 
     def columns(self, trial, robot, joint, shape):
         return stack([trial.of_signals(robot, theta=np.eye(3)[joint])])

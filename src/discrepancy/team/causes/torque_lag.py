@@ -10,9 +10,13 @@ class TorqueLag(Cause):
     name = "torque_lag"
     family = "dissipation"
     parameters = ("time_constant_s",)
-    per = "robot"
+    tolerances = (1e-4,)
+    at = "robot"
     positive = ("time_constant_s",)
     separate = "The commands separate a lag inside the sensor from a late log."
+
+    def sentence(self, n):
+        return f"the torque sensor follows with a time constant of {n('time_constant_s', 'ms', 1e3, signed=True)}"
 
     def columns(self, trial, robot, joint, shape):
         rate = with_rates(trial.signals.tau[:, robot], trial.signals.rate_hz)[1]

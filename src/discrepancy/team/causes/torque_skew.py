@@ -11,8 +11,12 @@ class TorqueSkew(Cause):
     name = "torque_skew"
     family = "dissipation"
     parameters = ("delay_s",)
-    per = "robot"
+    tolerances = (1e-4,)
+    at = "robot"
     separate = "The commands separate a late log from a lag inside the sensor, which the controller sees too."
+
+    def sentence(self, n):
+        return f"the torques are logged {n('delay_s', 'ms', 1e3, signed=True)} later than the angles"
 
     def columns(self, trial, robot, joint, shape):
         rate = with_rates(trial.signals.tau[:, robot], trial.signals.rate_hz)[1]

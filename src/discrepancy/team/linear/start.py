@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.team.linear.adjust import TorqueNoise
 from discrepancy.team.linear.noise import Noise
@@ -59,7 +60,7 @@ def linearised(
 ) -> tuple[TrialLinear, Whitening, TorqueNoise]:
     """One trial's linearisation, and what the sensors' noise leaves in its rows; k is its number."""
     linear = linearise(signals, shared, bases, design, reduction, full=True)
-    draws, torques = noise_rows(linear, noise, np.random.default_rng([20250, k]))
+    draws, torques = noise_rows(linear, noise, np.random.default_rng([rules.NOISE_SEED, k]))
     moving = reduction.moving
     return linear, Whitening.of(draws, moving), TorqueNoise.of(draws, torques, moving)
 

@@ -7,7 +7,9 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
+from discrepancy import rules
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.residual import (
@@ -27,9 +29,6 @@ from estimator.estimate.principal import inertia_matrix
 from estimator.signals.grasp_data import GraspData
 
 Array = NDArray[np.float64]
-
-NOISE_DRAWS = 24
-JACOBIAN_HZ = 25.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,7 +204,7 @@ def _by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, design:
     Central differences through one robot's own formulas, then by hand through what is linear in the robots;
     evaluated at 25 Hz.
     """
-    samples, every = len(s), max(1, round(data.rate_hz / JACOBIAN_HZ))
+    samples, every = len(s), max(1, round(data.rate_hz / rules.TEAM_JACOBIAN_HZ))
     knots = np.arange(0, samples, every)
     s = s[knots]
     data = _thinned(data, knots)
@@ -293,13 +292,13 @@ def start_bases(signals: Signals, shared: Shared, design: OmnidDesign) -> Bases:
     for i in range(1, N):
         mean = so3.chordal_mean(R[:, 0] @ shared.grasps.R_1i[i] @ np.swapaxes(R[:, i], -1, -2))
         yaw = np.arctan2(mean[1, 0] - mean[0, 1], mean[0, 0] + mean[1, 1])
-        turns.append(so3.exp(np.array([0.0, 0.0, yaw])))
+        turns.append(Rotation.from_rotvec([0.0, 0.0, yaw]).as_matrix())
         places.append(np.mean(h[:, 0] + R[:, 0] @ shared.grasps.p_1i[i] - h[:, i] @ turns[i].T, axis=0))
     return Bases(np.array(turns), np.array(places))
 
 
 def noise_rows(
-    trial: TrialLinear, noise: Noise, rng: np.random.Generator, draws: int = NOISE_DRAWS
+    trial: TrialLinear, noise: Noise, rng: np.random.Generator, draws: int = rules.NOISE_DRAWS
 ) -> tuple[Array, Array]:
     """What the sensors' errors alone would leave: residuals (draws, n, C), and the torques' own (draws, n, N, 3)."""
     out, torques = [], []

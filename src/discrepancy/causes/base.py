@@ -1,0 +1,78 @@
+"""What the causes of every rig have in common: names, sizes, words."""
+
+from __future__ import annotations
+
+import inspect
+from abc import ABC
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.causes.numbers import Numbers, number
+from discrepancy.rig import Candidate, Parameter, Transient
+
+Array = NDArray[np.float64]
+Shape = Mapping[str, float]
+
+
+class Cause(ABC):
+    """One physical cause, as the diagnosis and the report know it.
+
+    Attributes:
+        name: as in the verdict.
+        family: causes of one family look alike.
+        parameters: names of the columns' parameters, units as suffix.
+        tolerances: of the parameters, standard deviations that are no news; none where the cause is an event.
+        scales: their typical sizes, where there are no tolerances.
+        positive: parameters that cannot be negative.
+        transient: whether it acts for a while in one trial.
+        where: the part of the machine, of what sits at no robot.
+        separate: what experiment would tell it from its look-alikes.
+    """
+
+    name: ClassVar[str]
+    family: ClassVar[str]
+    parameters: ClassVar[tuple[str, ...]]
+    tolerances: ClassVar[tuple[float, ...]] = ()
+    scales: ClassVar[tuple[float, ...]] = ()
+    positive: ClassVar[tuple[str, ...]] = ()
+    transient: ClassVar[bool] = False
+    where: ClassVar[str] = "payload"
+    separate: ClassVar[str] = ""
+
+    def candidate(
+        self, given: Mapping[str, float], shape: Shape, robot: int | None = None, joint: int | None = None
+    ) -> Candidate:
+        """The cause at a place.
+
+        Args:
+            given: standard deviations that are no news, by parameter; an event where there are none.
+            shape: numbers inside its columns.
+            robot, joint: where, from 1.
+        """
+        parameters = tuple(
+            Parameter(name, given.get(name, 0.0), scale)
+            for name, scale in zip(self.parameters, self.tolerances or self.scales, strict=True)
+        )
+        return Candidate(self.name, self.family, robot, joint, parameters, dict(shape), where=self.where)
+
+    def event(self, given: Mapping[str, float], when: Transient) -> Candidate:
+        """A transient cause during an interval."""
+        return replace(self.candidate(given, when.shape), transient=when)
+
+    def never_negative(self, values: Array, se: Array) -> bool:
+        """Whether nothing that must be positive is negative beyond two standard errors."""
+        return all(values[k] > -2.0 * se[k] for k, n in enumerate(self.parameters) if n in self.positive)
+
+    def place(self, candidate: Candidate) -> str:
+        """Where it is, as a sentence begins."""
+        return candidate.place.capitalize()
+
+    def sentence(self, n: Numbers) -> str:
+        """What it does, without place and full stop; the first line of its docstring, if it says nothing else."""
+        said = (inspect.getdoc(self) or self.name).splitlines()[0].rstrip(".")
+        each = ", ".join(f"{name} = {number(value, n.se.get(name), '')}" for name, value in n.values.items())
+        return f"{said} ({each})"

@@ -1,0 +1,54 @@
+"""Intervals at which an event may have acted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy import rules
+from discrepancy.rig import Transient
+
+Array = NDArray[np.float64]
+
+
+def worst_intervals(
+    trial: int, time: Array, x: Array, durations_s: Sequence[float], *, two_sided: bool
+) -> list[Transient]:
+    """The intervals with the largest sum of a series over its noise.
+
+    Args:
+        trial: index of the trial, from 0.
+        time: of the rows [s], shape (n,), evenly spaced but for gaps.
+        x: such as the square of a whitened residual, shape (n,).
+        durations_s: lengths that are tried [s].
+        two_sided: whether a sum far below zero counts as one far above.
+    """
+    if len(time) < 3:
+        return []
+    total = np.concatenate([[0.0], np.cumsum(x - np.median(x))])
+    rate = (len(time) - 1) / (time[-1] - time[0])
+    best = []
+    for duration in durations_s:
+        width = max(2, round(duration * rate))
+        if width < len(time):
+            sums = (total[width:] - total[:-width]) / np.sqrt(width)
+            sums = np.abs(sums) if two_sided else sums
+            at = int(np.argmax(sums))
+            best.append((float(sums[at]), float(time[at]), duration))
+    return [
+        Transient(trial, start, duration) for _, start, duration in sorted(best)[-rules.WORST_INTERVALS :]
+    ]
+
+
+def intervals_near(when: Transient, shortest_s: float) -> list[Transient]:
+    """The same event with its ends moved, longer than ``shortest_s``."""
+    start, end = when.start_s, when.start_s + when.duration_s
+    steps = np.array(rules.PUSH_MOVES) * when.duration_s
+    return [
+        Transient(when.trial, float(start + a), float(end + b - start - a))
+        for a in steps
+        for b in steps
+        if (a or b) and end + b - start - a > shortest_s
+    ]
