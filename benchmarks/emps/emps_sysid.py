@@ -1,7 +1,7 @@
 """The same fit with ``mujoco.sysid``: same axis, same four numbers (mass, Coulomb, viscous forwards and backwards).
 
     pip install 'mujoco[sysid]'
-    python benchmarks/emps_sysid.py
+    python benchmarks/emps/emps_sysid.py
 
 ``mujoco.sysid`` fits the closed loop of the MJCF by non-linear least squares on position and voltage; the diagnosis'
 problem is linear in the force, whitened as in a diagnosis or plain. All are judged alike: by force, and by the digital
