@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from discrepancy.causes.tolerances_file import read_tolerances
-from discrepancy.emps.catalogue import DEFAULTS
+from discrepancy.emps.catalogue import default_tolerances
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.diagnosis import diagnose_axis
 from discrepancy.emps.recording.reader import read_emps
@@ -38,7 +38,7 @@ def run(options: Diagnose) -> None:
             f"{len(options.rec)} recordings are given; the emps rig takes one and cuts it into blocks that validate "
             "each other"
         )
-    tolerances = read_tolerances(options.tolerances, DEFAULTS)
+    tolerances = read_tolerances(options.tolerances, default_tolerances())
     with whole_folder(options.out) if options.out else nullcontext() as folder, stages() as (say, advance):
         say("read")
         log = read_emps(next(iter(options.rec)))
