@@ -2,7 +2,7 @@
 
     python benchmarks/emps_gain.py
 
-Force (inverse), position and voltage (reference run again in closed loop): in sample, on held-out blocks, and on the
+Force (inverse), position and voltage (reference resimulated in closed loop): in sample, on held-out blocks, and on the
 whole second recording, which nothing was fitted to but the pulses that its own diagnosis finds.
 """
 

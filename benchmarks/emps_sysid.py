@@ -5,7 +5,7 @@
 
 ``mujoco.sysid`` fits the closed loop of the MJCF by non-linear least squares on position and voltage; the diagnosis'
 problem is linear in the force, whitened as in a diagnosis or plain. All are judged alike: by force, and by the digital
-loop run again.
+loop, resimulated.
 """
 
 from __future__ import annotations

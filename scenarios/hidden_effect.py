@@ -19,7 +19,7 @@ from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.words import TeamWords
 from estimator.estimate.payload import estimate_payload
-from estimator.recording.model import write_recording
+from estimator.recording.parquet import write_recording
 from mocobot_sim.effects import apply_effects, make_effect
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import measure, sensor_preset

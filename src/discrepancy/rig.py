@@ -1,4 +1,4 @@
-"""What the diagnosis needs to know of a rig: rows, unknowns, causes, and how to run it again."""
+"""What the diagnosis needs to know of a rig: rows, unknowns, causes, and how to resimulate it."""
 
 from __future__ import annotations
 
@@ -234,15 +234,15 @@ class Rig(ABC):
 
     # The simulator.
 
-    def can_run_again(self) -> str | None:
-        """Why the recordings cannot be simulated again, or None."""
+    def can_resimulate(self) -> str | None:
+        """Why the recordings cannot be resimulated, or None."""
         return None
 
     @abstractmethod
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
     ) -> Callable[[], dict[str, Array] | None]:
-        """What runs one trial's commands again, in any process.
+        """What resimulates one trial's commands, in any process.
 
         It returns recorded minus simulated response by channel, or None where that cannot be simulated.
         """

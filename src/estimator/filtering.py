@@ -61,6 +61,8 @@ def differentiate(x: ArrayLike, rate_hz: float) -> Array:
     Raises:
         InputError: fewer than 16 samples.
     """
+    # The same as scipy's savgol_filter(x, 7, 6, deriv=1), whose weights are off by 4e-15: enough to change the tiny
+    # errors of noise-free recordings by 5e-7 of themselves.
     x = _samples(x)
     n, width = len(x), 2 * _HALF_WIDTH + 1
     y = np.empty_like(x)

@@ -109,7 +109,8 @@ class Fields:
         check_known(self.values, keys, self.where)
         for key in self.required:
             if key not in self.values:
-                raise InputError(f"{self.where}: missing key {key!r}; the keys are {', '.join(keys)}")
+                rule = "required are" if self.optional else "the keys are"
+                raise InputError(f"{self.where}: missing key {key!r}; {rule} {', '.join(self.required)}")
 
     def __contains__(self, key: str) -> bool:
         """Whether an optional key is given."""

@@ -1,6 +1,109 @@
-"""Command line of mocobot."""
+"""Simulate mobile cobots that carry an unknown payload, estimate it, and find out what the simulation gets wrong.
+
+The names in ``__all__`` are the public ones (docs/api.md); each is imported when it is first used, so that
+``import mocobot`` costs nothing.
+"""
+
+from __future__ import annotations
 
 import os
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 # The matrices are small: threads that fight over them make a diagnosis several times slower on a busy machine.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+if TYPE_CHECKING:
+    from estimator.errors import InputError as InputError
+    from estimator.recording.model import Recording as Recording
+    from estimator.recording.parquet import read_recording as read_recording
+    from estimator.recording.parquet import write_recording as write_recording
+    from mocobot import bases as bases
+    from mocobot import emps as emps
+    from mocobot import guiding as guiding
+    from mocobot import pictures as pictures
+    from mocobot import robots as robots
+    from mocobot import trajectories as trajectories
+    from mocobot.api.conversion import Conversion as Conversion
+    from mocobot.api.conversion import convert as convert
+    from mocobot.api.diagnosis import Cause as Cause
+    from mocobot.api.diagnosis import Diagnosis as Diagnosis
+    from mocobot.api.diagnosis import diagnose as diagnose
+    from mocobot.api.estimation import Estimate as Estimate
+    from mocobot.api.estimation import estimate as estimate
+    from mocobot.api.estimation import read_estimate as read_estimate
+    from mocobot.api.inspection import Inspection as Inspection
+    from mocobot.api.inspection import inspect as inspect
+    from mocobot.api.replay import replay as replay
+    from mocobot.api.simulation import SimulatedRecording as SimulatedRecording
+    from mocobot.api.simulation import simulate as simulate
+    from mocobot_sim.effects.base import Effect as Effect
+    from mocobot_sim.effects.catalogue import EFFECTS as EFFECTS
+    from mocobot_sim.effects.catalogue import apply_effects as apply_effects
+    from mocobot_sim.effects.catalogue import make_effect as make_effect
+    from mocobot_sim.errors import TrialError as TrialError
+    from mocobot_sim.scene.scene import TeamScene as TeamScene
+    from mocobot_sim.scene.scene import build_team as build_team
+    from mocobot_sim.trial.sensors import PRESETS as PRESETS
+    from mocobot_sim.trial.sensors import SensorPreset as SensorPreset
+    from mocobot_sim.trial.sensors import measure as measure
+    from mocobot_sim.trial.trial import run_trial as run_trial
+    from mocobot_sim.trial.trial_log import TrialLog as TrialLog
+    from mocobot_sim.trial.truth import GroundTruth as GroundTruth
+
+_HOMES = {
+    "Cause": "mocobot.api.diagnosis",
+    "Conversion": "mocobot.api.conversion",
+    "Diagnosis": "mocobot.api.diagnosis",
+    "EFFECTS": "mocobot_sim.effects.catalogue",
+    "Effect": "mocobot_sim.effects.base",
+    "Estimate": "mocobot.api.estimation",
+    "GroundTruth": "mocobot_sim.trial.truth",
+    "InputError": "estimator.errors",
+    "Inspection": "mocobot.api.inspection",
+    "PRESETS": "mocobot_sim.trial.sensors",
+    "Recording": "estimator.recording.model",
+    "SensorPreset": "mocobot_sim.trial.sensors",
+    "SimulatedRecording": "mocobot.api.simulation",
+    "TeamScene": "mocobot_sim.scene.scene",
+    "TrialError": "mocobot_sim.errors",
+    "TrialLog": "mocobot_sim.trial.trial_log",
+    "apply_effects": "mocobot_sim.effects.catalogue",
+    "bases": "mocobot",
+    "build_team": "mocobot_sim.scene.scene",
+    "convert": "mocobot.api.conversion",
+    "diagnose": "mocobot.api.diagnosis",
+    "emps": "mocobot",
+    "estimate": "mocobot.api.estimation",
+    "guiding": "mocobot",
+    "inspect": "mocobot.api.inspection",
+    "make_effect": "mocobot_sim.effects.catalogue",
+    "measure": "mocobot_sim.trial.sensors",
+    "pictures": "mocobot",
+    "read_estimate": "mocobot.api.estimation",
+    "read_recording": "estimator.recording.parquet",
+    "replay": "mocobot.api.replay",
+    "robots": "mocobot",
+    "run_trial": "mocobot_sim.trial.trial",
+    "simulate": "mocobot.api.simulation",
+    "trajectories": "mocobot",
+    "write_recording": "estimator.recording.parquet",
+}
+"""Where each public name is defined; modules of this package are themselves public."""
+
+__all__ = list(_HOMES)  # pyright: ignore[reportUnsupportedDunderAll]
+
+
+def __getattr__(name: str) -> Any:
+    """A public name, imported now (PEP 562)."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    home = _HOMES[name]
+    found = import_module(f"{home}.{name}") if home == __name__ else getattr(import_module(home), name)
+    globals()[name] = found
+    return found
+
+
+def __dir__() -> list[str]:
+    """What a notebook completes."""
+    return sorted(__all__)

@@ -57,7 +57,7 @@ class Diagnose:
     jobs: int = 2
     """Parallel processes."""
     tolerances: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
-    """How far a healthy robot may be off; see docs/diagnosis.md."""
+    """How far a healthy robot may be off; see docs/diagnosis/guide.md."""
     exclude: Annotated[tuple[str, ...], tyro.conf.arg(metavar="CAUSE...")] = ()
     """Causes not to consider."""
     closed_loop: bool = True

@@ -16,8 +16,8 @@ from discrepancy.result.traces_file import NAME as RESIDUALS
 from discrepancy.result.traces_file import load_traces
 from discrepancy.rig import Channel
 from estimator.errors import InputError
-from estimator.estimate.json import FORMAT as ESTIMATE
-from estimator.estimate.json import VERSION as ESTIMATE_VERSION
+from estimator.estimate.result import FORMAT as ESTIMATE
+from estimator.estimate.result import VERSION as ESTIMATE_VERSION
 from estimator.estimate.result import PayloadEstimate
 from mocobot_sim.paper.tables import paper_tables, summary_table
 from mocobot_view.facts.diagnosis import VERDICTS

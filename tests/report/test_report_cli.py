@@ -172,8 +172,8 @@ def test_nothing_of_others_is_overwritten(tmp_path: Path, capsys: pytest.Capture
 
 def test_page_lies_beside_what_it_is_of_when_diagnosed_again(tmp_path: Path) -> None:
     """A folder that also holds a report is still a diagnosis that may be replaced."""
-    from mocobot.commands.diagnose_folder import _is_diagnosis
+    from discrepancy.result.diagnosed import is_diagnosis
 
     folder = diagnosis_folder(tmp_path / "result")
     (folder / "report.html").write_text("")
-    assert _is_diagnosis(folder)
+    assert is_diagnosis(folder)

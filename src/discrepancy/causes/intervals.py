@@ -7,14 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.rig import Transient
 
 Array = NDArray[np.float64]
-
-WORST = 2
-"""Intervals that are looked at, of all lengths."""
-MOVES = np.array([-0.4, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2, 0.4])
-"""By which either end is moved, in lengths of the interval."""
 
 
 def worst_intervals(
@@ -41,13 +37,15 @@ def worst_intervals(
             sums = np.abs(sums) if two_sided else sums
             at = int(np.argmax(sums))
             best.append((float(sums[at]), float(time[at]), duration))
-    return [Transient(trial, start, duration) for _, start, duration in sorted(best)[-WORST:]]
+    return [
+        Transient(trial, start, duration) for _, start, duration in sorted(best)[-rules.WORST_INTERVALS :]
+    ]
 
 
 def intervals_near(when: Transient, shortest_s: float) -> list[Transient]:
     """The same event with its ends moved, longer than ``shortest_s``."""
     start, end = when.start_s, when.start_s + when.duration_s
-    steps = MOVES * when.duration_s
+    steps = np.array(rules.PUSH_MOVES) * when.duration_s
     return [
         Transient(when.trial, float(start + a), float(end + b - start - a))
         for a in steps

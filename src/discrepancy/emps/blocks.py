@@ -6,40 +6,32 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
+from discrepancy import rules
 from discrepancy.emps.recording.signals import Signals
 
 Array = NDArray[np.float64]
-
-EDGE_S = 0.15
-"""Left out at both ends of a recording, where smoothing has one side only."""
-LENGTH_S = 6.0
-"""About what a block lasts where the reference does not repeat."""
-SEARCH = 0.06
-"""A cut may move by this share of a block to where the motion is steady."""
-SAME = 3e-4
-"""Cycles of the reference agree to this share of its range; filled gaps leave that much."""
-LEAST_PERIOD_S = 1.0
 
 
 def period_of(reference: Array, rate_hz: float) -> int | None:
     """Samples after which the reference repeats itself at least once in full, or None."""
     count = len(reference)
     x = reference - reference.mean()
-    least, most = round(LEAST_PERIOD_S * rate_hz), count // 2
+    least, most = round(rules.LEAST_PERIOD_S * rate_hz), count // 2
     if most <= least or np.ptp(x) == 0:
         return None
     squares = np.concatenate([[0.0], np.cumsum(x**2)])
     product = fftconvolve(x, x[::-1])[count - 1 :]
     lags = np.arange(least, most + 1)
     apart = (squares[count] - squares[lags]) + squares[count - lags] - 2.0 * product[lags]
-    close = apart / (count - lags) < (SAME * np.ptp(x)) ** 2
+    close = apart / (count - lags) < (rules.SAME_CYCLE_SHARE * np.ptp(x)) ** 2
     if not close.any():
         return None
     # The first run of lags that will do, and the best of it: neighbours of the period nearly do, too.
     first = int(np.argmax(close))
     run = first + int(np.argmin(np.append(close[first:], False)))
     lag = int(lags[first:run][np.argmin((apart / (count - lags))[first:run])])
-    return lag if np.abs(reference[lag:] - reference[:-lag]).max() <= SAME * np.ptp(x) else None
+    apart = np.abs(reference[lag:] - reference[:-lag]).max()
+    return lag if apart <= rules.SAME_CYCLE_SHARE * np.ptp(x) else None
 
 
 def blocks(signals: Signals, period: int | None) -> list[slice]:
@@ -49,12 +41,12 @@ def blocks(signals: Signals, period: int | None) -> list[slice]:
     steadily: there its measured position and velocity say all about its state, so that a simulation can start.
     """
     rate, count = signals.log.rate_hz, len(signals.x)
-    first, last = round(EDGE_S * rate), count - round(EDGE_S * rate)
-    number = max(2, round((last - first) / (period or LENGTH_S * rate)))
+    first, last = round(rules.EDGE_S * rate), count - round(rules.EDGE_S * rate)
+    number = max(2, round((last - first) / (period or rules.BLOCK_LENGTH_S * rate)))
     length = period or (last - first) // number
-    starts = [_steady(signals, first, first + max(2, round(SEARCH * length)))]
+    starts = [_steady(signals, first, first + max(2, round(rules.CUT_SHARE * length)))]
     for k in range(1, number):
-        near, reach = starts[0] + k * length, round(0.5 * SEARCH * length)
+        near, reach = starts[0] + k * length, round(0.5 * rules.CUT_SHARE * length)
         starts.append(_steady(signals, near - reach, near + reach))
     return [slice(a, b) for a, b in zip(starts, [*starts[1:], last], strict=True)]
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.causes.base import Hints
 from discrepancy.emps.noise import dither
@@ -18,9 +19,6 @@ from discrepancy.rig import Candidate
 
 Array = NDArray[np.float64]
 Tolerances = Mapping[str, Mapping[str, float]]
-
-SPOILT = 0.01
-"""Share of a trace's square that rounding may be; a fit would be off by as much."""
 
 
 def default_tolerances() -> dict[str, dict[str, float]]:
@@ -51,7 +49,7 @@ def hidden_by_rounding(signals: Signals, reduction: Reduction, hints: Hints, whi
             white_here = replace(white, moving=len(own))
             trace += float(np.sum(white_here(own) ** 2))
             error += float(np.sum(white_here(off) ** 2))
-        if error > SPOILT * trace:
+        if error > rules.SPOILT_SHARE * trace:
             out.append(name)
     return out
 

@@ -1,4 +1,4 @@
-"""Run a recording's reference again, block by block from where each began."""
+"""Resimulate a recording's reference, block by block from where each began."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG, LIMIT_V, AxisLog
 from discrepancy.emps.recording.signals import Signals
 from discrepancy.rig import Candidate
@@ -15,9 +16,6 @@ from mocobot_sim.emps.loop import Start, run
 from mocobot_sim.emps.plant import Plant
 
 Array = NDArray[np.float64]
-
-REMEMBERED = 16
-"""Samples before a block that the loop may still remember."""
 
 
 def nominal_plant(log: AxisLog) -> Plant:
@@ -44,7 +42,7 @@ def plant_of(nominal: Plant, active: Sequence[tuple[Candidate, Array]]) -> Plant
 
 def start_of(signals: Signals, sample: int) -> Start:
     """State at one sample of a recording, from its smoothed signals."""
-    before = slice(max(sample - REMEMBERED, 0), sample)
+    before = slice(max(sample - rules.REMEMBERED, 0), sample)
     return Start(
         float(signals.x[sample]),
         float(signals.v[sample]),
@@ -53,7 +51,7 @@ def start_of(signals: Signals, sample: int) -> Start:
     )
 
 
-def errors_of_rerun(
+def resimulation_errors(
     plant: Plant,
     time: Array,
     reference: Array,

@@ -2,21 +2,49 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.causes.numbers import number
+from discrepancy.emps.catalogue import Tolerances
+from discrepancy.emps.recording.axis_log import AxisLog
 from discrepancy.emps.rig import EmpsRig
+from discrepancy.emps.traces import traces
+from discrepancy.emps.words import EmpsWords
 from discrepancy.engine.diagnose import Diagnosis, diagnose
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.block_errors import block_covariance, part_of, with_block_errors
+from discrepancy.result.diagnosed import Diagnosed
 
-MOST_CAUSES = 10
-"""The nominal axis is a bare mass: mass, friction of several kinds and the loop's details are all left out of it."""
-BLOCK_S = 1.0
-"""Blocks of the standard errors: what is left is correlated over a few tenths of a second."""
+
+def diagnose_emps(
+    log: AxisLog,
+    tolerances: Tolerances | None = None,
+    excluded: Sequence[str] = (),
+    *,
+    closed_loop: bool = True,
+    jobs: int = 1,
+    say: Callable[[str], object] | None = None,
+    simulated: Callable[[int], object] | None = None,
+) -> Diagnosed:
+    """Check a recording, and find out what the nominal axis gets wrong.
+
+    Args:
+        log: the recording.
+        tolerances: standard deviations by cause and parameter; None for the defaults.
+        excluded: causes left out of the catalogue.
+        closed_loop, jobs, say, simulated: as of ``diagnose``.
+
+    Raises:
+        InputError: the recording cannot be used, or a cause to be excluded does not exist.
+    """
+    rig = EmpsRig.of(log, tolerances, excluded)
+    found = diagnose_axis(rig, closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated)
+    return Diagnosed(rig, found, EmpsWords(), partial(traces, rig, found.explanation))
 
 
 def diagnose_axis(
@@ -33,7 +61,9 @@ def diagnose_axis(
         rig: the recording.
         closed_loop, jobs, say, simulated: as of ``diagnose``.
     """
-    found = diagnose(rig, closed_loop=closed_loop, most=MOST_CAUSES, jobs=jobs, say=say, simulated=simulated)
+    found = diagnose(
+        rig, closed_loop=closed_loop, most=rules.EMPS_MOST_CAUSES, jobs=jobs, say=say, simulated=simulated
+    )
     explanation = with_block_errors(found.explanation, block_rows(rig))
     notes = (*rig.log.notes, *found.notes, _noise(rig), *_loop(rig, found.explanation))
     return replace(found, explanation=explanation, notes=notes)
@@ -41,7 +71,7 @@ def diagnose_axis(
 
 def block_rows(rig: EmpsRig) -> int:
     """Rows in a block of the standard errors."""
-    return round(BLOCK_S * rig.row_rate_hz(0))
+    return round(rules.ERROR_BLOCK_S * rig.row_rate_hz(0))
 
 
 def also_fitted(

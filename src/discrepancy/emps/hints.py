@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lombscargle
 
-from discrepancy.emps.causes.base import SHORTEST_RIPPLE_M, Hints
+from discrepancy import rules
+from discrepancy.emps.causes.base import Hints
 from discrepancy.emps.causes.sliding import direction
 from discrepancy.emps.pulse_search import pulse_train, rectangle
 from discrepancy.emps.recording.signals import Signals, smooth
@@ -14,13 +15,11 @@ from discrepancy.emps.reduction import Reduction
 
 Array = NDArray[np.float64]
 
-SLOW_MPS = 1e-3
-
 
 def hints_of(signals: Signals, reduction: Reduction) -> Hints:
     """Hints from one recording."""
     v = signals.v
-    known = np.column_stack([signals.a, direction(signals, SLOW_MPS), v, np.abs(v), np.ones(len(v))])
+    known = np.column_stack([signals.a, direction(signals, rules.SLOW_MPS), v, np.abs(v), np.ones(len(v))])
     rows = np.concatenate(reduction(np.column_stack([signals.residual[:, 0], known, signals.x, v])))
     fitted = np.linalg.lstsq(rows[:, 1:6], rows[:, 0], rcond=None)[0]
     force = signals.residual[:, 0] - known[:, :-1] @ fitted[:-1]  # its constant may be the pulses' own
@@ -59,6 +58,6 @@ def _wavelength(x: Array, speed: Array, left: Array) -> float:
     moving = speed > 0.2 * np.sqrt(np.mean(speed**2))
     x, left = x[moving], np.clip(left[moving], -3.0 * np.std(left), 3.0 * np.std(left))
     stroke = float(np.ptp(x))
-    per_m = np.arange(2.0 / stroke, 1.0 / SHORTEST_RIPPLE_M, 0.2 / stroke)
+    per_m = np.arange(2.0 / stroke, 1.0 / rules.SHORTEST_RIPPLE_M, 0.2 / stroke)
     power = np.asarray(lombscargle(x, left - left.mean(), 2.0 * np.pi * per_m))
     return float(1.0 / per_m[int(np.argmax(power))])

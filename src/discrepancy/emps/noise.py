@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG
 from discrepancy.emps.recording.preflight import resolution
 from discrepancy.emps.recording.signals import Signals, smooth
@@ -21,10 +22,6 @@ from discrepancy.least_squares.whitening import Whitening
 from estimator.filtering import differentiate
 
 Array = NDArray[np.float64]
-
-REPEATED = 0.02
-"""Motion repeats if its tracking error differs between cycles by less than this share of itself."""
-DITHER_SEED = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +52,7 @@ def repeated(signals: Signals, period: int | None) -> bool:
     # A quantised position repeats but for where its steps fall.
     rounding = resolution(signals.log.position).step_m ** 2 / 6.0
     rms = np.sqrt(max(np.mean(change**2) - rounding, 0.0))
-    return bool(rms < REPEATED * np.sqrt(np.mean(error[usable] ** 2)))
+    return bool(rms < rules.REPEATED_SHARE * np.sqrt(np.mean(error[usable] ** 2)))
 
 
 def from_repeats(left: list[Array], signals: Signals, reduction: Reduction, period: int, order: int) -> Noise:
@@ -115,7 +112,7 @@ def _deviations(x: Array, period: int, usable: NDArray[np.bool_]) -> tuple[Array
 def dither(signals: Signals) -> Array:
     """A fresh draw of the position's rounding errors [m], shape (Q,); zero where it shows no steps."""
     step = resolution(signals.log.position).step_m
-    return np.random.default_rng(DITHER_SEED).uniform(-0.5 * step, 0.5 * step, len(signals.x))
+    return np.random.default_rng(rules.DITHER_SEED).uniform(-0.5 * step, 0.5 * step, len(signals.x))
 
 
 def _rounding(signals: Signals) -> Array:

@@ -11,12 +11,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from discrepancy import rules
 
-SHORTEST_S, LONGEST_S = 0.2, 6.0
-BINS = 50
-FOLD_HZ = 100.0
-WIDTHS = np.arange(2, BINS - 1)
+Array = NDArray[np.float64]
 
 
 class Train(NamedTuple):
@@ -30,13 +27,14 @@ class Train(NamedTuple):
 
 def pulse_train(residual: Array, rate_hz: float) -> Train:
     """The rectangular train that explains most of a residual, shape (Q,); there always is one, meaningful or not."""
-    step = max(1, round(rate_hz / FOLD_HZ))
+    step = max(1, round(rate_hz / rules.PULSE_FOLD_HZ))
     count = len(residual) // step
     coarse = residual[: count * step].reshape(count, step).mean(axis=1)
     time = (np.arange(count) + 0.5) * step / rate_hz
     level = coarse - np.median(coarse)
     duration = count * step / rate_hz
-    frequencies = np.arange(1.0 / min(LONGEST_S, duration / 2.0), 1.0 / SHORTEST_S, 0.1 / duration)
+    shortest, longest = rules.PULSE_PERIODS_S
+    frequencies = np.arange(1.0 / min(longest, duration / 2.0), 1.0 / shortest, 0.1 / duration)
     best = (-np.inf, 1.0, 0.0, 0.5)
     for frequency in frequencies:
         power, phase, width = _box(level, time * frequency % 1.0)
@@ -71,19 +69,20 @@ def rectangle(time: Array, start_s: float, period_s: float, width_s: float) -> A
 
 def _box(level: Array, phase: Array) -> tuple[float, float, float]:
     """The best box in a folded series: power, start and width in shares of the period."""
-    bins = np.minimum((phase * BINS).astype(int), BINS - 1)
-    sums = np.bincount(bins, level, BINS)
-    counts = np.bincount(bins, minlength=BINS)
+    bins = np.minimum((phase * rules.PULSE_BINS).astype(int), rules.PULSE_BINS - 1)
+    sums = np.bincount(bins, level, rules.PULSE_BINS)
+    counts = np.bincount(bins, minlength=rules.PULSE_BINS)
     total, number = sums.sum(), counts.sum()
     doubled = np.concatenate([[0.0], np.cumsum(np.tile(sums, 2))])
     many = np.concatenate([[0.0], np.cumsum(np.tile(counts, 2))])
-    start = np.arange(BINS)
-    stop = start + WIDTHS[:, None]
+    start = np.arange(rules.PULSE_BINS)
+    widths = np.arange(2, rules.PULSE_BINS - 1)
+    stop = start + widths[:, None]
     inside, n = doubled[stop] - doubled[start], many[stop] - many[start]
     spread = np.maximum(n * (number - n) / number, 1e-9)
     power = (inside - total * n / number) ** 2 / spread
     k, at = np.unravel_index(int(np.argmax(power)), power.shape)
-    return float(power[k, at]), at / BINS, WIDTHS[k] / BINS
+    return float(power[k, at]), at / rules.PULSE_BINS, widths[k] / rules.PULSE_BINS
 
 
 def _sharpened(residual: Array, rate_hz: float, train: Train) -> Train:

@@ -9,15 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import oaconvolve
 
-from discrepancy.emps.blocks import EDGE_S
+from discrepancy import rules
 from estimator.filtering import low_pass
 
 Array = NDArray[np.float64]
-
-CUTOFF_HZ = 40.0
-ROWS_HZ = 100.0
-HALF_S = 0.05
-"""Half of the filter's length; it has died to 1e-3 there, and rows closer to a block's ends than that are left out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,12 +32,12 @@ class Reduction:
     @classmethod
     def of(cls, rate_hz: float, blocks: Sequence[slice], usable: NDArray[np.bool_]) -> Reduction:
         """Rows of blocks of samples; a row is left out where the filter would see an unusable sample."""
-        half, step = round(HALF_S * rate_hz), max(1, round(rate_hz / ROWS_HZ))
+        half, step = round(rules.HALF_S * rate_hz), max(1, round(rate_hz / rules.EMPS_ROWS_HZ))
         wide = np.zeros(8 * half + 1)
         wide[4 * half] = 1.0
-        kernel = low_pass(wide, rate_hz, min(CUTOFF_HZ, 0.15 * rate_hz))[3 * half : 5 * half + 1]
+        kernel = low_pass(wide, rate_hz, min(rules.EMPS_CUTOFF_HZ, 0.15 * rate_hz))[3 * half : 5 * half + 1]
         # Differentiating smooths too, over about the edge's length.
-        reach = half + round(0.1 * EDGE_S * rate_hz)
+        reach = half + round(0.1 * rules.EDGE_S * rate_hz)
         spoilt = np.convolve(~usable, np.ones(2 * reach + 1), mode="same") > 0.5
         rows = []
         for block in blocks:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.causes.intervals import intervals_near, worst_intervals
 from discrepancy.emps.blocks import blocks, period_of
@@ -23,7 +24,7 @@ from discrepancy.emps.catalogue import (
 )
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.causes.base import Hints
-from discrepancy.emps.closed_loop import effects_of, errors_of_rerun, nominal_plant, plant_of, start_of
+from discrepancy.emps.closed_loop import effects_of, nominal_plant, plant_of, resimulation_errors, start_of
 from discrepancy.emps.hints import hints_of
 from discrepancy.emps.noise import Noise, from_remainder, from_repeats, repeated
 from discrepancy.emps.recording.axis_log import AxisLog
@@ -39,14 +40,6 @@ from mocobot_sim.emps.extended import write_extended
 from mocobot_sim.emps.plant import Plant
 
 Array = NDArray[np.float64]
-
-AR_ORDER = 8
-"""More does not whiten the benchmark's noise better (by Akaike's criterion)."""
-DURATIONS_S = (0.2, 0.4, 0.8, 1.6)
-SHORTEST_S = 0.15
-"""Any push shorter than that cannot be told from what friction does when the axis turns round."""
-LEAST_ROWS = 100
-"""Rows that a block must have to be one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,10 +85,10 @@ class EmpsRig(Rig):
         hints = hints_of(signals, reduction)
         left = remainder(signals, reduction, hints)
         if period is not None and repeated(signals, period):
-            noise = from_repeats(left, signals, reduction, period, AR_ORDER)
+            noise = from_repeats(left, signals, reduction, period, rules.EMPS_AR_ORDER)
         else:
             noise = from_remainder(left, signals, reduction)
-        shared = Whitening.of(noise.draws, noise.draws.shape[1], AR_ORDER)
+        shared = Whitening.of(noise.draws, noise.draws.shape[1], rules.EMPS_AR_ORDER)
         whitening = tuple(replace(shared, moving=len(rows)) for rows in reduction.samples)
         known = default_tolerances() if tolerances is None else tolerances
         hidden = hidden_by_rounding(signals, reduction, hints, shared)
@@ -189,7 +182,7 @@ class EmpsRig(Rig):
         causes = [c for c in CAUSES.values() if c.transient and c.name not in self.excluded]
         for t, z in enumerate(remaining if causes else ()):
             time = self.log.time[self.reduction.samples[t]]
-            worst = worst_intervals(t, time, z[:, 0], DURATIONS_S, two_sided=True)
+            worst = worst_intervals(t, time, z[:, 0], rules.EMPS_PUSH_S, two_sided=True)
             out += [cause.event(self.tolerances[cause.name], when) for cause in causes for when in worst]
         return out
 
@@ -198,21 +191,21 @@ class EmpsRig(Rig):
         cause, when = CAUSES[candidate.cause], candidate.transient
         if when:
             tolerance = self.tolerances[cause.name]
-            return [cause.event(tolerance, near) for near in intervals_near(when, SHORTEST_S)]
+            return [cause.event(tolerance, near) for near in intervals_near(when, rules.EMPS_SHORTEST_PUSH_S)]
         shapes = cause.finer(candidate.shape) if finer else cause.shapes(self.hints)
         return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
 
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
     ) -> Callable[[], dict[str, Array] | None]:
-        """What runs one block's reference again, with causes in the axis.
+        """What resimulates one block's reference, with causes in the axis.
 
         It returns recorded minus simulated ``position`` [m] and ``voltage`` [V], shape (Q,) each.
         """
         here, log = self.blocks[trial], self.log
         acting = [(c, v) for c, v in active if c.acts_in(trial)]
         return partial(
-            errors_of_rerun,
+            resimulation_errors,
             plant_of(self.nominal, acting),
             log.time[here],
             log.reference[here],
@@ -275,7 +268,7 @@ class EmpsRig(Rig):
 
 def _long_enough(log: AxisLog, cut: list[slice], reduction: Reduction) -> tuple[list[slice], Reduction]:
     """Only blocks with rows enough."""
-    keep = [k for k, rows in enumerate(reduction.samples) if len(rows) >= LEAST_ROWS]
+    keep = [k for k, rows in enumerate(reduction.samples) if len(rows) >= rules.LEAST_ROWS]
     if not keep:
         raise InputError(f"{log.name}: no part of it is long enough to diagnose")
     return [cut[k] for k in keep], replace(reduction, samples=tuple(reduction.samples[k] for k in keep))

@@ -8,21 +8,13 @@ from typing import Literal
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.engine.explanation import Explanation, Found
 from discrepancy.engine.gain import Gain, Response, mean_chi2, responses
-from discrepancy.engine.search import ENOUGH, MOST_CAUSES, refitted, search, without_idle
+from discrepancy.engine.search import refitted, search, without_idle
 from discrepancy.rig import Candidate, Rig
 
 Verdict = Literal["consistent", "explained", "partly_explained", "unexplained"]
-
-MARGIN = 0.02
-"""Two simulations whose chi-square differs by less than this share are equally good."""
-CLOSE_NATS = 20.0
-"""Rivals that the rows alone put closer than this are simulated, too."""
-VISIBLE = 3.0
-"""A closed-loop chi-square from which a named cause has to improve it."""
-LEAST_SHARE = 0.3
-"""Causes that explain less than this of a large misfit are no explanation."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +64,7 @@ def diagnose(
     rig: Rig,
     *,
     closed_loop: bool = True,
-    most: int = MOST_CAUSES,
+    most: int = rules.MOST_CAUSES,
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
     simulated: Callable[[int], object] | None = None,
@@ -81,7 +73,7 @@ def diagnose(
 
     Args:
         rig: recordings and causes.
-        closed_loop: whether to run the recorded commands again.
+        closed_loop: whether to resimulate the recorded commands.
         most: largest number of causes; more than the default where the nominal model leaves out much on purpose.
         jobs: parallel processes of the simulations.
         say: called with what is being done.
@@ -95,7 +87,7 @@ def diagnose(
     ):
         explanation, note = _without_transient(rig, explanation)
         notes.append(note)
-    why_not = rig.can_run_again() if closed_loop else "the closed loop was left out on request"
+    why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"
     alternatives: list[tuple[Alternative, ...]] = [_unsimulated(found) for found in explanation.found]
     gain: Gain | None = None
     if why_not is None and explanation.found:
@@ -123,7 +115,7 @@ def diagnose(
 
 
 def _unsimulated(found: Found) -> tuple[Alternative, ...]:
-    return tuple(Alternative(c, gap, None, gap < CLOSE_NATS / 4) for c, gap in found.rivals)
+    return tuple(Alternative(c, gap, None, gap < rules.AMBIGUOUS_NATS) for c, gap in found.rivals)
 
 
 def _verdict(explanation: Explanation) -> Verdict:
@@ -131,9 +123,9 @@ def _verdict(explanation: Explanation) -> Verdict:
         return "consistent" if explanation.clean else "unexplained"
     if _add_up(explanation):
         return "unexplained"
-    if explanation.clean or explanation.explained >= ENOUGH:
+    if explanation.clean or explanation.explained >= rules.EXPLAINED_SHARE:
         return "explained"
-    return "partly_explained" if explanation.explained >= LEAST_SHARE else "unexplained"
+    return "partly_explained" if explanation.explained >= rules.LEAST_SHARE else "unexplained"
 
 
 def _add_up(explanation: Explanation) -> bool:
@@ -142,7 +134,8 @@ def _add_up(explanation: Explanation) -> bool:
     families = {found.candidate.family for found in explanation.found}
     # Where no cause has a robot, all are at one place anyway, and only their families tell.
     placed = any(candidate.robot for candidate in explanation.problem.candidates)
-    return len(explanation.found) > 2 and ((placed and len(robots) <= 1) or len(families) <= 2)
+    few = rules.MOST_BELIEVED
+    return len(explanation.found) > few and ((placed and len(robots) <= 1) or len(families) <= few)
 
 
 def _without_transient(rig: Rig, explanation: Explanation) -> tuple[Explanation, str]:
@@ -181,7 +174,7 @@ def _confirm(
     for place, found in enumerate(explanation.found):
         for rival, gap in found.rivals:
             index = problem.index_of(rival)
-            if index is None or index in free or gap > CLOSE_NATS or rival.transient:
+            if index is None or index in free or gap > rules.CLOSE_NATS or rival.transient:
                 continue
             problem = problem.with_columns(index, rival, rig.columns(rival))
             trials.append((place, rival, gap))
@@ -192,7 +185,7 @@ def _confirm(
     chosen, best = free, mean_chi2(after)
     for (place, rival, _), hypothesis, result in zip(trials, hypotheses[2:], others, strict=True):
         value = mean_chi2(result)
-        if value < best * (1.0 - MARGIN) and _wins(result, after):
+        if value < best * (1.0 - rules.MARGIN_SHARE) and _wins(result, after):
             named = explanation.found[place].candidate
             notes.append(
                 f"The rows alone could not tell {named.label} from {rival.label}; in closed loop the latter does "
@@ -209,8 +202,8 @@ def _confirm(
             notes.append(f"{gone}: tells nothing any more beside that, so it is not named.")
             after = responses(rig, explanation.problem, [explanation.fit.free], jobs, simulated)[0]
     none, ours = mean_chi2(before), mean_chi2(after)
-    idle = none > VISIBLE and ours > none * (1.0 - LEAST_SHARE)
-    if ours > none * (1.0 + MARGIN) or idle:
+    idle = none > rules.VISIBLE_CHI2_PER_N and ours > none * (1.0 - rules.LEAST_SHARE)
+    if ours > none * (1.0 + rules.MARGIN_SHARE) or idle:
         dropped = ", ".join(found.candidate.label for found in explanation.found)
         notes.append(f"{dropped}: {_in_closed_loop(none, ours)}, so it is not named.")
         after, chosen = before, []
@@ -222,8 +215,8 @@ def _confirm(
         listed = []
         for rival, gap in found.rivals:
             value = tried.get((place, rival.key))
-            apart = value is not None and value > best * (1.0 + MARGIN)
-            listed.append(Alternative(rival, gap, value, gap < CLOSE_NATS / 4 and not apart))
+            apart = value is not None and value > best * (1.0 + rules.MARGIN_SHARE)
+            listed.append(Alternative(rival, gap, value, gap < rules.AMBIGUOUS_NATS and not apart))
         alternatives.append(tuple(listed))
     return explanation, alternatives, Gain(before, after, len(rig.trials) > 1), notes
 
@@ -245,4 +238,4 @@ def _wins(rival: Sequence[Response | None], named: Sequence[Response | None]) ->
         a is not None and (b is None or a.chi2_per_n < b.chi2_per_n)
         for a, b in zip(rival, named, strict=True)
     ]
-    return float(np.mean(better)) >= 0.5
+    return float(np.mean(better)) >= rules.WINNING_SHARE

@@ -7,15 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.engine.leaders import SIGNIFICANT
+from discrepancy import rules
 from discrepancy.least_squares.fit import Evidence, Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate
 
 Array = NDArray[np.float64]
-
-CLEAN = 1.15
-"""chi-square per number below which nothing is left to explain: clean recordings of a team gave 1.02 to 1.08."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,10 +70,11 @@ class Explanation:
     @property
     def explained(self) -> float:
         """Share of the nominal model's misfit above clean data that the causes alone remove."""
-        floor = min(self.plain, CLEAN * self.samples)
+        floor = min(self.plain, rules.CLEAN_CHI2_PER_N * self.samples)
         return float(np.clip((self.nominal - self.plain) / max(self.nominal - floor, 1e-9), 0.0, 1.0))
 
     @property
     def clean(self) -> bool:
         """Whether what is left is noise, and tolerances used as they usually are."""
-        return self.after <= CLEAN * self.samples and self.fit.strain[2] > SIGNIFICANT
+        noise = self.after <= rules.CLEAN_CHI2_PER_N * self.samples
+        return noise and self.fit.strain[2] > rules.SIGNIFICANT_LOG10_P

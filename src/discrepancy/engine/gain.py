@@ -1,4 +1,4 @@
-"""What a cause is worth: recorded commands run again, with and without it, on trials it was not fitted to."""
+"""What a cause is worth: recorded commands resimulated, with and without it, on trials it was not fitted to."""
 
 from __future__ import annotations
 

@@ -6,18 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate
-
-SHORT_ROWS = 24
-"""A transient of fewer rows (2 s) cannot be split and tested on its own; its evidence has to do."""
-INSIDE = 0.1
-"""Rows that a transient reaches at all: taking out a trial's own unknowns spreads a trace of it everywhere."""
-SUPPORTING = 2
-"""Trials that a cause must help at least, when it was fitted to the others."""
-AGAINST = 1.0 / 3.0
-"""What it harms in some trials, over what it helps in the others, at most. One that does not show it hardly counts."""
 
 
 def confirmed(folds: Sequence[float]) -> bool:
@@ -25,7 +17,8 @@ def confirmed(folds: Sequence[float]) -> bool:
     if len(folds) < 2:
         return True
     helped, harmed = sum(g for g in folds if g > 0), -sum(g for g in folds if g < 0)
-    return sum(gain > 0 for gain in folds) >= SUPPORTING and harmed <= AGAINST * helped
+    supporting = sum(gain > 0 for gain in folds)
+    return supporting >= rules.SUPPORTING_TRIALS and harmed <= rules.AGAINST_SHARE * helped
 
 
 def held_out_gains(problem: Problem, free: Sequence[int], index: int, candidate: Candidate) -> list[float]:
@@ -70,13 +63,13 @@ def shares(problem: Problem, free: Sequence[int], index: int) -> tuple[float, fl
 
 
 def _interleaved(
-    problem: Problem, free: Sequence[int], index: int, trial: int, blocks: int = 4
+    problem: Problem, free: Sequence[int], index: int, trial: int, blocks: int = rules.INTERLEAVED_BLOCKS
 ) -> list[float]:
     """The same within the trial of a transient, against none at all: fitted to all but every fourth block of it."""
     rows = problem.rows[trial]
     size = np.abs(rows[..., problem.spans[index]]).sum(axis=(1, 2))
-    inside = np.flatnonzero(size > INSIDE * size.max())
-    if len(inside) < SHORT_ROWS:
+    inside = np.flatnonzero(size > rules.INSIDE_SHARE * size.max())
+    if len(inside) < rules.SHORT_ROWS:
         return []
     width = max(1, len(inside) // (2 * blocks))
     gains = []

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.engine.leaders import Leader
-from discrepancy.least_squares.fit import COMPLEXITY
 from discrepancy.rig import Rig
 
 
@@ -21,7 +21,7 @@ def imitated(rig: Rig, leader: Leader, free: Sequence[int]) -> bool:
     if not candidate.transient:
         return False
     without = problem.fit(free, fixed=(leader.evidence.index, np.zeros(len(candidate.parameters))))
-    price = COMPLEXITY * np.log(problem.samples)
+    price = rules.COMPLEXITY * np.log(problem.samples)
     own = without.fall_with(rig.columns(candidate)) - price * len(candidate.parameters)
     others = (
         without.fall_with(columns) - price * columns[0].shape[2] for columns in rig.imitators(candidate)

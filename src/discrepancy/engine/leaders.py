@@ -8,21 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.engine.best_shape import nearest_shape
-from discrepancy.least_squares.fit import COMPLEXITY, Evidence, Fit
+from discrepancy.least_squares.fit import Evidence, Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
 
 Array = NDArray[np.float64]
 
-SIGNIFICANT = -6.0
-"""log10 p of the best of about a hundred candidates (a thousand intervals for a push) to be looked at."""
-INTERVALS_LOG10 = 3.0
-"""Intervals searched for a push, as powers of ten: its evidence pays for them."""
-LEADERS = 8
-FINER_ROUNDS = 4
-"""How often a shape is sharpened around the best so far."""
-POLISH_ROUNDS = 3
 
 Shaped = tuple[Evidence, Candidate, list[Array]]
 """A candidate in one shape: its evidence and its columns."""
@@ -52,12 +45,12 @@ def leaders(
     rig: Rig, problem: Problem, free: Sequence[int], evidence: Sequence[Evidence], inflation: float
 ) -> list[Leader]:
     """Significant candidates at their best, the least misfit first."""
-    significant = [e for e in evidence if log10_p(problem, e) <= SIGNIFICANT][:LEADERS]
+    significant = [e for e in evidence if log10_p(problem, e) <= rules.SIGNIFICANT_LOG10_P][: rules.LEADERS]
     found = []
     for first in significant:
         index = first.index
         best = _sharpened(rig, problem, free, index, inflation)
-        if best is None or log10_p(best.problem, best.evidence) > SIGNIFICANT:
+        if best is None or log10_p(best.problem, best.evidence) > rules.SIGNIFICANT_LOG10_P:
             continue
         values, covariance = best.problem.fit([*free, index]).part(index)
         units = best.candidate.units
@@ -77,7 +70,7 @@ def _sharpened(
     without = problem.fit(free, fixed=(index, np.zeros(len(start.parameters))))
     best: Shaped | None = None
     shapes = [start, *rig.refinements(start)]
-    for _ in range(FINER_ROUNDS + 1):
+    for _ in range(rules.FINER_ROUNDS + 1):
         last = best
         for shape in shapes:
             columns = rig.columns(shape)
@@ -92,13 +85,13 @@ def _sharpened(
     best = _polished(rig, without, best, inflation)
     evidence, shape, columns = best
     changed = problem if shape is start else problem.with_columns(index, shape, columns)
-    penalty = COMPLEXITY * np.log(problem.samples) * evidence.parameters
+    penalty = rules.COMPLEXITY * np.log(problem.samples) * evidence.parameters
     return Leader(evidence, changed, without.misfit - evidence.fall + penalty)
 
 
 def _polished(rig: Rig, without: Fit, best: Shaped, inflation: float) -> Shaped:
     """The best of a grid of shapes, moved to where the data want it."""
-    for _ in range(POLISH_ROUNDS if rig.steps(best[1]) else 0):
+    for _ in range(rules.POLISH_ROUNDS if rig.steps(best[1]) else 0):
         evidence, shape, _ = best
         nearer = nearest_shape(rig, without, shape, evidence.values * shape.units)
         columns = rig.columns(nearer)
@@ -128,7 +121,7 @@ def _best_with_unknowns(
         judged = opened.fit(free).evidence_of(index, inflation)
         if judged is None:
             continue
-        price = COMPLEXITY * np.log(problem.samples)
+        price = rules.COMPLEXITY * np.log(problem.samples)
         misfit = price * judged.parameters + min(
             opened.fit([*free, index]).misfit + price * sum(u.shape[2] for u in unknowns),
             changed.fit([*free, index]).misfit,
@@ -179,4 +172,4 @@ def with_transients(
 def log10_p(problem: Problem, evidence: Evidence) -> float:
     """Of so much evidence by chance; that of a transient also pays for the intervals searched."""
     transient = problem.candidates[evidence.index].transient is not None
-    return evidence.log10_p + (INTERVALS_LOG10 if transient else 0.0)
+    return evidence.log10_p + (rules.INTERVALS_LOG10 if transient else 0.0)

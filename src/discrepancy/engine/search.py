@@ -7,25 +7,21 @@ from dataclasses import replace
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.engine.best_shape import covariance_with_shape
-from discrepancy.engine.explanation import CLEAN, Explanation, Found
+from discrepancy.engine.explanation import Explanation, Found
 from discrepancy.engine.held_out import confirmed, held_out_gains, shares
 from discrepancy.engine.imitation import imitated
-from discrepancy.engine.leaders import SIGNIFICANT, in_best_shapes, leaders, log10_p, with_transients
+from discrepancy.engine.leaders import in_best_shapes, leaders, log10_p, with_transients
 from discrepancy.engine.worth import is_another, worth_naming
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
 
-MOST_CAUSES = 3
-ENOUGH = 0.8
-"""Share of the misfit that causes must explain on held-out trials, or the verdict is not ``explained``."""
-RIVAL_SHARE = 0.5
-"""A rival explains at least this share of what the best does."""
-MOST_REJECTED = 4
 
-
-def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] | None = None) -> Explanation:
+def search(
+    rig: Rig, most: int = rules.MOST_CAUSES, progress: Callable[[str], object] | None = None
+) -> Explanation:
     """Explain the misfit of a rig's recordings by as few causes as possible.
 
     Args:
@@ -44,7 +40,7 @@ def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] 
     fit = problem.fit()
     before, nominal = fit.misfit, problem.fit(background=False).misfit
     while len(found) < most:
-        inflation = max(1.0, fit.misfit / (CLEAN * problem.samples))
+        inflation = max(1.0, fit.misfit / (rules.CLEAN_CHI2_PER_N * problem.samples))
         problem = in_best_shapes(rig, problem, fit)
         fit = problem.fit(free)
         # A transient stays only if what is named is judged with it in the model.
@@ -61,13 +57,13 @@ def search(rig: Rig, most: int = MOST_CAUSES, progress: Callable[[str], object] 
         folds = held_out_gains(best.problem, free, best.evidence.index, candidate)
         if not confirmed(folds) or imitated(rig, best, free):
             rejected.append(candidate)
-            if len(rejected) > MOST_REJECTED:
+            if len(rejected) > rules.MOST_REJECTED:
                 break
             continue
         rivals = tuple(
             (k.candidate, 0.5 * (k.misfit - best.misfit))
             for k in ranked[1:]
-            if fit.misfit - k.misfit > RIVAL_SHARE * (fit.misfit - best.misfit)
+            if fit.misfit - k.misfit > rules.RIVAL_SHARE * (fit.misfit - best.misfit)
         )
         problem = best.problem
         before_it = list(free)
@@ -167,15 +163,17 @@ def _idle(problem: Problem, free: Sequence[int], places: Iterable[int]) -> list[
     for place in places:
         index = free[place]
         others = problem.fit([i for i in free if i != index])
-        inflation = max(1.0, others.misfit / (CLEAN * problem.samples))
+        inflation = max(1.0, others.misfit / (rules.CLEAN_CHI2_PER_N * problem.samples))
         judged = others.evidence_of(index, inflation)
         told = 0.0 if judged is None else log10_p(problem, judged)
-        if told > SIGNIFICANT and (weakest is None or told > weakest[0]):
+        if told > rules.SIGNIFICANT_LOG10_P and (weakest is None or told > weakest[0]):
             weakest = told, place
     return [] if weakest is None else [weakest[1]]
 
 
-def _refit(rig: Rig, problem: Problem, free: Sequence[int], rounds: int = 3) -> tuple[Problem, Fit]:
+def _refit(
+    rig: Rig, problem: Problem, free: Sequence[int], rounds: int = rules.REFIT_ROUNDS
+) -> tuple[Problem, Fit]:
     """Gauss-Newton on causes and unknowns: exact residuals, the catalogue's columns."""
     fit = problem.fit(free)
     for _ in range(rounds):
@@ -198,7 +196,7 @@ def _refit(rig: Rig, problem: Problem, free: Sequence[int], rounds: int = 3) -> 
             back.append(total)
         moved = problem.with_residual(back)
         new = moved.fit(free)
-        if new.misfit > 1.5 * fit.misfit + problem.samples:  # diverges: the linear answer is the better one
-            break
+        if new.misfit > rules.DIVERGED_RATIO * fit.misfit + problem.samples:
+            break  # it diverges: the linear answer is the better one
         problem, fit = moved, new
     return problem, fit

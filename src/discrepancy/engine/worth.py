@@ -5,15 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.engine.explanation import CLEAN
+from discrepancy import rules
 from discrepancy.engine.leaders import Leader
 from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Rig
-
-NEXT_SHARE = 0.25
-"""A further cause has to take away this share of what the ones before it left."""
-LOOK_ALIKE = 10.0
-"""Growth of a named cause's standard error beside a further one, from which the two are one and the same."""
 
 
 def worth_naming(rig: Rig, fit: Fit, leader: Leader, *, first: bool) -> bool:
@@ -25,10 +20,10 @@ def worth_naming(rig: Rig, fit: Fit, leader: Leader, *, first: bool) -> bool:
     transient = leader.candidate.transient is not None
     if first and not transient:
         return True
-    excess = max(fit.misfit - CLEAN * fit.problem.samples, 0.0)
+    excess = max(fit.misfit - rules.CLEAN_CHI2_PER_N * fit.problem.samples, 0.0)
     if not first:
         excess = min(excess, _excess(fit, _channels_of(rig, fit, leader)))
-    return fit.misfit - leader.misfit >= NEXT_SHARE * excess
+    return fit.misfit - leader.misfit >= rules.NEXT_SHARE * excess
 
 
 def is_another(fit: Fit, leader: Leader) -> bool:
@@ -38,7 +33,8 @@ def is_another(fit: Fit, leader: Leader) -> bool:
     """
     both = leader.problem.fit([*fit.free, leader.evidence.index])
     alone = leader.problem.fit(fit.free)
-    return all(np.all(np.diag(both.part(i)[1]) < LOOK_ALIKE**2 * np.diag(alone.part(i)[1])) for i in fit.free)
+    most = rules.LOOK_ALIKE_GROWTH**2
+    return all(np.all(np.diag(both.part(i)[1]) < most * np.diag(alone.part(i)[1])) for i in fit.free)
 
 
 def _channels_of(rig: Rig, fit: Fit, leader: Leader) -> NDArray[np.bool_]:
@@ -55,4 +51,4 @@ def _channels_of(rig: Rig, fit: Fit, leader: Leader) -> NDArray[np.bool_]:
 def _excess(fit: Fit, channels: NDArray[np.bool_]) -> float:
     """What a fit leaves in some channels above clean data."""
     left = [fit.remaining(t)[:, channels] for t in range(len(fit.problem.rows))]
-    return max(sum(float(np.sum(x**2)) - CLEAN * x.size for x in left), 0.0)
+    return max(sum(float(np.sum(x**2)) - rules.CLEAN_CHI2_PER_N * x.size for x in left), 0.0)

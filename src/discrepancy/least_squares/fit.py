@@ -10,17 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
+from discrepancy import rules
 from discrepancy.least_squares.gram import flat_inverse, gram_of, project
 
 if TYPE_CHECKING:
     from discrepancy.least_squares.problem import Problem
 
 Array = NDArray[np.float64]
-
-LEAST_INFORMATION = 1e-3
-"""A direction about which the data say less than this (inverse variance in tolerances) is undecidable."""
-COMPLEXITY = 1.6
-"""Penalty per parameter and ln n, on the scale of chi-square."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +161,7 @@ class Fit:
         """How much chi-square falls with further columns, shape (n, C, k) per trial, whose values are free."""
         information, score = self._told_by(columns)
         eigenvalues, vectors = np.linalg.eigh(information)
-        keep = eigenvalues > LEAST_INFORMATION
+        keep = eigenvalues > rules.LEAST_INFORMATION
         return float(np.sum((vectors[:, keep].T @ score) ** 2 / eigenvalues[keep]))
 
     def solution_with(self, columns: Sequence[Array]) -> tuple[Array, Array]:
@@ -190,7 +186,7 @@ class Fit:
         self, index: int, information: Array, score: Array, inflation: float, *, tolerant: bool
     ) -> Evidence | None:
         eigenvalues, vectors = np.linalg.eigh(information)
-        keep = eigenvalues > LEAST_INFORMATION
+        keep = eigenvalues > rules.LEAST_INFORMATION
         if not keep.any():
             return None
         lam, V = eigenvalues[keep], vectors[:, keep]
@@ -204,7 +200,7 @@ class Fit:
             fall,
             k,
             float(chi2.logsf(gain, k) / np.log(10.0)),
-            gain - COMPLEXITY * k * np.log(self.problem.samples),
+            gain - rules.COMPLEXITY * k * np.log(self.problem.samples),
             V @ (z / lam),
             (V / lam) @ V.T,
         )
@@ -222,7 +218,7 @@ class Fit:
         for candidate, span in zip(self.problem.candidates, self.problem.spans, strict=True):
             information, _, tolerant = self._information(span)
             lam, V = np.linalg.eigh(information)
-            keep = lam > LEAST_INFORMATION
+            keep = lam > rules.LEAST_INFORMATION
             weight = lam[keep] / (1.0 + lam[keep]) if tolerant else lam[keep]
             power = np.einsum("ik,k,ik->i", V[:, keep], weight, V[:, keep])
             size = np.sqrt(gain / np.maximum(power, 1e-300))

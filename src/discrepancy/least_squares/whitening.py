@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 
-Array = NDArray[np.float64]
+from discrepancy import rules
 
-AR_ORDER = 2
-SHRINKAGE = 0.05
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +31,7 @@ class Whitening:
     innovation: Array
 
     @classmethod
-    def of(cls, draws: Array, moving: int, order: int = AR_ORDER) -> Whitening:
+    def of(cls, draws: Array, moving: int, order: int = rules.AR_ORDER) -> Whitening:
         """Whitening from noise draws, shape (D, n, C), of which the first ``moving`` rows are a series.
 
         Args:
@@ -44,7 +43,7 @@ class Whitening:
         chol_moving = _cholesky(draws[:, :moving])
         chol_alone = _cholesky(draws[:, moving:])
         ar, innovation = np.zeros((channels, order)), np.ones(channels)
-        if order and moving > 10 * order:
+        if order and moving > rules.ROWS_PER_COEFFICIENT * order:
             flat = _per_row(chol_moving, draws[:, :moving].reshape(-1, channels))
             white = flat.reshape(len(draws), moving, channels)
             lag = [np.mean(white[:, k:] * white[:, : moving - k], axis=(0, 1)) for k in range(order + 1)]
@@ -87,7 +86,7 @@ def _cholesky(draws: Array) -> Array:
     if not len(rows):
         return np.eye(channels)
     covariance = rows.T @ rows / len(rows)
-    weight = SHRINKAGE + (1.0 - SHRINKAGE) * min(1.0, channels / len(rows))
+    weight = rules.SHRINKAGE_SHARE + (1.0 - rules.SHRINKAGE_SHARE) * min(1.0, channels / len(rows))
     diagonal = np.diag(np.diag(covariance) + 1e-30)
     factor = np.linalg.cholesky((1.0 - weight) * covariance + weight * diagonal)
     return np.array(factor, dtype=np.float64)

@@ -7,13 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.engine.explanation import Explanation
 from discrepancy.rig import Candidate
-
-NOTICED = 38.0
-"""Expected gain of chi-square at which a cause is found in about nine of ten data sets."""
-ABSURD = 1e3
-"""A limit of so many tolerances (or typical sizes) is none."""
 
 
 def detection_limits(explanation: Explanation) -> list[dict[str, Any]]:
@@ -41,12 +37,12 @@ def blind_spots(explanation: Explanation) -> list[dict[str, Any]]:
 
 
 def _judged(explanation: Explanation) -> Iterator[tuple[Candidate, dict[str, Any]]]:
-    limits = explanation.fit.limits(NOTICED)
+    limits = explanation.fit.limits(rules.NOTICED_CHI2)
     for index, (candidate, sizes) in enumerate(zip(explanation.problem.candidates, limits, strict=True)):
         if index in explanation.fit.free or candidate.transient:
             continue
         parameters = {
-            p.name: float(size) if size < ABSURD * p.unit else None
+            p.name: float(size) if size < rules.ABSURD_UNITS * p.unit else None
             for p, size in zip(candidate.parameters, np.asarray(sizes), strict=True)
         }
         yield (

@@ -6,12 +6,10 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from discrepancy.engine.explanation import CLEAN
+from discrepancy import rules
 from discrepancy.result.text_gain import gain_lines
 
 WIDTH = 100
-STRAINED = -6.0
-"""log10 of the probability below which tolerances are no explanation."""
 Values = Mapping[str, Any]
 
 
@@ -103,16 +101,16 @@ def _residual(values: Values) -> Iterable[str]:
     )
     if values["causes"]:
         text += f", {residual['chi2_per_n']:.3g} with what is named"
-    yield f"{text} (up to {CLEAN:g} counts as clean)."
+    yield f"{text} (up to {rules.CLEAN_CHI2_PER_N:g} counts as clean)."
     tolerances = residual["tolerances"]
-    if values["verdict"] != "consistent" and tolerances["log10_p"] < STRAINED:
+    if values["verdict"] != "consistent" and tolerances["log10_p"] < rules.SIGNIFICANT_LOG10_P:
         yield (
             f"The tolerances are used harder than chance allows: chi2 {tolerances['chi2']:.0f} of "
             f"{tolerances['freedom']:.0f} (probability {_power(tolerances['log10_p'])})."
         )
     if values["verdict"] != "consistent":
         yield f"As simulated: {residual['nominal']['signature']['sentence']}"
-    if residual["chi2_per_n"] > CLEAN:
+    if residual["chi2_per_n"] > rules.CLEAN_CHI2_PER_N:
         yield f"What is left: {residual['signature']['sentence']}"
 
 

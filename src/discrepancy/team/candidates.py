@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.causes.intervals import intervals_near, worst_intervals
 from discrepancy.rig import Candidate, Transient
 from discrepancy.team.causes import CAUSES
@@ -15,9 +16,6 @@ from discrepancy.team.linear.reduction import Reduction
 
 Array = NDArray[np.float64]
 Tolerances = Mapping[str, float]
-
-DURATIONS_S = (0.4, 0.8, 1.6, 3.2, 6.4)
-SHORTEST_S = 0.1
 
 
 def every_candidate(
@@ -62,7 +60,7 @@ def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]
 
 def nearby_events(cause: str, when: Transient, tolerance: Tolerances) -> list[Candidate]:
     """A transient cause with its interval moved."""
-    return [CAUSES[cause].event(tolerance, near) for near in intervals_near(when, SHORTEST_S)]
+    return [CAUSES[cause].event(tolerance, near) for near in intervals_near(when, rules.TEAM_SHORTEST_PUSH_S)]
 
 
 def worst_events(
@@ -83,6 +81,6 @@ def worst_events(
     causes = [cause for cause in CAUSES.values() if cause.transient and cause.name not in excluded]
     for t, (reduction, z) in enumerate(zip(reductions, remaining, strict=True) if causes else ()):
         time, square = reduction.time[: reduction.moving], np.sum(z[: reduction.moving, -6:] ** 2, axis=1)
-        worst = worst_intervals(t, time, square, DURATIONS_S, two_sided=False)
+        worst = worst_intervals(t, time, square, rules.TEAM_PUSH_S, two_sided=False)
         out += [cause.event(tolerances.get(cause.name, {}), when) for cause in causes for when in worst]
     return out

@@ -1,4 +1,4 @@
-"""Run the recorded commands again, with the estimated payload and bases, with or without causes."""
+"""Resimulate recorded commands with the estimated payload and bases, with or without causes."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from discrepancy import rules
 from discrepancy.rig import Candidate
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
@@ -24,15 +25,9 @@ from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.payload_mjcf import payload_mjcf
 from mocobot_sim.scene.scene import TeamScene, build_team
-from mocobot_sim.trial.resimulate import predicted, rerun
+from mocobot_sim.trial.resimulate import predicted, resimulate
 
 Array = NDArray[np.float64]
-
-TIMESTEP_S = 1e-3
-FLOORS = {"phi": 2.5e-5, "theta": 1e-5, "tau": 6e-4}
-"""What the integrator does to the closed loop at 1 ms (docs/diagnosis.md) [rad, rad, N m]."""
-SMALLEST = 1e-3
-"""Least principal moment of a simulated payload over the largest: a body needs some."""
 
 
 def team_of(
@@ -58,7 +53,7 @@ def team_of(
     X_1i = RigidTransform.from_components(grasps.p_1i, Rotation.from_matrix(grasps.R_1i))
     payload = payload_mjcf(mass, p_1c, physical_inertia(about_c), X_1i)
     mounts = RigidTransform.from_components(p, Rotation.from_matrix(bases.R))
-    scene = build_team(payload, mounts=mounts, initial=initial, timestep_s=TIMESTEP_S)
+    scene = build_team(payload, mounts=mounts, initial=initial, timestep_s=rules.TEAM_TIMESTEP_S)
     return apply_effects(scene, effects)
 
 
@@ -86,7 +81,7 @@ def named_effect(candidate: Candidate, effect: Effect | None) -> Effect:
 
 
 def why_not(recording: Recording) -> str | None:
-    """Why a recording cannot be simulated again, or None."""
+    """Why a recording cannot be resimulated, or None."""
     if recording.ref is None:
         return f"{recording.name} has no commands (ref_x, ref_y, ref_z)"
     if not recording.metadata.control or "feed_forward_N" not in recording.metadata.control:
@@ -98,8 +93,9 @@ def why_not(recording: Recording) -> str | None:
 
 def scale_of_response(noise: Noise, signals: Signals) -> dict[str, tuple[Array, Array]]:
     """Standard deviation of the noise and of the motion, by channel, shape (N, 3) each."""
+    floors = {"phi": rules.PHI_FLOOR_RAD, "theta": rules.THETA_FLOOR_RAD, "tau": rules.TAU_FLOOR_NM}
     out = {}
-    for k, (name, floor) in enumerate(FLOORS.items()):
+    for k, (name, floor) in enumerate(floors.items()):
         sigma = np.sqrt(noise.sigma[k] ** 2 + noise.step[k] ** 2 / 12.0 + floor**2)
         out[name] = sigma, np.std(getattr(signals, name)[signals.keep], axis=0)
     return out
@@ -113,14 +109,14 @@ def impossible() -> None:
 def physical_inertia(inertia: Array) -> Array:
     """The nearest inertia that a rigid body can have: principal moments positive, none above the others' sum."""
     moments, axes = np.linalg.eigh(inertia)
-    moments = np.maximum(moments, SMALLEST * max(moments[-1], 1e-9))
+    moments = np.maximum(moments, rules.LEAST_MOMENT_RATIO * max(moments[-1], 1e-9))
     excess = moments[2] - moments[0] - moments[1]
     if excess > 0:  # moved to the sum of the others in equal parts
         moments = moments + np.array([1.0, 1.0, -1.0]) * excess / 3.0 * 1.001
     return (axes * moments) @ axes.T
 
 
-def errors_of_rerun(
+def resimulation_errors(
     recording: Recording, shared: Shared, bases: Bases, effects: Sequence[Effect], number: int, keep: slice
 ) -> dict[str, Array] | None:
     """Recorded minus simulated phi, theta [rad] and tau [N m] of one trial, shape (Q, N, 3) each.
@@ -129,7 +125,7 @@ def errors_of_rerun(
     """
     try:
         scene = team_of(shared, bases, effects, (recording.phi[0], recording.theta[0]))
-        log = rerun(recording, replace(scene), timestep_s=TIMESTEP_S, trial_number=number)
+        log = resimulate(recording, replace(scene), timestep_s=rules.TEAM_TIMESTEP_S, trial_number=number)
     except (TrialError, InputError):
         return None
     simulated = predicted(log)

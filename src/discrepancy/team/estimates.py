@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from discrepancy.engine.explanation import Explanation
 from discrepancy.team.linear.residual import Shared
 from discrepancy.team.rig import TeamRig
-from estimator import so3
 from estimator.estimate.principal import inertia_matrix
 
 Array = NDArray[np.float64]
@@ -43,7 +43,10 @@ def to_dict(shared: Shared) -> Estimate:
         "p_1c_m": p_1c.tolist(),
         "principal_inertia_kgm2": np.linalg.eigvalsh(about_c).tolist(),
         "grasps": [
-            {"p_1i_m": p.tolist(), "R_1i_rotvec_deg": np.rad2deg(so3.log(R)).tolist()}
+            {
+                "p_1i_m": p.tolist(),
+                "R_1i_rotvec_deg": Rotation.from_matrix(R).as_rotvec(degrees=True).tolist(),
+            }
             for p, R in zip(shared.grasps.p_1i, shared.grasps.R_1i, strict=True)
         ],
     }
@@ -58,8 +61,10 @@ def errors(estimate: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, f
     moments, true_moments = (_array(x["principal_inertia_kgm2"], (3,)) for x in (estimate, truth))
     turns, places = [0.0], [0.0]
     for mine, true in zip(estimate["grasps"], truth["grasps"], strict=True):
-        R, R_true = (so3.exp(np.deg2rad(_array(x["R_1i_rotvec_deg"], (3,)))) for x in (mine, true))
-        turns.append(float(np.rad2deg(np.linalg.norm(so3.log(R_true.T @ R)))))
+        R, R_true = (
+            Rotation.from_rotvec(_array(x["R_1i_rotvec_deg"], (3,)), degrees=True) for x in (mine, true)
+        )
+        turns.append(float(np.rad2deg((R_true.inv() * R).magnitude())))
         places.append(
             1e3 * float(np.linalg.norm(_array(mine["p_1i_m"], (3,)) - _array(true["p_1i_m"], (3,))))
         )

@@ -26,9 +26,9 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.closed_loop import (
     effect_of,
-    errors_of_rerun,
     impossible,
     named_effect,
+    resimulation_errors,
     scale_of_response,
     team_of,
     why_not,
@@ -149,14 +149,14 @@ class TeamRig(Rig):
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return CAUSES[candidate.cause].possible(values, se, candidate.shape)
 
-    def can_run_again(self) -> str | None:
-        """Why the recordings cannot be simulated again, or None."""
+    def can_resimulate(self) -> str | None:
+        """Why the recordings cannot be resimulated, or None."""
         return next(filter(None, map(why_not, self.recordings)), None)
 
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
     ) -> Callable[[], dict[str, Array] | None]:
-        """What runs one trial's commands again, with the unknowns moved and causes in the simulation.
+        """What resimulates one trial's commands, with the unknowns moved and causes in the simulation.
 
         It returns recorded minus simulated ``phi``, ``theta`` [rad] and ``tau`` [N m], shape (Q, N, 3), or None if
         that cannot be simulated. It carries the recording and numbers only, so that processes can take it.
@@ -166,7 +166,7 @@ class TeamRig(Rig):
         if any(effect is None for effect in effects):
             return impossible
         return partial(
-            errors_of_rerun,
+            resimulation_errors,
             self.recordings[trial],
             linear.shared.moved(shared),
             linear.bases.moved(local),

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import sys
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from estimator.errors import InputError
-
-# Also refuses inf, NaN and whole numbers too large for a float.
-_LARGEST = sys.float_info.max
+from estimator.strict import Fields, is_number, read_toml
 
 Triple = tuple[float, float, float]
 
@@ -63,12 +59,8 @@ class OmnidDesign:
             InputError: a key is unknown or missing, or a value is not a finite number of the allowed sign.
         """
         names = [field.name for field in dataclasses.fields(cls)]
-        unknown = sorted(set(values) - set(names))
-        missing = [name for name in names if name not in values]
-        if unknown or missing:
-            problem = f"unknown key {unknown[0]!r}" if unknown else f"missing key {missing[0]!r}"
-            raise InputError(f"{where}: {problem}; the keys are {', '.join(names)}")
-        return cls(**{name: _number(f"{where}.{name}", name, values[name]) for name in names})
+        numbers = Fields(values, names, where).values
+        return cls(**{name: _number(f"{where}.{name}", name, numbers[name]) for name in names})
 
     def to_dict(self) -> dict[str, Any]:
         """The numbers as plain JSON types, keys as in ``design.toml``."""
@@ -81,24 +73,20 @@ def load_design(path: Path) -> OmnidDesign:
     Raises:
         InputError: the file cannot be read, is not TOML, or its keys are not the documented ones.
     """
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: not a readable design file ({error})") from error
-    return OmnidDesign.from_dict(values, where=str(path))
+    return OmnidDesign.from_dict(read_toml(path, "design file"), where=str(path))
 
 
 def _number(where: str, name: str, value: Any) -> Any:
     if name.endswith("_inertia_kgm2") and name.split("_")[0] in ("yoke", "ring", "flange"):
         if not isinstance(value, list | tuple) or len(value) != 3:
-            raise InputError(f"{where} is {value!r}; it must be three numbers")
+            raise InputError(f"{where} is {value!r:.60}; it must be three numbers")
         return tuple(_scalar(where, entry, positive=True) for entry in value)
     return _scalar(where, value, positive=name != "phi_min_rad")
 
 
 def _scalar(where: str, value: Any, *, positive: bool) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _LARGEST:
-        raise InputError(f"{where} is {value!r}; it must be a finite number")
+    if not is_number(value):
+        raise InputError(f"{where} is {value!r:.60}; it must be a finite number")
     if positive and value <= 0:
         raise InputError(f"{where} is {value!r}; it must be greater than 0")
     return float(value)

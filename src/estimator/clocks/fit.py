@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.signal import butter, sosfiltfilt
+from scipy.spatial.transform import Rotation
 
 from estimator import so3
 from estimator.arm.gimbal import rate_matrix
@@ -138,7 +139,7 @@ def fit_clock(
         shift, stretch = step[3], step[4] if with_drift else 0.0
         if not abs(here + shift - guess) + abs(stretch) < STEP_LIMIT_S:
             return None
-        R = so3.exp(step[:3]) @ R
+        R = Rotation.from_rotvec(step[:3]).as_matrix() @ R
         here, drift = here + shift, drift + stretch / half_s
         q_i, q_dot = moved()
         if abs(shift) + abs(stretch) < _CONVERGED_S:

@@ -13,8 +13,8 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from estimator import so3
 from estimator.errors import InputError
 from estimator.estimate.fusion import fuse
 from estimator.estimate.grasp_estimate import GraspEstimate
@@ -194,7 +194,7 @@ def _disagreement(a: GraspEstimate, b: GraspEstimate) -> str | None:
     for j in range(1, a.robots):
         part = slice(6 * (j - 1), 6 * j)
         variance = np.diag(a.covariance)[part] + np.diag(b.covariance)[part]
-        angle = float(np.linalg.norm(so3.log(a.R_1i[j].T @ b.R_1i[j])))
+        angle = float(Rotation.from_matrix(a.R_1i[j].T @ b.R_1i[j]).magnitude())
         shift = float(np.linalg.norm(a.p_1i[j] - b.p_1i[j]))
         allowed = POSITION_TOLERANCE * (1 + float(np.linalg.norm(a.p_1i[j])))
         if angle > max(ANGLE_TOLERANCE_RAD, 5 * np.sqrt(variance[:3].sum())):

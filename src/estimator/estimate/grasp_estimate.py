@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from estimator import so3
 from estimator.estimate.uncertainty import norm_se, standard_errors
@@ -34,7 +37,7 @@ class PairGrasp:
     @property
     def axis_angle_rad(self) -> Array:
         """Rotation vector of R_ij [rad], shape (3,)."""
-        return so3.log(self.R_ij)
+        return Rotation.from_matrix(self.R_ij).as_rotvec()
 
     @property
     def axis_angle_se_rad(self) -> Array:
@@ -50,6 +53,19 @@ class PairGrasp:
     def distance_se_m(self) -> float:
         """Standard error of |p_ij| [m]."""
         return norm_se(self.p_ij, self.covariance[3:, 3:])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain types; see ``estimator.estimate.result``."""
+        return {
+            "i": self.i,
+            "j": self.j,
+            "R_axis_angle_deg": np.rad2deg(self.axis_angle_rad).tolist(),
+            "R_se_deg": np.rad2deg(self.axis_angle_se_rad).tolist(),
+            "p_m": self.p_ij.tolist(),
+            "p_se_m": self.p_se_m.tolist(),
+            "distance_m": float(np.linalg.norm(self.p_ij)),
+            "distance_se_m": self.distance_se_m,
+        }
 
 
 @dataclass(frozen=True)
@@ -114,8 +130,44 @@ class GraspEstimate:
         x = np.asarray(x).reshape(-1, 6)
         R, p = self.R_1i.copy(), self.p_1i.copy()
         if len(x):
-            R[1:], p[1:] = so3.exp(x[:, :3]) @ R[1:], p[1:] + x[:, 3:]
+            R[1:], p[1:] = Rotation.from_rotvec(x[:, :3]).as_matrix() @ R[1:], p[1:] + x[:, 3:]
         return replace(self, R_1i=R, p_1i=p)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain types; see ``estimator.estimate.result``."""
+        return {
+            "pairs": [
+                self.pair(i, j).to_dict()
+                | {
+                    "angular_residual_radps": float(self.angular_residual_rms[i - 1, j - 1]),
+                    "linear_residual_mps": float(self.linear_residual_rms[i - 1, j - 1]),
+                }
+                for i, j in combinations(range(1, self.robots + 1), 2)
+            ],
+            "covariance": self.covariance.tolist(),
+            "angular_residual_radps": self.angular_residual_rms.tolist(),
+            "linear_residual_mps": self.linear_residual_rms.tolist(),
+            "angular_motion_radps": self.angular_motion_rms.tolist(),
+            "linear_motion_mps": self.linear_motion_rms.tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any], robots: int) -> GraspEstimate:
+        """Inverse of ``to_dict``, for a number of robots N."""
+        R, p, size = np.tile(np.eye(3), (robots, 1, 1)), np.zeros((robots, 3)), 6 * (robots - 1)
+        for pair in values["pairs"]:
+            if pair["i"] == 1:
+                R[pair["j"] - 1] = Rotation.from_rotvec(pair["R_axis_angle_deg"], degrees=True).as_matrix()
+                p[pair["j"] - 1] = pair["p_m"]
+        return cls(
+            R,
+            p,
+            np.array(values["covariance"], dtype=float).reshape(size, size),
+            np.array(values["angular_residual_radps"]),
+            np.array(values["linear_residual_mps"]),
+            np.array(values["angular_motion_radps"]),
+            np.array(values["linear_motion_mps"]),
+        )
 
     def _index(self, robot: int) -> int:
         if not 1 <= robot <= self.robots:

@@ -165,9 +165,8 @@ def _refine(V: Array, R: Array, p: Array, weights: Array) -> tuple[Array, Array]
 
     def frames(x: Array) -> tuple[Array, Array]:
         x = x.reshape(N - 1, 6)
-        return np.concatenate([R_0[:1], so3.exp(x[:, :3]) @ R_0[1:]]), np.concatenate(
-            [p_0[:1], p_0[1:] + x[:, 3:]]
-        )
+        R = Rotation.from_rotvec(x[:, :3]).as_matrix() @ R_0[1:]
+        return np.concatenate([R_0[:1], R]), np.concatenate([p_0[:1], p_0[1:] + x[:, 3:]])
 
     def residuals(x: Array) -> Array:
         return (weights * _residuals(V, *frames(x))).ravel()

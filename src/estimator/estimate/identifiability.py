@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +38,10 @@ class WeakDirection:
 
     def __str__(self) -> str:
         return f"{self.step}, {self.direction}: {self.reason}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain types; see ``estimator.estimate.result``."""
+        return {"direction": self.direction, "vector": list(self.vector), "reason": self.reason}
 
 
 @dataclass(frozen=True)
@@ -74,6 +79,34 @@ class StepReport:
         """Largest over smallest singular value; infinite for a singular regressor."""
         smallest = self.singular_values[-1]
         return self.singular_values[0] / smallest if smallest > 0 else float("inf")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain types; see ``estimator.estimate.result``."""
+        return {
+            "step": self.step,
+            "parameters": list(self.parameters),
+            "unit": self.unit,
+            "singular_values": list(self.singular_values),
+            "noise": self.noise,
+            "rank": self.rank,
+            "condition": self.condition if np.isfinite(self.condition) else None,
+            "weak": [weak.to_dict() for weak in self.weak],
+        }
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> StepReport:
+        """Inverse of ``to_dict``."""
+        step = values["step"]
+        return cls(
+            step,
+            tuple(values["parameters"]),
+            values["unit"],
+            tuple(values["singular_values"]),
+            values["noise"],
+            tuple(
+                WeakDirection(step, w["direction"], tuple(w["vector"]), w["reason"]) for w in values["weak"]
+            ),
+        )
 
 
 def judge(

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +22,7 @@ from estimator.estimate.uncertainty import (
     WINDOW_S,
     Window,
     numerical_jacobian,
+    standard_errors,
     window_covariance,
     window_normals,
     windows,
@@ -54,6 +56,30 @@ class InertiaEstimate:
     projected: bool
     residual_rms: float
     moment_rms: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain types; see ``estimator.estimate.result``."""
+        return {
+            "I_b_kgm2": self.inertia.tolist(),
+            "I_b_se_kgm2": inertia_matrix(standard_errors(self.covariance)).tolist(),
+            "covariance_kg2m4": self.covariance.tolist(),
+            **self.principal.to_dict(),
+            "projected": self.projected,
+            "residual_Nm": self.residual_rms,
+            "moment_Nm": self.moment_rms,
+        }
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> InertiaEstimate:
+        """Inverse of ``to_dict``."""
+        return cls(
+            np.array(values["I_b_kgm2"]),
+            np.array(values["covariance_kg2m4"]),
+            PrincipalInertia.from_dict(values),
+            values["projected"],
+            values["residual_Nm"],
+            values["moment_Nm"],
+        )
 
 
 def momentum_regressor(w: Array) -> Array:

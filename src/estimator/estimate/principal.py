@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from estimator import so3
 from estimator.estimate.uncertainty import standard_errors
@@ -39,7 +41,7 @@ class PrincipalInertia:
     @property
     def axis_angle_rad(self) -> Array | None:
         """Rotation vector of R_1c [rad], shape (3,), or None."""
-        return None if self.R_1c is None else so3.log(self.R_1c)
+        return None if self.R_1c is None else Rotation.from_matrix(self.R_1c).as_rotvec()
 
     @property
     def axis_angle_se_rad(self) -> Array | None:
@@ -47,6 +49,28 @@ class PrincipalInertia:
         if self.R_1c is None or self.R_1c_covariance is None:
             return None
         return standard_errors(so3.rotvec_covariance(self.R_1c, self.R_1c_covariance))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain types; see ``estimator.estimate.result``."""
+        axes, axes_se, covariance = self.axis_angle_rad, self.axis_angle_se_rad, self.R_1c_covariance
+        return {
+            "principal_kgm2": self.moments.tolist(),
+            "principal_se_kgm2": self.moments_se.tolist(),
+            "R_1c_axis_angle_deg": None if axes is None else np.rad2deg(axes).tolist(),
+            "R_1c_se_deg": None if axes_se is None else np.rad2deg(axes_se).tolist(),
+            "R_1c_covariance_rad2": None if covariance is None else covariance.tolist(),
+        }
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> PrincipalInertia:
+        """Inverse of ``to_dict``; other keys are left alone."""
+        axes, covariance = values["R_1c_axis_angle_deg"], values["R_1c_covariance_rad2"]
+        return cls(
+            np.array(values["principal_kgm2"]),
+            np.array(values["principal_se_kgm2"]),
+            None if axes is None else Rotation.from_rotvec(axes, degrees=True).as_matrix(),
+            None if covariance is None else np.array(covariance),
+        )
 
 
 def inertia_matrix(parameters: Array) -> Array:

@@ -1,13 +1,48 @@
-"""The estimate of a payload: what ``estimate_payload`` returns."""
+"""The estimate of a payload: what ``estimate_payload`` returns.
+
+``PayloadEstimate.to_dict`` makes strict JSON: plain types, no NaN, units in the keys; null is what the data do not
+determine.
+
+format, version            "mocobot-estimate", 1
+payload, robots, method    label or null; N; "staged" or "joint"
+grasps                     null, or
+    pairs                  list over i < j of {i, j, R_axis_angle_deg [3], R_se_deg [3], p_m [3], p_se_m [3],
+                           distance_m, distance_se_m, angular_residual_radps, linear_residual_mps}
+    covariance             of the frames {2}..{N}, 6(N-1) square, order and units of GraspEstimate
+    angular_residual_radps, linear_residual_mps   N x N rms residuals of all pairs
+    angular_motion_radps, linear_motion_mps       N rms motions
+mass                       null or {m_kg, m_se_kg, residual_N}
+com                        null or {p_1c_m [3], p_1c_se_m [3], distance_m, distance_se_m, covariance_m2}
+inertia                    null, or
+    I_b_kgm2               3 x 3 about the CoM, axes of {1}
+    I_b_se_kgm2            3 x 3 standard errors
+    covariance_kg2m4       6 x 6 in the order xx, xy, xz, yy, yz, zz
+    principal_kgm2, principal_se_kgm2             3, ascending
+    R_1c_axis_angle_deg, R_1c_se_deg              3 or null when moments are too alike
+    R_1c_covariance_rad2   3 x 3 or null
+    projected              true if a negative eigenvalue was set to zero
+    residual_Nm, moment_Nm rms moment left and explained
+steps                      list of {step, parameters, unit, singular_values, noise, rank, condition,
+                           weak: [{direction, vector, reason}]}; condition null if infinite
+undetermined               list of {step, direction, vector, reason}: all weak directions again
+recordings                 list of {name, trial, duration_s, holds, grasps, inertia, force_residual,
+                           moment_residual_m}
+flags                      list of sentences
+
+``mocobot estimate`` adds ``provenance``: versions, options and hashes of the recordings (``mocobot.files.provenance``).
+Readers ignore it and any other key.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.identifiability import StepReport, WeakDirection
 from estimator.estimate.inertia import InertiaEstimate
@@ -15,6 +50,9 @@ from estimator.estimate.statics import MassEstimate
 from estimator.estimate.uncertainty import norm_se, standard_errors
 
 Array = NDArray[np.float64]
+Given = TypeVar("Given")
+
+FORMAT, VERSION = "mocobot-estimate", 1
 
 
 @dataclass(frozen=True)
@@ -41,6 +79,23 @@ class RecordingEstimate:
     inertia: InertiaEstimate | None = None
     force_residual: float | None = None
     moment_residual_m: float | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain types; keys as the fields."""
+        return {
+            **vars(self),
+            "grasps": self.grasps and self.grasps.to_dict(),
+            "inertia": self.inertia and self.inertia.to_dict(),
+        }
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any], robots: int) -> RecordingEstimate:
+        """Inverse of ``to_dict``, for a number of robots N."""
+        parts = {
+            "grasps": _if_given(values["grasps"], lambda grasps: GraspEstimate.from_dict(grasps, robots)),
+            "inertia": _if_given(values["inertia"], InertiaEstimate.from_dict),
+        }
+        return cls(**(values | parts))
 
 
 @dataclass(frozen=True)
@@ -91,18 +146,59 @@ class PayloadEstimate:
         return tuple(weak for step in self.steps for weak in step.weak)
 
     def to_dict(self) -> dict[str, Any]:
-        """Strict JSON with units in the keys; see ``estimator.estimate.json`` for the keys."""
-        from estimator.estimate.json import to_dict
-
-        return to_dict(self)
+        """The estimate as documented at the head of this module."""
+        com, mass = None, self.mass
+        if self.p_1c is not None and self.p_1c_covariance is not None:
+            com = {
+                "p_1c_m": self.p_1c.tolist(),
+                "p_1c_se_m": standard_errors(self.p_1c_covariance).tolist(),
+                "distance_m": float(np.linalg.norm(self.p_1c)),
+                "distance_se_m": self.p_1c_distance_se_m,
+                "covariance_m2": self.p_1c_covariance.tolist(),
+            }
+        return {
+            "format": FORMAT,
+            "version": VERSION,
+            "payload": self.payload,
+            "robots": self.robots,
+            "method": self.method,
+            "grasps": self.grasps and self.grasps.to_dict(),
+            "mass": mass and {"m_kg": mass.mass, "m_se_kg": mass.se, "residual_N": mass.residual_rms},
+            "com": com,
+            "inertia": self.inertia and self.inertia.to_dict(),
+            "steps": [step.to_dict() for step in self.steps],
+            "undetermined": [{"step": weak.step, **weak.to_dict()} for weak in self.undetermined],
+            "recordings": [recording.to_dict() for recording in self.recordings],
+            "flags": list(self.flags),
+        }
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> PayloadEstimate:
         """Inverse of ``to_dict``.
 
         Raises:
-            InputError: the mapping is not such an estimate.
+            InputError: the mapping is not such an estimate, or of another version.
         """
-        from estimator.estimate.json import from_dict
+        if not isinstance(values, dict) or values.get("format") != FORMAT or values.get("version") != VERSION:
+            raise InputError(f"not an estimate: it must have format {FORMAT!r} and version {VERSION}")
+        try:
+            robots, mass, com = values["robots"], values["mass"], values["com"]
+            return cls(
+                payload=values["payload"],
+                robots=robots,
+                method=values["method"],
+                grasps=_if_given(values["grasps"], lambda grasps: GraspEstimate.from_dict(grasps, robots)),
+                mass=_if_given(mass, lambda m: MassEstimate(m["m_kg"], m["m_se_kg"], m["residual_N"])),
+                p_1c=_if_given(com, lambda com: np.array(com["p_1c_m"])),
+                p_1c_covariance=_if_given(com, lambda com: np.array(com["covariance_m2"])),
+                inertia=_if_given(values["inertia"], InertiaEstimate.from_dict),
+                steps=tuple(StepReport.from_dict(step) for step in values["steps"]),
+                recordings=tuple(RecordingEstimate.from_dict(r, robots) for r in values["recordings"]),
+                flags=tuple(values["flags"]),
+            )
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise InputError(f"not a complete estimate ({type(error).__name__}: {error})") from error
 
-        return from_dict(values)
+
+def _if_given(value: Any, make: Callable[[Any], Given]) -> Given | None:
+    return None if value is None else make(value)

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 from estimator.arm.design import OmnidDesign
 from estimator.errors import InputError
+from estimator.strict import Fields, parse_json
 
 FORMAT = "mocobot-recording"
 VERSIONS = (1, 2)
@@ -85,20 +86,10 @@ class RecordingMetadata:
         Raises:
             InputError: not JSON, a key unknown, missing or repeated, or a value of the wrong type or range.
         """
-        try:
-            values = json.loads(text, object_pairs_hook=_unique_keys, parse_constant=_no_constant)
-        except (ValueError, RecursionError) as error:
-            raise InputError(f"{where}: not valid JSON ({error})") from error
-        if not isinstance(values, dict):
-            raise InputError(f"{where}: must be a JSON object, not {values!r:.60}")
+        values = parse_json(text, where)
         _check_format(values, where)
         required = _REQUIRED + (("level",) if values.get("version") == 2 else ())
-        for key in sorted(set(values) - {*required, *_OPTIONAL}):
-            raise InputError(f"{where}: unknown key {key!r}; the keys are {', '.join(required + _OPTIONAL)}")
-        for key in required:
-            if key not in values:
-                raise InputError(f"{where}: missing key {key!r}; required are {', '.join(required)}")
-        _check_values(values, where)
+        _check_values(Fields(values, required, where, _OPTIONAL))
         return cls(
             robots=values["robots"],
             rate_hz=float(values["rate_hz"]),
@@ -122,11 +113,12 @@ def _check_format(values: dict[str, Any], where: str) -> None:
         raise InputError(f"{where}: version is {version!r:.60}; this program reads versions {known}")
 
 
-def _check_values(values: dict[str, Any], where: str) -> None:
+def _check_values(fields: Fields) -> None:
     def require(key: str, allowed: str, *, good: bool) -> None:
         if not good:
-            raise InputError(f"{where}: {key} is {values[key]!r:.60}; it must be {allowed}")
+            fields.refuse(key, allowed)
 
+    values = fields.values
     robots, rate, payload, seed = (values[key] for key in ("robots", "rate_hz", "payload", "seed"))
     require("robots", "a whole number, at least 1", good=type(robots) is int and robots >= 1)
     # A bound instead of isfinite, which overflows on whole numbers beyond the range of a float.
@@ -138,20 +130,8 @@ def _check_values(values: dict[str, Any], where: str) -> None:
     is_label = payload is None or (isinstance(payload, str) and payload.isprintable())
     require("payload", "text or null, all of it printable", good=is_label)
     require("seed", "a whole number or null", good=seed is None or type(seed) is int)
-    require("design", "an object", good=isinstance(values["design"], dict))
-    if "level" in values:
+    fields.object("design")
+    if "level" in fields:
         require("level", f"one of {', '.join(LEVELS)}", good=values["level"] in LEVELS)
-    if "control" in values:
+    if "control" in fields:
         require("control", "an object (leave it out if unknown)", good=isinstance(values["control"], dict))
-
-
-def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    values = dict(pairs)
-    if len(values) != len(pairs):
-        repeated = next(key for i, (key, _) in enumerate(pairs) if key in dict(pairs[:i]))
-        raise ValueError(f"key {repeated!r} appears twice")
-    return values
-
-
-def _no_constant(name: str) -> None:
-    raise ValueError(f"{name} is not a JSON number")

@@ -4,40 +4,21 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from contextlib import nullcontext
-from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from discrepancy.engine.diagnose import Diagnosis, diagnose
-from discrepancy.result.json import diagnosis_to_dict
-from discrepancy.result.text import format_diagnosis
+from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.team.causes import CAUSES
-from discrepancy.team.estimates import errors, estimates
-from discrepancy.team.linear.signals import TRIM_S
-from discrepancy.team.rig import TeamRig
+from discrepancy.team.diagnosis import against_truth, diagnose_team
 from discrepancy.team.tolerances import read_tolerances
-from discrepancy.team.traces import traces
-from discrepancy.team.words import TeamWords
-from estimator.errors import InputError
-from estimator.estimate.payload import estimate_payload
-from estimator.estimate.result import PayloadEstimate
-from estimator.estimate.statics import CONTRADICTION
-from estimator.files import whole_folder
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
-from mocobot.commands.diagnose_folder import check_options, write_diagnosis
-from mocobot.files.provenance import file_facts, provenance
-from mocobot.progress import bar, stages
+from mocobot.commands.diagnose_folder import Count, Say, check_options, diagnose_and_tell
+from mocobot.progress import bar
 from mocobot_sim.trial.truth import truth_path
 
 if TYPE_CHECKING:
     from mocobot.options import Diagnose
-
-LEAST_S, GOOD_S = 5.0, 30.0
-"""Length of all recordings together below which nothing is diagnosed, and with which it starts to be of use."""
-MASS_TOLERANCE = 0.05
-"""Trials whose masses differ by more than this share are not of one payload."""
 
 
 def run(options: Diagnose) -> None:
@@ -48,102 +29,25 @@ def run(options: Diagnose) -> None:
     """
     check_options(options, CAUSES)
     tolerances = read_tolerances(options.tolerances)
-    with whole_folder(options.out) if options.out else nullcontext() as folder:
-        with bar(len(options.rec), "reading", "file") as advance:
-            recordings = []
-            for path in options.rec:
-                recordings.append(read_recording(path))
-                advance(1)
-        _check_recordings(recordings)
-        inputs = [*options.rec, *([options.tolerances] if options.tolerances else [])]
-        made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
-        with stages() as (say, advance):
-            say("estimate")
-            estimate = estimate_payload(recordings)
-            _check_masses(recordings)
-            _check_estimate(estimate)
-            say("linearise")
-            rig = TeamRig.of(recordings, estimate, tolerances, options.exclude, options.jobs)
-            diagnosis = diagnose(
-                rig, closed_loop=options.closed_loop, jobs=options.jobs, say=say, simulated=advance
-            )
-            values = _values(diagnosis, rig, options.rec)
-            if folder is not None:
-                say("write")
-                if "errors" in values["gain"]:
-                    made_with["files"] += [file_facts(truth_path(path)) for path in options.rec]
-                values["provenance"] = made_with
-                shown = (rig, diagnosis.explanation)
-                write_diagnosis(folder, values, diagnosis, rig, TeamWords(), lambda: traces(*shown))
-    print(format_diagnosis(values))  # after the folder is in place: whoever reads may close the pipe
-    if options.out:
-        print(f"\nWritten to {options.out}.")
+
+    def diagnosed(recordings: list[Recording], say: Say, simulated: Count) -> Diagnosed:
+        found = diagnose_team(
+            recordings, tolerances, options.exclude,
+            closed_loop=options.closed_loop, jobs=options.jobs, say=say, simulated=simulated,
+        )  # fmt: skip
+        truth = _truth(options.rec)
+        return found if truth is None else against_truth(found, truth)
+
+    diagnose_and_tell(options, lambda: _read(options.rec), diagnosed)
 
 
-def _check_recordings(recordings: Sequence[Recording]) -> None:
-    first = recordings[0]
-    if first.metadata.robots < 2:
-        raise InputError(
-            f"{first.name} has one robot; without a second one nothing tells where the payload really is, so there is "
-            "nothing to diagnose"
-        )
-    used = [max(0.0, recording.time[-1] - recording.time[0] - 2.0 * TRIM_S) for recording in recordings]
-    if sum(used) < LEAST_S:
-        names = ", ".join(recording.name for recording in recordings)
-        raise InputError(
-            f"{names}: {sum(used):.1f} s are left when {TRIM_S:g} s are dropped at both ends; a diagnosis needs at "
-            f"least {LEAST_S:g} s, and {GOOD_S:g} s of motion to be worth much"
-        )
-    for other in recordings[1:]:
-        if other.metadata.robots != first.metadata.robots:
-            raise InputError(
-                f"{other.name} has {other.metadata.robots} robots and {first.name} has {first.metadata.robots}; "
-                "recordings of one payload must have the same robots"
-            )
-        if other.metadata.design != first.metadata.design:
-            raise InputError(
-                f"{other.name} and {first.name} are of robots of different design; diagnose one at a time"
-            )
-
-
-def _check_estimate(estimate: PayloadEstimate) -> None:
-    """Without a payload there is no model; say why, where wrenches that contradict each other are the reason."""
-    if estimate.p_1c is None and any(CONTRADICTION in flag for flag in estimate.flags):
-        names = ", ".join(recording.name for recording in estimate.recordings)
-        raise InputError(
-            f"{names}: the robots' wrenches do not add up to one payload, so there is nothing to hold the data "
-            "against; is a robot missing, or a torque's sign or column wrong?"
-        )
-
-
-def _check_masses(recordings: Sequence[Recording]) -> None:
-    """Recordings without a label may still be of different payloads in the same grasps."""
-    masses = []
-    for recording in recordings if len(recordings) > 1 else ():
-        try:
-            alone = estimate_payload([recording])
-        except InputError:  # too little motion to tell on its own
-            continue
-        if alone.mass is not None:
-            masses.append((alone.mass.mass, alone.mass.se, recording.name))
-    if not masses:
-        return
-    (low, low_se, light), (high, high_se, heavy) = min(masses), max(masses)
-    if high - low > max(MASS_TOLERANCE * high, 6.0 * (low_se + high_se)):
-        raise InputError(
-            f"{light} says {low:.2f} kg and {heavy} says {high:.2f} kg; recordings must be of one payload"
-        )
-
-
-def _values(diagnosis: Diagnosis, rig: TeamRig, paths: Sequence[Path]) -> dict[str, Any]:
-    found: dict[str, Any] = dict(estimates(rig, diagnosis.explanation))
-    truth = _truth(paths)
-    if truth is not None:
-        try:
-            found["errors"] = {name: errors(found[name], truth) for name in ("before", "after")}
-        except (KeyError, TypeError, ValueError, IndexError):  # a sidecar of something else
-            found.pop("errors", None)
-    return diagnosis_to_dict(diagnosis, rig, TeamWords(), found)
+def _read(paths: Sequence[Path]) -> list[Recording]:
+    recordings = []
+    with bar(len(paths), "reading", "file") as advance:
+        for path in paths:
+            recordings.append(read_recording(path))
+            advance(1)
+    return recordings
 
 
 def _truth(paths: Sequence[Path]) -> dict[str, Any] | None:

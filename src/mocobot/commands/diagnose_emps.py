@@ -2,25 +2,17 @@
 
 from __future__ import annotations
 
-from contextlib import nullcontext
-from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from discrepancy.causes.tolerances_file import read_tolerances
 from discrepancy.emps.catalogue import default_tolerances
 from discrepancy.emps.causes import CAUSES
-from discrepancy.emps.diagnosis import diagnose_axis
+from discrepancy.emps.diagnosis import diagnose_emps
+from discrepancy.emps.recording.axis_log import AxisLog
 from discrepancy.emps.recording.reader import read_emps
-from discrepancy.emps.rig import EmpsRig
-from discrepancy.emps.traces import traces
-from discrepancy.emps.words import EmpsWords
-from discrepancy.result.json import diagnosis_to_dict
-from discrepancy.result.text import format_diagnosis
+from discrepancy.result.diagnosed import Diagnosed
 from estimator.errors import InputError
-from estimator.files import whole_folder
-from mocobot.commands.diagnose_folder import check_options, write_diagnosis
-from mocobot.files.provenance import provenance
-from mocobot.progress import stages
+from mocobot.commands.diagnose_folder import Count, Say, check_options, diagnose_and_tell
 
 if TYPE_CHECKING:
     from mocobot.options import Diagnose
@@ -39,21 +31,11 @@ def run(options: Diagnose) -> None:
             "each other"
         )
     tolerances = read_tolerances(options.tolerances, default_tolerances())
-    with whole_folder(options.out) if options.out else nullcontext() as folder, stages() as (say, advance):
-        say("read")
-        log = read_emps(next(iter(options.rec)))
-        inputs = [*options.rec, *([options.tolerances] if options.tolerances else [])]
-        made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
-        rig = EmpsRig.of(log, tolerances, options.exclude)
-        diagnosis = diagnose_axis(
-            rig, closed_loop=options.closed_loop, jobs=options.jobs, say=say, simulated=advance
-        )
-        values = diagnosis_to_dict(diagnosis, rig, EmpsWords())
-        if folder is not None:
-            say("write")
-            values["provenance"] = made_with
-            shown = (rig, diagnosis.explanation)
-            write_diagnosis(folder, values, diagnosis, rig, EmpsWords(), lambda: traces(*shown))
-    print(format_diagnosis(values))  # after the folder is in place: whoever reads may close the pipe
-    if options.out:
-        print(f"\nWritten to {options.out}.")
+
+    def diagnosed(log: AxisLog, say: Say, simulated: Count) -> Diagnosed:
+        return diagnose_emps(
+            log, tolerances, options.exclude,
+            closed_loop=options.closed_loop, jobs=options.jobs, say=say, simulated=simulated,
+        )  # fmt: skip
+
+    diagnose_and_tell(options, lambda: read_emps(next(iter(options.rec))), diagnosed)

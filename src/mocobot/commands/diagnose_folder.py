@@ -1,29 +1,25 @@
-"""What every rig's diagnosis has in common at the edge: options that can be refused early, and the result's folder."""
+"""What every rig's diagnosis has in common at the edge: options refused early, the result's folder, what is printed."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Collection, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Collection
+from contextlib import nullcontext
+from dataclasses import asdict
+from typing import TYPE_CHECKING, TypeVar
 
-from discrepancy.causes.words import Words
-from discrepancy.engine.diagnose import Diagnosis
-from discrepancy.result.json import FORMAT
-from discrepancy.result.plots import PLOTS, save_plots
-from discrepancy.result.text import format_diagnosis
-from discrepancy.result.traces import Trace
-from discrepancy.result.traces_file import NAME as RESIDUALS
-from discrepancy.result.traces_file import save_traces
-from discrepancy.rig import Rig
+from discrepancy.result.diagnosed import Diagnosed, is_diagnosis
 from estimator.errors import InputError
-from estimator.files import write_json, write_text
+from estimator.files import whole_folder
+from mocobot.files.provenance import file_facts, provenance
 from mocobot.files.targets import check_folder, check_recordings
+from mocobot.progress import stages
+from mocobot_sim.trial.truth import truth_path
 
 if TYPE_CHECKING:
     from mocobot.options import Diagnose
 
-JSON, REPORT, EXTENDED, PAGE = "diagnosis.json", "report.txt", "extended", "report.html"
+Data = TypeVar("Data")
+Say, Count = Callable[[str], object], Callable[[int], object]
 
 
 def check_options(options: Diagnose, causes: Collection[str]) -> None:
@@ -46,44 +42,33 @@ def check_options(options: Diagnose, causes: Collection[str]) -> None:
         raise InputError("every cause is excluded; nothing is left to look for")
     if options.out:
         inputs = [*options.rec, *([options.tolerances] if options.tolerances else [])]
-        check_folder(options.out, inputs, _is_diagnosis, "an earlier diagnosis")
+        check_folder(options.out, inputs, is_diagnosis, "an earlier diagnosis")
 
 
-def _is_diagnosis(folder: Path) -> bool:
-    """Whether a folder holds a diagnosis and nothing that someone else put there."""
-    try:
-        ours = json.loads((folder / JSON).read_text(encoding="utf-8"))["format"] == FORMAT
-    except (OSError, ValueError, TypeError, KeyError):
-        return False
-    known = [JSON, REPORT, RESIDUALS, EXTENDED, PAGE, *PLOTS]
-    return ours and all(any(path.match(pattern) for pattern in known) for path in folder.iterdir())
-
-
-def write_diagnosis(
-    folder: Path,
-    values: dict[str, Any],
-    diagnosis: Diagnosis,
-    rig: Rig,
-    words: Words,
-    traces: Callable[[], Sequence[Trace]],
+def diagnose_and_tell(
+    options: Diagnose, read: Callable[[], Data], diagnosed: Callable[[Data, Say, Count], Diagnosed]
 ) -> None:
-    """Write extended model, residuals, pictures, JSON and report into an existing folder.
+    """Read, diagnose, write if asked, and print the report.
 
     Args:
-        folder: where.
-        values: the diagnosis as in the JSON; a note is added where there is no extended model.
-        diagnosis: the verdict.
-        rig: what was diagnosed.
-        words: of the rig.
-        traces: makes the residuals for file and pictures.
+        options: checked.
+        read: reads what is to be diagnosed.
+        diagnosed: diagnoses it; takes the functions that are told of the progress, too.
+
+    Raises:
+        InputError: as of both, or the output cannot be written.
     """
-    if diagnosis.causes:
-        try:
-            rig.write_extended(diagnosis.explanation, folder / EXTENDED)
-        except InputError as error:  # values that no effect can have, such as a negative friction
-            values["notes"].append(f"There is no extended model: {error}.")
-    residuals = traces()
-    save_traces(residuals, rig.channels, folder / RESIDUALS)
-    save_plots(values, residuals, rig.channels, words, folder)
-    write_json(folder / JSON, values)
-    write_text(folder / REPORT, format_diagnosis(values) + "\n")
+    with whole_folder(options.out) if options.out else nullcontext() as folder:
+        data = read()
+        inputs = [*options.rec, *([options.tolerances] if options.tolerances else [])]
+        made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
+        with stages() as (say, simulated):
+            found = diagnosed(data, say, simulated)
+            if folder is not None:
+                say("write")
+                if found.estimates and "errors" in found.estimates:
+                    made_with["files"] += [file_facts(truth_path(path)) for path in options.rec]
+                found.write_into(folder, provenance=made_with)
+    print(found)  # after the folder is in place: whoever reads may close the pipe
+    if options.out:
+        print(f"\nWritten to {options.out}.")

@@ -7,11 +7,10 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
-from estimator.estimate.payload import estimate_payload
-from estimator.estimate.text import format_estimate
 from estimator.files import write_json
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
+from mocobot.api.estimation import estimate
 from mocobot.files.provenance import provenance
 from mocobot.files.targets import check_recordings
 from mocobot.progress import stages
@@ -36,8 +35,8 @@ def run(options: Estimate) -> None:
                 say(f"reading {path.name}")
                 yield read_recording(path)
 
-        estimate = estimate_payload(each(), options.method, options.cutoff_hz, say=say)
+        found = estimate(each(), method=options.method, cutoff_hz=options.cutoff_hz, say=say)
     if options.out:
         made = provenance("estimate", asdict(options), options.rec)
-        write_json(options.out, estimate.to_dict() | {"provenance": made})
-    print(format_estimate(estimate))
+        write_json(options.out, found.to_dict() | {"provenance": made})
+    print(found)

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import os
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
 from estimator.recording.parquet import read_recording
-from mocobot.files.targets import check_recordings, check_target
+from mocobot.api.replay import check_replay_target, check_rerun
+from mocobot.files.targets import check_recordings
 from mocobot.progress import bar
+from mocobot_view.facts.diagnosis import read_diagnosis
+from mocobot_view.facts.fact_files import read_estimate, read_truth
+from mocobot_view.replay.replay_trial import ReplayTrial, distinct_names, replay_trial
 
 if TYPE_CHECKING:
     from mocobot.options import Replay
-    from mocobot_view.replay.replay_trial import ReplayTrial
-
-INSTALL = "pip install 'rerun-sdk>=0.41,<0.42'"
-SUFFIX = ".rrd"
 
 
 def run(options: Replay) -> None:
@@ -28,9 +27,7 @@ def run(options: Replay) -> None:
             written.
     """
     _check(options)
-    _check_rerun()
-    import rerun as rr
-
+    check_rerun()
     from mocobot_view.replay.outputs import (
         check_enabled,
         has_display,
@@ -45,7 +42,6 @@ def run(options: Replay) -> None:
             "there is no display to open the viewer on; write a file with --save replay.rrd, or serve it to a browser "
             "with --web"
         )
-    rr.set_strict_mode(True)  # what Rerun cannot log is an error, not a warning among others
     trials = _trials(options)
     for trial in trials:
         for note in trial.notes:
@@ -75,32 +71,10 @@ def _check(options: Replay) -> None:
         raise InputError("--save and --web are both given; choose a file or a browser")
     check_recordings(options.rec)
     if options.save is not None:
-        if options.save.suffix != SUFFIX:
-            raise InputError(f"{options.save}: the file's name must end in {SUFFIX}")
-        check_target(options.save)
-
-
-def _check_rerun() -> None:
-    """Refuse in one sentence if Rerun is missing, or is not the version that this code speaks to."""
-    os.environ.setdefault(
-        "RUST_LOG", "off"
-    )  # or the SDK repeats in its own words what we say in one sentence
-    try:
-        import rerun
-        from rerun.chunk import RrdReader  # noqa: F401
-    except ImportError as error:
-        found = "is not installed" if error.name == "rerun" else "is not of the right version"
-        raise InputError(f"replay needs the Rerun SDK, which {found}; get it with: {INSTALL}") from error
-    version = str(getattr(rerun, "__version__", "unknown"))
-    if not version.startswith("0.41."):
-        raise InputError(f"replay needs the Rerun SDK 0.41; this is {version}; get it with: {INSTALL}")
+        check_replay_target(options.save)
 
 
 def _trials(options: Replay) -> list[ReplayTrial]:
-    from mocobot_view.facts.diagnosis import read_diagnosis
-    from mocobot_view.facts.fact_files import read_estimate, read_truth
-    from mocobot_view.replay.replay_trial import distinct_names, replay_trial
-
     estimate = read_estimate(options.estimate) if options.estimate else None
     diagnosis = read_diagnosis(options.diagnosis) if options.diagnosis else None
     trials = []

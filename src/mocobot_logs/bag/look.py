@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Literal
 
 import numpy as np
 
-from estimator.errors import InputError
 from mocobot_logs.bag.cdr import CdrReader, Selector
-from mocobot_logs.bag.files import BagFiles
-from mocobot_logs.bag.messages import BLOCK_BYTES, MESSAGE_BYTES, Messages, Topic, joined
+from mocobot_logs.bag.messages import Messages
+from mocobot_logs.bag.storage.files import BagFiles
 from mocobot_logs.bag.types import JOINT_STATE, message_type
-from mocobot_logs.bag.unpack import UnpackError, unpack_message
 from mocobot_logs.log import Stamps
 
 STAMPS = 1000
@@ -25,25 +23,16 @@ _NAMES_BYTES = 64 << 10  # several publishers may have a part of the joints each
 class Look:
     """What the first messages of a bag's topics say."""
 
-    def __init__(self, bag: str, files: BagFiles, topics: Mapping[str, Topic]) -> None:
+    def __init__(self, bag: str, files: BagFiles) -> None:
         """Take the bag; nothing is read yet.
 
         Args:
             bag: what messages call the bag.
             files: its files.
-            topics: its topics.
         """
-        self._bag, self._files, self._topics = bag, files, topics
+        self._bag, self._files = bag, files
         self._joints: dict[str, tuple[str, ...]] = {}
         self._stamps: dict[tuple[str, str], Stamps] = {}
-
-    def has_messages(self, topic: str) -> bool:
-        """Whether there is any message of a topic, as far as the files say.
-
-        Raises:
-            InputError: the bag is damaged.
-        """
-        return any(storage.has_messages(topic) for storage in self._files.storages)
 
     def first(self, topic: str, block_bytes: int) -> Messages | None:
         """The first messages of a topic, of about so many bytes; None if there are none.
@@ -51,9 +40,9 @@ class Look:
         Raises:
             InputError: the bag is damaged.
         """
-        if not self.has_messages(topic):
+        if not self._files.has_messages(topic):
             return None
-        found = blocks(self._files, (topic,), lambda _: None, block_bytes)
+        found = self._files.blocks((topic,), lambda _: None, block_bytes)
         return next((block[topic] for block in found), None)
 
     def joints(self, topic: str) -> tuple[str, ...]:
@@ -63,7 +52,7 @@ class Look:
             InputError: the bag is damaged, or does not define the type.
         """
         if topic not in self._joints:
-            kind = message_type(self._topics[topic], self._bag)
+            kind = message_type(self._files.topics[topic], self._bag)
             reader = CdrReader(kind, [Selector("position", "")], stamp=False)
             if kind.name == JOINT_STATE:
                 kind.require_joints("position")
@@ -80,11 +69,12 @@ class Look:
         """
         missing = [topic for topic in topics if (topic, clock) not in self._stamps]
         readers = {
-            t: CdrReader(message_type(self._topics[t], self._bag), (), clock == "header") for t in missing
+            t: CdrReader(message_type(self._files.topics[t], self._bag), (), clock == "header")
+            for t in missing
         }
         found: dict[str, list[Stamps]] = {topic: [np.empty(0, np.int64)] for topic in missing}
-        wanted = tuple(topic for topic in missing if self.has_messages(topic))
-        looked_at = blocks(self._files, wanted, lambda _: None) if wanted else ()
+        wanted = tuple(topic for topic in missing if self._files.has_messages(topic))
+        looked_at = self._files.blocks(wanted, lambda _: None) if wanted else ()
         for number, block in enumerate(looked_at, 1):
             for topic, messages in block.items():
                 stamps = readers[topic].read(messages)[0] if clock == "header" else messages.log_ns
@@ -95,32 +85,3 @@ class Look:
         for topic, parts in found.items():
             self._stamps[topic, clock] = np.concatenate(parts)[:STAMPS]
         return {topic: self._stamps[topic, clock] for topic in topics}
-
-
-def blocks(
-    files: BagFiles,
-    topics: tuple[str, ...],
-    advance: Callable[[int], object],
-    block_bytes: int = BLOCK_BYTES,
-) -> Iterator[dict[str, Messages]]:
-    """Messages of some topics in all files of a bag, unpacked (see ``Storage.blocks``).
-
-    Raises:
-        InputError: a file is damaged.
-    """
-    for storage in files.storages:
-        for block in storage.blocks(topics, advance, block_bytes):
-            if files.packed:
-                yield {
-                    topic: _unpacked(m, f"{storage.name}: topic {topic!r:.80}") for topic, m in block.items()
-                }
-            else:
-                yield block
-
-
-def _unpacked(messages: Messages, where: str) -> Messages:
-    try:
-        payloads = [unpack_message(messages[k], MESSAGE_BYTES) for k in range(len(messages))]
-    except UnpackError as error:
-        raise InputError(f"{where}: damaged, a compressed message {error}") from error
-    return joined(payloads, messages.log_ns, where)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
@@ -129,33 +129,24 @@ def check_sizes(size: NDArray[np.int64], where: str) -> None:
         )
 
 
-def merged_topics(storages: Collection[Storage]) -> dict[str, Topic]:
-    """Topics of all files of a bag.
+def merged(topics: Iterable[Topic], where: str) -> dict[str, Topic]:
+    """Topics by name: recorders list one once for each quality of service, and once in each file.
 
     Raises:
-        InputError: a topic has one type in one file and another one in another.
+        InputError: a topic has one type or encoding here and another one there.
     """
     found: dict[str, Topic] = {}
-    for storage in storages:
-        for name, topic in storage.topics.items():
-            known = found.setdefault(name, topic)
-            if known is topic:
-                continue
-            if (known.type, known.encoding) != (topic.type, topic.encoding):
+    for topic in topics:
+        known = found.setdefault(topic.name, topic)
+        if known is topic:
+            continue
+        for one, other in ((known.type, topic.type), (known.encoding, topic.encoding)):
+            if one != other:
                 raise InputError(
-                    f"{storage.name}: topic {name!r:.80} holds {topic.type!r:.80} ({topic.encoding!r:.20}), but "
-                    f"{known.type!r:.80} ({known.encoding!r:.20}) in another file of the bag"
+                    f"{where}: topic {topic.name!r:.80} holds both {one!r:.80} and {other!r:.80}"
                 )
-            count = None if known.count is None or topic.count is None else known.count + topic.count
-            described = known if known.definition_format else topic
-            found[name] = Topic(
-                name,
-                topic.type,
-                topic.encoding,
-                described.definition_format,
-                described.definition,
-                count,
-            )
+        count = None if known.count is None or topic.count is None else known.count + topic.count
+        found[topic.name] = replace(known if known.definition_format else topic, count=count)
     return found
 
 

@@ -20,11 +20,11 @@ from estimator.recording.metadata import RecordingMetadata
 from mocobot_logs.bag.align import Part
 from mocobot_logs.bag.cdr import CdrReader
 from mocobot_logs.bag.choose import choose_map
-from mocobot_logs.bag.files import is_bag, open_files
 from mocobot_logs.bag.join import Clock, agree, make_joiner
-from mocobot_logs.bag.look import Look, blocks
-from mocobot_logs.bag.messages import Messages, listed_names, merged_topics
+from mocobot_logs.bag.look import Look
+from mocobot_logs.bag.messages import Messages, listed_names
 from mocobot_logs.bag.plan import Plan, TopicPlan, make_plan
+from mocobot_logs.bag.storage.files import BagFiles, is_bag
 from mocobot_logs.bag.types import STRING, string_of, type_name
 from mocobot_logs.log import CHANNELS, REF, Level, Samples
 from mocobot_logs.map.log_map import LogMap
@@ -60,15 +60,14 @@ class BagSource:
             InputError: see ``open_bag``.
         """
         self.name = str(path)
-        self._files = open_files(path)
-        self._topics = merged_topics(self._files.storages)
-        self._look = Look(self.name, self._files, self._topics)
-        self._map = choose_map(self.name, self._topics, self._look) if log_map is None else log_map
+        self._files = BagFiles(path)
+        self._look = Look(self.name, self._files)
+        self._map = choose_map(self.name, self._files.topics, self._look) if log_map is None else log_map
         self._clock: Clock = self._map.time.clock
         self._plan = self._make_plan()
         self.level: Level = self._map.level
         self.robots, self.channels = self._plan.robots, self._plan.channels
-        self.size = sum(storage.size for storage in self._files.storages)
+        self.size = self._files.size
         self.metadata = self._read_metadata()
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
@@ -82,7 +81,7 @@ class BagSource:
             make_joiner(self.name, robot, topics, len(self.channels), self._look, self._clock)
             for robot, topics in enumerate(self._plan.parts, 1)
         ]
-        for block in blocks(self._files, tuple(readers), advance):
+        for block in self._files.blocks(tuple(readers), advance):
             parts: list[dict[int, Part]] = [{} for _ in range(self.robots)]
             for topic, messages in block.items():
                 readers[topic].read(messages, parts)
@@ -97,8 +96,8 @@ class BagSource:
 
     def _make_plan(self) -> Plan:
         """The plan; without commands that a log may lack where they are not stamped together with the samples."""
-        arguments = self.name, self._topics, self._map, self._look.joints
-        found = make_plan(*arguments, self._look.has_messages)
+        arguments = self.name, self._files.topics, self._map, self._look.joints
+        found = make_plan(*arguments, self._files.has_messages)
         if any(len(topics) > 1 for topics in found.parts):  # all at once: the bag need not be looked at again
             self._look.stamps(tuple(found.topics), self._clock)
         may_lack = found.channels != CHANNELS[self._map.level] and self._map.common[REF[0]].optional
@@ -107,7 +106,7 @@ class BagSource:
         return found
 
     def _read_metadata(self) -> RecordingMetadata | None:
-        topic = self._topics.get(METADATA_TOPIC)
+        topic = self._files.topics.get(METADATA_TOPIC)
         if topic is None or type_name(topic) != STRING:
             return None
         if (messages := self._look.first(METADATA_TOPIC, 1)) is None:

@@ -42,9 +42,9 @@ from rosbags.typesys.store import Typestore
 from estimator.arm.wrist_level import wrist_of
 from estimator.errors import InputError
 from estimator.recording.model import Recording
+from mocobot_logs.bag.mcap_writer import ChecksummedMcap
 from mocobot_logs.bag.messages import Topic
 from mocobot_logs.bag.read import METADATA_TOPIC
-from mocobot_logs.bag.storage_mcap import ChecksummedMcap
 from mocobot_logs.bag.types import JOINT_STATE, STRING, message_type
 from mocobot_logs.bag.walk import Walk
 from mocobot_logs.log import Array, Level, Stamps

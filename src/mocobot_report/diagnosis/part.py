@@ -7,8 +7,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
-from estimator import so3
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.blocks import (
@@ -160,7 +160,7 @@ def _grasped(values: Values) -> PayloadEstimate:
     count = len(grasps)
     none = np.zeros((count, count))
     found = GraspEstimate(
-        so3.exp(np.deg2rad([g["R_1i_rotvec_deg"] for g in grasps])),
+        Rotation.from_rotvec([g["R_1i_rotvec_deg"] for g in grasps], degrees=True).as_matrix(),
         np.array([g["p_1i_m"] for g in grasps], dtype=float),
         np.zeros((6 * (count - 1), 6 * (count - 1))),
         none, none, np.zeros(count), np.zeros(count),

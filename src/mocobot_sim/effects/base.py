@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from estimator.errors import InputError
 from mocobot_sim.scene.scene import TeamScene
-from mocobot_sim.scene.soft import tuned
 
 Array = NDArray[np.float64]
 
@@ -77,7 +76,7 @@ class Effect(ABC):
         robot = getattr(self, "robot", 1)
         if robot > scene.robots:
             raise InputError(f"{self.cause}: robot is {robot}; the team has robots 1 .. {scene.robots}")
-        return tuned(self._edit(scene))
+        return self._edit(scene).tuned()
 
     def carried(self) -> Array:
         """Inertial parameters (m, m c, J about {1}) that it adds to the payload's in an estimate, shape (10,)."""

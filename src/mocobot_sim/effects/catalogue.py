@@ -9,6 +9,7 @@ from typing import Any
 
 from estimator.errors import InputError
 from mocobot_sim.effects.base import PLACE, Effect
+from mocobot_sim.scene.applied import Applied
 from mocobot_sim.scene.scene import TeamScene
 
 NAMES = (
@@ -87,7 +88,7 @@ def _has_default(entry: Any) -> bool:
     return isinstance(entry.default, float)
 
 
-def effect_to_dict(effect: Effect) -> dict[str, Any]:
+def effect_to_dict(effect: Applied) -> dict[str, Any]:
     """Plain JSON values: ``cause``, ``robot`` and ``joint`` where there are, ``parameters``."""
     place = {name: getattr(effect, name) for name in effect.place_names()}
     parameters = {name: getattr(effect, name) for name in effect.parameter_names()}

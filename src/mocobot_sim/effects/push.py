@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import ClassVar
 
 import mujoco
@@ -34,7 +34,7 @@ class Push(Effect):
     point_z_m: float
 
     def _edit(self, scene: TeamScene) -> TeamScene:
-        return replace(scene, pushes=(*scene.pushes, self))
+        return scene
 
     def act(self, model: mujoco.MjModel, data: mujoco.MjData, body: int, R_Wb1: np.ndarray) -> None:
         """Add the force to ``data.xfrc_applied`` of the payload's body if ``data.time`` is in the interval.

@@ -15,7 +15,6 @@ from scipy.spatial.transform import RigidTransform
 
 from estimator.errors import InputError
 from mocobot_sim.effects import Effect, effect_from_dict, effect_to_dict
-from mocobot_sim.effects.push import Push
 from mocobot_sim.extended.json import Fields, parse_object, poses_to_list
 from mocobot_sim.extended.readme import readme
 from mocobot_sim.scene.as_built import AsBuilt
@@ -143,7 +142,6 @@ def load_extended(folder: Path) -> TeamScene:
         mounts=_poses(read, "mounts", robots),
         initial=_initial(read, robots),
         sensors=_sensors(read, robots),
-        pushes=tuple(effect for effect in effects if isinstance(effect, Push)),
         grasp_slack_m=tuple(read.array("grasp_slack_m", (robots,)).tolist()),
         effects=effects,
         xml=_read(folder / SCENE),

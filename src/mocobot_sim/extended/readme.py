@@ -37,5 +37,5 @@ Simulate a trial with it:
     mocobot simulate --model . --trajectory random --out trial.parquet
 
 From Python: `mocobot_sim.extended.extended.load_extended(folder)`, then `mocobot_sim.trial.trial.run_trial` or
-`mocobot_sim.trial.resimulate.rerun`.
+`mocobot_sim.trial.resimulate.resimulate`.
 """

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from estimator import so3
 from estimator.errors import InputError
+from estimator.strict import Fields, read_toml
 
 Array = NDArray[np.float64]
 
@@ -53,6 +53,10 @@ class PayloadTruth:
 
 
 PAYLOADS = ("a", "b", "c", "d")
+_FILE = Path(__file__).with_name("published.toml")
+_TRUTH = (
+    "R_12_deg", "R_23_deg", "R_31_deg", "p_12_m", "p_23_m", "p_31_m", "mass_kg", "p_1c_m", "R_1c_deg", "principal_kgm2"
+)  # fmt: skip
 
 
 def payload_truth(name: str) -> PayloadTruth:
@@ -63,17 +67,19 @@ def payload_truth(name: str) -> PayloadTruth:
     Raises:
         InputError: there is no such payload.
     """
-    row = _payload(name)["truth"]
-    R_12, R_31 = so3.exp(np.deg2rad(row["R_12_deg"])), so3.exp(np.deg2rad(row["R_31_deg"]))
-    p_13 = -R_31.T @ np.array(row["p_31_m"])
+    row = Fields(printed_truth(name), _TRUTH, f"{_FILE.name}: {name}.truth")
+    R_12, R_31, R_1c = (
+        Rotation.from_rotvec(row.array(key, (3,)), degrees=True).as_matrix()
+        for key in ("R_12_deg", "R_31_deg", "R_1c_deg")
+    )
     return PayloadTruth(
         name=name,
         R_1i=np.stack([np.eye(3), R_12, R_31.T]),
-        p_1i=np.stack([np.zeros(3), np.array(row["p_12_m"]), p_13]),
-        mass=row["mass_kg"],
-        p_1c=np.array(row["p_1c_m"]),
-        R_1c=so3.exp(np.deg2rad(row["R_1c_deg"])),
-        principal_moments=np.array(row["principal_kgm2"]),
+        p_1i=np.stack([np.zeros(3), row.array("p_12_m", (3,)), -R_31.T @ row.array("p_31_m", (3,))]),
+        mass=row.number("mass_kg", above=0.0),
+        p_1c=row.array("p_1c_m", (3,)),
+        R_1c=R_1c,
+        principal_moments=row.array("principal_kgm2", (3,)),
     )
 
 
@@ -104,4 +110,4 @@ def _payload(name: str) -> dict[str, Any]:
 
 @cache
 def _tables() -> dict[str, Any]:
-    return tomllib.loads(files("mocobot_sim.paper").joinpath("published.toml").read_text(encoding="utf-8"))
+    return read_toml(_FILE, "file of the paper's tables")

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
-from estimator.so3 import log
 from mocobot_sim.paper.published import PayloadTruth
 
 Array = NDArray[np.float64]
@@ -57,7 +57,7 @@ def score(estimate: PayloadEstimate, truth: PayloadTruth) -> dict[str, Any]:
 
 def rotation_error_deg(R: Array, R_estimated: Array) -> float:
     """Angle of R^T R_estimated [deg], shapes (3, 3)."""
-    return float(np.rad2deg(np.linalg.norm(log(R.T @ R_estimated))))
+    return float(np.rad2deg(Rotation.from_matrix(R.T @ R_estimated).magnitude()))
 
 
 def _grasp_errors(grasps: Sequence[GraspEstimate], truth: PayloadTruth) -> dict[str, Any]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
@@ -15,16 +14,13 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from estimator.errors import InputError
 from mocobot_sim.base.design import base_design
 from mocobot_sim.base.rollers import release, rough_floor
+from mocobot_sim.scene.applied import Applied, Pushing
 from mocobot_sim.scene.as_built import AsBuilt, units_of
 from mocobot_sim.scene.models import base_height_m, models_dir, omnid_design
 from mocobot_sim.scene.payload import grasp_frames, load_payload
 from mocobot_sim.scene.pymjcf import mjcf
 from mocobot_sim.scene.sensor_effects import SensorEffects
-from mocobot_sim.scene.soft import SoftRow
-
-if TYPE_CHECKING:
-    from mocobot_sim.effects.base import Effect
-    from mocobot_sim.effects.push import Push
+from mocobot_sim.scene.soft import SoftRow, tune
 
 Array = NDArray[np.float64]
 
@@ -49,11 +45,10 @@ class TeamScene:
         mounts: pose of every robot's place on the floor in the world, before any tilt; N transforms.
         initial: true (phi, theta) near which a trial starts [rad], two arrays (N, 3); None for home.
         sensors: timing faults of the sensors.
-        pushes: forces from outside that a trial applies to the payload.
         grasp_slack_m: by how much each grasp may open in a sound trial, beyond a weld's softness [m], N entries;
             empty for none.
         soft: springs and dampers that are soft constraints.
-        effects: what was applied to the team, for the record.
+        effects: what was applied to the team.
         xml: the scene's MJCF if ``root`` is None.
         assets: files that ``xml`` refers to, by name.
     """
@@ -67,10 +62,9 @@ class TeamScene:
     mounts: RigidTransform
     initial: tuple[Array, Array] | None = None
     sensors: SensorEffects = field(default_factory=SensorEffects)
-    pushes: tuple[Push, ...] = ()
     grasp_slack_m: tuple[float, ...] = ()
     soft: tuple[SoftRow, ...] = ()
-    effects: tuple[Effect, ...] = ()
+    effects: tuple[Applied, ...] = ()
     xml: str | None = None
     assets: Mapping[str, bytes] = field(default_factory=dict)
 
@@ -78,6 +72,11 @@ class TeamScene:
     def X_Wb(self) -> RigidTransform:
         """Every robot's {b} in the world as its floor mount has it, without any tilt; N transforms."""
         return self.mounts * RigidTransform.from_translation([0.0, 0.0, base_height_m()])
+
+    @property
+    def pushes(self) -> tuple[Pushing, ...]:
+        """Forces from outside that a trial applies to the payload."""
+        return tuple(effect for effect in self.effects if isinstance(effect, Pushing))
 
     def to_xml(self) -> str:
         """The scene as one MJCF document that loads in plain MuJoCo."""
@@ -94,6 +93,12 @@ class TeamScene:
             return mujoco.MjModel.from_xml_string(self.to_xml(), assets)
         except ValueError as error:
             raise InputError(f"MuJoCo cannot compile the team ({' '.join(str(error).split())})") from error
+
+    def tuned(self) -> TeamScene:
+        """The scene with every soft row set for the inertias that it has now, in place."""
+        if self.root is not None and self.soft:
+            tune(self.root, self.compile(), self.soft)
+        return self
 
 
 def build_team(

@@ -12,14 +12,13 @@ coordinate in the model's zero pose. So x has stiffness s / ((1 - d) A), or, wit
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import mujoco
 import numpy as np
 
-if TYPE_CHECKING:
-    from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.scene.pymjcf import mjcf
 
 # Of d and of 1 - d: MuJoCo clips d to this range.
 _LEAST = 1e-4
@@ -70,12 +69,9 @@ def _constant_impedance(d: float) -> list[float]:
     return [float(d), float(d), 0.001, 0.5, 2.0]
 
 
-def tuned(scene: TeamScene) -> TeamScene:
-    """Set every soft row for the inertias that the scene has now; returns the scene, edited in place."""
-    if not scene.soft:
-        return scene
-    model = scene.compile()
-    for row in scene.soft:
+def tune(root: mjcf.RootElement, model: mujoco.MjModel, rows: Sequence[SoftRow]) -> None:
+    """Set soft rows of a PyMJCF tree for the inertias of the model that it compiles to."""
+    for row in rows:
         equality = model.equality(row.equality).id
         on = model.eq_obj1id[equality]
         if model.eq_type[equality] == mujoco.mjtEq.mjEQ_TENDON:
@@ -87,9 +83,8 @@ def tuned(scene: TeamScene) -> TeamScene:
         else:
             assert row.damping is not None
             solref, solimp = damper_parameters(row.damping, inverse_inertia)
-        element = scene.root.find("equality", row.equality)
+        element = root.find("equality", row.equality)
         element.solref, element.solimp = solref, solimp
-    return scene
 
 
 def row_compliance(model: mujoco.MjModel, joint: int) -> float:

@@ -13,7 +13,6 @@ Index = NDArray[np.intp]
 GIMBAL_AXES = ("z", "y", "x")
 SLIDES = ("platform_x", "platform_y", "platform_z")
 PAYLOAD_PREFIX = "omnid1/payload/"
-YIELDING = ("creep", "compliance", "flex", "play")
 
 
 @dataclass(frozen=True)
@@ -27,8 +26,8 @@ class TeamIndex:
         grasp_site: the flange's site of every robot, shape (N,).
         payload_site: the payload's grasp site of every robot, shape (N,).
         payload_body: body id of the payload.
-        yielding_dof: slides of bases and grasps that yield, are loose or creep; none in a team as designed.
-        slosh_dof: hinges of a pendulum in the payload.
+        yielding_dof: slides that effects have added: bases and grasps that yield, are loose or creep.
+        hanging_dof: hinges that effects have added: what swings in the payload.
         base_dof: free chassis, wheels and rollers; none in a team that is parked.
     """
 
@@ -46,7 +45,7 @@ class TeamIndex:
     payload_site: Index
     payload_body: int
     yielding_dof: Index
-    slosh_dof: Index
+    hanging_dof: Index
     base_dof: Index
 
     @property
@@ -82,6 +81,8 @@ class TeamIndex:
             ],
             dtype=np.intp,
         )
+        base = _base_joints(model)
+        own = np.concatenate([joints.ravel() for joints in (motor, spring, gimbal, slide, knee, base)])
         return cls(
             motor_qpos=model.jnt_qposadr[motor].astype(np.intp),
             spring_qpos=model.jnt_qposadr[spring].astype(np.intp),
@@ -100,21 +101,21 @@ class TeamIndex:
                 [model.site(f"{PAYLOAD_PREFIX}grasp{i + 1}").id for i in range(robots)], dtype=np.intp
             ),
             payload_body=model.body(f"{PAYLOAD_PREFIX}payload").id,
-            yielding_dof=_named(model, YIELDING),
-            slosh_dof=_named(model, ("slosh",)),
-            base_dof=_base(model),
+            yielding_dof=_added(model, own, mujoco.mjtJoint.mjJNT_SLIDE),
+            hanging_dof=_added(model, own, mujoco.mjtJoint.mjJNT_HINGE),
+            base_dof=np.flatnonzero(np.isin(model.dof_jntid, base)).astype(np.intp),
         )
 
 
-def _named(model: mujoco.MjModel, kinds: tuple[str, ...]) -> Index:
-    """Positions in ``qvel`` of joints called ``.../{kind}_{axis}``."""
-    names = {f"{kind}_{axis}" for kind in kinds for axis in "xyz"}
-    found = [j for j in range(model.njnt) if model.joint(j).name.rsplit("/", 1)[-1] in names]
-    return model.jnt_dofadr[np.array(found, dtype=int)].astype(np.intp)
+def _added(model: mujoco.MjModel, own: Index, kind: mujoco.mjtJoint) -> Index:
+    """Positions in ``qvel`` of joints of one kind that the robots as designed do not have: effects add them."""
+    joints = np.setdiff1d(np.flatnonzero(model.jnt_type == kind), own)
+    return model.jnt_dofadr[joints].astype(np.intp)
 
 
-def _base(model: mujoco.MjModel) -> Index:
-    """Positions in ``qvel`` of free joints, and of joints called ``.../wheel_*``."""
+def _base_joints(model: mujoco.MjModel) -> Index:
+    """Free joints, and joints called ``.../wheel_*``."""
     wheel = [model.joint(j).name.rsplit("/", 1)[-1].startswith("wheel_") for j in range(model.njnt)]
-    joints = np.flatnonzero(np.array(wheel) | (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE))
-    return np.flatnonzero(np.isin(model.dof_jntid, joints)).astype(np.intp)
+    return np.flatnonzero(
+        np.array(wheel, dtype=bool) | (model.jnt_type == mujoco.mjtJoint.mjJNT_FREE)
+    ).astype(np.intp)

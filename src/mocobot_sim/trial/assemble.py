@@ -89,7 +89,7 @@ def _settle(
     model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex, arms: NDArray[np.intp], start: Array
 ) -> bool:
     """Put everything that yields where its load holds it; whether anything moved."""
-    moved = hang(model, data, index.slosh_dof)
+    moved = hang(model, data, index.hanging_dof)
     _, unheld, load = _static_forces(model, data, index, check=False)
     if unheld > UNHELD_NM:
         locked = np.concatenate([index.motor_dof.ravel(), index.spring_dof.ravel()])
@@ -127,7 +127,7 @@ def _static_forces(
     mujoco.mj_fwdVelocity(model, data)
     spring = index.spring_dof.ravel()
     # The floor carries released bases: their wheels settle in a trial's first milliseconds.
-    apart = np.concatenate([index.motor_dof.ravel(), index.yielding_dof, index.slosh_dof, index.base_dof])
+    apart = np.concatenate([index.motor_dof.ravel(), index.yielding_dof, index.hanging_dof, index.base_dof])
     rows = np.setdiff1d(np.arange(model.nv), apart)
     jacobian = loop_jacobian(model, data)[0].T  # (nv, loops)
     constraint = jacobian[rows]

@@ -1,4 +1,4 @@
-"""Run a recording's commands again in closed loop, and what its sensors should then have read."""
+"""Resimulation: a recording's commands in closed loop once more, and what its sensors should then have read."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from mocobot_sim.trial.trial import TrialLog, run_trial
 Array = NDArray[np.float64]
 
 
-def rerun(
+def resimulate(
     recording: Recording,
     scene: TeamScene,
     gains: ControlGains | None = None,
@@ -45,14 +45,14 @@ def rerun(
     meta = recording.metadata
     if recording.ref is None:
         raise InputError(
-            f"{recording.name}: has no commands (ref_x, ref_y, ref_z); running it again needs them"
+            f"{recording.name}: has no commands (ref_x, ref_y, ref_z); resimulating it needs them"
         )
     if meta.control is None:
-        raise InputError(f"{recording.name}: metadata has no 'control'; running it again needs it")
+        raise InputError(f"{recording.name}: metadata has no 'control'; resimulating it needs it")
     if meta.robots != scene.robots:
         raise InputError(f"{recording.name}: is of {meta.robots} robots; the scene has {scene.robots}")
     if meta.rate_hz != RATE_HZ:
-        raise InputError(f"{recording.name}: rate_hz is {meta.rate_hz:g}; running it again needs {RATE_HZ:g}")
+        raise InputError(f"{recording.name}: rate_hz is {meta.rate_hz:g}; resimulating it needs {RATE_HZ:g}")
     feed_forward = _feed_forward(recording)
     try:
         gains = gains or ControlGains.from_dict(meta.control)

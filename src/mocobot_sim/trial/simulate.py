@@ -12,6 +12,7 @@ from scipy.spatial.transform import RigidTransform
 from estimator.errors import InputError
 from estimator.recording.model import Recording
 from mocobot_sim.control.control import ControlGains
+from mocobot_sim.effects import Effect, apply_effects
 from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset, measure
@@ -75,6 +76,7 @@ def simulate(
     gains: ControlGains | None = None,
     progress: Callable[[int], object] | None = None,
     scene: TeamScene | None = None,
+    effects: Sequence[Effect] = (),
 ) -> Simulated:
     """Run one trial and read it through one or several sensor presets.
 
@@ -90,6 +92,7 @@ def simulate(
         progress: called with the number of samples done since the last call.
         scene: the team, in place of one built from ``request.payload``, which then is its label only; its robots are
             what they are, so the presets must be calibrated ones.
+        effects: what is hidden in the team.
 
     Raises:
         InputError: a request or preset that cannot be met.
@@ -108,6 +111,8 @@ def simulate(
             f"preset {presets[0].name!r} draws robots of its own, but the model already says how its robots deviate; "
             f"use {' or '.join(name for name, preset in PRESETS.items() if preset.calibrated)}"
         )
+    if effects:
+        scene = apply_effects(scene, effects)
     trajectory = make_trajectory(request, scene, grasps)
     log = run_trial(scene, trajectory, gains, progress, trial_number=request.number + 1)
     recordings = {

@@ -1,7 +1,7 @@
 """Commanded wrist positions: random vias, motion on a common sphere, static orientations.
 
 Commands are sampled at the recording's rate; between them the controller follows the cubic spline through them, so
-a recording that carries its commands can be run again exactly.
+a recording that carries its commands can be resimulated exactly.
 """
 
 from __future__ import annotations

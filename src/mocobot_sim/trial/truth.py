@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
-from mocobot_sim.effects import Effect, effect_to_dict
+from mocobot_sim.effects import effect_to_dict
+from mocobot_sim.scene.applied import Applied
 from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import TeamIndex
@@ -43,7 +44,7 @@ class GroundTruth:
     R_1c: Array
     principal_kgm2: Array
     units: tuple[AsBuilt, ...]
-    effects: tuple[Effect, ...] = ()
+    effects: tuple[Applied, ...] = ()
 
     @classmethod
     def of(cls, scene: TeamScene) -> GroundTruth:

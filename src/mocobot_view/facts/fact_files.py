@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from estimator import so3
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from mocobot_sim.trial.truth import truth_path
@@ -35,12 +35,14 @@ def read_truth(recording: Path, robots: int) -> BodyFacts:
     each = [_Numbers(path, entry, f"grasps[{k}].") for k, entry in enumerate(grasps)]
     return BodyFacts(
         grasps=Grasps(
-            np.array([so3.exp(np.deg2rad(entry("R_1i_rotvec_deg", (3,)))) for entry in each]),
+            Rotation.from_rotvec(
+                [entry("R_1i_rotvec_deg", (3,)) for entry in each], degrees=True
+            ).as_matrix(),
             np.array([entry("p_1i_m", (3,)) for entry in each]),
         ),
         mass_kg=float(numbers("mass_kg", ())),
         p_1c=numbers("p_1c_m", (3,)),
-        R_1c=so3.exp(np.deg2rad(numbers("R_1c_rotvec_deg", (3,)))),
+        R_1c=Rotation.from_rotvec(numbers("R_1c_rotvec_deg", (3,)), degrees=True).as_matrix(),
         principal_kgm2=numbers("principal_inertia_kgm2", (3,)),
     )
 

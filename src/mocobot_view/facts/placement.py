@@ -81,7 +81,7 @@ def place_bases(R_bi: Array, p_bi: Array, grasps: Grasps, height_m: float) -> Ba
     for i in range(1, R_bi.shape[1]):
         turn = so3.chordal_mean(R_bi[:, 0] @ grasps.R_1i[i] @ np.swapaxes(R_bi[:, i], -1, -2))
         yaw = np.arctan2(turn[1, 0] - turn[0, 1], turn[0, 0] + turn[1, 1])
-        R = so3.exp(np.array([0.0, 0.0, yaw]))
+        R = Rotation.from_rotvec([0.0, 0.0, yaw]).as_matrix()
         R_b1b.append(R)
         p_b1b.append(np.mean(p_bi[:, 0] + R_bi[:, 0] @ grasps.p_1i[i] - p_bi[:, i] @ R.T, axis=0))
     return Bases(np.array(R_b1b), np.array(p_b1b) + np.array([0.0, 0.0, height_m]))

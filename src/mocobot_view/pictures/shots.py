@@ -9,8 +9,8 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from estimator import so3
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
@@ -162,7 +162,7 @@ def _shot(
 
     cameras = [framing(points, AZIMUTH + turn, elevation, aspect, FOVY) for turn in TURNS]
     best = max(cameras, key=apart)
-    turn = so3.exp(np.array([0.0, 0.0, np.deg2rad(best.azimuth - AZIMUTH)]))
+    turn = Rotation.from_rotvec([0.0, 0.0, best.azimuth - AZIMUTH], degrees=True).as_matrix()
     centre = model.stat.center * [1.0, 1.0, 0.0]
     moved = np.append(feet.mean(axis=0)[:2], 0.0) if len(feet) else centre
     model.light_pos[:] = (model.light_pos - centre) @ turn.T + moved

@@ -118,7 +118,7 @@ class FakeRig(Rig):
         when = Transient(self.burst[0], 3.2, 4.0)
         return [cause("push", None, 0.0, self.burst[2], "push", when)]
 
-    def can_run_again(self):
+    def can_resimulate(self):
         return None if self.loop else "it is made up"
 
     def simulation(self, trial, shared, local, active):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from discrepancy.engine.diagnose import diagnose
-from discrepancy.engine.explanation import CLEAN
 from discrepancy.engine.held_out import confirmed
 from discrepancy.engine.search import _idle, refitted, search, without_idle
 from discrepancy.least_squares.problem import Problem
+from discrepancy.rules import CLEAN_CHI2_PER_N
 from fake_rig import CATALOGUE, TWINS, FakeRig, cause, names
 
 
@@ -20,7 +20,7 @@ def test_clean_data_have_no_cause(seed):
     assert names(explanation.found) == []
     assert explanation.rejected == ()
     assert explanation.samples == 4 * 120 * 4
-    assert explanation.after == explanation.before < CLEAN * explanation.samples
+    assert explanation.after == explanation.before < CLEAN_CHI2_PER_N * explanation.samples
     diagnosis = diagnose(rig, closed_loop=False)
     assert diagnosis.verdict == "consistent"
     assert diagnosis.not_simulated

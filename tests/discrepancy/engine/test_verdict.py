@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from discrepancy.engine.diagnose import _verdict, diagnose
-from discrepancy.engine.explanation import CLEAN
 from discrepancy.engine.search import search
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Transient
+from discrepancy.rules import CLEAN_CHI2_PER_N
 from fake_rig import CATALOGUE, FakeRig, names
 
 
@@ -100,7 +100,7 @@ def test_strained_tolerances_are_not_clean():
     rig = FakeRig({k: 4.5 for k in range(5)})
     problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
     explanation = replace(search(FakeRig({})), fit=problem.fit())
-    assert explanation.after <= CLEAN * explanation.samples
+    assert explanation.after <= CLEAN_CHI2_PER_N * explanation.samples
     assert not explanation.clean
     assert _verdict(explanation) == "unexplained"
 

@@ -8,7 +8,7 @@ import pytest
 
 import discrepancy.team.causes
 import mocobot_sim.effects
-from discrepancy.engine.explanation import CLEAN
+from discrepancy.rules import CLEAN_CHI2_PER_N
 from discrepancy.team.causes import CAUSES
 from hidden.draw import Ground, draw_effect
 from hidden.generator import generate
@@ -48,7 +48,7 @@ def test_nothing_is_named_where_nothing_is_hidden(kind):
     assert truth["effects"] == []
     assert (len(truth["background"]) > 100) == (kind == "tolerance")
     assert verdict["found"] == []
-    assert verdict["after"] < CLEAN
+    assert verdict["after"] < CLEAN_CHI2_PER_N
 
 
 @pytest.mark.slow

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt, welch
 
-from discrepancy.team.linear.reduction import DECIMATED_HZ, Reduction
-from discrepancy.team.linear.signals import TRIM_S, Signals
+from discrepancy.rules import TEAM_ROWS_HZ, TEAM_TRIM_S
+from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.signals import Signals
 from estimator.errors import InputError
 
 QUANTUM = 2 * np.pi / 2**16
@@ -70,13 +71,13 @@ def test_hold_is_one_row_its_mean(trial, reduction):
 def test_moving_rows_come_at_one_rate(rate, step):
     trial = signals(10.0, rate, ())
     reduction = Reduction.of(trial)
-    assert reduction.step == step == round(rate / DECIMATED_HZ)
+    assert reduction.step == step == round(rate / TEAM_ROWS_HZ)
     assert reduction.moving == len(reduction.time)
     np.testing.assert_allclose(np.diff(reduction.time), step / rate)
     np.testing.assert_array_equal(reduction.time, trial.time[reduction.sample])
-    assert reduction.time[0] >= TRIM_S
-    assert reduction.time[-1] < 10.0 - TRIM_S
-    assert reduction.moving == pytest.approx((10.0 - 2 * TRIM_S) * rate / step, abs=1)
+    assert reduction.time[0] >= TEAM_TRIM_S
+    assert reduction.time[-1] < 10.0 - TEAM_TRIM_S
+    assert reduction.moving == pytest.approx((10.0 - 2 * TEAM_TRIM_S) * rate / step, abs=1)
 
 
 @pytest.mark.parametrize("frequency", [0.5, 2.0, 5.0, 8.0, 12.0])

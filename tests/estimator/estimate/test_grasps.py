@@ -60,7 +60,7 @@ def test_planar_angular_velocities_give_a_rotation_and_not_a_reflection():
     noisy = omega_2 @ R.T + rng.normal(0, 0.05, (200, 3))
     estimate = pair_rotation(noisy, omega_2)
     assert np.linalg.det(estimate) == pytest.approx(1)
-    assert np.linalg.norm(so3.log(R.T @ estimate)) < 0.05
+    assert Rotation.from_matrix(R.T @ estimate).magnitude() < 0.05
 
 
 def test_loops_close_and_pairs_are_inverse():
@@ -137,8 +137,8 @@ def test_left_jacobian_against_finite_differences(angle):
     phi, h = angle * np.array([0.48, -0.6, 0.64]), 1e-6
     columns = []
     for d in h * np.eye(3):
-        plus, minus = so3.exp(phi + d), so3.exp(phi - d)
-        columns.append(so3.log(plus @ minus.T) / (2 * h))
+        plus, minus = Rotation.from_rotvec(phi + d), Rotation.from_rotvec(phi - d)
+        columns.append((plus * minus.inv()).as_rotvec() / (2 * h))
     np.testing.assert_allclose(so3.left_jacobian(phi), np.column_stack(columns), atol=2e-9)
 
 
@@ -155,7 +155,7 @@ def test_residual_jacobian_against_finite_differences():
         sides = []
         for x in (d, -d):
             x = x.reshape(-1, 6)
-            moved_R = np.concatenate([R[:1], so3.exp(x[:, :3]) @ R[1:]])
+            moved_R = np.concatenate([R[:1], Rotation.from_rotvec(x[:, :3]).as_matrix() @ R[1:]])
             sides.append(module._residuals(V, moved_R, np.concatenate([p[:1], p[1:] + x[:, 3:]])))
         np.testing.assert_allclose(J[..., k], (sides[0] - sides[1]) / (2 * h), atol=1e-8)
 

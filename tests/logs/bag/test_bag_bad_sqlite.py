@@ -78,3 +78,20 @@ def test_a_database_whose_pages_repeat(tmp_path):
         content[at : at + 4] = first
     path.write_bytes(content)
     refuses(path, "damaged, (its table 'messages' holds the same row twice|or not a bag)")
+
+
+def test_a_message_whose_pages_run_in_a_circle(tmp_path):
+    """A small file claims a message of 100 MB: its last page names itself as the next one."""
+    path = rosbags_bag(tmp_path / "bag", Team.draw(robots=1, rows=5).said(), "sqlite3") / "bag.db3"
+    connection = sqlite3.connect(path)
+    (pages,) = connection.execute("PRAGMA page_count").fetchone()
+    connection.execute("UPDATE messages SET data = zeroblob(100000000) WHERE id = 3")
+    connection.commit()
+    connection.close()
+    with path.open("r+b") as file:
+        content = bytearray(file.read((pages + 4) * 4096))
+        content[-4096:-4092] = content[28:32] = (pages + 4).to_bytes(4, "big")
+        file.truncate(0)
+        file.seek(0)
+        file.write(content)
+    refuses(path, "a message of more than 16 MiB|disk image is malformed")

@@ -6,6 +6,7 @@ import tracemalloc
 
 import numpy as np
 import pytest
+from mcap.opcode import Opcode
 from mcap.reader import make_reader
 from mcap.writer import CompressionType
 from mcap.writer import Writer as McapWriter
@@ -124,6 +125,28 @@ def test_a_bag_of_several_files(tmp_path, storage):
     told = yaml.read_text()
     yaml.write_text(told.replace(f"  - bag{suffix}\n", f"  - bag/bag{suffix}\n  - bag/bag_1{suffix}\n"))
     assert yaml.read_text() != told
+    bags.assert_holds(path, TEAM)
+
+
+def test_an_index_that_lacks_chunks(tmp_path):
+    """What holds the messages counts, not what the index says of it."""
+    content = bytearray(raw_mcap(tmp_path / "whole.mcap", TEAM.said()).read_bytes())
+    at, hidden = int.from_bytes(content[-28:-20], "little"), 0
+    while at < len(content) - 37:
+        if content[at] == Opcode.CHUNK_INDEX and hidden < 3:
+            content[at] = 0x93  # a private record
+            hidden += 1
+        at += 9 + int.from_bytes(content[at + 1 : at + 9], "little")
+    assert hidden == 3
+    path = tmp_path / "a.mcap"
+    path.write_bytes(content)
+    bags.assert_holds(path, TEAM)
+
+
+def test_topics_that_are_not_of_ros_do_not_matter(tmp_path):
+    foreign = bags.Said("/log", int(TEAM.stamps[0, 0]), "foxglove.Log", b"\x0a\x01x")
+    definitions = {"foxglove.Log": ("protobuf", "\n\x07lab")}
+    path = raw_mcap(tmp_path / "a.mcap", [foreign, *TEAM.said()], definitions=definitions, profile="")
     bags.assert_holds(path, TEAM)
 
 

@@ -12,7 +12,7 @@ from estimator.recording.parquet import read_recording, write_recording
 from mocobot_sim.scene.models import base_height_m
 from mocobot_sim.scene.payload_mjcf import payload_mjcf
 from mocobot_sim.scene.scene import build_team
-from mocobot_sim.trial.resimulate import predicted, rerun
+from mocobot_sim.trial.resimulate import predicted, resimulate
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.truth import GroundTruth
 
@@ -35,7 +35,7 @@ def test_the_same_team_does_the_same_again(recording, tmp_path):
     """Through a file, too. Only the first second knows that the load was taken up."""
     path = tmp_path / "rec.parquet"
     write_recording(recording, path)
-    again = predicted(rerun(read_recording(path), build_team("a")))
+    again = predicted(resimulate(read_recording(path), build_team("a")))
     difference = _rms(again, recording)
     assert difference["phi"] < 1e-7
     assert difference["theta"] < 1e-7
@@ -44,23 +44,23 @@ def test_the_same_team_does_the_same_again(recording, tmp_path):
 
 
 def test_a_finer_step_stays_close(recording):
-    difference = _rms(predicted(rerun(recording, build_team("a"), timestep_s=0.0005)), recording)
+    difference = _rms(predicted(resimulate(recording, build_team("a"), timestep_s=0.0005)), recording)
     assert difference["phi"] < 0.03e-3
     assert difference["tau"] < 0.8e-3
 
 
 def test_nominal_sensors_are_good_enough_to_start_from(random_a, recording):
     noisy = measure(random_a, sensor_preset("nominal"), np.random.default_rng(0))
-    difference = _rms(predicted(rerun(noisy, build_team("a"))), recording)
+    difference = _rms(predicted(resimulate(noisy, build_team("a"))), recording)
     assert difference["phi"] < 1e-6
     assert difference["tau"] < 1e-4
 
 
 def test_the_guilty_effect_explains_a_recording_and_others_do_not(recording):
-    hidden = predicted(rerun(recording, team_with("a", example("sea_scale", 2))))
+    hidden = predicted(resimulate(recording, team_with("a", example("sea_scale", 2))))
     assert _rms(hidden, recording)["tau"] > 1e-2
-    right = predicted(rerun(hidden, team_with("a", example("sea_scale", 2))))
-    wrong = predicted(rerun(hidden, team_with("a", example("sea_scale", 3))))
+    right = predicted(resimulate(hidden, team_with("a", example("sea_scale", 2))))
+    wrong = predicted(resimulate(hidden, team_with("a", example("sea_scale", 3))))
     hidden_scale = _rms(right, hidden)
     assert hidden_scale["tau"] < 2e-5
     assert _rms(wrong, hidden)["tau"] > 1e-2
@@ -83,7 +83,7 @@ def test_a_team_from_numbers_alone_is_the_team(recording, team_a):
     np.testing.assert_allclose(scene.wrist_home_b, team_a.wrist_home_b, rtol=0, atol=1e-12)
     np.testing.assert_allclose(scene.theta_home, team_a.theta_home, rtol=0, atol=1e-12)
     np.testing.assert_allclose(scene.X_Wb.translation[:, 2], base_height_m(), rtol=0, atol=1e-15)
-    difference = _rms(predicted(rerun(recording, scene)), recording)
+    difference = _rms(predicted(resimulate(recording, scene)), recording)
     assert difference["phi"] < 1e-6
     assert difference["tau"] < 1e-5
 
@@ -95,12 +95,12 @@ def test_mounts_that_are_off_are_assembled_from_the_first_sample(recording, team
     error = RigidTransform.from_components(
         rng.normal(0, 5e-4, (3, 3)), Rotation.from_rotvec(rng.normal(0, 1e-3, (3, 3)))
     )
-    again = predicted(rerun(recording, build_team(payload, mounts=mounts * error)))
+    again = predicted(resimulate(recording, build_team(payload, mounts=mounts * error)))
     assert 1e-5 < np.abs(again.phi[0] - recording.phi[0]).max() < 0.02
     assert _rms(again, recording)["phi"] < 0.02
 
 
-def test_what_cannot_be_run_again_is_refused(recording, teams):
+def test_what_cannot_be_resimulated_is_refused(recording, teams):
     scene = build_team("a")
     meta = recording.metadata
 
@@ -113,12 +113,12 @@ def test_what_cannot_be_run_again_is_refused(recording, teams):
         (but(control={}), scene, r"rec: control.feed_forward_N is null; it must be 3 x 3 finite numbers"),
         (but(control=meta.control | {"feed_forward_N": [[1, 2]]}), scene, r"feed_forward_N is \[\[1, 2\]\]"),
         (but(control=meta.control | {"torque_gain": -1}), scene, "rec: control.torque_gain is -1"),
-        (but(rate_hz=200.0), scene, "rec: rate_hz is 200; running it again needs 100"),
+        (but(rate_hz=200.0), scene, "rec: rate_hz is 200; resimulating it needs 100"),
         (recording, build_team("a", timestep_s=0.001) and teams[2], "is of 3 robots; the scene has 2"),
     ]
     for bad, team, sentence in cases:
         with pytest.raises(InputError, match=sentence):
-            rerun(bad, team)
+            resimulate(bad, team)
 
 
 @pytest.mark.parametrize(

@@ -2,17 +2,11 @@
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.emps.causes.base import Cause, force
 from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG
 from discrepancy.emps.recording.preflight import resolution
 from estimator.filtering import differentiate, low_pass
-
-CARRIAGE = 0.5
-"""Share of the moving mass behind the play: assumed."""
-SOFT_N = 2.0
-SMOOTH_HZ = 60.0
-STEPS = 3.0
-"""A play of fewer steps of the encoder is rounding."""
 
 
 class Backlash(Cause):
@@ -30,12 +24,12 @@ class Backlash(Cause):
 
     def columns(self, signals, shape):
         # The side on which motor and carriage touch is that of the force passed on.
-        passed = signals.force - (1.0 - CARRIAGE) * FIRST_GUESS_KG * signals.a
+        passed = signals.force - (1.0 - rules.CARRIAGE_SHARE) * FIRST_GUESS_KG * signals.a
         rate = signals.log.rate_hz
-        side = low_pass(np.tanh(passed / SOFT_N), rate, min(SMOOTH_HZ, 0.2 * rate))
+        side = low_pass(np.tanh(passed / rules.PLAY_SOFT_N), rate, min(rules.PLAY_HZ, 0.2 * rate))
         second = differentiate(differentiate(side, rate), rate)
-        return force(-0.5 * CARRIAGE * FIRST_GUESS_KG * second)
+        return force(-0.5 * rules.CARRIAGE_SHARE * FIRST_GUESS_KG * second)
 
     def visible(self, signals, hints, values):
         # Rounding by whole steps has a hysteresis of its own.
-        return abs(values[0]) > STEPS * resolution(signals.log.position).step_m
+        return abs(values[0]) > rules.PLAY_STEPS * resolution(signals.log.position).step_m

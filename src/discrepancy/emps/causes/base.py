@@ -15,11 +15,6 @@ from discrepancy.emps.recording.signals import Signals, smooth
 
 Array = NDArray[np.float64]
 
-GIVEN_TO = 1e-4
-"""Share by which a gain may be off for the digits it is given with."""
-SHORTEST_RIPPLE_M = 1e-3
-"""Shorter ripples are faster than the rows at most speeds."""
-
 
 @dataclass(frozen=True, eq=False)
 class Hints:

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from discrepancy.emps.causes.base import SHORTEST_RIPPLE_M, Cause, force
+from discrepancy import rules
+from discrepancy.emps.causes.base import Cause, force
 
 
 class PositionForce(Cause):
@@ -26,7 +27,7 @@ class PositionForce(Cause):
 
     def shapes(self, hints):
         lengths = (factor * hints.wavelength_m for factor in (1.0, 0.5, 2.0))
-        return [{"wavelength_m": length} for length in lengths if length >= SHORTEST_RIPPLE_M]
+        return [{"wavelength_m": length} for length in lengths if length >= rules.SHORTEST_RIPPLE_M]
 
     def finer(self, shape):
         return [

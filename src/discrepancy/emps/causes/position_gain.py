@@ -1,6 +1,7 @@
 """The position loop's gain is not its nominal value."""
 
-from discrepancy.emps.causes.base import GIVEN_TO, Cause, voltage
+from discrepancy import rules
+from discrepancy.emps.causes.base import Cause, voltage
 
 
 class PositionGain(Cause):
@@ -21,4 +22,4 @@ class PositionGain(Cause):
         return voltage(signals.log.kv_Vs_per_m * signals.error)
 
     def visible(self, signals, hints, values):
-        return abs(values[0]) > GIVEN_TO * signals.log.kp_per_s
+        return abs(values[0]) > rules.GIVEN_TO_SHARE * signals.log.kp_per_s

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.causes.free_while import free_while
 from discrepancy.emps.recording.signals import Signals
 
 Array = NDArray[np.float64]
 
-SLOW = tuple({"slow_mps": s} for s in (1e-3, 1e-4, 3e-4, 3e-3))
+SLOW = tuple({"slow_mps": s} for s in rules.SLOWER_MPS)
 """Speeds below which the direction of friction fades; the first is the catalogue's."""
-SHORTEST_REST_S = 0.1
 
 
 def direction(signals: Signals, slow: float) -> Array:
@@ -23,4 +23,4 @@ def direction(signals: Signals, slow: float) -> Array:
 def rests(signals: Signals, slow: float) -> list[Array]:
     """One indicator (Q,) per interval of rest: there friction has an unknown value of its own."""
     still = np.abs(signals.v) < slow
-    return free_while(still, signals.log.rate_hz, np.inf, SHORTEST_REST_S)
+    return free_while(still, signals.log.rate_hz, np.inf, rules.EMPS_SHORTEST_REST_S)

@@ -2,11 +2,9 @@
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.emps.causes.base import Cause, filtered, force
 from discrepancy.emps.causes.sliding import direction
-
-SPEEDS_MPS = (0.01, 0.004, 0.02, 0.04)
-SLOW_MPS = 1e-3
 
 
 class Stribeck(Cause):
@@ -26,12 +24,13 @@ class Stribeck(Cause):
 
     def columns(self, signals, shape):
         fade = np.exp(-np.abs(signals.v) / shape["speed_mps"])
-        return force(filtered(signals, direction(signals, SLOW_MPS) * fade))
+        return force(filtered(signals, direction(signals, rules.SLOW_MPS) * fade))
 
     def shapes(self, hints):
-        return [{"speed_mps": speed} for speed in SPEEDS_MPS]
+        return [{"speed_mps": speed} for speed in rules.STRIBECK_MPS]
 
     def finer(self, shape):
         near = (factor * shape["speed_mps"] for factor in (0.7, 0.85, 1.2, 1.4))
         # Slower than that it is how dry friction fades, faster it is viscous friction by another name.
-        return [{"speed_mps": speed} for speed in near if min(SPEEDS_MPS) <= speed <= max(SPEEDS_MPS)]
+        least, most = min(rules.STRIBECK_MPS), max(rules.STRIBECK_MPS)
+        return [{"speed_mps": speed} for speed in near if least <= speed <= most]

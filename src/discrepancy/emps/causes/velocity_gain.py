@@ -1,6 +1,7 @@
 """The velocity loop's gain is not its nominal value."""
 
-from discrepancy.emps.causes.base import GIVEN_TO, Cause, voltage
+from discrepancy import rules
+from discrepancy.emps.causes.base import Cause, voltage
 
 
 class VelocityGain(Cause):
@@ -21,4 +22,4 @@ class VelocityGain(Cause):
         return voltage(signals.log.kp_per_s * signals.error - signals.v)
 
     def visible(self, signals, hints, values):
-        return abs(values[0]) > GIVEN_TO * signals.log.kv_Vs_per_m
+        return abs(values[0]) > rules.GIVEN_TO_SHARE * signals.log.kv_Vs_per_m

@@ -7,20 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.emps.recording.axis_log import LIMIT_V, AxisLog
 from estimator.errors import InputError
 from estimator.filtering import differentiate, low_pass
 
 Array = NDArray[np.float64]
-
-STUCK_S = 0.05
-MOVED_M = 1e-3
-"""A reading that does not change for so long, while the reference moves so far, is stuck."""
-LONGEST_STUCK = 0.25
-"""Share of a recording that may be left out."""
-COARSE_M = 1e-6
-BAND_HZ = 40.0
-LEAST_MOTION_M = 1e-3
 
 
 @dataclass(frozen=True)
@@ -37,10 +29,10 @@ def checked(log: AxisLog) -> AxisLog:
         InputError: nothing moves, too much of it is stuck, or voltage and acceleration contradict each other.
     """
     notes = list(log.notes)
-    if np.ptp(log.position) < LEAST_MOTION_M:
+    if np.ptp(log.position) < rules.LEAST_MOTION_M:
         raise InputError(
             f"{log.name}: qm moves by {1e3 * np.ptp(log.position):.3g} mm in all; at least "
-            f"{1e3 * LEAST_MOTION_M:g} mm are needed to tell anything"
+            f"{1e3 * rules.LEAST_MOTION_M:g} mm are needed to tell anything"
         )
     usable, position = log.usable.copy(), log.position.copy()
     for start, stop in stuck(log):
@@ -51,14 +43,14 @@ def checked(log: AxisLog) -> AxisLog:
             f"qm is stuck at {log.position[start]:.6g} m from {log.time[start]:.3f} to {log.time[stop - 1]:.3f} s "
             f"while the reference moves by {moved:.3g} mm; that time is left out."
         )
-    if (~usable).mean() > LONGEST_STUCK:
+    if (~usable).mean() > rules.LONGEST_STUCK_SHARE:
         raise InputError(
             f"{log.name}: qm is stuck for {100 * (~usable).mean():.0f} % of the time; nothing can be made of the rest"
         )
     log = replace(log, position=position)
     _check_sign(log, usable)
     step = resolution(log.position).step_m
-    if step > COARSE_M:
+    if step > rules.COARSE_M:
         notes.append(
             f"qm comes in steps of {1e6 * step:.3g} um, so what moves less, and forces that change quickly, are lost "
             "in rounding."
@@ -78,7 +70,7 @@ def stuck(log: AxisLog) -> list[tuple[int, int]]:
     return [
         (int(a), int(b) + 1)
         for a, b in edges
-        if (b - a) * log.period_s >= STUCK_S and np.ptp(log.reference[a : b + 1]) >= MOVED_M
+        if (b - a) * log.period_s >= rules.STUCK_S and np.ptp(log.reference[a : b + 1]) >= rules.STUCK_WHILE_M
     ]
 
 
@@ -101,10 +93,10 @@ def _bridge(position: Array, reference: Array, start: int, stop: int) -> None:
 
 def _check_sign(log: AxisLog, usable: NDArray[np.bool_]) -> None:
     """Push and acceleration must agree: friction, whatever it is, follows the velocity."""
-    smooth = low_pass(log.position, log.rate_hz, min(BAND_HZ, 0.2 * log.rate_hz))
+    smooth = low_pass(log.position, log.rate_hz, min(rules.SIGN_HZ, 0.2 * log.rate_hz))
     velocity = differentiate(smooth, log.rate_hz)
     acceleration = differentiate(velocity, log.rate_hz)
-    force = log.gain_N_per_V * low_pass(log.voltage, log.rate_hz, min(BAND_HZ, 0.2 * log.rate_hz))
+    force = log.gain_N_per_V * low_pass(log.voltage, log.rate_hz, min(rules.SIGN_HZ, 0.2 * log.rate_hz))
     edge = max(8, round(0.1 * log.rate_hz))
     keep = usable.copy()
     keep[:edge] = keep[-edge:] = False

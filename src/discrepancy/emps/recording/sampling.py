@@ -8,16 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from discrepancy import rules
 from estimator.errors import InputError
 
 Array = NDArray[np.float64]
-
-LEAST_HZ = 200.0
-LEAST_S = 4.0
-JITTER = 0.1
-"""Stamps may be off the grid by this share of a period."""
-LONGEST_GAP_S = 0.02
-"""Gaps up to here are filled; the motion below 40 Hz does not change much in them."""
 
 
 def on_grid(
@@ -42,17 +36,17 @@ def on_grid(
             f"{name}: t goes from {time[k]:.6g} to {time[k + 1]:.6g} s at sample {k + 2}; it must increase"
         )
     period = _period(step)
-    if 1.0 / period < LEAST_HZ:
+    if 1.0 / period < rules.EMPS_LEAST_HZ:
         raise InputError(
             f"{name}: t has {1.0 / period:.4g} samples a second; differentiating twice "
-            f"needs at least {LEAST_HZ:g}"
+            f"needs at least {rules.EMPS_LEAST_HZ:g}"
         )
-    if time[-1] - time[0] < LEAST_S:
+    if time[-1] - time[0] < rules.EMPS_LEAST_S:
         raise InputError(
-            f"{name}: is {time[-1] - time[0]:.3g} s long; a diagnosis needs at least {LEAST_S:g} s"
+            f"{name}: is {time[-1] - time[0]:.3g} s long; a diagnosis needs at least {rules.EMPS_LEAST_S:g} s"
         )
     whole = np.round(step / period)
-    off = np.abs(step - whole * period) > JITTER * period
+    off = np.abs(step - whole * period) > rules.JITTER_SHARE * period
     if off.any():
         k = int(np.argmax(off))
         raise InputError(
@@ -66,11 +60,11 @@ def on_grid(
     if not missing:
         return grid, dict(series), np.ones(len(grid), dtype=bool), []
     longest = float(whole.max() * period)
-    if longest > LONGEST_GAP_S + 0.5 * period:
+    if longest > rules.LONGEST_GAP_S + 0.5 * period:
         k = int(np.argmax(whole))
         raise InputError(
-            f"{name}: {longest:.3g} s are missing from t = {time[k]:.6g} s on; gaps of up to {LONGEST_GAP_S:g} s can "
-            "be filled, so cut the recording there"
+            f"{name}: {longest:.3g} s are missing from t = {time[k]:.6g} s on; gaps of up to {rules.LONGEST_GAP_S:g} s "
+            "can be filled, so cut the recording there"
         )
     filled = {}
     for key, values in series.items():

@@ -8,13 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from discrepancy import rules
 from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG, AxisLog
 from estimator.filtering import differentiate, low_pass
 
 Array = NDArray[np.float64]
-
-SMOOTH_HZ = 100.0
-"""Cut-off before differentiating, well above the rows' own; a signal that skips it would not fit the others."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +58,7 @@ class Signals:
 
 def smooth(x: Array, rate_hz: float) -> Array:
     """The filter that comes before differentiating, for everything alike, shape (Q, ...)."""
-    return low_pass(x, rate_hz, min(SMOOTH_HZ, 0.2 * rate_hz))
+    return low_pass(x, rate_hz, min(rules.EMPS_SMOOTH_HZ, 0.2 * rate_hz))
 
 
 def at_delay(x: Array, rate_hz: float, delay_s: float) -> Array:

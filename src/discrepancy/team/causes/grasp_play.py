@@ -2,10 +2,9 @@
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.causes.free_while import free_while
 from discrepancy.team.causes.base import Cause, stack
-
-KNOTS_S = 0.2
 
 
 class GraspPlay(Cause):
@@ -34,7 +33,7 @@ class GraspPlay(Cause):
         between = np.abs(trial.data.wrench[:, robot, 3:]) < shape["force_N"]
         columns = []
         for axis, unit in enumerate(np.eye(3)):
-            for place in free_while(between[:, axis], trial.signals.rate_hz, KNOTS_S):
+            for place in free_while(between[:, axis], trial.signals.rate_hz, rules.PLAY_KNOTS_S):
                 column = _moved(trial, robot, place[:, None] * unit)
                 if column.any():  # not before the first row or after the last
                     columns.append(column)

@@ -5,14 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.causes.free_while import free_while
-from discrepancy.team.linear.noise import SMOOTH_HZ
 from estimator.filtering import differentiate, low_pass
 
 Array = NDArray[np.float64]
-
-SHORTEST_REST_S = 0.15
-KNOTS_S = 0.5
 
 
 def sliding(x: Array, rate_hz: float, slow: float) -> tuple[Array, Array]:
@@ -20,11 +17,11 @@ def sliding(x: Array, rate_hz: float, slow: float) -> tuple[Array, Array]:
 
     Below the rate ``slow`` the direction fades to zero: at rest friction may have any value up to its limit.
     """
-    rate = differentiate(low_pass(x, rate_hz, SMOOTH_HZ), rate_hz)
+    rate = differentiate(low_pass(x, rate_hz, rules.TEAM_SMOOTH_HZ), rate_hz)
     return np.clip(rate / slow, -1.0, 1.0), rate
 
 
 def rests(x: Array, rate_hz: float, slow: float) -> list[Array]:
     """Columns (Q,) of what friction does while it holds: any force that it takes, as it changes with the load."""
     still = np.abs(sliding(x, rate_hz, slow)[0]) < 1.0
-    return free_while(still, rate_hz, KNOTS_S, SHORTEST_REST_S)
+    return free_while(still, rate_hz, rules.REST_KNOTS_S, rules.TEAM_SHORTEST_REST_S)

@@ -5,15 +5,9 @@ from typing import ClassVar, cast
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
+from discrepancy import rules
 from discrepancy.team.causes.base import Array, Cause, stack
 from estimator.estimate.fusion import fuse
-
-LENGTHS_M, MOST_DAMPED = (0.04, 1.0), 0.3
-"""Pendulums of 0.5 to 2.5 Hz that swing; what is slower, faster or damped more looks like drag or play."""
-SWINGS = 0.25
-"""A best fit that is damped more leans on the bound: it is something else, such as drag."""
-REACH_M = 1.5
-"""From the centre of mass to where it hangs at most: a payload that three robots carry is no larger."""
 
 
 class Slosh(Cause):
@@ -74,13 +68,13 @@ class Slosh(Cause):
         return [
             {"length_m": x, "damping_ratio": y}
             for x, y in shapes
-            if LENGTHS_M[0] <= x <= LENGTHS_M[1] and y <= MOST_DAMPED
+            if rules.SLOSH_LENGTHS_M[0] <= x <= rules.SLOSH_LENGTHS_M[1] and y <= rules.SLOSH_MOST_DAMPED
         ]
 
     def possible(self, values, se, shape):
         """A mass that is there, swings, and hangs within the payload's reach."""
-        within = np.abs(values[1:]) <= REACH_M * max(values[0], 0.0) + 2.0 * se[1:]
-        return bool(values[0] > 2.0 * se[0] and within.all() and shape["damping_ratio"] <= SWINGS)
+        within = np.abs(values[1:]) <= rules.SLOSH_REACH_M * max(values[0], 0.0) + 2.0 * se[1:]
+        return bool(values[0] > 2.0 * se[0] and within.all() and shape["damping_ratio"] <= rules.SLOSH_SWINGS)
 
     def physical(self, values, context):
         mass = values[0] if abs(values[0]) > 1e-6 else 1e-6

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.team.linear.residual import Bases, Shared, robot_data
 from discrepancy.team.linear.slots import COUNT, STEPS
 from estimator.arm.design import OmnidDesign
@@ -14,8 +15,6 @@ from estimator.signals.grasp_data import GraspData
 
 Array = NDArray[np.float64]
 
-JACOBIAN_HZ = 25.0
-
 
 def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, design: OmnidDesign) -> Array:
     """Derivative of the residual by every robot's signals, shape (N, Q, C, 21).
@@ -23,7 +22,7 @@ def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, design: 
     Central differences through one robot's own formulas, then by hand through what is linear in the robots;
     evaluated at 25 Hz.
     """
-    samples, every = len(s), max(1, round(data.rate_hz / JACOBIAN_HZ))
+    samples, every = len(s), max(1, round(data.rate_hz / rules.TEAM_JACOBIAN_HZ))
     knots = np.arange(0, samples, every)
     s = s[knots]
     data = _thinned(data, knots)

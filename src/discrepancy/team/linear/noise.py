@@ -8,16 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
+from discrepancy import rules
 from discrepancy.team.linear.signals import Signals
 from estimator.filtering import low_pass
 
 Array = NDArray[np.float64]
-
-ANGLE_FLOOR_RAD = 1.2e-5
-"""Noise ascribed to an angle at least; with it the model's own errors (rods, welds, integration) are covered."""
-TORQUE_FLOOR_NM = 2e-3
-ABOVE_HZ = 25.0
-SMOOTH_HZ = 12.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +31,8 @@ class Noise:
     def of(cls, trials: list[Signals]) -> Noise:
         """Resolution of the sensors behind some trials."""
         step, sigma = [], []
-        for field, floor in (("phi", ANGLE_FLOOR_RAD), ("theta", ANGLE_FLOOR_RAD), ("tau", TORQUE_FLOOR_NM)):
+        angle, torque = rules.ANGLE_FLOOR_RAD, rules.TORQUE_FLOOR_NM
+        for field, floor in (("phi", angle), ("theta", angle), ("tau", torque)):
             x = [getattr(trial, field) for trial in trials]
             # Trial by trial: the grid may lie differently in each.
             steps = np.median([np.apply_along_axis(_step, 0, a) for a in x], axis=0)
@@ -51,7 +47,7 @@ class Noise:
         """One realisation of the sensors' errors on a trial: what they would add to its smooth signals."""
         errors: list[Array] = []
         for k, field in enumerate(("phi", "theta", "tau")):
-            x = low_pass(getattr(signals, field), signals.rate_hz, SMOOTH_HZ)
+            x = low_pass(getattr(signals, field), signals.rate_hz, rules.TEAM_SMOOTH_HZ)
             step = np.where(self.step[k] > 0, self.step[k], 1.0)
             x = x + step * _phase(x / step, rng)
             read = x + self.sigma[k] * rng.standard_normal(x.shape)
@@ -84,7 +80,7 @@ def _step(x: Array) -> float:
 
 def _white(x: Array, rate_hz: float) -> Array:
     """Standard deviation of white noise, from what lies above 25 Hz (a robust mean square), shape (N, 3)."""
-    high = min(ABOVE_HZ, 0.4 * rate_hz)
+    high = min(rules.NOISE_ABOVE_HZ, 0.4 * rate_hz)
     y = sosfiltfilt(butter(4, high, btype="high", fs=rate_hz, output="sos"), x, axis=0)
     share = 1.0 - high / (rate_hz / 2.0)
     return 1.4826 * np.median(np.abs(y), axis=0) / np.sqrt(share)

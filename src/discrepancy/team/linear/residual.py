@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
-from estimator import so3
 from estimator.arm.delta import forward_kinematics, leg_geometry, wrist_motion
 from estimator.arm.design import OmnidDesign
 from estimator.arm.dynamics import wrench_on_payload
@@ -61,7 +61,7 @@ class Bases:
     def moved(self, x: Array) -> Bases:
         """Changed by x = (dx, dy, dz, dyaw for i >= 2), shape (4 (N - 1),)."""
         x = x.reshape(-1, 4)
-        turn = so3.exp(np.column_stack([np.zeros((len(x), 2)), x[:, 3]]))
+        turn = Rotation.from_rotvec(np.column_stack([np.zeros((len(x), 2)), x[:, 3]])).as_matrix()
         return Bases(
             np.concatenate([self.R[:1], turn @ self.R[1:]]),
             np.concatenate([self.p[:1], self.p[1:] + x[:, :3]]),
@@ -79,7 +79,7 @@ def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:
     parts = []
     for i in range(1, grasps.robots):
         back = R[:, 0] @ grasps.R_1i[i]  # R_b1 R_1i
-        parts.append(so3.log(bases.R[i] @ R[:, i] @ np.swapaxes(back, -1, -2)))
+        parts.append(Rotation.from_matrix(bases.R[i] @ R[:, i] @ np.swapaxes(back, -1, -2)).as_rotvec())
         parts.append(bases.p[i] + h[:, i] @ bases.R[i].T - h[:, 0] - R[:, 0] @ grasps.p_1i[i])
     return np.concatenate(parts, axis=1) if parts else np.zeros((len(R), 0))
 

@@ -7,14 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from estimator.filtering import differentiate, low_pass, trim_slice
 from estimator.recording.model import Recording
 
 Array = NDArray[np.float64]
-
-PRE_HZ = 20.0
-"""Cut-off before the nonlinear formulas [Hz]: high enough that filtering and they commute to within the noise."""
-TRIM_S = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +44,11 @@ class Signals:
     @property
     def keep(self) -> slice:
         """Rows left once the filters' transients at both ends are dropped."""
-        return trim_slice(len(self.time), self.rate_hz, TRIM_S)
+        return trim_slice(len(self.time), self.rate_hz, rules.TEAM_TRIM_S)
 
 
 def with_rates(x: Array, rate_hz: float) -> Array:
     """Filtered value, rate and acceleration of joint angles, shape (Q, ...) -> (3, Q, ...)."""
-    value = low_pass(x, rate_hz, PRE_HZ)
+    value = low_pass(x, rate_hz, rules.TEAM_PRE_HZ)
     rate = differentiate(value, rate_hz)
     return np.stack([value, rate, differentiate(rate, rate_hz)])

@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 from joblib import Parallel, delayed
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
+from discrepancy import rules
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.team.linear.adjust import TorqueNoise, with_adjusted_torques
 from discrepancy.team.linear.noise import Noise
@@ -26,8 +28,6 @@ from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 
 Array = NDArray[np.float64]
-
-NOISE_DRAWS = 24
 
 
 def start_shared(estimate: PayloadEstimate) -> Shared:
@@ -99,7 +99,7 @@ def start_bases(signals: Signals, shared: Shared, design: OmnidDesign) -> Bases:
     for i in range(1, N):
         mean = so3.chordal_mean(R[:, 0] @ shared.grasps.R_1i[i] @ np.swapaxes(R[:, i], -1, -2))
         yaw = np.arctan2(mean[1, 0] - mean[0, 1], mean[0, 0] + mean[1, 1])
-        turns.append(so3.exp(np.array([0.0, 0.0, yaw])))
+        turns.append(Rotation.from_rotvec([0.0, 0.0, yaw]).as_matrix())
         places.append(np.mean(h[:, 0] + R[:, 0] @ shared.grasps.p_1i[i] - h[:, i] @ turns[i].T, axis=0))
     return Bases(np.array(turns), np.array(places))
 
@@ -115,7 +115,7 @@ def linearised(
 ) -> tuple[TrialLinear, Whitening, TorqueNoise]:
     """One trial's linearisation, and what the sensors' noise leaves in its rows; k is its number."""
     linear = linearise(signals, shared, bases, design, reduction, full=True)
-    draws, torques = noise_rows(linear, noise, np.random.default_rng([20250, k]))
+    draws, torques = noise_rows(linear, noise, np.random.default_rng([rules.NOISE_SEED, k]))
     moving = reduction.moving
     return linear, Whitening.of(draws, moving), TorqueNoise.of(draws, torques, moving)
 
@@ -153,7 +153,7 @@ def gauss_newton(linear: Sequence[TrialLinear], whitening: Sequence[Whitening]) 
 
 
 def noise_rows(
-    trial: TrialLinear, noise: Noise, rng: np.random.Generator, draws: int = NOISE_DRAWS
+    trial: TrialLinear, noise: Noise, rng: np.random.Generator, draws: int = rules.NOISE_DRAWS
 ) -> tuple[Array, Array]:
     """What the sensors' errors alone would leave: residuals (draws, n, C), and the torques' own (draws, n, N, 3)."""
     out, torques = [], []

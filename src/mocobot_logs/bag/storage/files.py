@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import shutil
 import weakref
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Iterator
 from itertools import accumulate
 from pathlib import Path, PurePosixPath
 from tempfile import mkdtemp
@@ -18,11 +18,10 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from estimator.errors import InputError
-from mocobot_logs.bag.mcap import McapBag
-from mocobot_logs.bag.mcap_runs import MAGIC
-from mocobot_logs.bag.messages import Storage
-from mocobot_logs.bag.sqlite import HEAD, SqliteBag
-from mocobot_logs.bag.unpack import unpack_file
+from mocobot_logs.bag.messages import BLOCK_BYTES, MESSAGE_BYTES, Messages, Storage, joined, merged
+from mocobot_logs.bag.storage.mcap import MAGIC, McapBag
+from mocobot_logs.bag.storage.sqlite import HEAD, SqliteBag
+from mocobot_logs.bag.storage.unpack import UnpackError, unpack_file, unpack_message
 from mocobot_logs.faults import detail_of
 
 VERSIONS = range(1, 10)
@@ -55,19 +54,68 @@ class Scratch:
         weakref.finalize(self, shutil.rmtree, self.path, ignore_errors=True)
 
 
-@dataclass(frozen=True, eq=False)
 class BagFiles:
-    """The files of a bag, opened.
+    """All files of a bag, opened.
 
     Attributes:
-        storages: files in order.
-        packed: whether every message is compressed by itself (zstd).
-        unpacked: keeps the folder with unpacked copies, which goes when this goes.
+        topics: by name.
+        size: bytes to read.
     """
 
-    storages: tuple[Storage, ...]
-    packed: bool
-    unpacked: Scratch | None
+    def __init__(self, path: Path) -> None:
+        """Open them.
+
+        Raises:
+            InputError: there is no bag, its ``metadata.yaml`` is not usable, or a file is not complete.
+        """
+        paths, self._are_packed = _files_of(path)
+        self._scratch: Scratch | None = None  # keeps unpacked copies, which go when this goes
+        self._storages = [self._opened(file, number) for number, file in enumerate(paths)]
+        self.topics = merged((t for storage in self._storages for t in storage.topics.values()), str(path))
+        self.size = sum(storage.size for storage in self._storages)
+
+    def has_messages(self, topic: str) -> bool:
+        """Whether there is any message of a topic, as far as the files say.
+
+        Raises:
+            InputError: a file is damaged.
+        """
+        return any(storage.has_messages(topic) for storage in self._storages)
+
+    def blocks(
+        self, topics: Collection[str], advance: Callable[[int], object], block_bytes: int = BLOCK_BYTES
+    ) -> Iterator[dict[str, Messages]]:
+        """Messages of some topics in the order of the files, each unpacked (see ``Storage.blocks``).
+
+        Raises:
+            InputError: a file is damaged.
+        """
+        for storage in self._storages:
+            for block in storage.blocks(topics, advance, block_bytes):
+                if self._are_packed:
+                    yield {t: _unpacked(m, f"{storage.name}: topic {t!r:.80}") for t, m in block.items()}
+                else:
+                    yield block
+
+    def _opened(self, path: Path, number: int) -> Storage:
+        name, head = str(path), _head(path)
+        if head.startswith(_ZSTD):
+            self._scratch = self._scratch or Scratch(path)
+            packed, path = path, self._scratch.path / str(number)
+            unpack_file(packed, path, tuple(STORAGES.values()), name)
+            head = _head(path)
+        if head.startswith(MAGIC):
+            return McapBag(path, name)
+        if head.startswith(HEAD):
+            return SqliteBag(path, name)
+        if head.startswith(_ROS1):
+            raise InputError(
+                f"{name}: a bag of ROS 1; `rosbags-convert` makes a ROS 2 bag of it, which can be read"
+            )
+        what = (
+            "is empty" if not head else "is neither an MCAP nor an SQLite file, as those of a ROS 2 bag are"
+        )
+        raise InputError(f"{name}: {what}")
 
 
 def is_bag(path: Path) -> bool:
@@ -84,48 +132,26 @@ def is_bag(path: Path) -> bool:
         return False
 
 
-def open_files(path: Path) -> BagFiles:
-    """Open all files of a bag.
-
-    Raises:
-        InputError: there is no bag, its ``metadata.yaml`` is not usable, or a file is not complete.
-    """
+def _files_of(path: Path) -> tuple[list[Path], bool]:
+    """The files, and whether every message is compressed by itself."""
     try:
         exists, is_folder = path.exists(), path.is_dir()
     except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL in it
         raise InputError(f"{str(path)!r:.80}: not a usable file name ({error})") from error
     if not exists:
         raise InputError(f"{path}: there is no such file or folder")
-    if is_folder:
-        names, packed = _read_metadata(path)
-        paths = [path / name for name in names]
-    else:
-        packed, paths = False, [path]
-    holder: Scratch | None = None
-    storages = []
-    for number, file in enumerate(paths):
-        head = _head(file)
-        local = file
-        if head.startswith(_ZSTD):
-            holder = holder or Scratch(file)
-            local = holder.path / str(number)
-            unpack_file(file, local, tuple(STORAGES.values()), str(file))
-            head = _head(local)
-        storages.append(_storage(local, head, str(file)))
-    return BagFiles(tuple(storages), packed, holder)
+    if not is_folder:
+        return [path], False
+    names, are_packed = _read_metadata(path)
+    return [path / name for name in names], are_packed
 
 
-def _storage(path: Path, head: bytes, name: str) -> Storage:
-    if head.startswith(MAGIC):
-        return McapBag(path, name)
-    if head.startswith(HEAD):
-        return SqliteBag(path, name)
-    if head.startswith(_ROS1):
-        raise InputError(
-            f"{name}: a bag of ROS 1; `rosbags-convert` makes a ROS 2 bag of it, which can be read"
-        )
-    what = "is empty" if not head else "is neither an MCAP nor an SQLite file, as those of a ROS 2 bag are"
-    raise InputError(f"{name}: {what}")
+def _unpacked(messages: Messages, where: str) -> Messages:
+    try:
+        payloads = [unpack_message(messages[k], MESSAGE_BYTES) for k in range(len(messages))]
+    except UnpackError as error:
+        raise InputError(f"{where}: damaged, a compressed message {error}") from error
+    return joined(payloads, messages.log_ns, where)
 
 
 def _head(path: Path) -> bytes:

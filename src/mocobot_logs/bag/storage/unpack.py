@@ -107,14 +107,11 @@ def unpack_file(source: Path, target: Path, heads: tuple[bytes, ...], name: str)
 
 def _zstd(data: bytes, size: int) -> bytes:
     """At most ``size`` bytes and one more."""
-    if zstandard.frame_content_size(data) == size:
-        return zstandard.ZstdDecompressor().decompress(data, max_output_size=size) if size else b""
-    parts, left = [], size + 1
-    with zstandard.ZstdDecompressor().stream_reader(data, read_across_frames=True) as stream:
-        while left and (part := stream.read(min(left, _STEP))):
-            parts.append(part)
-            left -= len(part)
-    return b"".join(parts)
+    unpacker = zstandard.ZstdDecompressor()
+    if zstandard.frame_content_size(data) == size:  # three times as fast as a stream
+        return unpacker.decompress(data, max_output_size=size) if size else b""
+    with unpacker.stream_reader(data, read_across_frames=True) as stream:
+        return stream.read(size + 1)
 
 
 def _lz4(data: bytes, size: int) -> bytes:

@@ -2,7 +2,8 @@
 
 Messages come in the order in which they were inserted. The file is taken as it lies on the disk (immutable), so nothing
 is ever written beside it; a database that somebody made to harm (views, loops of pages) is stopped by SQLite's own
-limits and by rows that do not ascend.
+limits and by rows that do not ascend. ``rosbags`` sets no limits (45 kB whose pages run in circles became 1.8 GB) and
+refuses a whole bag for one topic whose definition or quality of service it does not know.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from estimator.errors import InputError
-from mocobot_logs.bag.messages import BLOCK_BYTES, MESSAGE_BYTES, Messages, Topic, joined
+from mocobot_logs.bag.messages import BLOCK_BYTES, MESSAGE_BYTES, Messages, Topic, joined, merged
 from mocobot_logs.faults import detail_of
 
 HEAD = b"SQLite format 3\0"
@@ -55,8 +56,7 @@ class SqliteBag:
             InputError: the file is damaged.
         """
         ids = [key for key, name in self._ids.items() if name in topics]
-        last = dict.fromkeys(topics, -(1 << 63))
-        told = 0
+        last, told = -(1 << 63), 0
         with self._connected() as connection:
             marks = ",".join("?" * len(ids))
             # By rowid: no index is trusted, nothing sorted, and the file is read from front to back.
@@ -66,44 +66,46 @@ class SqliteBag:
                 ids,
             )
             while found := self._next(rows, block_bytes):
-                block = {topic: self._messages(part, topic, last) for topic, part in found.items()}
-                yield block
-                done = max(last.values()) / self._last if self._last > 0 else 0.0
-                now = int(self.size * min(max(done, 0.0), 1.0))
+                order = np.array([row[3] for row in found], np.int64)
+                if order[0] <= last or (order[1:] <= order[:-1]).any():
+                    raise InputError(f"{self.name}: damaged, its table 'messages' holds the same row twice")
+                last = int(order[-1])
+                yield self._by_topic(found)
+                now = int(self.size * min(max(last / self._last, 0.0), 1.0)) if self._last > 0 else 0
                 advance(now - told)
                 told = now
         advance(self.size - told)
 
-    def _next(self, rows: Iterator[_Row], block_bytes: int) -> dict[str, list[_Row]]:
-        """Rows of about one block, by topic."""
-        parts: dict[int, list[_Row]] = {key: [] for key in self._ids}
-        held = 0
+    def _next(self, rows: Iterator[_Row], block_bytes: int) -> list[_Row]:
+        """Rows of about one block."""
+        found, held = [], 0
         try:
             for row in rows:
-                parts[row[0]].append(row)
+                found.append(row)
                 held += len(row[1]) + 64
                 if held > block_bytes:
                     break
         except TypeError as error:
             raise InputError(f"{self.name}: damaged, its table 'messages' has a row without data") from error
-        found: dict[str, list[_Row]] = {}
-        for key, part in parts.items():
-            if part:
-                found.setdefault(self._ids[key], []).extend(part)
         return found
 
-    def _messages(self, part: list[_Row], topic: str, last: dict[str, int]) -> Messages:
-        """Rows of one topic as messages; ``last`` has the number of each topic's last row so far."""
-        keys, payloads, stamps, numbers = zip(*part, strict=True)
-        if len(set(keys)) > 1:  # one topic may be listed several times
-            _, payloads, stamps, numbers = zip(*sorted(part, key=lambda row: row[3]), strict=True)
-        if {*map(type, payloads)} != {bytes} or {*map(type, stamps)} != {int}:
-            raise InputError(f"{self.name}: damaged, its table 'messages' has a row that holds no message")
-        order = np.array(numbers, np.int64)
-        if order[0] <= last[topic] or (order[1:] <= order[:-1]).any():
-            raise InputError(f"{self.name}: damaged, its table 'messages' holds the same row twice")
-        last[topic] = int(order[-1])
-        return joined(payloads, np.array(stamps, np.int64), f"{self.name}: topic {topic!r:.80}")
+    def _by_topic(self, rows: list[_Row]) -> dict[str, Messages]:
+        parts: dict[str, list[_Row]] = {name: [] for name in self._ids.values()}
+        by_id = {key: parts[name] for key, name in self._ids.items()}  # one topic may be listed several times
+        for row in rows:
+            by_id[row[0]].append(row)
+        found = {}
+        for topic, part in parts.items():
+            if not part:
+                continue
+            _, payloads, stamps, _ = zip(*part, strict=True)
+            if {*map(type, payloads)} != {bytes} or {*map(type, stamps)} != {int}:
+                raise InputError(
+                    f"{self.name}: damaged, its table 'messages' has a row that holds no message"
+                )
+            where = f"{self.name}: topic {topic!r:.80}"
+            found[topic] = joined(payloads, np.array(stamps, np.int64), where)
+        return found
 
     def has_messages(self, topic: str) -> bool:
         """Whether there is any message of a topic.
@@ -185,17 +187,13 @@ class SqliteBag:
             for kind, encoding, text in connection.execute(query):
                 if isinstance(kind, str) and isinstance(encoding, str) and isinstance(text, str):
                     definitions[kind] = encoding, text
-        topics: dict[str, Topic] = {}
+        topics: list[Topic] = []
         query = "SELECT id, name, type, serialization_format FROM topics LIMIT 10000"
         for key, name, kind, encoding in connection.execute(query):
             if not (type(key) is int and all(isinstance(text, str) for text in (name, kind, encoding))):
                 raise InputError(
                     f"{self.name}: damaged, its table 'topics' has a row {(key, name, kind)!r:.80}"
                 )
-            known = topics.setdefault(name, Topic(name, kind, encoding, *definitions.get(kind, ("", ""))))
-            if (known.type, known.encoding) != (kind, encoding):
-                raise InputError(
-                    f"{self.name}: topic {name!r:.80} holds both {known.type!r:.80} and {kind!r:.80}"
-                )
+            topics.append(Topic(name, kind, encoding, *definitions.get(kind, ("", ""))))
             self._ids[key] = name
-        return topics
+        return merged(topics, self.name)

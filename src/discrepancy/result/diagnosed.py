@@ -1,0 +1,88 @@
+"""A finished diagnosis with all that is told, drawn and written of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from discrepancy.causes.words import Words
+from discrepancy.engine.diagnose import Diagnosis
+from discrepancy.result.json import FORMAT, diagnosis_to_dict
+from discrepancy.result.plots import PLOTS, save_plots
+from discrepancy.result.text import format_diagnosis
+from discrepancy.result.traces import Trace
+from discrepancy.result.traces_file import NAME as RESIDUALS
+from discrepancy.result.traces_file import save_traces
+from discrepancy.rig import Rig
+from estimator.errors import InputError
+from estimator.files import write_json, write_text
+
+JSON, REPORT, EXTENDED, PAGE = "diagnosis.json", "report.txt", "extended", "report.html"
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosed:
+    """A verdict with the rig that it is of.
+
+    Attributes:
+        rig: what was diagnosed.
+        diagnosis: the engine's result.
+        words: of the rig.
+        traces: makes the residuals for file and pictures.
+        estimates: what the rig estimates ``before`` and ``after``, or None; ``errors`` may lie beside them.
+    """
+
+    rig: Rig
+    diagnosis: Diagnosis
+    words: Words
+    traces: Callable[[], Sequence[Trace]]
+    estimates: Mapping[str, Any] | None = None
+
+    @cached_property
+    def _values(self) -> dict[str, Any]:
+        return diagnosis_to_dict(self.diagnosis, self.rig, self.words, self.estimates)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Strict JSON with units in the keys; see ``discrepancy.result.json`` for the keys."""
+        return self._values
+
+    def __str__(self) -> str:
+        """The text report."""
+        return format_diagnosis(self._values)
+
+    def write_into(self, folder: Path, **more: Any) -> None:
+        """Write extended model, residuals, pictures, JSON and report into an existing folder.
+
+        Args:
+            folder: where.
+            more: further keys of the JSON.
+
+        Raises:
+            InputError: something cannot be written.
+        """
+        values = self._values
+        if self.diagnosis.causes:
+            try:
+                self.rig.write_extended(self.diagnosis.explanation, folder / EXTENDED)
+            except InputError as error:  # values that no effect can have, such as a negative friction
+                note = f"There is no extended model: {error}."
+                values["notes"] = [*(n for n in values["notes"] if n != note), note]
+        residuals = self.traces()
+        save_traces(residuals, self.rig.channels, folder / RESIDUALS)
+        save_plots(values, residuals, self.rig.channels, self.words, folder)
+        write_json(folder / JSON, values | more)
+        write_text(folder / REPORT, f"{self}\n")
+
+
+def is_diagnosis(folder: Path) -> bool:
+    """Whether a folder holds a diagnosis and nothing that someone else put there."""
+    try:
+        ours = json.loads((folder / JSON).read_text(encoding="utf-8"))["format"] == FORMAT
+    except (OSError, ValueError, TypeError, KeyError):
+        return False
+    known = [JSON, REPORT, RESIDUALS, EXTENDED, PAGE, *PLOTS]
+    return ours and all(any(path.match(pattern) for pattern in known) for path in folder.iterdir())

@@ -1,0 +1,84 @@
+"""What recordings of a team must be before they are held against a model of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from discrepancy import rules
+from estimator.errors import InputError
+from estimator.estimate.payload import estimate_payload
+from estimator.estimate.result import PayloadEstimate
+from estimator.estimate.statics import CONTRADICTION
+from estimator.recording.model import Recording
+
+
+def check_recordings(recordings: Sequence[Recording]) -> None:
+    """Enough of them, and all of one team.
+
+    Raises:
+        InputError: there is none, they have one robot or differ in robots or design, or they are too short.
+    """
+    if not recordings:
+        raise InputError("no recording given; name at least one file")
+    first = recordings[0]
+    if first.metadata.robots < 2:
+        raise InputError(
+            f"{first.name} has one robot; without a second one nothing tells where the payload really is, so there is "
+            "nothing to diagnose"
+        )
+    used = [
+        max(0.0, recording.time[-1] - recording.time[0] - 2.0 * rules.TEAM_TRIM_S) for recording in recordings
+    ]
+    if sum(used) < rules.LEAST_S:
+        names = ", ".join(recording.name for recording in recordings)
+        raise InputError(
+            f"{names}: {sum(used):.1f} s are left when {rules.TEAM_TRIM_S:g} s are dropped at both ends; a diagnosis "
+            f"needs at least {rules.LEAST_S:g} s, and {rules.GOOD_S:g} s of motion to be worth much"
+        )
+    for other in recordings[1:]:
+        if other.metadata.robots != first.metadata.robots:
+            raise InputError(
+                f"{other.name} has {other.metadata.robots} robots and {first.name} has {first.metadata.robots}; "
+                "recordings of one payload must have the same robots"
+            )
+        if other.metadata.design != first.metadata.design:
+            raise InputError(
+                f"{other.name} and {first.name} are of robots of different design; diagnose one at a time"
+            )
+
+
+def check_masses(recordings: Sequence[Recording]) -> None:
+    """Recordings without a label may still be of different payloads in the same grasps.
+
+    Raises:
+        InputError: two of them do not say the same mass, each on its own.
+    """
+    masses = []
+    for recording in recordings if len(recordings) > 1 else ():
+        try:
+            alone = estimate_payload([recording])
+        except InputError:  # too little motion to tell on its own
+            continue
+        if alone.mass is not None:
+            masses.append((alone.mass.mass, alone.mass.se, recording.name))
+    if not masses:
+        return
+    (low, low_se, light), (high, high_se, heavy) = min(masses), max(masses)
+    if high - low > max(rules.MASS_TOLERANCE_SHARE * high, rules.MASS_TOLERANCE_SE * (low_se + high_se)):
+        raise InputError(
+            f"{light} says {low:.2f} kg and {heavy} says {high:.2f} kg; recordings must be of one payload"
+        )
+
+
+def check_estimate(estimate: PayloadEstimate) -> None:
+    """Without a payload there is no model; say why, where wrenches that contradict each other are the reason.
+
+    Raises:
+        InputError: they do.
+    """
+    if estimate.p_1c is None and any(CONTRADICTION in flag for flag in estimate.flags):
+        names = ", ".join(recording.name for recording in estimate.recordings)
+        raise InputError(
+            f"{names}: the robots' wrenches do not add up to one payload, so there is nothing to hold the data "
+            "against; is a robot missing, or a torque's sign or column wrong?"
+        )

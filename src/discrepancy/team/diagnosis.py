@@ -1,0 +1,72 @@
+"""Diagnose recordings of one payload that a team carries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+from discrepancy.engine.diagnose import diagnose
+from discrepancy.result.diagnosed import Diagnosed
+from discrepancy.team.checks import check_estimate, check_masses, check_recordings
+from discrepancy.team.estimates import errors, estimates
+from discrepancy.team.rig import TeamRig
+from discrepancy.team.tolerances import read_tolerances
+from discrepancy.team.traces import traces
+from discrepancy.team.words import TeamWords
+from estimator.estimate.payload import estimate_payload
+from estimator.recording.model import Recording
+
+
+def diagnose_team(
+    recordings: Sequence[Recording],
+    tolerances: Mapping[str, Mapping[str, float]] | None = None,
+    excluded: Sequence[str] = (),
+    *,
+    closed_loop: bool = True,
+    jobs: int = 1,
+    say: Callable[[str], object] = lambda _: None,
+    simulated: Callable[[int], object] | None = None,
+) -> Diagnosed:
+    """Check and estimate recordings, and find out what the simulation gets wrong.
+
+    Args:
+        recordings: trials of one payload; several, so that what is named can be validated.
+        tolerances: standard deviations by cause and parameter (``read_tolerances``); None for the defaults.
+        excluded: causes left out of the catalogue.
+        closed_loop: whether to run the recorded commands again.
+        jobs: parallel processes.
+        say: takes the name of the stage that begins.
+        simulated: called with 1 for every simulated trial.
+
+    Raises:
+        InputError: the recordings do not belong together, are too short, or do not determine the payload, or a
+            cause to be excluded does not exist.
+    """
+    check_recordings(recordings)
+    say("estimate")
+    estimate = estimate_payload(recordings)
+    check_masses(recordings)
+    check_estimate(estimate)
+    say("linearise")
+    known = read_tolerances(None) if tolerances is None else tolerances
+    rig = TeamRig.of(recordings, estimate, known, excluded, jobs)
+    found = diagnose(rig, closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated)
+    payload = estimates(rig, found.explanation)
+    return Diagnosed(rig, found, TeamWords(), partial(traces, rig, found.explanation), payload)
+
+
+def against_truth(found: Diagnosed, truth: Mapping[str, Any]) -> Diagnosed:
+    """The same with the errors of its estimates.
+
+    Args:
+        found: of ``diagnose_team``.
+        truth: the payload, in the form of ``GroundTruth.to_dict``; where it is of something else there are no errors.
+    """
+    known = dict(found.estimates or {})
+    try:
+        known["errors"] = {name: errors(known[name], truth) for name in ("before", "after")}
+    except (KeyError, TypeError, ValueError, IndexError):
+        return found
+    return replace(found, estimates=known)

@@ -1,0 +1,1 @@
+"""What ``mocobot`` offers to Python; take it from there (docs/api.md)."""

@@ -1,0 +1,96 @@
+"""Bring a measured log onto one grid and one clock."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from estimator.arm.design import OmnidDesign, load_design
+from estimator.recording.metadata import Level
+from mocobot.api.public import public
+from mocobot_logs import convert as below
+from mocobot_logs.convert_report import format_conversion
+from mocobot_logs.map.files import read_map
+from mocobot_logs.open_log import open_log
+from mocobot_logs.resample.resample import MAX_GAP_S, RATE_HZ
+from mocobot_sim.scene.models import omnid_design
+
+
+@dataclass(frozen=True, eq=False)
+class Conversion(below.Converted):
+    """A log that became a recording.
+
+    Attributes:
+        recording: on one grid and one clock, checked.
+        level: of the log.
+        streams: what was found in each robot's stream, and done to it.
+        clocks: how the robots' clocks differ, and whether that was corrected.
+        log: what was converted.
+    """
+
+    log: Path
+
+    def report(self, out: Path | str) -> str:
+        """What was found and done, as text that names the recording's file."""
+        return format_conversion(self, str(self.log), Path(out))
+
+    def write(self, path: Path | str, advance: Callable[[int], object] = lambda _: None) -> None:
+        """Write the recording: .parquet, .csv, .npz, .mcap or .db3, or a rosbag2 folder if there is no suffix.
+
+        Args:
+            path: target.
+            advance: takes the number of samples written since the last call.
+
+        Raises:
+            InputError: it cannot be written, or nothing is written under such a name.
+        """
+        below.write_converted(self.recording, Path(path), advance)
+
+
+def convert(
+    log: Path | str,
+    *,
+    map: Path | str | None = None,
+    trial: str | None = None,
+    payload: str | None = None,
+    design: OmnidDesign | Path | str | None = None,
+    level: Level | None = None,
+    clock: Literal["keep", "correct"] = "keep",
+    rate_hz: float = RATE_HZ,
+    max_gap_s: float = MAX_GAP_S,
+    episode: int | None = None,
+    advance: Callable[[int], object] = lambda _: None,
+) -> Conversion:
+    """Convert a log (ROS 2 bag, CSV, NPZ, Parquet, LeRobot) to a recording.
+
+    Args:
+        log: a rosbag2 folder, .mcap, .db3, .csv, .npz or .parquet file, or a LeRobot dataset.
+        map: map file, or name of a built-in map (docs/measured-data.md); found out if not given.
+        trial: ``"random"``, ``"periodic"`` or ``"static"``, if neither log nor map says; ``"random"`` else.
+        payload: its name.
+        design: numbers of the robots, or a TOML file of them, if not the log's own or those of the Omnid.
+        level: how a file of the recording tells the samples; that of the log if not given.
+        clock: believe the robots' stamps, or take out what their clocks differ by.
+        rate_hz: of the recording [Hz].
+        max_gap_s: longest time without samples that is filled [s].
+        episode: of a LeRobot dataset that holds several.
+        advance: takes the progress made in reading, in the log's units.
+
+    Raises:
+        InputError: log, map or design cannot be used, or the result is not a plausible recording.
+    """
+    log_map = read_map(str(map)) if map is not None else None
+    labels = below.Labels(
+        trial=trial or (log_map.trial if log_map is not None else None),
+        payload=payload,
+        design=load_design(Path(design)) if isinstance(design, Path | str) else design,
+        level=level,
+    )
+    source = open_log(log, log_map, episode)
+    done = below.convert(
+        source, labels, omnid_design(),
+        rate_hz=rate_hz, max_gap_s=max_gap_s, correct=clock == "correct", advance=advance,
+    )  # fmt: skip
+    return public(Conversion, done, log=Path(log))

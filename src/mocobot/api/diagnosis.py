@@ -1,0 +1,121 @@
+"""Find out what the simulation of a team gets wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from discrepancy.engine.diagnose import Verdict
+from discrepancy.result.diagnosed import Diagnosed, is_diagnosis
+from discrepancy.team.diagnosis import against_truth, diagnose_team
+from discrepancy.team.tolerances import read_tolerances
+from estimator.files import whole_folder
+from mocobot.api.given import Given, recordings_of
+from mocobot.api.public import public
+from mocobot.files.targets import check_folder
+from mocobot_sim.trial.truth import GroundTruth
+
+
+@dataclass(frozen=True)
+class Cause:
+    """One named cause.
+
+    Attributes:
+        cause: name in the catalogue, such as ``"sea_bias"``.
+        robot: counted from 1, or None.
+        joint: counted from 1, or None.
+        sentence: what it does, with its numbers.
+        parameters: values by name, units in the names; ``make_effect`` takes them.
+        standard_errors: by the same names; None for what was chosen, not fitted.
+        in_sample: share of the nominal model's misfit that it removes.
+        held_out: the same on trials left out of the fit, or None.
+    """
+
+    cause: str
+    robot: int | None
+    joint: int | None
+    sentence: str
+    parameters: Mapping[str, float]
+    standard_errors: Mapping[str, float | None]
+    in_sample: float
+    held_out: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis(Diagnosed):
+    """A verdict with all that supports it: printable, a table in a notebook, and a folder of files."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """``"consistent"``, ``"explained"``, ``"partly_explained"`` or ``"unexplained"``."""
+        return self.diagnosis.verdict
+
+    @property
+    def causes(self) -> tuple[Cause, ...]:
+        """The named causes, in the order of discovery."""
+        return tuple(_cause(entry) for entry in self.to_dict()["causes"])
+
+    def _repr_html_(self) -> str:
+        from mocobot.api.notebook import diagnosis_html
+
+        return diagnosis_html(self.to_dict())
+
+    def write(self, folder: Path | str) -> None:
+        """Write JSON, report, residuals, pictures and the extended model; an earlier diagnosis is replaced.
+
+        ``mocobot report`` makes a page of the folder; ``simulate`` takes its ``extended`` as a model.
+
+        Raises:
+            InputError: the folder holds something else, or cannot be written.
+        """
+        check_folder(Path(folder), [], is_diagnosis, "an earlier diagnosis")
+        with whole_folder(Path(folder)) as whole:
+            self.write_into(whole)
+
+
+def diagnose(
+    recordings: Given | Iterable[Given],
+    *,
+    truth: GroundTruth | None = None,
+    tolerances: Path | str | None = None,
+    exclude: Iterable[str] = (),
+    closed_loop: bool = True,
+    jobs: int = 1,
+    say: Callable[[str], object] = lambda _: None,
+    simulated: Callable[[int], object] | None = None,
+) -> Diagnosis:
+    """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth.
+
+    Args:
+        recordings: of one payload, or paths of their files; several, so that what is named can be validated.
+        truth: of the payload, for the errors of the estimates; it is not looked at before the verdict.
+        tolerances: TOML file that says how far a healthy robot may be off (docs/diagnosis.md); None for the defaults.
+        exclude: causes not to consider.
+        closed_loop: whether to run the recorded commands again, without and with what is found.
+        jobs: parallel processes.
+        say: takes the name of the stage that begins.
+        simulated: called with 1 for every trial that was simulated.
+
+    Raises:
+        InputError: recordings, tolerances or causes that cannot be used.
+    """
+    known = read_tolerances(Path(tolerances) if tolerances is not None else None)
+    found = diagnose_team(
+        list(recordings_of(recordings)), known, tuple(exclude),
+        closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated,
+    )  # fmt: skip
+    if truth is not None:
+        found = against_truth(found, truth.to_dict())
+    return public(Diagnosis, found)
+
+
+def _cause(values: Mapping[str, Any]) -> Cause:
+    parameters = values["parameters"]
+    return Cause(
+        values["cause"], values["robot"], values["joint"], values["sentence"],
+        {name: entry["value"] for name, entry in parameters.items()},
+        {name: entry["se"] for name, entry in parameters.items()},
+        values["explained"]["in_sample"], values["explained"]["held_out"],
+    )  # fmt: skip

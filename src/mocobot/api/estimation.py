@@ -1,0 +1,73 @@
+"""Estimate a payload."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from estimator.estimate.payload import Method, estimate_payload
+from estimator.estimate.result import PayloadEstimate
+from estimator.estimate.text import format_estimate
+from estimator.files import write_json
+from mocobot.api.given import Given, recordings_of
+from mocobot.api.public import public
+
+
+@dataclass(frozen=True)
+class Estimate(PayloadEstimate):
+    """Grasps, mass, centre of mass and inertia of one payload, printable, and a table in a notebook.
+
+    The attributes are those of ``estimator.estimate.result.PayloadEstimate``; None marks what the data do not
+    determine.
+    """
+
+    def __str__(self) -> str:
+        """The text report."""
+        return format_estimate(self)
+
+    def _repr_html_(self) -> str:
+        from mocobot.api.notebook import estimate_html
+
+        return estimate_html(self)
+
+    def write(self, path: Path | str) -> None:
+        """Write it as JSON, which ``read_estimate`` reads.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        write_json(Path(path), self.to_dict())
+
+
+def estimate(
+    recordings: Given | Iterable[Given],
+    *,
+    method: Method = "auto",
+    cutoff_hz: float = 5.0,
+    say: Callable[[str], object] = lambda _: None,
+) -> Estimate:
+    """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
+
+    Args:
+        recordings: one or several, or paths of their files.
+        method: ``"staged"``, the paper's sequence; ``"joint"``, one least squares; ``"auto"``, staged where static
+            holds determine the centre of mass.
+        cutoff_hz: cut-off of the low-pass filter [Hz].
+        say: takes the name of the stage that begins.
+
+    Raises:
+        InputError: a recording cannot be used, they contradict each other, or nothing can be estimated.
+    """
+    return public(Estimate, estimate_payload(recordings_of(recordings), method, cutoff_hz, say=say))
+
+
+def read_estimate(path: Path | str) -> Estimate:
+    """Read what ``Estimate.write`` or ``mocobot estimate --out`` wrote.
+
+    Raises:
+        InputError: the file cannot be read, or is not a whole estimate.
+    """
+    from mocobot_view.facts.fact_files import read_estimate as read  # needs MuJoCo; an estimate does not
+
+    return public(Estimate, read(Path(path)))

@@ -1,0 +1,84 @@
+"""Look at a log before anyone trusts a number of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from estimator.arm.design import OmnidDesign, load_design
+from estimator.files import write_json
+from mocobot.api.public import public
+from mocobot_inspect import inspection
+from mocobot_inspect.findings import Finding, findings
+from mocobot_inspect.json import inspection_dict
+from mocobot_inspect.text import format_inspection, ready_line
+from mocobot_logs.map.files import read_map
+from mocobot_logs.open_log import open_log
+from mocobot_sim.scene.models import omnid_design
+
+
+@dataclass(frozen=True, eq=False)
+class Inspection(inspection.Inspection):
+    """Stamps, channels, clocks, wiring and excitation of a log: printable, and a table in a notebook.
+
+    The attributes are those of ``mocobot_inspect.inspection.Inspection``.
+    """
+
+    @property
+    def findings(self) -> list[Finding]:
+        """All that is wrong: ``topic`` and ``sentence`` each."""
+        return findings(self)
+
+    @property
+    def ready_for(self) -> str:
+        """What the log can be used for, one line."""
+        return ready_line(self)
+
+    def __str__(self) -> str:
+        """The text report."""
+        return format_inspection(self)
+
+    def _repr_html_(self) -> str:
+        from mocobot.api.notebook import inspection_html
+
+        return inspection_html(self.to_dict())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Strict JSON with units in the keys; see ``mocobot_inspect.json`` for the keys."""
+        return inspection_dict(self)
+
+    def write(self, path: Path | str) -> None:
+        """Write it as JSON.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        write_json(Path(path), self.to_dict())
+
+
+def inspect(
+    log: Path | str,
+    *,
+    map: Path | str | None = None,
+    design: OmnidDesign | Path | str | None = None,
+    episode: int | None = None,
+    advance: Callable[[int], object] = lambda _: None,
+) -> Inspection:
+    """Look at a log; whatever is wrong with its samples is reported and not refused.
+
+    Args:
+        log: a recording, or a log of any format that ``convert`` reads.
+        map: map file, or name of a built-in map (docs/measured-data.md); found out if not given.
+        design: numbers of the robots, or a TOML file of them, where the log does not say; None for the Omnid's.
+        episode: of a LeRobot dataset that holds several.
+        advance: takes the progress made in reading, in the log's units.
+
+    Raises:
+        InputError: the log, map or design cannot be read.
+    """
+    log_map = read_map(str(map)) if map is not None else None
+    standard = load_design(Path(design)) if isinstance(design, Path | str) else design or omnid_design()
+    source = open_log(Path(log), log_map, episode)
+    return public(Inspection, inspection.inspect_log(source, standard, advance))

@@ -1,0 +1,105 @@
+"""Results as small HTML tables for notebooks: no script, no network; every text is escaped."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+from estimator.estimate.result import PayloadEstimate
+from mocobot_report.blocks.blocks import Entry, Num, bullets, component, measurement, quantity, table, tidy
+from mocobot_report.blocks.html import Child, Node, el
+from mocobot_report.blocks.numbers import NONE, percent, plain
+
+Values = Mapping[str, Any]
+STYLE = (
+    ".mocobot table{border-collapse:collapse;margin:.5em 0}.mocobot caption{text-align:left;font-weight:600}"
+    ".mocobot caption .note{font-weight:400;opacity:.75;display:block}"
+    ".mocobot th,.mocobot td{text-align:left;padding:.15em .8em .15em 0}.mocobot .num{text-align:right}"
+)
+
+
+def estimate_html(estimate: PayloadEstimate) -> str:
+    """Mass, centre of mass, principal moments and grasps with standard errors, then doubts."""
+    e = estimate
+    rows: list[list[Entry]] = [["mass", measurement(e.mass.mass, e.mass.se) if e.mass else Num(NONE), "kg"]]
+    rows += [
+        [quantity(f"p_1c {axis}"), component(e.p_1c, e.p_1c_se_m, k, 1e3), "mm"]
+        for k, axis in enumerate("xyz")
+    ]
+    moments = e.inertia.principal if e.inertia else None
+    for k in range(3):
+        value = component(moments.moments, moments.moments_se, k) if moments else Num(NONE)
+        rows.append([f"principal moment {k + 1}", value, "kg m²"])
+    for j in range(2, e.robots + 1):
+        pair = e.grasps.pair(1, j) if e.grasps else None
+        distance = (
+            measurement(1e3 * float(np.linalg.norm(pair.p_ij)), 1e3 * pair.distance_se_m)
+            if pair
+            else Num(NONE)
+        )
+        rows.append([quantity(f"distance p_1{j}"), distance, "mm"])
+    title = f"Payload ({e.payload})" if e.payload is not None else "Payload"
+    said = f"{len(e.recordings)} recording{'s' * (len(e.recordings) != 1)}, {e.method}; p in {{1}}"
+    doubts = [*e.flags, *(f"Not determined: {weak}." for weak in e.undetermined)]
+    return _whole(
+        table(title, ["", "value ± standard error", "unit"], rows, note=said),
+        bullets(doubts) if doubts else None,
+    )
+
+
+def diagnosis_html(values: Values) -> str:
+    """The verdict with the causes' sentences, their parameters, and the misfit before and after."""
+    rows: list[list[Entry]] = []
+    for cause in values["causes"]:
+        for k, (name, entry) in enumerate(cause["parameters"].items()):
+            first = (cause["cause"], cause["place"]) if k == 0 else ("", "")
+            rows.append([*first, name, measurement(entry["value"], entry["se"])])
+    residual = values["residual"]
+    misfit: list[list[Entry]] = [["chi²/n as simulated", Num(plain(residual["nominal"]["chi2_per_n"]))]]
+    if rows:
+        misfit.append(["chi²/n with the named causes", Num(plain(residual["chi2_per_n"]))])
+    removed = (values["gain"] or {}).get("removed")
+    if removed is not None and rows:
+        misfit.append(["excess error of the response removed", Num(percent(removed["share"]))])
+    named = el("p", el("strong", values["verdict"].replace("_", " ").upper()))
+    sentences = [tidy(cause["sentence"]) for cause in values["causes"]]
+    if not sentences and values["verdict"] != "consistent":
+        sentences = [tidy(residual["nominal"]["signature"]["sentence"])]
+    return _whole(
+        named,
+        bullets(sentences) if sentences else None,
+        table("Named causes", ["cause", "place", "parameter", "value ± standard error"], rows)
+        if rows
+        else None,
+        table(
+            "Misfit", ["", ""], misfit, note=f"of {len(values['recordings'])} trials; chi²/n of 1 is clean"
+        ),
+    )
+
+
+def inspection_html(values: Values) -> str:
+    """What the log is ready for, what is wrong with it, and the robots' streams."""
+    log, wrong = values["log"], [finding["sentence"] for finding in values["findings"]]
+    rows: list[list[Entry]] = [
+        [
+            f"robot {robot}", Num(str(s["samples"])), Num(plain(s["rate_hz"], 6)), Num(f"{s['duration_s']:.1f}"),
+            Num(str(s["gaps"])), Num(str(s["duplicates"])),
+        ]
+        for robot, s in enumerate(values["streams"], start=1)
+    ]  # fmt: skip
+    head = ["", "samples", "rate [Hz]", "length [s]", "gaps", "duplicates"]
+    return _whole(
+        el("p", el("strong", values["ready"])),
+        bullets(wrong) if wrong else el("p", "Nothing wrong was found."),
+        table(f"Log {log['name']}", head, rows, note=f"{log['level']} level"),
+    )
+
+
+def _whole(*blocks: Child) -> str:
+    style: Sequence[Node] = [el("style", STYLE)]
+    return ElementTree.tostring(
+        el("div", style, *blocks, class_="mocobot"), encoding="unicode", method="html"
+    )

@@ -1,0 +1,107 @@
+"""Simulate one trial."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from estimator.errors import InputError
+from estimator.recording.metadata import Level
+from estimator.recording.model import Recording
+from estimator.recording.parquet import write_recording
+from mocobot.api.public import public
+from mocobot_sim.control.control import ControlGains
+from mocobot_sim.effects.base import Effect
+from mocobot_sim.extended.extended import load_extended
+from mocobot_sim.trial.sensors import SensorPreset, sensor_preset
+from mocobot_sim.trial.simulate import TrialRequest
+from mocobot_sim.trial.simulate import simulate as simulate_request
+from mocobot_sim.trial.trial_log import TrialLog
+from mocobot_sim.trial.truth import GroundTruth, write_truth
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class SimulatedRecording(Recording):
+    """A recording with what is known because it was simulated; nothing that estimates or diagnoses looks at it.
+
+    Attributes:
+        truth: the payload and the robots.
+        log: what truly happened, before any sensor.
+    """
+
+    truth: GroundTruth
+    log: TrialLog
+
+    def write(self, path: Path | str) -> None:
+        """Write the recording as Parquet, and the truth beside it as ``NAME.truth.json``.
+
+        Raises:
+            InputError: a file cannot be written.
+        """
+        write_recording(self, path)
+        write_truth(self.truth, Path(path))
+
+
+def simulate(
+    payload: str | Path | None = None,
+    trajectory: str = "random",
+    *,
+    vias: int | None = None,
+    duration_s: float | None = None,
+    preset: SensorPreset | str = "nominal",
+    seed: int = 0,
+    number: int = 0,
+    effects: Sequence[Effect] = (),
+    model: Path | str | None = None,
+    level: Level = "joint",
+    gains: ControlGains | None = None,
+    progress: Callable[[int], object] | None = None,
+) -> SimulatedRecording:
+    """Simulate one trial and read it through the sensors; equal arguments give equal bits.
+
+    Args:
+        payload: name of a shipped payload, or path of a payload MJCF (body ``payload``, sites ``grasp1`` ..
+            ``graspN``); ``"a"`` if neither this nor a model is given.
+        trajectory: ``"random"``, ``"periodic"`` or ``"static"``.
+        vias: vias of a random trial; 80 if not given.
+        duration_s: length of a periodic motion [s]; 60 if not given.
+        preset: sensors, or their name: ``"ideal"``, ``"nominal"`` or ``"uncalibrated"``.
+        seed: of trajectory, noise and calibration errors, at least 0.
+        number: which of several trials of that kind, at least 0; the noise differs from one to the next.
+        effects: what is hidden in the team (``make_effect``).
+        model: folder of an extended model, as a diagnosis writes it, in place of a payload.
+        level: what the recording's file will hold: ``"joint"``, driven angles and spring torques, or ``"wrist"``.
+        gains: of the arms' control; None for the defaults.
+        progress: called with the number of samples done since the last call.
+
+    Raises:
+        InputError: an argument that cannot be met.
+        TrialError: the physics of the trial cannot be trusted.
+    """
+    check_fits("vias", vias, "random", trajectory)
+    check_fits("duration_s", duration_s, "periodic", trajectory)
+    if model is not None and payload is not None:
+        raise InputError("payload and model are both given; the model has its own payload, so leave one out")
+    scene = load_extended(Path(model)) if model is not None else None
+    label = str(payload or "a") if model is None else Path(model).resolve().name
+    sensors = sensor_preset(preset) if isinstance(preset, str) else preset
+    given = {"vias": vias, "duration_s": duration_s}
+    request = replace(
+        TrialRequest(label, trajectory, seed, number),
+        **{name: value for name, value in given.items() if value is not None},
+    )
+    done = simulate_request(request, [sensors], gains=gains, progress=progress, scene=scene, effects=effects)
+    recording = done.recordings[sensors.name]
+    metadata = replace(recording.metadata, level=level)
+    return public(SimulatedRecording, recording, metadata=metadata, truth=done.truth, log=done.log)
+
+
+def check_fits(name: str, value: float | None, needed: str, trajectory: str) -> None:
+    """Refuse a number that says nothing about a kind of motion.
+
+    Raises:
+        InputError: it is given, and the trajectory is not the one that needs it.
+    """
+    if value is not None and trajectory != needed:
+        raise InputError(f"{name} is for a {needed} trajectory; this one is {trajectory}")

@@ -1,0 +1,33 @@
+"""Bases that drive: planned motions in the plane, mecanum kinematics, one robot alone, and what a drive logs."""
+
+from __future__ import annotations
+
+from mocobot_sim.base.design import WHEELS, BaseDesign, base_design
+from mocobot_sim.base.drive import BaseDrive, DriveLog
+from mocobot_sim.base.follow import FollowingDrive
+from mocobot_sim.base.mecanum import MecanumKinematics
+from mocobot_sim.base.motion import Leg, PlanarMotion, carried, plan
+from mocobot_sim.base.planar import compose, relative, yaw_of
+from mocobot_sim.base.snapshots import Snapshots
+from mocobot_sim.base.solo import build_solo, compile_solo, drive_solo
+
+__all__ = [
+    "WHEELS",
+    "BaseDesign",
+    "BaseDrive",
+    "DriveLog",
+    "FollowingDrive",
+    "Leg",
+    "MecanumKinematics",
+    "PlanarMotion",
+    "Snapshots",
+    "base_design",
+    "build_solo",
+    "carried",
+    "compile_solo",
+    "compose",
+    "drive_solo",
+    "plan",
+    "relative",
+    "yaw_of",
+]

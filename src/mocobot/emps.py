@@ -1,0 +1,72 @@
+"""The EMPS benchmark's axis: diagnose its recordings, and measure what every cause is worth (docs/emps.md)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable
+from pathlib import Path
+
+from discrepancy.causes.tolerances_file import read_tolerances
+from discrepancy.emps.catalogue import default_tolerances
+from discrepancy.emps.diagnosis import diagnose_emps
+from discrepancy.emps.recording.reader import read_emps
+from discrepancy.emps.rig import EmpsRig
+from discrepancy.emps.staircase import Step, format_staircase
+from discrepancy.emps.staircase import staircase as stairs
+from estimator.errors import InputError
+from mocobot.api.diagnosis import Diagnosis
+from mocobot.api.public import public
+
+__all__ = ["Step", "diagnose", "format_staircase", "staircase"]
+
+
+def diagnose(
+    recording: Path | str,
+    *,
+    tolerances: Path | str | None = None,
+    exclude: Iterable[str] = (),
+    closed_loop: bool = True,
+    jobs: int = 1,
+    say: Callable[[str], object] = lambda _: None,
+    simulated: Callable[[int], object] | None = None,
+) -> Diagnosis:
+    """Find out what a mass without friction gets wrong about the axis.
+
+    Args:
+        recording: MAT file; it is cut into blocks that validate each other.
+        tolerances, exclude, closed_loop, jobs, say, simulated: as of ``mocobot.diagnose``.
+
+    Raises:
+        InputError: recording, tolerances or causes that cannot be used.
+    """
+    known = read_tolerances(Path(tolerances) if tolerances is not None else None, default_tolerances())
+    found = diagnose_emps(
+        read_emps(Path(recording)), known, tuple(exclude),
+        closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated,
+    )  # fmt: skip
+    return public(Diagnosis, found)
+
+
+def staircase(
+    diagnosis: Diagnosis, other: Diagnosis | None = None, different: Collection[str] = ()
+) -> list[Step]:
+    """Errors of the nominal axis, and with each named cause added in the order of discovery.
+
+    Args:
+        diagnosis: of one recording.
+        other: of a second one, held out: it is predicted with the causes of the first.
+        different: names of causes that the second has of its own, such as ``"injected_voltage"``.
+
+    Raises:
+        InputError: a diagnosis is not one of the axis.
+    """
+    elsewhere = None
+    if other is not None:
+        own = [(f.candidate, f.values) for f in other.diagnosis.causes if f.candidate.cause in different]
+        elsewhere = _axis(other), own
+    return stairs(_axis(diagnosis), diagnosis.diagnosis.explanation, elsewhere)
+
+
+def _axis(diagnosis: Diagnosis) -> EmpsRig:
+    if not isinstance(diagnosis.rig, EmpsRig):
+        raise InputError("the diagnosis is not one of the EMPS axis")
+    return diagnosis.rig

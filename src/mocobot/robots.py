@@ -1,0 +1,22 @@
+"""The robots: design numbers, kinematics of the arm, deviations from the design, control gains."""
+
+from __future__ import annotations
+
+from estimator.arm.delta import forward_kinematics, inverse_kinematics
+from estimator.arm.design import OmnidDesign, load_design
+from mocobot_sim.control.control import ControlGains
+from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread
+from mocobot_sim.scene.models import omnid_design
+from mocobot_sim.trial.simulate import draw_units
+
+__all__ = [
+    "AsBuilt",
+    "CalibrationSpread",
+    "ControlGains",
+    "OmnidDesign",
+    "draw_units",
+    "forward_kinematics",
+    "inverse_kinematics",
+    "load_design",
+    "omnid_design",
+]

@@ -1,0 +1,1 @@
+"""Files of a bag: MCAP and SQLite, compressed or not, hostile or not."""

@@ -1,0 +1,80 @@
+"""Numbers that decide a verdict stand in one place."""
+
+from __future__ import annotations
+
+import ast
+
+from source_tree import SRC, module_files
+
+FREE = {
+    "discrepancy.emps.recording.axis_log": {"FIRST_GUESS_KG", "LIMIT_V"},  # the nominal axis
+    "discrepancy.result.evidence_list": {"MOST", "BY_CHANCE"},  # of a picture
+    "discrepancy.result.json": {"LEAST_LOG10_P", "VERSION"},  # JSON has no minus infinity
+    "discrepancy.result.plots": {"RUNNING_S"},
+    "discrepancy.result.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
+    "discrepancy.result.text": {"WIDTH"},
+    "discrepancy.result.traces_file": {"VERSION"},
+    "discrepancy.team.linear.slots": {
+        "COUNT",
+        "STEPS",
+    },  # a layout, with the steps of its numerical derivatives
+}
+"""Formats, layouts and sizes of pictures, by module."""
+
+
+def constants(source: str) -> dict[str, ast.expr]:
+    """Upper-case names that a module assigns at its top level, and their values."""
+    out = {}
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.AnnAssign):
+            pairs = [(node.target, node.value)]
+        elif isinstance(node, ast.Assign):
+            pairs = [(target, node.value) for target in node.targets]
+        else:
+            continue
+        for target, value in pairs:
+            split = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+            both = zip(target.elts, value.elts, strict=True) if split else [(target, value)]
+            out |= {
+                name.id: of for name, of in both if isinstance(name, ast.Name) and name.id.isupper() and of
+            }
+    return out
+
+
+def is_numeric(value: ast.expr) -> bool:
+    """Whether a value is made of numbers, and what is computed of them, but neither of words nor a table."""
+    if isinstance(value, ast.Dict | ast.DictComp):
+        return False
+    literals = [node.value for node in ast.walk(value) if isinstance(node, ast.Constant)]
+    return bool(literals) and not any(isinstance(literal, str | bytes | bool) for literal in literals)
+
+
+def numbers(source: str) -> set[str]:
+    return {name for name, value in constants(source).items() if is_numeric(value)}
+
+
+def test_numbers_that_decide_are_in_one_file() -> None:
+    elsewhere = {
+        module: numbers(path.read_text(encoding="utf-8"))
+        for module, path in module_files("discrepancy").items()
+        if module != "discrepancy.rules"
+    }
+    assert {module: names for module, names in elsewhere.items() if names} == FREE
+
+
+def test_every_rule_says_where_it_comes_from() -> None:
+    source = (SRC / "discrepancy" / "rules.py").read_text(encoding="utf-8")
+    body = ast.parse(source).body[1:]
+    assert len(body) > 100
+    for rule, words in zip(body[::2], body[1::2], strict=True):
+        assert isinstance(rule, ast.Assign), ast.unparse(rule)
+        assert isinstance(words, ast.Expr), ast.unparse(rule)
+        said = ast.unparse(words)
+        assert any(origin in said for origin in ("Derived", "Measured", "Chosen")), ast.unparse(rule)
+
+
+def test_what_counts_as_a_number() -> None:
+    source = (
+        "A = 1\nB, C = -2.5, (1e-3, 2.0)\nD: int = 2 * 3\nE = 'x'\nF = {'a': 1}\nG = H * 2\ni = 3\nJ = f(K)\n"
+    )
+    assert numbers(source) == {"A", "B", "C", "D", "G"}
