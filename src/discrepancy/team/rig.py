@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.engine.explanation import Explanation
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rig, Rows
 from discrepancy.team.candidates import (
@@ -272,8 +273,8 @@ class TeamRig(Rig):
             named_effect(found.candidate, self.effect(found.candidate, found.values))
             for found in explanation.found
         ]
-        fit = explanation.problem.fit(explanation.fit.free, background=False)
-        shared = self.linear[0].shared.moved(-fit.coefficients[: explanation.problem.shared])
+        fit = Fit.of(explanation.problem, explanation.fit.free, background=False)
+        shared = self.linear[0].shared.moved(-fit.shared)
         bases = self.linear[0].bases.moved(-fit.local(0)[: self.local_unknowns])
         first = self.recordings[0]
         scene = team_of(shared, bases, effects, (first.phi[0], first.theta[0]))

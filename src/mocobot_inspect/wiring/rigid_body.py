@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from estimator.estimate.identifiability import FACTOR, cross_information
 from estimator.estimate.joint import newton_euler_regressor
+from estimator.statistics import rms
 from mocobot_inspect.wiring.motion import Grasp
 
 Array = NDArray[np.float64]
@@ -122,11 +123,6 @@ def cross(a: Array, b: Array) -> Array:
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     u, v, w = b[..., 0], b[..., 1], b[..., 2]
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
-
-
-def rms(x: Array) -> float:
-    """Root mean square of all entries."""
-    return float(np.sqrt(np.mean(np.square(x))))
 
 
 def _position(w: Array, difference: Array) -> Array:

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from mocobot_view.facts.diagnosis import read_diagnosis
 
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.result.json import diagnosis_to_dict
@@ -21,7 +22,6 @@ from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trajectories import random_vias, sphere_motion
 from mocobot_sim.trial.trial import run_trial
-from mocobot_view.facts.diagnosis import read_diagnosis
 
 STIFFNESS = 0.3
 
