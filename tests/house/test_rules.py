@@ -13,8 +13,10 @@ FREE = {
     "discrepancy.result.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
     "discrepancy.result.text": {"WIDTH"},
     "discrepancy.result.traces_file": {"VERSION"},
-    "discrepancy.team.linear.residual": {"SIGNALS"},  # a layout
-    "discrepancy.team.linear.trial_linear": {"_STEPS"},  # of numerical derivatives
+    "discrepancy.team.linear.slots": {
+        "COUNT",
+        "STEPS",
+    },  # a layout, with the steps of its numerical derivatives
 }
 """Formats, layouts and sizes of pictures, by module."""
 
