@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from estimator.estimate.identifiability import FACTOR, cross_information
 from estimator.estimate.joint import newton_euler_regressor
+from estimator.so3 import chordal_mean
 from estimator.statistics import rms
 from mocobot_inspect.wiring.motion import Grasp
 
