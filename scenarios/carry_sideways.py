@@ -23,7 +23,8 @@ from mocobot_sim.base.snapshots import Snapshots
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
-from mocobot_sim.trial.trial import TrialLog, run_trial
+from mocobot_sim.trial.trial import run_trial
+from mocobot_sim.trial.trial_log import TrialLog
 from mocobot_view.pictures.camera import Camera
 from mocobot_view.pictures.marks import Marks
 from mocobot_view.pictures.render import make_folder, render
