@@ -101,10 +101,6 @@ LEAST_S = 5.0
 """Of all recordings together below which nothing is diagnosed. Chosen."""
 GOOD_S = 30.0
 """With which a diagnosis starts to be of use; only said. Chosen."""
-MASS_TOLERANCE_SHARE = 0.05
-"""Trials whose masses differ by more are not of one payload, if beyond ``MASS_TOLERANCE_SE`` as well. Chosen."""
-MASS_TOLERANCE_SE = 6.0
-"""The same in sums of both standard errors. Chosen."""
 
 # A team: filters and rows.
 
@@ -221,7 +217,7 @@ NOISE_SEED, DITHER_SEED = 20250, 0
 SPOILT_SHARE = 0.01
 """Of a trace's square, that rounding may be. Derived: a fit would be off by as much."""
 ERROR_BLOCK_S = 1.0
-"""Blocks of the standard errors. Measured: benchmarks/emps_errors.py; what is left is correlated over a few tenths."""
+"""Blocks of the standard errors. Measured: benchmarks/emps/emps_errors.py; the rest correlates over a few tenths."""
 REMEMBERED = 16
 """Samples before a block that the simulated loop starts with. Chosen."""
 

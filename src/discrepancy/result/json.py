@@ -54,11 +54,10 @@ from discrepancy.engine.explanation import Explanation, Found
 from discrepancy.engine.gain import Gain, Response
 from discrepancy.least_squares.fit import Fit
 from discrepancy.result.evidence_list import evidence_list, finite_log10_p, place_of
+from discrepancy.result.read import FORMAT, VERSION
 from discrepancy.result.sensitivity import blind_spots, detection_limits
 from discrepancy.result.signature import signature
 from discrepancy.rig import Rig
-
-FORMAT, VERSION = "mocobot-diagnosis", 1
 
 
 def diagnosis_to_dict(

@@ -156,6 +156,22 @@ def estimate_com(
     return ComEstimate(mass.mass, p_1c, total, covariance, J, rms(residual)), report
 
 
+def estimate_from_holds(
+    holds: Sequence[Hold], grasps: GraspEstimate | None, gravity_mps2: float
+) -> tuple[MassEstimate | None, ComEstimate | None, StepReport | None]:
+    """Mass and centre of mass as far as there are holds and grasps for them.
+
+    Raises:
+        InputError: the robots do not carry anything.
+    """
+    if not holds:
+        return None, None, None
+    mass = estimate_mass(holds, gravity_mps2)
+    if grasps is None:
+        return mass, None, None
+    return mass, *estimate_com(holds, mass, grasps, gravity_mps2)
+
+
 def weak_com_reason(tilt: str, moment_rms: float, weight: float) -> str:
     """Why the centre of mass is open: too little ``tilt`` [sentence], or moments [N m] that make no sense."""
     if moment_rms < CONTRADICTION_M * weight:

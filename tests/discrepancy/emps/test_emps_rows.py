@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from discrepancy.emps.blocks import blocks, period_of
-from discrepancy.emps.catalogue import DEFAULTS, candidate_of
+from discrepancy.emps.catalogue import candidate_of
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.noise import repeated
 from discrepancy.emps.pulse_search import pulse_train, rectangle
@@ -227,7 +227,7 @@ def test_whitened_noise_is_white_and_of_unit_size() -> None:
 
 
 def test_a_rig_is_linear_in_its_causes(clean: EmpsRig) -> None:
-    causes = [candidate_of(n, clean.hints, DEFAULTS) for n in ("mass", "viscous_friction", "position_gain")]
+    causes = [candidate_of(n, clean.hints) for n in ("mass", "viscous_friction", "position_gain")]
     values = [np.array([3.0]), np.array([20.0]), np.array([1.0])]
     rows = clean.rows(causes)
     left = clean.residual(np.zeros(0), [], list(zip(causes, values, strict=True)))
@@ -237,10 +237,10 @@ def test_a_rig_is_linear_in_its_causes(clean: EmpsRig) -> None:
 
 
 def test_negative_friction_and_invisible_play_cannot_be(clean: EmpsRig) -> None:
-    friction = candidate_of("coulomb_friction", clean.hints, DEFAULTS)
+    friction = candidate_of("coulomb_friction", clean.hints)
     assert clean.possible(friction, np.array([-0.1]), np.array([[1.0]]))
     assert not clean.possible(friction, np.array([-5.0]), np.array([[1.0]]))
-    play = candidate_of("backlash", clean.hints, DEFAULTS)
+    play = candidate_of("backlash", clean.hints)
     assert not clean.possible(play, np.array([4e-7]), np.array([[1e-16]]))  # two steps of the encoder
     assert clean.possible(play, np.array([4e-5]), np.array([[1e-16]]))
 

@@ -1,6 +1,6 @@
 """Are the standard errors right? The sandwich over blocks beside a bootstrap of the same blocks and the naive ones.
 
-python benchmarks/emps_errors.py
+python benchmarks/emps/emps_errors.py
 """
 
 from __future__ import annotations
