@@ -217,7 +217,7 @@ NOISE_SEED, DITHER_SEED = 20250, 0
 SPOILT_SHARE = 0.01
 """Of a trace's square, that rounding may be. Derived: a fit would be off by as much."""
 ERROR_BLOCK_S = 1.0
-"""Blocks of the standard errors. Measured: benchmarks/emps_errors.py; what is left is correlated over a few tenths."""
+"""Blocks of the standard errors. Measured: benchmarks/emps/emps_errors.py; the rest correlates over a few tenths."""
 REMEMBERED = 16
 """Samples before a block that the simulated loop starts with. Chosen."""
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from discrepancy.result.json import FORMAT as DIAGNOSIS
-from discrepancy.result.json import VERSION as DIAGNOSIS_VERSION
+from discrepancy.result.read import FORMAT as DIAGNOSIS
+from discrepancy.result.read import parse_diagnosis
 from discrepancy.result.text import format_diagnosis
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import NAME as RESIDUALS
@@ -19,9 +19,9 @@ from estimator.errors import InputError
 from estimator.estimate.result import FORMAT as ESTIMATE
 from estimator.estimate.result import VERSION as ESTIMATE_VERSION
 from estimator.estimate.result import PayloadEstimate
+from estimator.strict import Fields, is_number, read_json
 from mocobot_sim.paper.tables import paper_tables, summary_table
-from mocobot_view.facts.diagnosis import VERDICTS
-from mocobot_view.facts.fact_files import read_estimate, read_json
+from mocobot_view.facts.fact_files import read_estimate
 
 SOUGHT = (
     "paper.json of `mocobot paper --out`, diagnosis.json of `mocobot diagnose --out`, or JSON files of "
@@ -151,21 +151,13 @@ def _paper(folder: Path) -> Paper:
 def _trials(path: Path) -> tuple[Json, ...]:
     if not path.is_file():
         return ()
-    trials = read_json(path, "the checks of the trials").get("trials")
-    if not isinstance(trials, list) or not all(map(_is_trial, trials)):
-        keys = ", ".join(TRIAL_KEYS)
-        raise InputError(
-            f"{path}: not the checks of the trials; each must have a name, and the numbers {keys}"
-        )
+    trials = Fields(read_json(path, "the checks of the trials"), ("trials",), str(path)).list("trials")
+    for k, values in enumerate(trials):
+        trial = Fields(values, ("name", *TRIAL_KEYS), f"{path}: trials[{k}]")
+        trial.text("name")
+        for key in TRIAL_KEYS:
+            trial.number(key, 0.0)
     return tuple(trials)
-
-
-def _is_trial(values: Any) -> bool:
-    return (
-        isinstance(values, dict)
-        and isinstance(values.get("name"), str)
-        and all(values.get(key) is not None and _number(values[key]) for key in TRIAL_KEYS)
-    )
 
 
 def _provenance(path: Path) -> Json | None:
@@ -188,17 +180,7 @@ def _estimate(path: Path, values: Json) -> Estimated:
 def _diagnosis(path: Path, values: Json, other: Diagnosed | None) -> Diagnosed:
     if other is not None:
         raise InputError(f"{path}: is a second diagnosis in one folder; a report takes one")
-    if values.get("format") != DIAGNOSIS:
-        raise InputError(f"{path}: not a diagnosis; it must have format {DIAGNOSIS!r}")
-    if values.get("version") != DIAGNOSIS_VERSION:
-        raise InputError(
-            f"{path}: is a diagnosis of version {values.get('version')!r:.40}; this mocobot reads version "
-            f"{DIAGNOSIS_VERSION}"
-        )
-    if values.get("verdict") not in VERDICTS:
-        raise InputError(
-            f"{path}: verdict is {values.get('verdict')!r:.40}; it must be one of {', '.join(VERDICTS)}"
-        )
+    parse_diagnosis(values, path)
     try:
         format_diagnosis(values)  # touches most keys that a report has to show
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
@@ -225,9 +207,7 @@ def complete(path: Path) -> Iterator[None]:
 
 def _number(value: Any) -> bool:
     """Whether a score is null or a finite number of at least 0."""
-    return value is None or (
-        isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < 1e300
-    )
+    return value is None or (is_number(value) and value >= 0)
 
 
 def _words(error: Exception) -> str:

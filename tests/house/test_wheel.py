@@ -21,6 +21,8 @@ def test_wheel_simulates_on_its_own(tmp_path: Path) -> None:
     site = tmp_path / "site"
     with zipfile.ZipFile(wheel) as archive:
         archive.extractall(site)
+    for package in (ROOT / "src").glob("*/__init__.py"):
+        assert (site / package.parent.name / "py.typed").is_file()
     code = (
         "import mocobot.cli, mocobot.commands.diagnose, mocobot_sim.scene.models as m;"
         "import mocobot_sim.paper.published as t;"

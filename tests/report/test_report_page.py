@@ -296,6 +296,13 @@ def test_provenance_lists_what_was_read(pages: dict[str, Reader], folders: dict[
     )
 
 
+def test_options_are_shown_as_they_were_given(pages: dict[str, Reader]) -> None:
+    """0 is a number, and no "no"."""
+    assert "option seed 0" in pages["paper"].rows()
+    assert "option closed_loop yes" in pages["diagnosis"].rows()
+    assert "option closed_loop no" in pages["axis"].rows()
+
+
 def test_one_page_for_several_results(tmp_path: Path, no_pictures: pytest.MonkeyPatch) -> None:
     folder = diagnosis_folder(tmp_path / "all", "unexplained")
     source = estimate_folder(tmp_path / "one", "b")

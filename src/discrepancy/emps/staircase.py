@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.engine.explanation import Explanation
+from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Candidate
 from estimator.statistics import rms
 
@@ -97,9 +98,7 @@ def errors(rig: EmpsRig, models: Sequence[Active]) -> Errors:
 
 
 def _fitted(explanation: Explanation, free: Sequence[int], trials: Sequence[int]) -> Active:
-    problem = explanation.problem
-    fit = problem.fit(free, trials, background=False)
-    return [(problem.candidates[i], fit.part(i)[0] * problem.candidates[i].units) for i in free]
+    return Fit.of(explanation.problem, free, trials, background=False).active
 
 
 def format_staircase(steps: Sequence[Step], other: str | None = None) -> str:

@@ -60,7 +60,8 @@ class ParquetTable:
             raise InputError(f"{name}: column {repeated!r:.80} appears more than once")
         text = (schema.metadata or {}).get(METADATA_KEY)
         where = f"{name}: metadata"
-        self.metadata = None if text is None else RecordingMetadata.from_json(text, where=where)
+        told = None if text is None else RecordingMetadata.from_json(text, where=where)
+        self.metadata: RecordingMetadata | None = told
         # Rows without any value are part of a broken recording, which is to be seen as it is.
         self.sparse = self.metadata is None
         self.shapes: Mapping[str, tuple[int, ...]] = self._row_shapes()

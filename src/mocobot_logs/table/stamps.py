@@ -70,7 +70,8 @@ def from_text(values: pa.Array, unit_ns: int, where: str, row: int = 0) -> tuple
         text = values[bad].as_py()
         raise InputError(f"{where} is {text!r:.60} in row {row + bad}; a time must be a number") from None
     ns = decimals.view(pa.decimal128(38, 0))  # the digits without the point are the nanoseconds
-    beyond = pc.fill_null(pc.greater(pc.abs(ns), LARGEST_NS), False)
+    size = pc.call_function("abs", [ns])
+    beyond = pc.fill_null(pc.call_function("greater", [size, pa.scalar(LARGEST_NS)]), False)
     _refuse(values, beyond.to_numpy(zero_copy_only=False), where, row)
     given = ns.is_valid().to_numpy(zero_copy_only=False)
     return pc.fill_null(ns, 0).cast(pa.int64()).to_numpy(zero_copy_only=False), given

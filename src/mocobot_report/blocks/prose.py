@@ -39,8 +39,8 @@ def folded(title: str, *children: Child) -> Node:
 
 
 def facts(entries: Sequence[tuple[str, Child]]) -> Node:
-    """Names and what they are."""
-    return el("dl", *((el("dt", n), el("dd", v if v else NONE)) for n, v in entries), class_="facts")
+    """Names and what they are; a dash for an empty text."""
+    return el("dl", *((el("dt", n), el("dd", NONE if v == "" else v)) for n, v in entries), class_="facts")
 
 
 def tidy(sentence: str, *, inside: bool = False) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from discrepancy.result.read import VERDICTS, read_diagnosis
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
@@ -26,7 +27,6 @@ from mocobot_report.diagnosis.residuals import residual_sections
 from mocobot_report.diagnosis.rest import rest_sections
 from mocobot_report.folder import Diagnosed
 from mocobot_report.sources import sources
-from mocobot_view.facts.diagnosis import VERDICTS, read_diagnosis
 from mocobot_view.pictures.shots import axis_shot, diagnosis_shot
 
 Values = Mapping[str, Any]

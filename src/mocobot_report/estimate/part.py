@@ -14,6 +14,7 @@ from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import NONE, percent, plain, with_error
+from mocobot_report.blocks.payload import distance, mass, moment, place
 from mocobot_report.blocks.pictures import ASPECT
 from mocobot_report.blocks.prose import bullets, folded, paragraph, tiles, verdict
 from mocobot_report.blocks.sections import section
@@ -140,19 +141,15 @@ def _truth(found: list[Source], robots: int) -> tuple[BodyFacts | None, str]:
 
 
 def _payload(e: PayloadEstimate) -> Node:
-    mass = measurement(e.mass.mass, e.mass.se) if e.mass else Num(NONE)
-    rows: list[list[Entry]] = [["mass", "kg", mass]]
-    rows += [
-        [quantity(f"p_1c {x}"), "mm", component(e.p_1c, e.p_1c_se_m, k, 1e3)] for k, x in enumerate("xyz")
-    ]
+    rows: list[list[Entry]] = [["mass", "kg", mass(e)]]
+    rows += [[quantity(f"p_1c {name}"), "mm", place(e, k)] for k, name in enumerate("xyz")]
     if e.inertia is None:
         rows.append(["inertia", "kg m²", Num(NONE)])
     else:
         se, p = np.sqrt(np.diag(e.inertia.covariance)), e.inertia.principal
         for k, (a, b, name) in enumerate(ORDER):
             rows.append([quantity(f"I_{name}"), "kg m²", measurement(float(e.inertia.inertia[a, b]), se[k])])
-        for k in range(3):
-            rows.append([f"principal moment {k + 1}", "kg m²", component(p.moments, p.moments_se, k)])
+        rows += [[f"principal moment {k + 1}", "kg m²", moment(e, k)] for k in range(3)]
         for k, name in enumerate("xyz"):
             rows.append(
                 [quantity(f"R_1c {name}"), "deg", component(p.axis_angle_rad, p.axis_angle_se_rad, k, DEG)]
@@ -169,8 +166,7 @@ def _grasps(e: PayloadEstimate) -> list[Node]:
     for i, j in combinations(range(1, e.robots + 1), 2):
         pair = e.grasps.pair(i, j)
         places = [component(pair.p_ij, pair.p_se_m, k, 1e3) for k in range(3)]
-        distance = measurement(1e3 * float(np.linalg.norm(pair.p_ij)), 1e3 * pair.distance_se_m)
-        positions.append([quantity(f"p_{i}{j}"), *places, distance])
+        positions.append([quantity(f"p_{i}{j}"), *places, distance(e, i, j)])
         angles = [component(pair.axis_angle_rad, pair.axis_angle_se_rad, k, DEG) for k in range(3)]
         rotations.append([quantity(f"R_{i}{j}"), *angles])
     return [

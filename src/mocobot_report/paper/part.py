@@ -6,14 +6,14 @@ from functools import partial
 
 import numpy as np
 
-from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Node, el
-from mocobot_report.blocks.numbers import NONE, about, plain, spelled
+from mocobot_report.blocks.numbers import about, plain, spelled
+from mocobot_report.blocks.payload import distance, mass, moment, place
 from mocobot_report.blocks.pictures import ASPECT
 from mocobot_report.blocks.prose import bullets, folded, paragraph, tiles, verdict
 from mocobot_report.blocks.sections import section, tabs
-from mocobot_report.blocks.tables import Entry, Num, component, measurement, quantity, table, value
+from mocobot_report.blocks.tables import Entry, Num, quantity, table, value
 from mocobot_report.folder import Paper
 from mocobot_report.paper.charts import summary_chart, table_chart, trial_chart
 from mocobot_sim.paper.published import payload_truth
@@ -167,27 +167,17 @@ def _estimates(book: Book, paper: Paper) -> list[Node]:
 def _against_truth(paper: Paper, payload: str) -> Node:
     truth = payload_truth(payload)
     found = {preset: e for (p, preset), e in paper.estimates.items() if p == payload}
-    masses = [measurement(e.mass.mass, e.mass.se) if e.mass else Num(NONE) for e in found.values()]
-    rows: list[list[Entry]] = [["mass", "kg", value(truth.mass, 5), *masses]]
+    rows: list[list[Entry]] = [["mass", "kg", value(truth.mass, 5), *map(mass, found.values())]]
     for k, name in enumerate("xyz"):
-        places = [component(e.p_1c, e.p_1c_se_m, k, 1e3) for e in found.values()]
-        rows.append([quantity(f"p_1c {name}"), "mm", value(1e3 * float(truth.p_1c[k]), 4), *places])
+        true = value(1e3 * float(truth.p_1c[k]), 4)
+        rows.append([quantity(f"p_1c {name}"), "mm", true, *(place(e, k) for e in found.values())])
     for k in range(3):
-        principal = [e.inertia and e.inertia.principal for e in found.values()]
-        moments = [component(p and p.moments, p and p.moments_se, k) for p in principal]
         true = value(float(truth.principal_moments[k]), 4)
-        rows.append([f"principal moment {k + 1}", "kg m²", true, *moments])
+        rows.append([f"principal moment {k + 1}", "kg m²", true, *(moment(e, k) for e in found.values())])
     for j in (2, 3):
         true = value(1e3 * float(np.linalg.norm(truth.T(1, j)[:3, 3])), 5)
-        rows.append([quantity(f"|p_1{j}|"), "mm", true, *(_distance(e, j) for e in found.values())])
+        rows.append([quantity(f"|p_1{j}|"), "mm", true, *(distance(e, 1, j) for e in found.values())])
     return table(f"Payload ({payload})", ["", "unit", "truth", *found], rows)
-
-
-def _distance(e: PayloadEstimate, j: int) -> Num:
-    if e.grasps is None or e.robots < j:
-        return Num(NONE)
-    pair = e.grasps.pair(1, j)
-    return measurement(1e3 * float(np.linalg.norm(pair.p_ij)), 1e3 * pair.distance_se_m)
 
 
 def _trials(paper: Paper) -> list[Node]:

@@ -9,7 +9,8 @@ from mocobot_sim.base.drive import BaseDrive, DriveLog
 from mocobot_sim.base.rollers import release, rough_floor
 from mocobot_sim.base.snapshots import Snapshots
 from mocobot_sim.scene.models import models_dir
-from mocobot_sim.scene.pymjcf import mjcf
+from mocobot_sim.scene.omnid import load_omnid, stand
+from mocobot_sim.scene.pymjcf import compiled, mjcf
 from mocobot_sim.scene.scene import TIMESTEP_S
 from mocobot_sim.trial.trajectories import RATE_HZ
 
@@ -28,8 +29,7 @@ def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S)
     root = mjcf.from_path(str(models_dir() / "team.xml"))
     root.model = "solo"
     root.option.timestep = timestep_s
-    omnid = mjcf.from_path(str(models_dir() / "omnid" / "omnid.xml"))
-    omnid.model = "omnid1"
+    omnid = load_omnid(1)
     release(omnid, design)
     wheels = {f"wheel_{wheel}" for wheel in WHEELS}
     for element in [*omnid.equality.all_children(), *omnid.actuator.all_children()]:
@@ -38,15 +38,14 @@ def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S)
     for joint in omnid.find_all("joint"):
         if not any(joint.name.startswith(wheel) for wheel in wheels):
             joint.remove()
-    site = root.worldbody.add("site", name="mount1", group=4, pos=[0.0, 0.0, 0.0])
-    site.attach(omnid).add("freejoint")
+    stand(root, omnid, [0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]).add("freejoint")
     rough_floor(root, design)
     return root
 
 
 def compile_solo(root: mjcf.RootElement) -> mujoco.MjModel:
     """Compile what ``build_solo`` returned."""
-    return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
+    return compiled(root)
 
 
 def drive_solo(

@@ -10,7 +10,8 @@ import numpy as np
 from mocobot_sim.effects.as_built import add_to_unit
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.scene.as_built import AsBuilt
-from mocobot_sim.scene.scene import TeamScene, deviate_geometry
+from mocobot_sim.scene.omnid import deviate_geometry
+from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.errors import InputError
 from mocobot_sim.scene.models import payload_path
-from mocobot_sim.scene.pymjcf import mjcf
+from mocobot_sim.scene.pymjcf import compiled, mjcf
 
 OWN_COMPILER_SETTINGS = ("angle", "autolimits", "eulerseq", "assetdir", "meshdir", "texturedir")
 # What else a payload's file may hold: the rest of MJCF would act on the robots too, or on the payload from outside.
@@ -66,7 +66,7 @@ def grasp_frames(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
             ``graspN``, the first at its origin.
     """
     try:
-        model = mujoco.MjModel.from_xml_string(payload_root.to_xml_string(), payload_root.get_assets())
+        model = compiled(payload_root)
     except ValueError as error:
         raise InputError(
             f"{where}: MuJoCo cannot compile the payload ({' '.join(str(error).split())})"

@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import os
 
+import mujoco
+
 _renderer = os.environ.get("MUJOCO_GL")
 os.environ["MUJOCO_GL"] = "disabled"
 try:
@@ -16,4 +18,13 @@ finally:
     if _renderer is not None:
         os.environ["MUJOCO_GL"] = _renderer
 
-__all__ = ["mjcf"]
+__all__ = ["compiled", "mjcf"]
+
+
+def compiled(root: mjcf.RootElement) -> mujoco.MjModel:
+    """A fresh MuJoCo model of a PyMJCF tree.
+
+    Raises:
+        ValueError: MuJoCo cannot compile it.
+    """
+    return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())

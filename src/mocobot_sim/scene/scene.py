@@ -17,6 +17,7 @@ from mocobot_sim.base.rollers import release, rough_floor
 from mocobot_sim.scene.applied import Applied, Pushing
 from mocobot_sim.scene.as_built import AsBuilt, units_of
 from mocobot_sim.scene.models import base_height_m, models_dir, omnid_design
+from mocobot_sim.scene.omnid import deviate, load_omnid, park, stand
 from mocobot_sim.scene.payload import grasp_frames, load_payload
 from mocobot_sim.scene.pymjcf import mjcf
 from mocobot_sim.scene.sensor_effects import SensorEffects
@@ -26,8 +27,6 @@ Array = NDArray[np.float64]
 
 TIMESTEP_S = 0.001
 STIFF = {"solref": [0.004, 1.0], "solimp": [0.9999, 0.9999, 0.001, 0.5, 2.0]}
-BASE_JOINTS = ("base_x", "base_y", "base_yaw")
-WHEELS = ("wheel_front_left", "wheel_front_right", "wheel_rear_left", "wheel_rear_right")
 
 
 @dataclass(frozen=True)
@@ -147,18 +146,13 @@ def build_team(
     wrist_home_b, theta_home, mounts, mount_quats = _home(X_1i, mounts)
     _check_tilts(theta_home[:, 1:], design.gimbal_limit_rad, label)
     for i in range(robots):
-        omnid = mjcf.from_path(str(models_dir() / "omnid" / "omnid.xml"))
-        omnid.model = f"omnid{i + 1}"
+        omnid = load_omnid(i + 1)
         deviate(omnid, units[i])
         if released:
             release(omnid, base_design())
         else:
-            _park(omnid)
-        mount = root.worldbody.add(
-            "site", name=f"mount{i + 1}", group=4, pos=mounts[i].translation,
-            quat=mount_quats[i],
-        )  # fmt: skip
-        frame = mount.attach(omnid)
+            park(omnid)
+        frame = stand(root, omnid, mounts[i].translation, mount_quats[i])
         if released:
             frame.add("freejoint")
         if i == 0:
@@ -219,32 +213,3 @@ def _check_tilts(tilts: Array, limit_rad: float, where: str) -> None:
             f"{where}: grasp{over[0] + 1} asks for gimbal angles (y, x) of ({degrees}) deg at home; "
             f"the gimbal ends at {np.rad2deg(limit_rad):.1f} deg"
         )
-
-
-def _park(omnid: mjcf.RootElement) -> None:
-    """Lock base and wheels to the floor, exactly and at no cost: a parked joint is one that is not there."""
-    for name in (*BASE_JOINTS, *WHEELS):
-        omnid.find("joint", name).remove()
-
-
-def deviate(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
-    """Move one unit's geometry and springs off their design values."""
-    deviate_geometry(omnid, unit)
-    for k in range(3):
-        spring = omnid.find("joint", f"spring{k + 1}")
-        spring.stiffness = omnid_design().sea_stiffness_Nm_per_rad * (1.0 + unit.stiffness_ratio[k])
-
-
-def deviate_geometry(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
-    """Move one unit's geometry by what ``unit`` says, on top of what it is."""
-    for k in range(3):
-        azimuth = 2.0 * np.pi * k / 3.0
-        u = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-        proximal = omnid.find("body", f"proximal{k + 1}")
-        proximal.pos = proximal.pos + unit.base_radius_m[k] * u
-        rod = omnid.find("body", f"rod{k + 1}")
-        rod.pos = rod.pos + np.array([unit.proximal_length_m[k], 0.0, 0.0])
-        tip = omnid.find("site", f"rod{k + 1}_tip")
-        tip.pos = tip.pos + np.array([unit.rod_length_m[k], 0.0, 0.0])
-        platform = omnid.find("site", f"platform{k + 1}")
-        platform.pos = platform.pos + unit.platform_radius_m[k] * u

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -12,6 +11,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from estimator.errors import InputError
 from mocobot_sim.scene.models import payload_names
 from mocobot_sim.scene.payload import grasp_frames, load_payload
+from mocobot_sim.scene.pymjcf import compiled
 from mocobot_view.bodies.primitives import capsule, join
 from mocobot_view.bodies.shapes import Shape, body_shape
 from mocobot_view.facts.body_facts import BodyFacts
@@ -40,7 +40,7 @@ def cad_shape(payload: str | Path, robots: int) -> tuple[Shape | None, Grasps]:
         raise InputError(
             f"{payload}: the payload has {len(frames)} grasps; the recording is of {robots} robots"
         )
-    model = mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
+    model = compiled(root)
     grasps = Grasps(frames.rotation.as_matrix(), frames.translation)
     return body_shape(model, list(range(1, model.nbody))), grasps
 

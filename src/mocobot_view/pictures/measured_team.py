@@ -18,8 +18,9 @@ from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from mocobot_sim.control.control import home_phi
 from mocobot_sim.scene.models import models_dir, omnid_design
+from mocobot_sim.scene.omnid import load_omnid, stand
 from mocobot_sim.scene.payload import load_payload
-from mocobot_sim.scene.pymjcf import mjcf
+from mocobot_sim.scene.pymjcf import compiled, mjcf
 from mocobot_view import colours
 from mocobot_view.bodies.payload_shape import drawn_payload
 from mocobot_view.bodies.poses import rod_angles
@@ -129,14 +130,10 @@ def _model(bases: Bases, payload: str | Path | None, design: OmnidDesign, height
     root = mjcf.from_path(str(models_dir() / "team.xml"))
     turns = Rotation.from_matrix(bases.R_Wb).as_quat(scalar_first=True)
     for i, (p, quat) in enumerate(zip(bases.p_Wb, turns, strict=True), start=1):
-        omnid = mjcf.from_path(str(models_dir() / "omnid" / "omnid.xml"))
-        omnid.model = f"omnid{i}"
-        root.worldbody.add("site", name=f"mount{i}", group=4, pos=p - [0.0, 0.0, height_m], quat=quat).attach(
-            omnid
-        )
+        stand(root, load_omnid(i), p - [0.0, 0.0, height_m], quat)
     if payload is not None:
         root.worldbody.attach(load_payload(payload)).add("freejoint")
-    model = mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
+    model = compiled(root)
     for i in range(1, len(turns) + 1):
         fit_design(model, design, f"omnid{i}/")
         for name in TINTED:

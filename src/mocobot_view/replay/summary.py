@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from discrepancy.result.read import VERDICTS, WrittenDiagnosis
 from estimator.statistics import rms, rms_length
 from mocobot_view import colours
 from mocobot_view.colours import Colour
-from mocobot_view.facts.diagnosis import VERDICTS, Diagnosis
 from mocobot_view.replay.replay_trial import ReplayTrial
 from mocobot_view.sizes import FORCE_M_PER_N
 
@@ -36,7 +36,7 @@ def summary(trial: ReplayTrial) -> str:
     return "\n\n".join(part for part in parts if part) + "\n"
 
 
-def _verdict(diagnosis: Diagnosis) -> str:
+def _verdict(diagnosis: WrittenDiagnosis) -> str:
     lines = [f"**Diagnosis: {VERDICTS[diagnosis.verdict]}.**"]
     lines += [f"- **{_plain(cause.name)}**: {_plain(cause.sentence)}" for cause in diagnosis.causes]
     if not diagnosis.causes:

@@ -18,6 +18,9 @@ class Backlash(Cause):
     positive = ("play_m",)
     separate = "A scale or a dial gauge on the carriage while the motor reverses."
 
+    def sentence(self, n):
+        return f"motor and carriage have a play of {n('play_m', 'um', 1e6)} in all"
+
     def columns(self, signals, shape):
         # The side on which motor and carriage touch is that of the force passed on.
         passed = signals.force - (1.0 - rules.CARRIAGE_SHARE) * FIRST_GUESS_KG * signals.a
