@@ -28,7 +28,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 
     Args:
         path: the file.
-        what: what it should be, with its article, for the message.
+        what: what it should be, without an article, for the message.
 
     Raises:
         InputError: it cannot be read, or is not TOML.
@@ -40,16 +40,22 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 
 
 def read_json(path: Path, what: str) -> dict[str, Any]:
-    """The object of a JSON file (arguments as in ``read_toml``).
+    """The object of a JSON file.
+
+    Args:
+        path: the file.
+        what: what it should be, with its article, for the message.
 
     Raises:
-        InputError: it cannot be read, or is not one.
+        InputError: there is no such file, it cannot be read, or is not a JSON object.
     """
     try:
-        text = Path(path).read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: not a readable {what} ({error})") from error
-    return parse_json(text, str(path))
+        content = Path(path).read_bytes()
+    except FileNotFoundError as error:
+        raise InputError(f"{path}: there is no such file; it would be {what}") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error}); it must be {what}") from error
+    return parse_json(content, str(path))
 
 
 def parse_json(text: str | bytes, where: str) -> dict[str, Any]:

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from discrepancy.result.json import FORMAT as DIAGNOSIS
-from discrepancy.result.json import VERSION as DIAGNOSIS_VERSION
+from discrepancy.result.read import FORMAT as DIAGNOSIS
+from discrepancy.result.read import parse_diagnosis
 from discrepancy.result.text import format_diagnosis
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import NAME as RESIDUALS
@@ -19,9 +19,9 @@ from estimator.errors import InputError
 from estimator.estimate.result import FORMAT as ESTIMATE
 from estimator.estimate.result import VERSION as ESTIMATE_VERSION
 from estimator.estimate.result import PayloadEstimate
+from estimator.strict import read_json
 from mocobot_sim.paper.tables import paper_tables, summary_table
-from mocobot_view.facts.diagnosis import VERDICTS
-from mocobot_view.facts.fact_files import read_estimate, read_json
+from mocobot_view.facts.fact_files import read_estimate
 
 SOUGHT = (
     "paper.json of `mocobot paper --out`, diagnosis.json of `mocobot diagnose --out`, or JSON files of "
@@ -188,17 +188,7 @@ def _estimate(path: Path, values: Json) -> Estimated:
 def _diagnosis(path: Path, values: Json, other: Diagnosed | None) -> Diagnosed:
     if other is not None:
         raise InputError(f"{path}: is a second diagnosis in one folder; a report takes one")
-    if values.get("format") != DIAGNOSIS:
-        raise InputError(f"{path}: not a diagnosis; it must have format {DIAGNOSIS!r}")
-    if values.get("version") != DIAGNOSIS_VERSION:
-        raise InputError(
-            f"{path}: is a diagnosis of version {values.get('version')!r:.40}; this mocobot reads version "
-            f"{DIAGNOSIS_VERSION}"
-        )
-    if values.get("verdict") not in VERDICTS:
-        raise InputError(
-            f"{path}: verdict is {values.get('verdict')!r:.40}; it must be one of {', '.join(VERDICTS)}"
-        )
+    parse_diagnosis(values, path)
     try:
         format_diagnosis(values)  # touches most keys that a report has to show
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:

@@ -7,10 +7,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from estimator.errors import InputError
-from mocobot_report.blocks.blocks import Entry, Num, facts, folded, paragraph, section, table
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Node, el
 from mocobot_report.blocks.numbers import size
+from mocobot_report.blocks.prose import facts, folded, paragraph
+from mocobot_report.blocks.sections import section
+from mocobot_report.blocks.tables import Entry, Num, table
 from mocobot_report.folder import Contents
 
 

@@ -10,7 +10,6 @@ FREE = {
     "discrepancy.emps.recording.axis_log": {"FIRST_GUESS_KG", "LIMIT_V"},  # the nominal axis
     "discrepancy.result.evidence_list": {"MOST", "BY_CHANCE"},  # of a picture
     "discrepancy.result.json": {"LEAST_LOG10_P", "VERSION"},  # JSON has no minus infinity
-    "discrepancy.result.plots": {"RUNNING_S"},
     "discrepancy.result.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
     "discrepancy.result.text": {"WIDTH"},
     "discrepancy.result.traces_file": {"VERSION"},

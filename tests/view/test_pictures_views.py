@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from discrepancy.result.read import NamedCause
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import MassEstimate
@@ -18,7 +19,6 @@ from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.truth import GroundTruth
 from mocobot_view import colours
 from mocobot_view.facts.body_facts import BodyFacts
-from mocobot_view.facts.diagnosis import Cause
 from mocobot_view.facts.placement import Grasps
 from mocobot_view.pictures import render as render_module
 from mocobot_view.pictures.camera import pixels
@@ -29,7 +29,7 @@ from mocobot_view.pictures.views import diagnosis_view, emps_view, estimate_view
 from rendering import made
 from replay_case import BODIES, Placed, payload_body, placed_trial, robot_body, true_estimate
 
-FRICTION = Cause("joint_friction", 2, "proximal3", "It rubs.")
+FRICTION = NamedCause("joint_friction", 2, 3, "It rubs.")
 ASPECT, WIDTH, HEIGHT = 1.6, 480, 300
 
 
@@ -153,8 +153,8 @@ def test_words_say_what_is_shown_and_what_is_not_known(placed_a: Placed) -> None
 
 def test_causes_are_red_where_they_sit(placed_a: Placed) -> None:
     recording, estimate = placed_a.recording(payload="a"), whole_estimate(placed_a)
-    causes = [FRICTION, Cause("sea_bias", 2, "proximal3", ""), Cause("payload_mass", None, None, ""),
-              Cause("base_tilt", 3, None, "")]  # fmt: skip
+    causes = [FRICTION, NamedCause("sea_bias", 2, 3, ""), NamedCause("payload_mass", None, None, ""),
+              NamedCause("base_tilt", 3, None, "")]  # fmt: skip
     shot = diagnosis_shot(recording, estimate, causes)
     data = mujoco.MjData(shot.model)
     data.qpos[:] = shot.qpos

@@ -232,12 +232,13 @@ def test_files_that_are_no_estimate(
         (None, "there is no such file"),
         (put([], "grasps"), "has 0 grasps"),
         (drop("mass_kg"), "missing key 'mass_kg'"),
-        (put([0.0, "x", 0.0], "p_1c_m"), "p_1c_m does not hold numbers"),
+        (put([0.0, "x", 0.0], "p_1c_m"), "p_1c_m is [0.0, 'x', 0.0]; it must be 3 finite numbers"),
         (
             put([0.0, 0.0], "grasps", 1, "p_1i_m"),
-            "grasps[1].p_1i_m is [0.0, 0.0]; it must be 3 finite numbers",
+            "grasps[1]: p_1i_m is [0.0, 0.0]; it must be 3 finite numbers",
         ),
-        (put(float("inf"), "mass_kg"), "mass_kg is inf; it must be one finite number"),
+        (put(float("inf"), "mass_kg"), "not valid JSON (Infinity is not a JSON number)"),
+        (put(10**301, "mass_kg"), "it must be a finite number"),
     ],
 )
 def test_bad_truth(

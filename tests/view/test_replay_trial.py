@@ -11,13 +11,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from diagnosed import small_diagnosis
+from discrepancy.result.read import NamedCause, WrittenDiagnosis, read_diagnosis
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trial import TrialLog
 from mocobot_view.bodies.payload_shape import BAR_M, cad_shape, held_elsewhere
-from mocobot_view.facts.diagnosis import Cause, Diagnosis, read_diagnosis
+from mocobot_view.facts.cause_body import body_of
 from mocobot_view.facts.placement import Grasps
 from mocobot_view.replay.blueprint import blueprint
 from mocobot_view.replay.outputs import save_replay
@@ -159,8 +160,8 @@ def test_axes_that_are_not_determined_are_not_drawn(recording: Recording, tmp_pa
     assert "rec/payload/estimate/axes" not in entities
 
 
-def cause(name: str, robot: int | None, body: str | None) -> Cause:
-    return Cause(name, robot, body, f"{name} [is] *here*.")
+def cause(name: str, robot: int | None, joint: int | None) -> NamedCause:
+    return NamedCause(name, robot, joint, f"{name} [is] *here*.")
 
 
 @pytest.mark.parametrize(
@@ -183,15 +184,15 @@ def test_causes_sit_at_bodies(
     values["causes"][0] |= {"cause": name, "robot": robot, "joint": joint}
     (tmp_path / "diagnosis.json").write_text(json.dumps(values), encoding="utf-8")
     (found,) = read_diagnosis(tmp_path).causes
-    assert (found.name, found.robot, found.body) == (name, robot, body)
+    assert (found.name, found.robot, body_of(found)) == (name, robot, body)
 
 
 def test_causes_are_marked_where_they_sit(recording: Recording, tmp_path: Path) -> None:
     causes = (
-        cause("sea_bias", 2, "proximal3"), cause("joint_friction", 2, "proximal3"), cause("base_tilt", 1, None),
-        cause("theta_zero", 3, "ring"), cause("slosh", None, None),
+        cause("sea_bias", 2, 3), cause("joint_friction", 2, 3), cause("base_tilt", 1, None),
+        cause("theta_zero", 3, 2), cause("slosh", None, None),
     )  # fmt: skip
-    trial = replay_trial(recording, "rec", diagnosis=Diagnosis("explained", causes, ("rec",)))
+    trial = replay_trial(recording, "rec", diagnosis=WrittenDiagnosis("explained", causes, ("rec",)))
     assert not trial.notes
     save_replay([trial], tmp_path / "out.rrd")
     file = Replayed(tmp_path / "out.rrd")

@@ -11,8 +11,9 @@ from typing import Any
 
 from discrepancy.causes.words import Words
 from discrepancy.engine.diagnose import Diagnosis
-from discrepancy.result.json import FORMAT, diagnosis_to_dict
+from discrepancy.result.json import diagnosis_to_dict
 from discrepancy.result.plots import PLOTS, save_plots
+from discrepancy.result.read import FORMAT, NAME
 from discrepancy.result.text import format_diagnosis
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import NAME as RESIDUALS
@@ -21,7 +22,7 @@ from discrepancy.rig import Rig
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 
-JSON, REPORT, EXTENDED, PAGE = "diagnosis.json", "report.txt", "extended", "report.html"
+REPORT, EXTENDED, PAGE = "report.txt", "extended", "report.html"
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,15 +75,15 @@ class Diagnosed:
         residuals = self.traces()
         save_traces(residuals, self.rig.channels, folder / RESIDUALS)
         save_plots(values, residuals, self.rig.channels, self.words, folder)
-        write_json(folder / JSON, values | more)
+        write_json(folder / NAME, values | more)
         write_text(folder / REPORT, f"{self}\n")
 
 
 def is_diagnosis(folder: Path) -> bool:
     """Whether a folder holds a diagnosis and nothing that someone else put there."""
     try:
-        ours = json.loads((folder / JSON).read_text(encoding="utf-8"))["format"] == FORMAT
+        ours = json.loads((folder / NAME).read_text(encoding="utf-8"))["format"] == FORMAT
     except (OSError, ValueError, TypeError, KeyError):
         return False
-    known = [JSON, REPORT, RESIDUALS, EXTENDED, PAGE, *PLOTS]
+    known = [NAME, REPORT, RESIDUALS, EXTENDED, PAGE, *PLOTS]
     return ours and all(any(path.match(pattern) for pattern in known) for path in folder.iterdir())

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.engine.explanation import Explanation
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rows
 from discrepancy.team.candidates import (
@@ -334,8 +335,8 @@ class TeamRig:
                     f"{found.candidate.label}: no effect has the values found; nothing to extend"
                 )
             effects.append(effect)
-        fit = explanation.problem.fit(explanation.fit.free, background=False)
-        shared = self.linear[0].shared.moved(-fit.coefficients[: explanation.problem.shared])
+        fit = Fit.of(explanation.problem, explanation.fit.free, background=False)
+        shared = self.linear[0].shared.moved(-fit.shared)
         bases = self.linear[0].bases.moved(-fit.local(0)[: self.local_unknowns])
         first = self.recordings[0]
         scene = team_of(shared, bases, effects, (first.phi[0], first.theta[0]))

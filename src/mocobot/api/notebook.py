@@ -9,9 +9,10 @@ from xml.etree import ElementTree
 import numpy as np
 
 from estimator.estimate.result import PayloadEstimate
-from mocobot_report.blocks.blocks import Entry, Num, bullets, component, measurement, quantity, table, tidy
 from mocobot_report.blocks.html import Child, Node, el
 from mocobot_report.blocks.numbers import NONE, percent, plain
+from mocobot_report.blocks.prose import bullets, tidy
+from mocobot_report.blocks.tables import Entry, Num, component, measurement, quantity, table
 
 Values = Mapping[str, Any]
 STYLE = (

@@ -6,13 +6,13 @@ import os
 from collections.abc import Iterable
 from pathlib import Path
 
+from discrepancy.result.read import read_diagnosis
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from mocobot.api.given import Given, recordings_of
 from mocobot.files.targets import check_target
 from mocobot_sim.trial.truth import GroundTruth
 from mocobot_view.facts.body_facts import BodyFacts
-from mocobot_view.facts.diagnosis import read_diagnosis
 from mocobot_view.facts.placement import Grasps
 from mocobot_view.replay.replay_trial import distinct_names, replay_trial
 

@@ -6,12 +6,12 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from discrepancy.result.read import read_diagnosis
 from estimator.errors import InputError
 from estimator.recording.parquet import read_recording
 from mocobot.api.replay import check_replay_target, check_rerun
 from mocobot.files.targets import check_recordings
 from mocobot.progress import bar
-from mocobot_view.facts.diagnosis import read_diagnosis
 from mocobot_view.facts.fact_files import read_estimate, read_truth
 from mocobot_view.replay.replay_trial import ReplayTrial, distinct_names, replay_trial
 

@@ -23,7 +23,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mocobot_inspect.wiring.motion import Fault, Grasp, rms
+from estimator.statistics import rms
+from mocobot_inspect.wiring.motion import Fault, Grasp
 from mocobot_inspect.wiring.rigid_body import FARTHEST_M, Body, cross, rigid_body
 
 Array = NDArray[np.float64]

@@ -20,6 +20,7 @@ from estimator.arm.dynamics import arm_torque
 from estimator.arm.gimbal import angular_motion, rotation
 from estimator.arm.wrist_level import driven_motion
 from estimator.recording.checks import TORQUE_FACTOR
+from estimator.statistics import rms
 from mocobot_inspect.signals import Signals, noise_gains
 
 Array = NDArray[np.float64]
@@ -219,8 +220,3 @@ def _solve(matrix: Array, right: Array) -> Array:
 
 def _into(R_bi: Array, vector: Array) -> Array:
     return np.einsum("qji,qj->qi", R_bi, vector)
-
-
-def rms(x: Array) -> float:
-    """Root mean square of all entries."""
-    return float(np.sqrt(np.mean(np.square(x))))

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from estimator.estimate.identifiability import FACTOR, cross_information
 from estimator.estimate.joint import newton_euler_regressor
 from estimator.so3 import chordal_mean
-from mocobot_inspect.wiring.motion import Grasp, rms
+from estimator.statistics import rms
+from mocobot_inspect.wiring.motion import Grasp
 
 Array = NDArray[np.float64]
 

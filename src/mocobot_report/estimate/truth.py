@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.estimate.result import PayloadEstimate
-from mocobot_report.blocks.blocks import Entry, Num, quantity, table, value
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import NONE, plain
+from mocobot_report.blocks.tables import Entry, Num, quantity, table, value
 from mocobot_sim.paper.scoring import rotation_error_deg
 from mocobot_view.facts.body_facts import BodyFacts
 

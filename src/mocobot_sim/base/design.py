@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from dataclasses import dataclass
 from functools import cache
-from math import inf
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from estimator.errors import InputError
+from estimator.strict import Fields, is_number, read_toml
 from mocobot_sim.scene.models import models_dir
 
 Array = NDArray[np.float64]
@@ -59,9 +58,9 @@ class BaseDesign:
             if entry.name == "rollers":
                 good, allowed = type(value) is int and 3 <= value <= 60, "a whole number from 3 to 60"
             elif entry.name == "roller_angle_rad":
-                good, allowed = _number(value) and 0.1 <= value <= 1.47, "a number from 0.1 to 1.47"
+                good, allowed = is_number(value) and 0.1 <= value <= 1.47, "a number from 0.1 to 1.47"
             else:
-                good, allowed = _number(value) and 0 < value < inf, "a finite number greater than 0"
+                good, allowed = is_number(value) and value > 0, "a finite number greater than 0"
             if not good:
                 raise InputError(f"base design: {entry.name} is {value!r}; it must be {allowed}")
         if not self.roller_radius_m < 0.5 * self.wheel_radius_m:
@@ -82,15 +81,8 @@ def load_base_design(path: Path) -> BaseDesign:
     Raises:
         InputError: the file cannot be read, is not TOML, or its keys are not the documented ones.
     """
-    try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: not a readable design file ({error})") from error
-    names = [entry.name for entry in dataclasses.fields(BaseDesign)]
-    unknown, missing = sorted(set(values) - set(names)), [name for name in names if name not in values]
-    if unknown or missing:
-        problem = f"unknown key {unknown[0]!r}" if unknown else f"missing key {missing[0]!r}"
-        raise InputError(f"{path}: {problem}; the keys are {', '.join(names)}")
+    values = read_toml(path, "design file")
+    Fields(values, [entry.name for entry in dataclasses.fields(BaseDesign)], str(path))
     try:
         return BaseDesign(**values)
     except InputError as error:
@@ -101,7 +93,3 @@ def load_base_design(path: Path) -> BaseDesign:
 def base_design() -> BaseDesign:
     """Design numbers of the shipped base."""
     return load_base_design(models_dir() / "omnid" / "base.toml")
-
-
-def _number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)

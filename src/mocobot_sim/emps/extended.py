@@ -58,7 +58,7 @@ def load_plant(folder: Path) -> Plant:
     """
     path = Path(folder) / NUMBERS
     keys = ("format", "version", "plant", "causes", "recordings")
-    file = Fields(read_json(path, "file of an extended axis"), keys, str(path))
+    file = Fields(read_json(path, "the numbers of an extended axis"), keys, str(path))
     if (file.values["format"], file.values["version"]) != (FORMAT, VERSION):
         file.refuse("format", f"{FORMAT!r}, with version {VERSION}")
     plant = file.within("plant", [entry.name for entry in fields(Plant)])

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import json
-import shutil
-import uuid
 from collections.abc import Sequence
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from estimator.errors import InputError
+from estimator.files import whole_folder
+from estimator.strict import Fields, parse_json
 from mocobot_sim.effects import Effect, effect_from_dict, effect_to_dict
-from mocobot_sim.extended.json import Fields, parse_object, poses_to_list
+from mocobot_sim.extended.poses import poses_to_list, read_poses
 from mocobot_sim.extended.readme import readme
 from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.scene import TeamScene
@@ -84,22 +83,12 @@ def _list(angles: Any) -> list[list[float]]:
 def _write_folder(folder: Path, files: dict[str, bytes]) -> None:
     if folder.exists() and not _is_extended(folder):
         raise InputError(f"{folder}: exists and is not an extended model; name a new folder")
-    mark = uuid.uuid4().hex
-    temporary, old = folder.parent / f".{mark}.tmp", folder.parent / f".{mark}.old"
     try:
-        temporary.mkdir()
-        for name, content in files.items():
-            (temporary / name).write_bytes(content)
-        if folder.exists():
-            folder.rename(old)
-        temporary.rename(folder)
+        with whole_folder(folder) as temporary:
+            for name, content in files.items():
+                (temporary / name).write_bytes(content)
     except OSError as error:
-        if old.exists() and not folder.exists():
-            old.rename(folder)
         raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-        shutil.rmtree(old, ignore_errors=True)
 
 
 def _is_extended(folder: Path) -> bool:
@@ -118,7 +107,7 @@ def load_extended(folder: Path) -> TeamScene:
     """
     folder = Path(folder)
     where = str(folder / NUMBERS)
-    values = parse_object(_read(folder / NUMBERS), where)
+    values = parse_json(_read(folder / NUMBERS), where)
     if values.get("format") != FORMAT or values.get("version") != VERSION or type(values["version"]) is bool:
         raise InputError(
             f"{where}: format and version are {values.get('format')!r:.60} and {values.get('version')!r:.60}; "
@@ -137,9 +126,9 @@ def load_extended(folder: Path) -> TeamScene:
         robots=robots,
         wrist_home_b=read.array("wrist_home_b_m", (robots, 3)),
         theta_home=read.array("theta_home_rad", (robots, 3)),
-        X_1i=_poses(read, "grasps", robots),
+        X_1i=read_poses(read, "grasps", robots),
         units=_units(read, robots),
-        mounts=_poses(read, "mounts", robots),
+        mounts=read_poses(read, "mounts", robots),
         initial=_initial(read, robots),
         sensors=_sensors(read, robots),
         grasp_slack_m=tuple(read.array("grasp_slack_m", (robots,)).tolist()),
@@ -159,7 +148,7 @@ def extra_of(folder: Path) -> dict[str, Any]:
         InputError: it cannot be read.
     """
     path = Path(folder) / NUMBERS
-    return Fields(parse_object(_read(path), str(path)), KEYS, str(path)).object("extra")
+    return Fields(parse_json(_read(path), str(path)), KEYS, str(path)).object("extra")
 
 
 def _read(path: Path) -> str:
@@ -180,30 +169,25 @@ def _effects(entries: list[Any], where: str) -> list[Effect]:
     return effects
 
 
-def _poses(read: Fields, key: str, robots: int) -> RigidTransform:
-    return read.poses(key, robots)
-
-
 def _units(read: Fields, robots: int) -> tuple[AsBuilt, ...]:
     names = tuple(entry.name for entry in fields(AsBuilt))
-    entries = read.list("as_built", robots)
-    units = []
-    for i, entry in enumerate(entries, start=1):
-        unit = read.within(entry, names, f"as_built[{i}]")
-        units.append(AsBuilt(**{name: unit.array(name, (3,)) for name in names}))
-    return tuple(units)
+    entries = [
+        Fields(entry, names, f"{read.where}: as_built[{i}]")
+        for i, entry in enumerate(read.list("as_built", robots), start=1)
+    ]
+    return tuple(AsBuilt(**{name: unit.array(name, (3,)) for name in names}) for unit in entries)
 
 
 def _sensors(read: Fields, robots: int) -> SensorEffects:
     names = tuple(entry.name for entry in fields(SensorEffects))
-    inner = read.within(read.object("sensors"), names, "sensors")
+    inner = read.within("sensors", names)
     return SensorEffects(**{name: tuple(inner.array(name, (robots,)).tolist()) for name in names})
 
 
 def _initial(read: Fields, robots: int) -> tuple[NDArray[Any], NDArray[Any]] | None:
     if read.values["initial"] is None:
         return None
-    inner = read.within(read.object("initial"), ("phi_rad", "theta_rad"), "initial")
+    inner = read.within("initial", ("phi_rad", "theta_rad"))
     return inner.array("phi_rad", (robots, 3)), inner.array("theta_rad", (robots, 3))
 
 

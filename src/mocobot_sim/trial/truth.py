@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from estimator.errors import InputError
+from estimator.files import write_json
 from mocobot_sim.effects import effect_to_dict
 from mocobot_sim.scene.applied import Applied
 from mocobot_sim.scene.as_built import AsBuilt
@@ -99,14 +98,7 @@ def write_truth(truth: GroundTruth, recording: Path) -> None:
     Raises:
         InputError: it cannot be written.
     """
-    path = truth_path(recording)
-    temporary = path.with_suffix(".tmp")
-    try:
-        temporary.write_text(json.dumps(truth.to_dict(), indent=1) + "\n", encoding="utf-8")
-        temporary.replace(path)
-    except OSError as error:
-        temporary.unlink(missing_ok=True)
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+    write_json(truth_path(recording), truth.to_dict())
 
 
 def _rotvec_deg(R: Array) -> list[float]:

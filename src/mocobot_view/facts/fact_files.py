@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -12,11 +11,15 @@ from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
+from estimator.strict import Fields, read_json
 from mocobot_sim.trial.truth import truth_path
 from mocobot_view.facts.body_facts import BodyFacts
 from mocobot_view.facts.placement import Grasps
 
 Array = NDArray[np.float64]
+
+TRUTH = ("grasps", "mass_kg", "p_1c_m", "R_1c_rotvec_deg", "principal_inertia_kgm2")
+"""Keys of the truth that are drawn."""
 
 
 def read_truth(recording: Path, robots: int) -> BodyFacts:
@@ -27,23 +30,25 @@ def read_truth(recording: Path, robots: int) -> BodyFacts:
     """
     path = truth_path(recording)
     values = read_json(path, "the truth beside a simulated recording")
-    numbers = _Numbers(path, values)
-    grasps = values.get("grasps")
+    truth = Fields(values, TRUTH, str(path), optional=("as_built", "effects"))
+    grasps = values["grasps"]
     if not isinstance(grasps, list) or len(grasps) != robots:
         count = len(grasps) if isinstance(grasps, list) else "no"
         raise InputError(f"{path}: has {count} grasps; {recording} is of {robots} robots")
-    each = [_Numbers(path, entry, f"grasps[{k}].") for k, entry in enumerate(grasps)]
+    each = [
+        Fields(entry, ("p_1i_m", "R_1i_rotvec_deg"), f"{path}: grasps[{k}]") for k, entry in enumerate(grasps)
+    ]
     return BodyFacts(
         grasps=Grasps(
             Rotation.from_rotvec(
-                [entry("R_1i_rotvec_deg", (3,)) for entry in each], degrees=True
+                [entry.array("R_1i_rotvec_deg", (3,)) for entry in each], degrees=True
             ).as_matrix(),
-            np.array([entry("p_1i_m", (3,)) for entry in each]),
+            np.array([entry.array("p_1i_m", (3,)) for entry in each]),
         ),
-        mass_kg=float(numbers("mass_kg", ())),
-        p_1c=numbers("p_1c_m", (3,)),
-        R_1c=Rotation.from_rotvec(numbers("R_1c_rotvec_deg", (3,)), degrees=True).as_matrix(),
-        principal_kgm2=numbers("principal_inertia_kgm2", (3,)),
+        mass_kg=truth.number("mass_kg"),
+        p_1c=truth.array("p_1c_m", (3,)),
+        R_1c=Rotation.from_rotvec(truth.array("R_1c_rotvec_deg", (3,)), degrees=True).as_matrix(),
+        principal_kgm2=truth.array("principal_inertia_kgm2", (3,)),
     )
 
 
@@ -65,44 +70,6 @@ def read_estimate(path: Path) -> PayloadEstimate:
     ) as error:  # pairs of robots that are not there, numbers beyond all bounds
         raise InputError(f"{path}: not a complete estimate ({type(error).__name__}: {error})") from error
     return estimate
-
-
-def read_json(path: Path, what: str) -> dict[str, Any]:
-    """A JSON object from a file.
-
-    Raises:
-        InputError: there is no such file, or it holds something else.
-    """
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise InputError(f"{path}: there is no such file; it would be {what}") from error
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not valid JSON ({error}); it must be {what}") from error
-    if not isinstance(values, dict):
-        raise InputError(f"{path}: must be a JSON object, not {values!r:.40}; it must be {what}")
-    return values
-
-
-class _Numbers:
-    """Finite numbers of a JSON object by key."""
-
-    def __init__(self, path: Path, values: Any, where: str = "") -> None:
-        self.path, self.values, self.where = path, values if isinstance(values, dict) else {}, where
-
-    def __call__(self, key: str, shape: tuple[int, ...]) -> Array:
-        try:
-            array = np.array(self.values[key], dtype=float)
-        except KeyError as error:
-            raise InputError(f"{self.path}: missing key {self.where + key!r}") from error
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{self.path}: {self.where}{key} does not hold numbers") from error
-        if array.shape != shape or not np.isfinite(array).all():
-            size = "one finite number" if shape == () else f"{shape[0]} finite numbers"
-            raise InputError(f"{self.path}: {self.where}{key} is {self.values[key]!r:.60}; it must be {size}")
-        return array
 
 
 def _check(estimate: PayloadEstimate) -> None:

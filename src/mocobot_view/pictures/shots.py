@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from discrepancy.result.read import NamedCause
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
@@ -22,7 +23,7 @@ from mocobot_view import colours
 from mocobot_view.bodies.payload_shape import BAR_M, BAR_RGBA
 from mocobot_view.colours import Colour
 from mocobot_view.facts.body_facts import BodyFacts
-from mocobot_view.facts.diagnosis import Cause
+from mocobot_view.facts.cause_body import body_of
 from mocobot_view.pictures.camera import Camera, corners, framing, pixels
 from mocobot_view.pictures.marks import Marks
 from mocobot_view.pictures.measured_team import MeasuredTeam, measured_team
@@ -103,7 +104,7 @@ def estimate_shot(
 def diagnosis_shot(
     recording: Recording,
     estimate: PayloadEstimate,
-    causes: Sequence[Cause],
+    causes: Sequence[NamedCause],
     payload: str | Path | None = None,
     time_s: float | None = None,
     aspect: float = ASPECT,
@@ -112,7 +113,7 @@ def diagnosis_shot(
 
     Args:
         recording, estimate, payload, time_s, aspect: as for ``estimate_shot``.
-        causes: of ``mocobot_view.facts.diagnosis.read_diagnosis``.
+        causes: of ``discrepancy.result.read.read_diagnosis``.
 
     Raises:
         InputError: see ``measured_team``; or a cause sits at a robot that the recording does not have.
@@ -247,22 +248,22 @@ def _names(marks: Marks, team: MeasuredTeam) -> None:
         marks.label(f"omnid{i}", data.body(f"omnid{i}/chassis").xpos + NAME_AT, colours.of_robot(i))
 
 
-def _place(cause: Cause) -> str:
+def _place(cause: NamedCause) -> str:
     if cause.robot is None:
         return "payload"
-    return f"omnid{cause.robot}" + (f", {cause.body}" if cause.body else "")
+    return f"omnid{cause.robot}" + (f", {body}" if (body := body_of(cause)) else "")
 
 
-def _causes(marks: Marks, team: MeasuredTeam, causes: Sequence[Cause]) -> None:
+def _causes(marks: Marks, team: MeasuredTeam, causes: Sequence[NamedCause]) -> None:
     """A red ball at the body of every cause, the body in red, and its name; several at one place share a mark."""
-    places: dict[str, list[Cause]] = {}
+    places: dict[str, list[NamedCause]] = {}
     for cause in causes:
         places.setdefault(_place(cause), []).append(cause)
     data = mujoco.MjData(team.model)
     data.qpos[:] = team.qpos
     mujoco.mj_kinematics(team.model, data)
     for here in places.values():
-        robot, body = here[0].robot, here[0].body
+        robot, body = here[0].robot, body_of(here[0])
         if robot is None:
             if team.R_W1 is None:
                 continue

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from discrepancy.result.read import NamedCause
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from mocobot_view.facts.body_facts import BodyFacts
-from mocobot_view.facts.diagnosis import Cause
 from mocobot_view.pictures.render import Picture, Shot, render_shots
 from mocobot_view.pictures.shots import axis_shot, diagnosis_shot, estimate_shot, team_shot
 
@@ -40,7 +40,7 @@ def estimate_view(
 def diagnosis_view(
     recording: Recording,
     estimate: PayloadEstimate,
-    causes: Sequence[Cause],
+    causes: Sequence[NamedCause],
     width: int = WIDTH,
     height: int = HEIGHT,
     *,

@@ -7,11 +7,12 @@ import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
+from discrepancy.result.read import NamedCause
 from mocobot_view import colours
 from mocobot_view.bodies.robot import PATHS, TINTED, fixed_frames, robot_shapes
 from mocobot_view.bodies.shapes import Shape
 from mocobot_view.colours import Colour
-from mocobot_view.facts.diagnosis import Cause
+from mocobot_view.facts.cause_body import body_of
 from mocobot_view.replay.log_time import send, send_poses
 from mocobot_view.replay.replay_trial import ReplayTrial
 from mocobot_view.sizes import FORCE_M_PER_N, MARK_M
@@ -53,7 +54,7 @@ def log_robots(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
 
 def log_causes(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
     """Mark every cause of the diagnosis where it sits; several at one place share a mark."""
-    places: dict[str, list[Cause]] = {}
+    places: dict[str, list[NamedCause]] = {}
     for cause in trial.diagnosis.causes if trial.diagnosis else ():
         places.setdefault(_place(cause), []).append(cause)
     for place, causes in places.items():
@@ -96,10 +97,11 @@ def trail_paths(trial: ReplayTrial) -> list[str]:
     return [f"{trial.name}/omnid{i + 1}/base/wrist" for i in range(trial.robots)]
 
 
-def _place(cause: Cause) -> str:
+def _place(cause: NamedCause) -> str:
     if cause.robot is None:
         return "payload"
-    return f"omnid{cause.robot}/{'base' if cause.body is None else PATHS[cause.body]}"
+    body = body_of(cause)
+    return f"omnid{cause.robot}/{'base' if body is None else PATHS[body]}"
 
 
 def _log_paths(stream: rr.RecordingStream, trial: ReplayTrial, i: int) -> None:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import shutil
 import sys
-import uuid
 import warnings
 import webbrowser
 from collections.abc import Callable, Sequence
@@ -17,6 +15,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from estimator.errors import InputError
+from estimator.files import whole_file
 from mocobot_view.replay.replay_trial import ReplayTrial
 from mocobot_view.replay.stream import log_replay, new_stream
 
@@ -53,24 +52,17 @@ def save_replay(trials: Sequence[ReplayTrial], path: Path, progress: Progress = 
     Raises:
         InputError: it cannot be written.
     """
-    temporary = path.parent / f".{uuid.uuid4().hex}.tmp"
-    try:
-        with open(temporary, "xb"):  # the SDK's message would name the temporary file
-            pass
+    with whole_file(path) as temporary:
+        temporary.touch(exist_ok=False)  # the SDK's message would name the temporary file
         stream = new_stream()
-        stream.save(temporary)
-        log_replay(stream, trials, progress)
-        stream.flush()
-        stream.disconnect()
+        try:
+            stream.save(temporary)
+            log_replay(stream, trials, progress)
+            stream.flush()
+            stream.disconnect()
+        except RuntimeError as error:  # the SDK's writer, which does not say what the system told it
+            raise InputError(f"{path}: cannot be written ({_line(error)}); is the disk full?") from error
         _check_complete(temporary)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
-    except RuntimeError as error:  # the SDK's writer, which does not say what the system told it
-        raise InputError(f"{path}: cannot be written ({_line(error)}); is the disk full?") from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
 
 
 def show_replay(trials: Sequence[ReplayTrial], progress: Progress = None) -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.result.read import WrittenDiagnosis
 from estimator.arm.gimbal import rotation
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import single_robot
@@ -22,7 +23,6 @@ from mocobot_view.bodies.poses import BodyMotion, body_motion
 from mocobot_view.bodies.robot import robot_shapes
 from mocobot_view.bodies.shapes import Shape
 from mocobot_view.facts.body_facts import BodyFacts, facts_of
-from mocobot_view.facts.diagnosis import Diagnosis
 from mocobot_view.facts.placement import (
     Bases,
     Grasps,
@@ -73,7 +73,7 @@ class ReplayTrial:
     estimate: PayloadEstimate | None
     facts: BodyFacts | None
     truth: BodyFacts | None
-    diagnosis: Diagnosis | None
+    diagnosis: WrittenDiagnosis | None
     notes: tuple[str, ...]
 
     @property
@@ -87,7 +87,7 @@ def replay_trial(
     name: str,
     estimate: PayloadEstimate | None = None,
     truth: BodyFacts | None = None,
-    diagnosis: Diagnosis | None = None,
+    diagnosis: WrittenDiagnosis | None = None,
     payload: str | Path | None = None,
 ) -> ReplayTrial:
     """Work out everything that is drawn of a recording.
@@ -186,7 +186,7 @@ def _estimated(recording: Recording, notes: list[str]) -> PayloadEstimate | None
         return None
 
 
-def _check_diagnosis(diagnosis: Diagnosis, recording: Recording, notes: list[str]) -> None:
+def _check_diagnosis(diagnosis: WrittenDiagnosis, recording: Recording, notes: list[str]) -> None:
     if diagnosis.robots() > recording.metadata.robots:
         raise InputError(
             f"the diagnosis names robot {diagnosis.robots()}; {recording.name} is of "

@@ -16,8 +16,10 @@ from discrepancy.emps.recording.axis_log import AxisLog
 from discrepancy.emps.recording.signals import Signals, at_delay
 from discrepancy.emps.reduction import Reduction
 from discrepancy.emps.rig import EmpsRig
+from discrepancy.engine.block_errors import with_block_errors
 from discrepancy.engine.search import search
-from discrepancy.least_squares.block_errors import block_covariance, with_block_errors
+from discrepancy.least_squares.block_errors import block_covariance
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Parameter, Rows
 from emps_errors import bootstrap
@@ -290,7 +292,7 @@ def correlated(rng: np.random.Generator, phi: float, trials: int = 4, n: int = 5
 def test_block_errors_are_the_scatter_of_many_data_sets(phi: float) -> None:
     values, block, naive = [], [], []
     for seed in range(120):
-        fit = correlated(np.random.default_rng(seed), phi, trials=2, n=300).fit([0, 1])
+        fit = Fit.of(correlated(np.random.default_rng(seed), phi, trials=2, n=300), [0, 1])
         values.append(fit.solution)
         block.append(np.diag(block_covariance(fit, 50)))
         naive.append(np.diag(fit.covariance))
@@ -300,7 +302,7 @@ def test_block_errors_are_the_scatter_of_many_data_sets(phi: float) -> None:
 
 
 def test_block_errors_are_those_of_a_bootstrap() -> None:
-    fit = correlated(np.random.default_rng(5), 0.8).fit([0, 1])
+    fit = Fit.of(correlated(np.random.default_rng(5), 0.8), [0, 1])
     drawn = bootstrap(fit, 50, np.random.default_rng(0), draws=800)
     np.testing.assert_allclose(np.sqrt(np.diag(block_covariance(fit, 50))), drawn, rtol=0.15)
 

@@ -5,7 +5,6 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.emps.causes.base import Cause, force
 from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG
-from discrepancy.emps.recording.preflight import resolution
 from estimator.filtering import differentiate, low_pass
 
 
@@ -29,4 +28,4 @@ class Backlash(Cause):
 
     def visible(self, signals, hints, values):
         # Rounding by whole steps has a hysteresis of its own.
-        return abs(values[0]) > rules.PLAY_STEPS * resolution(signals.log.position).step_m
+        return abs(values[0]) > rules.PLAY_STEPS * signals.log.step_m

@@ -1,7 +1,7 @@
 """The same fit with ``mujoco.sysid``: same axis, same four numbers (mass, Coulomb, viscous forwards and backwards).
 
     pip install 'mujoco[sysid]'
-    python benchmarks/emps_sysid.py
+    python benchmarks/emps/emps_sysid.py
 
 ``mujoco.sysid`` fits the closed loop of the MJCF by non-linear least squares on position and voltage; the diagnosis'
 problem is linear in the force, whitened as in a diagnosis or plain. All are judged alike: by force, and by the digital
@@ -22,6 +22,7 @@ from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.staircase import Active, errors
 from discrepancy.least_squares.block_errors import block_covariance, part_of
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from emps_data import DATA, PULSES, needed_folder
 from emps_gain import plain_fit
@@ -38,7 +39,7 @@ def ours(rig: EmpsRig) -> tuple[np.ndarray, np.ndarray, float]:
     start = time.perf_counter()
     candidates = [candidate_of(name, rig.hints, DEFAULTS) for name in (*NAMES, "velocity_lag")]
     problem = Problem.of(rig.rows(candidates), candidates)
-    fit = problem.fit(range(len(candidates)))
+    fit = Fit.of(problem, range(len(candidates)))
     covariance = block_covariance(fit, block_rows(rig))
     values = np.array([fit.part(k)[0][0] * candidates[k].units[0] for k in range(4)])
     whole = np.zeros((4, 4))

@@ -1,6 +1,6 @@
 """What every named cause is worth on the EMPS recordings, beside plain least squares.
 
-    python benchmarks/emps_gain.py
+    python benchmarks/emps/emps_gain.py
 
 Force (inverse), position and voltage (reference resimulated in closed loop): in sample, on held-out blocks, and on the
 whole second recording, which nothing was fitted to but the pulses that its own diagnosis finds.

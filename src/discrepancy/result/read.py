@@ -1,15 +1,14 @@
-"""A diagnosis to be shown: its verdict, and where its causes sit."""
+"""A diagnosis read back from its file (format: ``discrepancy.result.json``)."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from discrepancy.team.causes import CAUSES
 from estimator.errors import InputError
-from mocobot_view.bodies.robot import GIMBAL
-from mocobot_view.facts.fact_files import read_json
+from estimator.strict import read_json
 
 FORMAT, VERSION, NAME = "mocobot-diagnosis", 1, "diagnosis.json"
 VERDICTS = {
@@ -18,27 +17,27 @@ VERDICTS = {
     "partly_explained": "Partly explained",
     "unexplained": "Unexplained",
 }
+"""In a word or two."""
 
 
 @dataclass(frozen=True)
-class Cause:
+class NamedCause:
     """One named cause.
 
     Attributes:
         name: of the cause, such as ``sea_bias``.
-        robot: counted from 1, or None for the payload.
-        body: the robot's body that it sits at, such as ``proximal1``; None for the base, or the payload.
+        robot, joint: where it sits, counted from 1; None where it has no such place.
         sentence: what it does, with its numbers.
     """
 
     name: str
     robot: int | None
-    body: str | None
+    joint: int | None
     sentence: str
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class WrittenDiagnosis:
     """What a diagnosis says.
 
     Attributes:
@@ -48,7 +47,7 @@ class Diagnosis:
     """
 
     verdict: str
-    causes: tuple[Cause, ...]
+    causes: tuple[NamedCause, ...]
     recordings: tuple[str, ...]
 
     def robots(self) -> int:
@@ -56,19 +55,32 @@ class Diagnosis:
         return max((cause.robot or 0 for cause in self.causes), default=0)
 
 
-def read_diagnosis(folder: Path) -> Diagnosis:
-    """Read what ``mocobot diagnose --out`` wrote for a team.
+def read_diagnosis(folder: Path) -> WrittenDiagnosis:
+    """Read what ``mocobot diagnose --out`` wrote.
 
     Args:
         folder: it, or its ``diagnosis.json``.
 
     Raises:
-        InputError: there is no diagnosis, or not one of a team of robots.
+        InputError: there is no diagnosis, or it is not complete.
     """
     path = folder if folder.suffix == ".json" else folder / NAME
-    values = read_json(path, "a diagnosis")
-    if values.get("format") != FORMAT or values.get("version") != VERSION:
-        raise InputError(f"{path}: not a diagnosis; it must have format {FORMAT!r} and version {VERSION}")
+    return parse_diagnosis(read_json(path, "a diagnosis"), path)
+
+
+def parse_diagnosis(values: Mapping[str, Any], path: Path) -> WrittenDiagnosis:
+    """The values of a diagnosis' file (``path``, for messages).
+
+    Raises:
+        InputError: they are something else, of another version, or not complete.
+    """
+    if values.get("format") != FORMAT:
+        raise InputError(f"{path}: not a diagnosis; it must have format {FORMAT!r}")
+    if values.get("version") != VERSION:
+        version = values.get("version")
+        raise InputError(
+            f"{path}: is a diagnosis of version {version!r:.40}; this mocobot reads version {VERSION}"
+        )
     verdict = values.get("verdict")
     if verdict not in VERDICTS:
         raise InputError(f"{path}: verdict is {verdict!r:.40}; it must be one of {', '.join(VERDICTS)}")
@@ -77,18 +89,12 @@ def read_diagnosis(folder: Path) -> Diagnosis:
         recordings = tuple(str(name) for name in values["recordings"])
     except (KeyError, TypeError, ValueError, IndexError) as error:
         raise InputError(f"{path}: not a complete diagnosis ({type(error).__name__}: {error})") from error
-    return Diagnosis(verdict, causes, recordings)
+    return WrittenDiagnosis(verdict, causes, recordings)
 
 
-def _cause(values: dict[str, Any]) -> Cause:
+def _cause(values: Mapping[str, Any]) -> NamedCause:
     name, robot, joint = str(values["cause"]), values["robot"], values["joint"]
     for what, number, most in (("robot", robot, None), ("joint", joint, 3)):
         if number is not None and (type(number) is not int or number < 1 or (most and number > most)):
             raise ValueError(f"{what} is {number!r:.40}")
-    body, at = None, CAUSES[name].at if name in CAUSES else None
-    if robot is not None:
-        if joint is not None:
-            body = GIMBAL[joint - 1] if at == "gimbal joint" else f"proximal{joint}"
-        elif at == "grasp":
-            body = "flange"
-    return Cause(name, robot, body, str(values["sentence"]))
+    return NamedCause(name, robot, joint, str(values["sentence"]))

@@ -1,0 +1,15 @@
+"""Which body of a robot a cause sits at."""
+
+from __future__ import annotations
+
+from discrepancy.result.read import NamedCause
+from discrepancy.team.causes import CAUSES
+from mocobot_view.bodies.robot import GIMBAL
+
+
+def body_of(cause: NamedCause) -> str | None:
+    """The robot's body, such as ``proximal1``; None for the base, or the payload."""
+    at = CAUSES[cause.name].at if cause.name in CAUSES else None
+    if cause.robot is not None and cause.joint is not None:
+        return GIMBAL[cause.joint - 1] if at == "gimbal joint" else f"proximal{cause.joint}"
+    return "flange" if cause.robot is not None and at == "grasp" else None
