@@ -22,8 +22,8 @@ lint: $(MARK)
 	$(BIN)/pyright
 
 benchmark: $(MARK)
-	$(BIN)/python benchmarks/trial_speed.py
-	$(BIN)/python benchmarks/paper_speed.py
+	$(BIN)/python benchmarks/speed/trial.py
+	$(BIN)/python benchmarks/speed/paper.py
 
 $(MARK): pyproject.toml constraints.txt
 	$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 13) and "mocobot needs Python 3.11 or 3.12: make PYTHON=python3.12 ...")'

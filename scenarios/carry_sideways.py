@@ -14,20 +14,22 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
-from estimator.arm.delta import forward_kinematics
-from estimator.errors import InputError
-from mocobot_sim.base.drive import BaseDrive, DriveLog
-from mocobot_sim.base.motion import Leg, PlanarMotion, carried, plan
-from mocobot_sim.base.planar import compose, relative, yaw_of
-from mocobot_sim.base.snapshots import Snapshots
-from mocobot_sim.scene.models import omnid_design
-from mocobot_sim.scene.scene import TeamScene, build_team
-from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
-from mocobot_sim.trial.trial import run_trial
-from mocobot_sim.trial.trial_log import TrialLog
-from mocobot_view.pictures.camera import Camera
-from mocobot_view.pictures.marks import Marks
-from mocobot_view.pictures.render import make_folder, render
+from mocobot import InputError, TeamScene, TrialLog, build_team, run_trial
+from mocobot.bases import (
+    BaseDrive,
+    DriveLog,
+    Leg,
+    PlanarMotion,
+    Snapshots,
+    carried,
+    compose,
+    plan,
+    relative,
+    yaw_of,
+)
+from mocobot.pictures import Camera, Marks, make_folder, render
+from mocobot.robots import forward_kinematics, omnid_design
+from mocobot.trajectories import RATE_HZ, Trajectory
 
 SIDEWAYS_M, YAW_RAD = 0.5, np.deg2rad(20.0)
 BEGIN_S, SIDE_S, TURN_S, REST_S = 1.5, 4.0, 4.0, 1.0

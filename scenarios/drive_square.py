@@ -12,17 +12,23 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
-from estimator.errors import InputError
-from mocobot_sim.base.design import WHEELS, base_design
-from mocobot_sim.base.drive import BaseDrive, DriveLog
-from mocobot_sim.base.mecanum import MecanumKinematics
-from mocobot_sim.base.motion import Leg, PlanarMotion, plan
-from mocobot_sim.base.snapshots import Snapshots
-from mocobot_sim.base.solo import build_solo, compile_solo, drive_solo
-from mocobot_sim.trial.trajectories import RATE_HZ
-from mocobot_view.pictures.camera import Camera
-from mocobot_view.pictures.marks import Marks
-from mocobot_view.pictures.render import make_folder, render
+import mocobot
+from mocobot.bases import (
+    WHEELS,
+    BaseDrive,
+    DriveLog,
+    Leg,
+    MecanumKinematics,
+    PlanarMotion,
+    Snapshots,
+    base_design,
+    build_solo,
+    compile_solo,
+    drive_solo,
+    plan,
+)
+from mocobot.pictures import Camera, Marks, make_folder, render
+from mocobot.trajectories import RATE_HZ
 
 SIDE_M = 0.8
 HURRY_S = 0.9  # a side: asks for 5.7 m/s^2, and the rollers' grip ends at 4.9
@@ -48,7 +54,7 @@ def main() -> None:
     options = parser.parse_args()
     try:
         compare(options.pace, options.out)
-    except InputError as error:
+    except mocobot.InputError as error:
         parser.error(str(error))
 
 

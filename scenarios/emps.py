@@ -12,13 +12,7 @@ import os
 import sys
 from pathlib import Path
 
-from discrepancy.emps.diagnosis import diagnose_axis
-from discrepancy.emps.recording.reader import read_emps
-from discrepancy.emps.rig import EmpsRig
-from discrepancy.emps.staircase import format_staircase, staircase
-from discrepancy.emps.words import EmpsWords
-from discrepancy.result.json import diagnosis_to_dict
-from discrepancy.result.text import format_diagnosis
+from mocobot import emps
 
 BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data" / "emps"
 
@@ -30,22 +24,19 @@ def main() -> None:
     if missing := [str(path) for path in paths if not path.is_file()]:
         raise SystemExit(f"missing: {', '.join(missing)}; the recordings are on nonlinearbenchmark.org")
 
-    rig = EmpsRig.of(read_emps(paths[0]))
-    diagnosis = diagnose_axis(rig)
+    diagnosis = emps.diagnose(paths[0])
     print(f"=== {paths[0].name}: four cycles of one motion. A mass without friction, and the data.\n")
-    print(format_diagnosis(diagnosis_to_dict(diagnosis, rig, EmpsWords())))
+    print(diagnosis)
 
     # The second recording was held out until here.
-    other = EmpsRig.of(read_emps(paths[1]))
-    there = diagnose_axis(other)
-    pulses = [(f.candidate, f.values) for f in there.causes if f.candidate.cause == "injected_voltage"]
+    there = emps.diagnose(paths[1])
     print(f"\n=== {paths[1].name}: the same reference with something added.\n")
-    for item in there.causes:
-        values, se = other.effect_parameters(item.candidate, item.values, item.covariance)
-        print(EmpsWords().describe(item.candidate, values, se))
+    for cause in there.causes:
+        print(cause.sentence)
 
     print("\n=== What every cause is worth; in the second recording nothing but the pulses was fitted.\n")
-    print(format_staircase(staircase(rig, diagnosis.explanation, (other, pulses)), paths[1].name))
+    steps = emps.staircase(diagnosis, there, different=["injected_voltage"])
+    print(emps.format_staircase(steps, paths[1].name))
 
 
 if __name__ == "__main__":

@@ -10,9 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from estimator.estimate.payload import estimate_payload
-from mocobot_sim.trial.sensors import sensor_preset
-from mocobot_sim.trial.simulate import TrialRequest, simulate
+import mocobot
 
 ROBOTS, RADIUS_M, MASS_KG = 5, 0.9, 20.0
 
@@ -46,18 +44,11 @@ def ring_mjcf() -> str:
 
 def main() -> None:
     """Estimate a ring that five robots carry."""
-    nominal = sensor_preset("nominal")
     with tempfile.TemporaryDirectory() as folder:
         payload = Path(folder) / "ring.xml"
         payload.write_text(ring_mjcf(), encoding="utf-8")
-        trials = [
-            simulate(request, [nominal])
-            for request in (
-                TrialRequest(str(payload), "random", vias=30),
-                TrialRequest(str(payload), "static"),
-            )
-        ]
-    estimate = estimate_payload([trial.recordings["nominal"] for trial in trials])
+        trials = [mocobot.simulate(payload, "random", vias=30), mocobot.simulate(payload, "static")]
+    estimate = mocobot.estimate(trials)
     if not (estimate.grasps and estimate.mass and estimate.inertia) or estimate.p_1c is None:
         raise SystemExit(f"not determined: {', '.join(map(str, estimate.undetermined))}")
     moments, truth = estimate.inertia.principal.moments, trials[0].truth

@@ -10,7 +10,6 @@ python scenarios/guided_by_hand.py [--payload a] [--estimate est.json] [--out FO
 from __future__ import annotations
 
 import argparse
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,25 +18,13 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.image import imsave
 
-from estimator.errors import InputError
-from estimator.estimate.payload import estimate_payload
-from estimator.estimate.result import PayloadEstimate
-from mocobot_sim.base.drive import DriveLog
-from mocobot_sim.base.follow import FollowingDrive
-from mocobot_sim.base.snapshots import Snapshots
-from mocobot_sim.control.control import ControlGains
-from mocobot_sim.guided.float_arms import FLOAT_GAINS, FloatArms
-from mocobot_sim.guided.hand import Grip, GuidingHand, HandLog, Move
-from mocobot_sim.guided.weight import Payload
-from mocobot_sim.scene.scene import TeamScene, build_team
-from mocobot_sim.trial.sensors import sensor_preset
-from mocobot_sim.trial.simulate import TrialRequest, draw_units, simulate
-from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
-from mocobot_sim.trial.trial import run_trial
-from mocobot_sim.trial.truth import GroundTruth
-from mocobot_view.pictures.camera import Camera
-from mocobot_view.pictures.marks import Marks
-from mocobot_view.pictures.render import make_folder, render
+import mocobot
+from mocobot import Estimate, GroundTruth, InputError, TeamScene, build_team, run_trial
+from mocobot.bases import DriveLog, FollowingDrive, Snapshots
+from mocobot.guiding import FLOAT_GAINS, FloatArms, Grip, GuidingHand, HandLog, Move, Payload
+from mocobot.pictures import Camera, Marks, make_folder, render
+from mocobot.robots import ControlGains, draw_units
+from mocobot.trajectories import RATE_HZ, Trajectory
 
 BEGIN_S = 3.0
 # Out of the way to one side, up and tilted, hold, and back.
@@ -108,7 +95,7 @@ def compare(payload: str, estimate_path: Path | None, out: Path) -> None:
         cases.append(Case("estimate from the file", FloatArms(known), FLOAT_GAINS, team))
     else:
         for preset in ("nominal", "uncalibrated"):
-            units = draw_units(payload, sensor_preset(preset), seed=0)
+            units = draw_units(payload, mocobot.PRESETS[preset], seed=0)
             estimate = make_estimate(payload, preset)
             print(_score(preset, estimate, truth))
             scene = build_team(payload, units)
@@ -143,18 +130,18 @@ def _handle(truth: Payload) -> np.ndarray:
 def read_estimate(path: Path) -> Payload:
     """What a file of `mocobot estimate --out` says."""
     try:
-        return Payload.of_estimate(PayloadEstimate.from_dict(json.loads(path.read_text(encoding="utf-8"))))
-    except (OSError, ValueError, InputError) as error:
+        return Payload.of_estimate(mocobot.read_estimate(path))
+    except InputError as error:
         raise InputError(f"{path}: not a usable estimate ({error})") from error
 
 
-def make_estimate(payload: str, preset: str) -> PayloadEstimate:
+def make_estimate(payload: str, preset: str) -> Estimate:
     """The robots' own: from one random and one static trial."""
-    requests = [TrialRequest(payload, "random", vias=30), TrialRequest(payload, "static")]
-    return estimate_payload([simulate(r, [sensor_preset(preset)]).recordings[preset] for r in requests])
+    random = mocobot.simulate(payload, "random", vias=30, preset=preset)
+    return mocobot.estimate([random, mocobot.simulate(payload, "static", preset=preset)])
 
 
-def _score(preset: str, estimate: PayloadEstimate, truth: Payload) -> str:
+def _score(preset: str, estimate: Estimate, truth: Payload) -> str:
     known = Payload.of_estimate(estimate)
     return (
         f"estimate by {preset} robots: mass {known.mass_kg:.3f} kg (true {truth.mass_kg:.3f}), centre of mass off by "

@@ -7,15 +7,15 @@ from pathlib import Path
 
 from matplotlib.image import imsave
 
-from estimator.errors import InputError
-from mocobot_view.pictures.views import team_view
+import mocobot
+from mocobot.pictures import team_view
 
 
 def main(payload: str, picture: Path) -> None:
     """Write a picture of the team in its home pose, or say why there is none."""
     try:
         seen = team_view(payload)
-    except InputError as error:
+    except mocobot.InputError as error:
         sys.exit(str(error))
     if isinstance(seen, str):
         sys.exit(seen)

@@ -5,23 +5,17 @@ python scenarios/unknown_payload.py
 
 from __future__ import annotations
 
-from estimator.estimate.payload import estimate_payload
-from estimator.estimate.text import format_estimate
-from mocobot_sim.trial.sensors import sensor_preset
-from mocobot_sim.trial.simulate import TrialRequest, simulate
+import mocobot
 
 
 def main() -> None:
     """Three trials with 16-bit encoders and noisy torques, one estimate."""
-    nominal = sensor_preset("nominal")
-    requests = [
-        TrialRequest("b", "random", vias=40),
-        TrialRequest("b", "periodic", duration_s=30),
-        TrialRequest("b", "static"),
+    trials = [
+        mocobot.simulate("b", "random", vias=40),
+        mocobot.simulate("b", "periodic", duration_s=30),
+        mocobot.simulate("b", "static"),
     ]
-    trials = [simulate(request, [nominal]) for request in requests]
-    estimate = estimate_payload([trial.recordings["nominal"] for trial in trials])
-    print(format_estimate(estimate))
+    print(mocobot.estimate(trials))
 
     truth = trials[0].truth
     print("\n[[Truth]]")

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed
 
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Transient
 from discrepancy.team.causes import CAUSES
@@ -48,7 +49,7 @@ def _limits(payload: str) -> tuple[list[tuple[str, tuple[str, ...], list[float]]
     problem = Problem.of(rig.rows(candidates), candidates)
     limits = [
         (candidate.cause, tuple(p.name for p in candidate.parameters), values.tolist())
-        for candidate, values in zip(candidates, problem.fit().limits(GAIN), strict=True)
+        for candidate, values in zip(candidates, Fit.of(problem).limits(GAIN), strict=True)
     ]
     return limits, _pendulum(rig, problem)
 
@@ -60,5 +61,5 @@ def _pendulum(rig: TeamRig, problem: Problem) -> list[float]:
         shape = {"length_m": length, "damping_ratio": 0.05}
         candidate = replace(problem.candidates[index], shape=shape)
         other = problem.with_columns(index, candidate, rig.columns(candidate))
-        masses.append(float(other.fit().limits(GAIN)[index][0]))
+        masses.append(float(Fit.of(other).limits(GAIN)[index][0]))
     return masses

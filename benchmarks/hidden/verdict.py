@@ -6,7 +6,8 @@ import time
 from collections.abc import Sequence
 from typing import Any, Literal
 
-from discrepancy.engine.diagnose import Alternative, Diagnosis, diagnose
+from discrepancy.engine.confirm import Alternative
+from discrepancy.engine.diagnose import Diagnosis, diagnose
 from discrepancy.engine.explanation import Found
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,116 +124,6 @@ class Rows:
     time: Array
 
 
-class Rig(Protocol):
-    """A machine and its simulation, seen by the diagnosis."""
-
-    @property
-    def trials(self) -> Sequence[str]:
-        """Names of the trials."""
-        ...
-
-    @property
-    def channels(self) -> Sequence[Channel]:
-        """The residual's channels."""
-        ...
-
-    @property
-    def local_unknowns(self) -> int:
-        """Number of unknowns that every trial has of its own."""
-        ...
-
-    def candidates(self) -> list[Candidate]:
-        """Every cause at every place."""
-        ...
-
-    def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
-        """Whitened rows of every trial at the nominal unknowns."""
-        ...
-
-    def columns(self, candidate: Candidate) -> list[Array]:
-        """Whitened columns of one candidate (its shape may differ from the catalogue's), one array per trial."""
-        ...
-
-    def residual(
-        self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
-    ) -> list[Array]:
-        """Exact whitened residual of every trial.
-
-        Args:
-            shared: displacement of the shared unknowns.
-            local: of every trial's own unknowns.
-            active: causes with the values of their parameters, to be taken out of the data or added to the model.
-        """
-        ...
-
-    def unknowns(self, candidate: Candidate) -> list[Array]:
-        """Whitened columns of what a cause leaves open in every trial, shape (n, C, k), possibly k = 0."""
-        ...
-
-    def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
-        """Whether such values can be: no negative mass, stiffness or friction beyond the errors."""
-        ...
-
-    def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
-        """Causes that act for a while in one trial only, where the whitened residuals (n, C) are worst."""
-        ...
-
-    def imitators(self, candidate: Candidate) -> list[list[Array]]:
-        """Whitened columns of errors of single sensors that last as long as a transient, one array per trial each."""
-        ...
-
-    def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
-        """The same candidate with other shapes, to choose the best from; ``finer`` ones around its own."""
-        ...
-
-    def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
-        """For every number of its shape that the data determine: a little less, a little more, and the difference."""
-        ...
-
-    def can_resimulate(self) -> str | None:
-        """Why the recordings cannot be resimulated, or None."""
-        ...
-
-    def simulation(
-        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
-    ) -> Callable[[], dict[str, Array] | None]:
-        """What resimulates one trial's commands, in any process.
-
-        It returns recorded minus simulated response by channel, or None where that cannot be simulated.
-        """
-        ...
-
-    def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
-        """Standard deviation of the noise and of the motion, by channel; shapes broadcast with the response."""
-        ...
-
-    def effect_parameters(
-        self, candidate: Candidate, values: Array, covariance: Array
-    ) -> tuple[dict[str, float], dict[str, float]]:
-        """Parameters of the simulator's effect, and their standard errors."""
-        ...
-
-    def quantities(self, trial: int) -> dict[str, Array]:
-        """What a misfit may depend on, per row of a trial, shape (n,); one of them is ``speed``."""
-        ...
-
-    def row_rate_hz(self, trial: int) -> float:
-        """Rate of a trial's moving rows [Hz]."""
-        ...
-
-    def directions(self, trial: int) -> dict[str, Array]:
-        """Orthonormal directions in the whitened channels of what single sources can do, shape (n, C, k)."""
-        ...
-
-    def write_extended(self, explanation: Any, folder: Path) -> None:
-        """Write the model with the causes in it, for the user to take away."""
-        ...
-
-    def undecidable(self) -> list[dict[str, Any]]:
-        """What recordings of this rig cannot decide, whatever the data: statements with a reason and a remedy."""
-        ...
-
-
 @dataclass(frozen=True)
 class Channel:
     """One residual channel.
@@ -248,3 +139,124 @@ class Channel:
     kind: str
     robot: int | None
     unit: str
+
+
+class Rig(ABC):
+    """A machine and its simulation, seen by the diagnosis.
+
+    What a machine may lack (unknowns of every trial, transients, shapes) has defaults that say so.
+    """
+
+    # Recordings.
+
+    @property
+    @abstractmethod
+    def trials(self) -> Sequence[str]:
+        """Names of the trials."""
+
+    @property
+    @abstractmethod
+    def channels(self) -> Sequence[Channel]:
+        """The residual's channels."""
+
+    @abstractmethod
+    def row_rate_hz(self, trial: int) -> float:
+        """Rate of a trial's moving rows [Hz]."""
+
+    @abstractmethod
+    def quantities(self, trial: int) -> dict[str, Array]:
+        """What a misfit may depend on, per row of a trial, shape (n,); one of them is ``speed``."""
+
+    # Rows: the whitened residual, and what moves it.
+
+    @property
+    def local_unknowns(self) -> int:
+        """Number of unknowns that every trial has of its own."""
+        return 0
+
+    @abstractmethod
+    def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
+        """Whitened rows of every trial at the nominal unknowns."""
+
+    @abstractmethod
+    def columns(self, candidate: Candidate) -> list[Array]:
+        """Whitened columns of one candidate (its shape may differ from the catalogue's), one array per trial."""
+
+    @abstractmethod
+    def residual(
+        self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
+    ) -> list[Array]:
+        """Exact whitened residual of every trial.
+
+        Args:
+            shared: displacement of the shared unknowns.
+            local: of every trial's own unknowns.
+            active: causes with the values of their parameters, to be taken out of the data or added to the model.
+        """
+
+    def directions(self, trial: int) -> dict[str, Array]:
+        """Orthonormal directions in the whitened channels of what single sources can do, shape (n, C, k)."""
+        return {}
+
+    # Causes.
+
+    @abstractmethod
+    def candidates(self) -> list[Candidate]:
+        """Every cause at every place."""
+
+    def unknowns(self, candidate: Candidate) -> list[Array]:
+        """Whitened columns of what a cause leaves open in every trial, shape (n, C, k), possibly k = 0."""
+        return [columns[..., :0] for columns in self.columns(candidate)]
+
+    def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
+        """Whether such values can be: no negative mass, stiffness or friction beyond the errors."""
+        return True
+
+    def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
+        """Causes that act for a while in one trial only, where the whitened residuals (n, C) are worst."""
+        return []
+
+    def imitators(self, candidate: Candidate) -> list[list[Array]]:
+        """Whitened columns of errors of single sensors that last as long as a transient, one array per trial each."""
+        return []
+
+    def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
+        """The same candidate with other shapes, to choose the best from; ``finer`` ones around its own."""
+        return []
+
+    def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
+        """For every number of its shape that the data determine: a little less, a little more, and the difference."""
+        return []
+
+    def undecidable(self) -> list[dict[str, Any]]:
+        """What recordings of this rig cannot decide, whatever the data: statements with a reason and a remedy."""
+        return []
+
+    # The simulator.
+
+    def can_resimulate(self) -> str | None:
+        """Why the recordings cannot be resimulated, or None."""
+        return None
+
+    @abstractmethod
+    def simulation(
+        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
+    ) -> Callable[[], dict[str, Array] | None]:
+        """What resimulates one trial's commands, in any process.
+
+        It returns recorded minus simulated response by channel, or None where that cannot be simulated.
+        """
+
+    @abstractmethod
+    def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
+        """Standard deviation of the noise and of the motion, by channel; shapes broadcast with the response."""
+
+    @abstractmethod
+    def effect_parameters(
+        self, candidate: Candidate, values: Array, covariance: Array
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """Parameters of the simulator's effect, and their standard errors."""
+
+    @abstractmethod
+    def write_extended(self, explanation: Any, folder: Path) -> None:
+        """Write the model with the causes in it, for the user to take away."""

@@ -37,7 +37,7 @@ SHRINKAGE_SHARE = 0.05
 # Search: which candidates are compared, how their shapes are sharpened.
 
 MOST_CAUSES = 3
-"""Chosen; docs/diagnosis/method.md."""
+"""Chosen; docs/diagnosis/method.md, 'Search'."""
 EMPS_MOST_CAUSES = 10
 """The nominal axis is a bare mass without friction of any kind. Chosen; the benchmark's first recording takes eight."""
 MOST_REJECTED = 4
@@ -58,10 +58,10 @@ RIVAL_SHARE = 0.5
 # Worth: is a further cause named beside others?
 
 NEXT_SHARE = 0.25
-"""Share of what those before it left that it must take away. Chosen; docs/diagnosis/method.md."""
+"""Share of what those before it left that it must take away. Chosen; docs/diagnosis/method.md, 'Search'."""
 LOOK_ALIKE_GROWTH = 10.0
 """Growth of a named cause's standard error beside it from which the two are the same. Chosen, after friction had been
-divided among parallel gimbal axes (docs/diagnosis/validation.md, 10 times)."""
+divided among parallel gimbal axes (docs/diagnosis/validation.md, 'Verdicts', 10 times)."""
 
 # Held out: does a cause help where it was not fitted?
 
@@ -83,7 +83,7 @@ EXPLAINED_SHARE = 0.8
 LEAST_SHARE = 0.3
 """Causes that explain less of a large misfit, of rows or closed loop, are no explanation. Chosen."""
 MOST_BELIEVED = 2
-"""More causes at one robot, or of so few families, imitate another. Chosen; docs/diagnosis/method.md."""
+"""More causes at one robot, or of so few families, imitate another. Chosen; docs/diagnosis/method.md, 'Verdict'."""
 CLOSE_NATS = 20.0
 """Rivals that the rows put closer are simulated, too. Chosen: simulations cost most of the time."""
 AMBIGUOUS_NATS = CLOSE_NATS / 4.0
@@ -101,10 +101,6 @@ LEAST_S = 5.0
 """Of all recordings together below which nothing is diagnosed. Chosen."""
 GOOD_S = 30.0
 """With which a diagnosis starts to be of use; only said. Chosen."""
-MASS_TOLERANCE_SHARE = 0.05
-"""Trials whose masses differ by more are not of one payload, if beyond ``MASS_TOLERANCE_SE`` as well. Chosen."""
-MASS_TOLERANCE_SE = 6.0
-"""The same in sums of both standard errors. Chosen."""
 
 # A team: filters and rows.
 
@@ -140,7 +136,7 @@ TEAM_SMOOTH_HZ = 12.0
 NOISE_DRAWS = 24
 """From which the rows' covariance is made. Chosen."""
 PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4
-"""Of the closed loop. Measured: the integrator's error at 1 and at 0.25 ms; docs/diagnosis/validation.md."""
+"""Of the closed loop. Measured: the integrator at 1 and at 0.25 ms; docs/diagnosis/validation.md, 'Integration'."""
 TEAM_TIMESTEP_S = 1e-3
 """Of the closed loop's simulation. Measured: with it the integrator's error stays below the sensors' noise (ibid.)."""
 LEAST_MOMENT_RATIO = 1e-3
@@ -221,7 +217,7 @@ NOISE_SEED, DITHER_SEED = 20250, 0
 SPOILT_SHARE = 0.01
 """Of a trace's square, that rounding may be. Derived: a fit would be off by as much."""
 ERROR_BLOCK_S = 1.0
-"""Blocks of the standard errors. Measured: benchmarks/emps_errors.py; what is left is correlated over a few tenths."""
+"""Blocks of the standard errors. Measured: benchmarks/emps/emps_errors.py; the rest correlates over a few tenths."""
 REMEMBERED = 16
 """Samples before a block that the simulated loop starts with. Chosen."""
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 
 from discrepancy.causes.tolerances_file import read_tolerances
-from discrepancy.emps.catalogue import DEFAULTS
+from discrepancy.emps.catalogue import default_tolerances
 from discrepancy.emps.diagnosis import diagnose_emps
 from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.rig import EmpsRig
@@ -38,7 +38,7 @@ def diagnose(
     Raises:
         InputError: recording, tolerances or causes that cannot be used.
     """
-    known = read_tolerances(Path(tolerances) if tolerances is not None else None, DEFAULTS)
+    known = read_tolerances(Path(tolerances) if tolerances is not None else None, default_tolerances())
     found = diagnose_emps(
         read_emps(Path(recording)), known, tuple(exclude),
         closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated,

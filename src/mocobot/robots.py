@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from estimator.arm.delta import forward_kinematics, inverse_kinematics
-from estimator.arm.design import OmnidDesign, load_design
+from estimator.arm.design import OmnidDesign
 from mocobot_sim.control.control import ControlGains
 from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread
 from mocobot_sim.scene.models import omnid_design
@@ -17,6 +17,5 @@ __all__ = [
     "draw_units",
     "forward_kinematics",
     "inverse_kinematics",
-    "load_design",
     "omnid_design",
 ]

@@ -12,9 +12,9 @@ from estimator.recording.checks import TORQUE_FACTOR
 from mocobot_inspect.inspection import FASTEST_HZ, MOSTLY, SLOWEST_HZ, Inspection, differs
 from mocobot_inspect.stream.channels import Channel, Stretch
 from mocobot_inspect.stream.timing import Timing
+from mocobot_inspect.wiring.check import Found
 from mocobot_inspect.wiring.misfit import SUSPICIOUS, Misfit
 from mocobot_inspect.wiring.mistakes.base import listed
-from mocobot_inspect.wiring.wiring import Found
 from mocobot_logs.log import NS
 
 Topic = Literal["time", "samples", "clocks", "wiring", "estimate"]

@@ -17,8 +17,8 @@ from mocobot_inspect.signals import RATE_HZ, Group, Signals, signals_of
 from mocobot_inspect.stream.channels import Channel
 from mocobot_inspect.stream.survey import Survey, survey
 from mocobot_inspect.stream.timing import Timing
+from mocobot_inspect.wiring.check import Wiring, check_wiring
 from mocobot_inspect.wiring.mistakes import Mistake
-from mocobot_inspect.wiring.wiring import Wiring, check_wiring
 from mocobot_logs.log import NS, Level, LogSource
 
 Array = NDArray[np.float64]

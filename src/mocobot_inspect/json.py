@@ -34,8 +34,8 @@ from mocobot_inspect.readiness import Readiness
 from mocobot_inspect.stream.channels import Channel
 from mocobot_inspect.stream.timing import Timing
 from mocobot_inspect.text import ready_line
+from mocobot_inspect.wiring.check import Wiring
 from mocobot_inspect.wiring.misfit import Misfit
-from mocobot_inspect.wiring.wiring import Wiring
 
 FORMAT, VERSION = "mocobot-inspection", 1
 

@@ -1,6 +1,8 @@
-"""How much a compressed file may claim to hold before it is taken for a bomb."""
+"""How much a file may hold, or claim to hold, before it is taken for a bomb."""
 
 from __future__ import annotations
+
+from pathlib import Path
 
 from estimator.errors import InputError
 
@@ -26,3 +28,25 @@ def check_claim(claimed_bytes: int, stored_bytes: int, where: str) -> None:
             f"{where} claims {claimed_bytes / 2**30:.3g} GiB in {stored_bytes / 2**20:.3g} MiB of the file; "
             f"more than {LARGEST_RATIO} times is no measured log"
         )
+
+
+def read_small(path: Path, most_bytes: int, where: str, kind: str) -> bytes:
+    """All of a file that describes something.
+
+    Args:
+        path: the file.
+        most_bytes: more are not read.
+        where: what messages call the file.
+        kind: what it should be, for the message.
+
+    Raises:
+        InputError: it is larger, or cannot be read.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(most_bytes + 1)
+    except OSError as error:
+        raise InputError(f"{where}: cannot be read ({error.strerror or error})") from error
+    if len(content) > most_bytes:
+        raise InputError(f"{where}: is larger than {most_bytes >> 20} MiB, which no {kind} is")
+    return content

@@ -16,8 +16,8 @@ from estimator.recording.parquet import write_recording
 from mocobot_logs.bag.write import write_bag
 from mocobot_logs.log import Level, LogSource
 from mocobot_logs.one_clock import ClockReport, to_recording
+from mocobot_logs.resample.log import MAX_GAP_S, RATE_HZ, resample
 from mocobot_logs.resample.report import StreamReport
-from mocobot_logs.resample.resample import MAX_GAP_S, RATE_HZ, resample
 from mocobot_logs.table.write import write_csv, write_npz
 
 Kind = Literal["parquet", "csv", "npz", "mcap", "sqlite3", "folder"]

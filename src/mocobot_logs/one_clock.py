@@ -22,7 +22,7 @@ from estimator.filtering import MIN_SAMPLES
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import Recording
 from mocobot_logs.log import CHANNELS, REF, THETA, Array
-from mocobot_logs.resample.resample import Resampled
+from mocobot_logs.resample.log import Resampled
 
 EARLY_S = 1.0
 """A robot's log that ends so much before another's is broken off."""

@@ -108,7 +108,7 @@ def _table(path: Path, kind: str, log_map: LogMap | None, episode: int | None) -
         return NpzTable(path, name)
     if kind == "lerobot":
         return LeRobotTable(path, name, episode)
-    return ParquetTable([path], name)
+    return ParquetTable(path, name)
 
 
 def _default_map(table: Table) -> LogMap:

@@ -19,7 +19,7 @@ from estimator.errors import InputError
 from estimator.estimate.result import FORMAT as ESTIMATE
 from estimator.estimate.result import VERSION as ESTIMATE_VERSION
 from estimator.estimate.result import PayloadEstimate
-from estimator.strict import read_json
+from estimator.strict import Fields, is_number, read_json
 from mocobot_sim.paper.tables import paper_tables, summary_table
 from mocobot_view.facts.fact_files import read_estimate
 
@@ -151,21 +151,13 @@ def _paper(folder: Path) -> Paper:
 def _trials(path: Path) -> tuple[Json, ...]:
     if not path.is_file():
         return ()
-    trials = read_json(path, "the checks of the trials").get("trials")
-    if not isinstance(trials, list) or not all(map(_is_trial, trials)):
-        keys = ", ".join(TRIAL_KEYS)
-        raise InputError(
-            f"{path}: not the checks of the trials; each must have a name, and the numbers {keys}"
-        )
+    trials = Fields(read_json(path, "the checks of the trials"), ("trials",), str(path)).list("trials")
+    for k, values in enumerate(trials):
+        trial = Fields(values, ("name", *TRIAL_KEYS), f"{path}: trials[{k}]")
+        trial.text("name")
+        for key in TRIAL_KEYS:
+            trial.number(key, 0.0)
     return tuple(trials)
-
-
-def _is_trial(values: Any) -> bool:
-    return (
-        isinstance(values, dict)
-        and isinstance(values.get("name"), str)
-        and all(values.get(key) is not None and _number(values[key]) for key in TRIAL_KEYS)
-    )
 
 
 def _provenance(path: Path) -> Json | None:
@@ -215,9 +207,7 @@ def complete(path: Path) -> Iterator[None]:
 
 def _number(value: Any) -> bool:
     """Whether a score is null or a finite number of at least 0."""
-    return value is None or (
-        isinstance(value, int | float) and not isinstance(value, bool) and 0 <= value < 1e300
-    )
+    return value is None or (is_number(value) and value >= 0)
 
 
 def _words(error: Exception) -> str:

@@ -7,10 +7,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from estimator.errors import InputError
-from mocobot_report.blocks.blocks import Entry, Num, facts, folded, paragraph, section, table
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Node, el
 from mocobot_report.blocks.numbers import size
+from mocobot_report.blocks.prose import facts, folded, paragraph
+from mocobot_report.blocks.sections import section
+from mocobot_report.blocks.tables import Entry, Num, table
 from mocobot_report.folder import Contents
 
 
@@ -52,28 +54,20 @@ def _one(made: Any) -> list[Node]:
 
 
 def _text(option: Any) -> str:
+    if isinstance(option, bool):
+        return "yes" if option else "no"
     if isinstance(option, list):
         return " ".join(map(str, option)) or "none"
-    return (
-        {None: "none", True: "yes", False: "no"}.get(option, str(option))
-        if not isinstance(option, dict)
-        else str(option)
-    )
+    return "none" if option is None else str(option)
 
 
 def _files(caption: str, listed: list[Mapping[str, Any]]) -> Node:
-    rows: list[list[Entry]] = [
-        [
-            el("code", str(entry.get("path", entry.get("name", "")))), Num(_size(entry.get("bytes"))),
-            el("span", str(entry.get("sha256", "")), class_="hash"),
-        ]
-        for entry in listed
-    ]  # fmt: skip
+    rows: list[list[Entry]] = []
+    for entry in listed:
+        count, digest = entry.get("bytes"), el("span", str(entry.get("sha256", "")), class_="hash")
+        name = el("code", str(entry.get("path", entry.get("name", ""))))
+        rows.append([name, Num(size(count) if isinstance(count, int) else ""), digest])
     return table(caption, ["file", "size", "SHA-256"], rows)
-
-
-def _size(count: Any) -> str:
-    return size(count) if isinstance(count, int) else ""
 
 
 def _read(contents: Contents) -> Node:
@@ -83,11 +77,6 @@ def _read(contents: Contents) -> Node:
             data = path.read_bytes()
         except OSError as error:
             raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
-        listed.append(
-            {
-                "path": path.relative_to(contents.folder).as_posix(),
-                "bytes": len(data),
-                "sha256": hashlib.sha256(data).hexdigest(),
-            }
-        )
+        name, digest = path.relative_to(contents.folder).as_posix(), hashlib.sha256(data).hexdigest()
+        listed.append({"path": name, "bytes": len(data), "sha256": digest})
     return _files("Read from the folder", listed)

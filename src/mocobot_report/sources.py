@@ -29,14 +29,15 @@ class Source:
     path: Path | None
     why: str = ""
 
-    def read(self) -> Recording | str:
-        """The recording, or why it cannot be read."""
+    def recording(self) -> Recording:
+        """Read it.
+
+        Raises:
+            InputError: it is not used, or cannot be read.
+        """
         if self.path is None:
-            return self.why
-        try:
-            return read_recording(self.path)
-        except InputError as error:
-            return str(error)
+            raise InputError(self.why)
+        return read_recording(self.path)
 
 
 def sources(provenance: dict[str, Any] | None, folder: Path) -> list[Source]:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import uuid
 from pathlib import Path
 
 from estimator.errors import InputError
+from estimator.files import whole_file
 
 MARK = "mocobot report"
 """Generator that a page names; a file without it is no report."""
@@ -48,13 +46,5 @@ def write_page(out: Path, content: bytes) -> None:
     Raises:
         InputError: the target cannot be written.
     """
-    real = Path(os.path.realpath(out))
-    temporary = real.parent / f".{uuid.uuid4().hex}.tmp"
-    try:
+    with whole_file(out) as temporary:
         temporary.write_bytes(content)
-        temporary.replace(real)
-    except OSError as error:
-        raise InputError(f"{out}: cannot be written ({error.strerror or error})") from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)

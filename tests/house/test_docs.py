@@ -54,7 +54,9 @@ def points_nowhere(target: str, page: Path) -> bool:
 def names_of(module: str) -> frozenset[str]:
     """Names that a module defines or imports at its top level."""
     found: set[str] = set()
-    for node in ast.parse(module_files()[module].read_text(encoding="utf-8")).body:
+    todo: list[ast.stmt] = ast.parse(module_files()[module].read_text(encoding="utf-8")).body
+    todo += [node for branch in todo if isinstance(branch, ast.If) for node in branch.body]
+    for node in todo:
         if isinstance(node, ast.FunctionDef | ast.ClassDef):
             found.add(node.name)
         elif isinstance(node, ast.Import | ast.ImportFrom):
@@ -132,6 +134,38 @@ def test_method_states_the_rules_as_they_are() -> None:
     assert {name: float(Fraction(value)) for name, value in stated.items()} == {
         name: getattr(rules, name) for name in stated
     }
+
+
+def rows_of(page: str, heading: str) -> list[tuple[str, str]]:
+    """First cell, without backticks, and second one, of the table rows below a heading of a page."""
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    section = re.split(r"^## ", text.split(f"\n## {heading}\n")[1], flags=re.MULTILINE)[0]
+    return re.findall(r"^\| `(\w+)` \| (.+?) \|", section, re.MULTILINE)
+
+
+def test_guide_lists_every_cause_with_its_family_and_tolerance() -> None:
+    from discrepancy.team.causes import CAUSES
+    from discrepancy.team.tolerances import read_tolerances
+
+    families = {cause: family for family, listed in rows_of("diagnosis/guide.md", "Families")
+                for cause in CODE.findall(listed)}  # fmt: skip
+    assert families == {name: cause.family for name, cause in CAUSES.items()}
+    stated = dict(rows_of("diagnosis/guide.md", "Tolerances"))
+    assert set(stated) == set(read_tolerances(None))
+    for cause, tolerances in read_tolerances(None).items():
+        numbers = re.findall(r"`(\w+)` (?:\.\.\. )?([\d.e-]+)", stated[cause])
+        assert {name: float(value) for name, value in numbers}.items() <= tolerances.items(), cause
+        assert len(numbers) == len(tolerances) or len(set(tolerances.values())) == 1, cause
+
+
+def test_effects_lists_every_cause() -> None:
+    from mocobot_sim.effects.catalogue import EFFECTS
+
+    text = (ROOT / "docs" / "effects.md").read_text(encoding="utf-8")
+    named = [
+        name for cell in re.findall(r"^\| (`.+?`) \|", text, re.MULTILINE) for name in CODE.findall(cell)
+    ]
+    assert sorted(named) == sorted(EFFECTS)
 
 
 def test_readme_lists_every_package_and_no_other() -> None:

@@ -10,13 +10,14 @@ FREE = {
     "discrepancy.emps.recording.axis_log": {"FIRST_GUESS_KG", "LIMIT_V"},  # the nominal axis
     "discrepancy.result.evidence_list": {"MOST", "BY_CHANCE"},  # of a picture
     "discrepancy.result.json": {"LEAST_LOG10_P"},  # JSON has no minus infinity
-    "discrepancy.result.plots": {"RUNNING_S"},
     "discrepancy.result.read": {"VERSION"},
     "discrepancy.result.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
     "discrepancy.result.text": {"WIDTH"},
     "discrepancy.result.traces_file": {"VERSION"},
-    "discrepancy.team.linear.residual": {"SIGNALS"},  # a layout
-    "discrepancy.team.linear.trial_linear": {"_STEPS"},  # of numerical derivatives
+    "discrepancy.team.linear.slots": {
+        "COUNT",
+        "STEPS",
+    },  # a layout, with the steps of its numerical derivatives
 }
 """Formats, layouts and sizes of pictures, by module."""
 

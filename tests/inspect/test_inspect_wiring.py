@@ -11,8 +11,8 @@ from estimator.arm.wrist_level import wrist_of
 from estimator.recording.model import Recording
 from miswired import MISTAKES, Miswired, miswire
 from mocobot_inspect.signals import Signals, signals_of
+from mocobot_inspect.wiring.check import Wiring, check_wiring
 from mocobot_inspect.wiring.misfit import SUSPICIOUS
-from mocobot_inspect.wiring.wiring import Wiring, check_wiring
 from mocobot_logs.log import Level
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import PRESETS, measure

@@ -75,7 +75,7 @@ def test_page_is_quiet_whole_and_readable(
         assert [url for url in seen.asked if not url.startswith(("data:", "blob:"))] == [pages[kind].as_uri()]
         _check_plots(seen)
         _check_markup(seen)
-        assert seen.page.locator("script").count() == 2 + seen.page.locator(".plot").count()
+        assert seen.page.locator("script").count() == 3 + seen.page.locator(".plot").count()
         if kind != "paper":  # what a file's name or label holds is shown, not obeyed
             assert NASTY[:30] in seen.page.evaluate("document.querySelector('main').textContent")
         assert seen.page.evaluate("document.documentElement.scrollWidth") <= size[0]

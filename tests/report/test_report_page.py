@@ -34,9 +34,12 @@ class Reader(HTMLParser):
         self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.text: list[str] = []
         self.blocks: dict[str, dict] = {}
+        """Figures."""
+        self.templates: dict[str, dict] = {}
         self.feed(page.decode())
         self.close()
         assert not self.open, self.open
+        self.templates = self.blocks.pop("templates", {})
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self.tags.append((tag, dict(attrs)))
@@ -106,28 +109,30 @@ def test_page_refers_to_nothing_outside(pages: dict[str, Reader]) -> None:
 
 
 def test_every_figure_is_valid_for_plotly(pages: dict[str, Reader]) -> None:
-    """Plotly's own schema, from its Python side, with colours and shared arrays put in."""
+    """Plotly's own schema, from its Python side, with a template and shared arrays put in."""
     for kind, page in pages.items():
         assert len(page.blocks) >= 5, kind
         for block in page.blocks.values():
-            resolved = _resolved(block, block.get("arrays", {}))
-            figure = go.Figure(resolved["data"], resolved["layout"])
+            shared = [t for t in block["data"] if isinstance(t["x"], int)]
+            assert {t["x"] for t in shared} == set(range(len(block["arrays"])))
+            data = [t | {"x": block["arrays"][t["x"]]} if t in shared else t for t in block["data"]]
+            figure = go.Figure(data, block["layout"] | {"template": page.templates["dark"]})
             assert len(figure.data) == len(block["data"]) > 0
-            for path in block.get("narrow", {}):
+            assert {t["meta"] for t in block["data"]} <= set(LIGHT)  # their colours
+            for path in block["narrow"]:
                 assert isinstance(figure.layout[path.split(".")[0]], object)
 
 
-def _resolved(value: object, arrays: dict) -> object:
-    if isinstance(value, list):
-        return [_resolved(item, arrays) for item in value]
-    if isinstance(value, dict):
-        if "colour" in value:
-            assert value["colour"] in LIGHT
-            return LIGHT[value["colour"]]
-        if "shared" in value:
-            return arrays[value["shared"]]
-        return {key: _resolved(item, arrays) for key, item in value.items()}
-    return value
+@pytest.mark.parametrize("theme", ["light", "dark"])
+def test_colours_of_plots_are_those_of_the_theme(pages: dict[str, Reader], theme: str) -> None:
+    """A template holds one colour at each place, and nothing else of a figure does."""
+    colours = {"light": LIGHT, "dark": DARK}[theme]
+    for page in pages.values():
+        layout = page.templates[theme]["layout"]
+        assert layout["font"]["color"] == colours["text"]
+        assert layout["xaxis"]["gridcolor"] == layout["yaxis"]["gridcolor"] == colours["grid"]
+        for block in page.blocks.values():
+            assert not re.search(r"#[0-9a-f]{6}|rgb", json.dumps(block))
 
 
 def test_published_figures_are_in_the_page(pages: dict[str, Reader]) -> None:
@@ -179,7 +184,7 @@ def test_labels_and_names_stay_text(pages: dict[str, Reader]) -> None:
     assert "alert" in "".join(pages["diagnosis"].text)
     for page in pages.values():
         scripts = [attributes for tag, attributes in page.tags if tag == "script"]
-        assert len(scripts) == 2 + len(page.blocks)
+        assert len(scripts) == 3 + len(page.blocks)
 
 
 def test_plots_do_not_read_names_as_markup(pages: dict[str, Reader]) -> None:
@@ -289,6 +294,13 @@ def test_provenance_lists_what_was_read(pages: dict[str, Reader], folders: dict[
         hashlib.sha256((folders["estimate"] / "a b.parquet").read_bytes()).hexdigest()
         in pages["estimate"].rows()
     )
+
+
+def test_options_are_shown_as_they_were_given(pages: dict[str, Reader]) -> None:
+    """0 is a number, and no "no"."""
+    assert "option seed 0" in pages["paper"].rows()
+    assert "option closed_loop yes" in pages["diagnosis"].rows()
+    assert "option closed_loop no" in pages["axis"].rows()
 
 
 def test_one_page_for_several_results(tmp_path: Path, no_pictures: pytest.MonkeyPatch) -> None:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.numbers import measured
+
 
 def number(value: float, se: float | None, unit: str, scale: float = 1.0) -> str:
     """``0.0500 +- 0.0012 N m``: as many digits as the standard error has meaning; without one, three digits.
@@ -17,13 +19,10 @@ def number(value: float, se: float | None, unit: str, scale: float = 1.0) -> str
         unit: to be shown.
         scale: shown units per own unit.
     """
-    value *= scale
     unit = f" {unit}" if unit else ""
     if se is None or not np.isfinite(se) or se <= 0:
-        return f"{value:.3g}{unit}"
-    se *= scale
-    digits = int(np.clip(1 - np.floor(np.log10(se)), 0, 9))
-    return f"{value:.{digits}f} +- {se:.{digits}f}{unit}"
+        return f"{value * scale:.3g}{unit}"
+    return " +- ".join(measured(value * scale, se * scale)) + unit
 
 
 @dataclass(frozen=True)

@@ -15,28 +15,20 @@ from discrepancy.emps.noise import dither
 from discrepancy.emps.recording.signals import Signals
 from discrepancy.emps.reduction import Reduction
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.rig import Candidate, Parameter
+from discrepancy.rig import Candidate
 
 Array = NDArray[np.float64]
 Tolerances = Mapping[str, Mapping[str, float]]
 
 
-DEFAULTS: dict[str, dict[str, float]] = {
-    cause.name: dict.fromkeys(cause.parameters, 0.0) for cause in CAUSES.values()
-}
-"""Standard deviations per parameter that are no news: none, since nobody has said what this axis' tolerances are."""
+def default_tolerances() -> dict[str, dict[str, float]]:
+    """Standard deviations per parameter that are no news: none, since nobody has said what this axis' are."""
+    return {name: dict.fromkeys(cause.parameters, 0.0) for name, cause in CAUSES.items()}
 
 
-def candidate_of(name: str, hints: Hints, tolerances: Tolerances) -> Candidate:
+def candidate_of(name: str, hints: Hints, tolerances: Tolerances | None = None) -> Candidate:
     """A cause of the catalogue with its first shape."""
-    cause = CAUSES[name]
-    parameters = tuple(
-        Parameter(p, tolerances[name][p], scale)
-        for p, scale in zip(cause.parameters, cause.scales, strict=True)
-    )
-    return Candidate(
-        name, cause.family, None, None, parameters, dict(cause.shapes(hints)[0]), where=cause.where
-    )
+    return CAUSES[name].candidate((tolerances or {}).get(name, {}), CAUSES[name].shapes(hints)[0])
 
 
 def hidden_by_rounding(signals: Signals, reduction: Reduction, hints: Hints, white: Whitening) -> list[str]:
@@ -47,11 +39,11 @@ def hidden_by_rounding(signals: Signals, reduction: Reduction, hints: Hints, whi
     """
     other = Signals.of(replace(signals.log, position=signals.log.position + dither(signals)))
     out = []
-    for name in CAUSES:
-        if name == "push":
+    for name, cause in CAUSES.items():
+        if cause.transient:
             continue
-        shape = candidate_of(name, hints, DEFAULTS).shape
-        column, changed = (CAUSES[name].columns(s, shape) for s in (signals, other))
+        shape = cause.shapes(hints)[0]
+        column, changed = (cause.columns(s, shape) for s in (signals, other))
         trace, error = 0.0, 0.0
         for own, off in zip(reduction(column), reduction(changed - column), strict=True):
             white_here = replace(white, moving=len(own))
@@ -64,7 +56,7 @@ def hidden_by_rounding(signals: Signals, reduction: Reduction, hints: Hints, whi
 
 def remainder(signals: Signals, reduction: Reduction, hints: Hints) -> list[Array]:
     """Rows (n, 2) that all causes of the catalogue together leave; a second step allows for what is not linear."""
-    causes = [candidate_of(name, hints, DEFAULTS) for name in CAUSES if name != "push"]
+    causes = [candidate_of(name, hints) for name, cause in CAUSES.items() if not cause.transient]
     columns = [reduction(CAUSES[c.cause].columns(signals, c.shape)) for c in causes]
     counts = np.cumsum([len(c.parameters) for c in causes])[:-1]
     values, left = [np.zeros(len(c.parameters)) for c in causes], signals.residual

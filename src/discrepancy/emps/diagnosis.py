@@ -15,9 +15,11 @@ from discrepancy.emps.recording.axis_log import AxisLog
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.traces import traces
 from discrepancy.emps.words import EmpsWords
+from discrepancy.engine.block_errors import with_block_errors
 from discrepancy.engine.diagnose import Diagnosis, diagnose
 from discrepancy.engine.explanation import Explanation
-from discrepancy.least_squares.block_errors import block_covariance, part_of, with_block_errors
+from discrepancy.least_squares.block_errors import block_covariance, part_of
+from discrepancy.least_squares.fit import Fit
 from discrepancy.result.diagnosed import Diagnosed
 
 
@@ -87,7 +89,7 @@ def also_fitted(
     problem = explanation.problem
     by_name = {c.cause: k for k, c in enumerate(problem.candidates) if not c.transient}
     wanted = {name: by_name[name] for name in causes if name in by_name}
-    fit = problem.fit(tuple(dict.fromkeys([*explanation.fit.free, *wanted.values()])))
+    fit = Fit.of(problem, tuple(dict.fromkeys([*explanation.fit.free, *wanted.values()])))
     covariance = block_covariance(fit, block_rows(rig))
     out = {}
     for name, index in wanted.items():

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG
-from discrepancy.emps.recording.preflight import resolution
 from discrepancy.emps.recording.signals import Signals, smooth
 from discrepancy.emps.reduction import Reduction
 from discrepancy.least_squares.whitening import Whitening
@@ -50,7 +49,7 @@ def repeated(signals: Signals, period: int | None) -> bool:
     both = usable[period:] & usable[:-period]
     change = (error[period:] - error[:-period])[both]
     # A quantised position repeats but for where its steps fall.
-    rounding = resolution(signals.log.position).step_m ** 2 / 6.0
+    rounding = signals.log.step_m**2 / 6.0
     rms = np.sqrt(max(np.mean(change**2) - rounding, 0.0))
     return bool(rms < rules.REPEATED_SHARE * np.sqrt(np.mean(error[usable] ** 2)))
 
@@ -71,7 +70,7 @@ def from_repeats(left: list[Array], signals: Signals, reduction: Reduction, peri
     rounding = _rounding(signals)
     rows = reduction(deviation + rounding)
     position, voltage = np.sqrt(np.mean(apart[usable] ** 2, axis=0))
-    step = resolution(signals.log.position).step_m
+    step = signals.log.step_m
     draws = draws_of([a + b for a, b in zip(left, reduction(rounding), strict=True)])
     white = Whitening.of(draws, draws.shape[1], order)
     level = np.sqrt(np.mean([np.mean(white(r)[order:] ** 2, axis=0) for r in draws_of(rows)], axis=0))
@@ -80,7 +79,7 @@ def from_repeats(left: list[Array], signals: Signals, reduction: Reduction, peri
 
 def from_remainder(left: list[Array], signals: Signals, reduction: Reduction) -> Noise:
     """Noise as all of what the whole catalogue leaves, rows (n, 2) per block, and the position's rounding."""
-    step = resolution(signals.log.position).step_m
+    step = signals.log.step_m
     high = signals.log.position - signals.x
     return Noise(
         draws_of([a + b for a, b in zip(left, reduction(_rounding(signals)), strict=True)]),
@@ -111,7 +110,7 @@ def _deviations(x: Array, period: int, usable: NDArray[np.bool_]) -> tuple[Array
 
 def dither(signals: Signals) -> Array:
     """A fresh draw of the position's rounding errors [m], shape (Q,); zero where it shows no steps."""
-    step = resolution(signals.log.position).step_m
+    step = signals.log.step_m
     return np.random.default_rng(rules.DITHER_SEED).uniform(-0.5 * step, 0.5 * step, len(signals.x))
 
 

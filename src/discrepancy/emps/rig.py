@@ -12,14 +12,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
+from discrepancy.causes.excluded import excluded_from
+from discrepancy.causes.intervals import intervals_near, worst_intervals
 from discrepancy.emps.blocks import blocks, period_of
-from discrepancy.emps.catalogue import DEFAULTS, Tolerances, candidate_of, hidden_by_rounding, remainder
+from discrepancy.emps.catalogue import (
+    Tolerances,
+    candidate_of,
+    default_tolerances,
+    hidden_by_rounding,
+    remainder,
+)
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.causes.base import Hints
 from discrepancy.emps.closed_loop import effects_of, nominal_plant, plant_of, resimulation_errors, start_of
 from discrepancy.emps.hints import hints_of
 from discrepancy.emps.noise import Noise, from_remainder, from_repeats, repeated
-from discrepancy.emps.pushes import intervals_near, push, worst_intervals
 from discrepancy.emps.recording.axis_log import AxisLog
 from discrepancy.emps.recording.preflight import checked
 from discrepancy.emps.recording.signals import Signals
@@ -27,7 +34,7 @@ from discrepancy.emps.reduction import Reduction
 from discrepancy.emps.undecidable import statements
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.rig import Candidate, Channel, Rows
+from discrepancy.rig import Candidate, Channel, Rig, Rows
 from estimator.errors import InputError
 from mocobot_sim.emps.extended import write_extended
 from mocobot_sim.emps.plant import Plant
@@ -36,7 +43,7 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class EmpsRig:
+class EmpsRig(Rig):
     """One recording of the axis, cut into blocks that validate each other.
 
     Attributes:
@@ -68,9 +75,7 @@ class EmpsRig:
         Raises:
             InputError: the recording cannot be used, or a cause to be excluded does not exist.
         """
-        unknown = sorted(set(excluded) - set(CAUSES))
-        if unknown:
-            raise InputError(f"cause {unknown[0]!r} does not exist; the causes are {', '.join(CAUSES)}")
+        left_out = excluded_from(CAUSES, excluded)
         log = checked(log)
         signals = Signals.of(log)
         period = period_of(log.reference, log.rate_hz)
@@ -85,26 +90,22 @@ class EmpsRig:
             noise = from_remainder(left, signals, reduction)
         shared = Whitening.of(noise.draws, noise.draws.shape[1], rules.EMPS_AR_ORDER)
         whitening = tuple(replace(shared, moving=len(rows)) for rows in reduction.samples)
-        known = DEFAULTS if tolerances is None else tolerances
+        known = default_tolerances() if tolerances is None else tolerances
         hidden = hidden_by_rounding(signals, reduction, hints, shared)
         if hidden:
             said = (
                 f"The position's rounding hides some causes, which are not looked for: {', '.join(hidden)}."
             )
             log = replace(log, notes=(*log.notes, said))
-        left_out = frozenset([*excluded, *hidden])
-        return cls(log, signals, tuple(cut), reduction, hints, noise, whitening, known, left_out)
+        return cls(
+            log, signals, tuple(cut), reduction, hints, noise, whitening, known, left_out | set(hidden)
+        )
 
     @property
     def trials(self) -> Sequence[str]:
         """Names of the blocks."""
         time, name = self.log.time, Path(self.log.name).stem
         return [f"{name} {time[b.start]:.2f}-{time[b.stop - 1]:.2f} s" for b in self.blocks]
-
-    @property
-    def local_unknowns(self) -> int:
-        """Blocks have no unknowns of their own."""
-        return 0
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -120,8 +121,8 @@ class EmpsRig:
         """Every cause of the catalogue; pushes come from ``transients``."""
         return [
             candidate_of(name, self.hints, self.tolerances)
-            for name in CAUSES
-            if name not in self.excluded and name != "push"
+            for name, cause in CAUSES.items()
+            if name not in self.excluded and not cause.transient
         ]
 
     def physical(self, candidate: Candidate) -> list[Array]:
@@ -173,45 +174,26 @@ class EmpsRig:
         """Whether such values can be: no friction or play that is negative beyond two standard errors, or rounding."""
         cause = CAUSES[candidate.cause]
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        return cause.visible(self.signals, self.hints, values) and all(
-            values[k] > -2.0 * se[k] for k, n in enumerate(cause.parameters) if n in cause.positive
-        )
+        return cause.visible(self.signals, self.hints, values) and cause.never_negative(values, se)
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the force is worst."""
-        if "push" in self.excluded:
-            return []
         out = []
-        for t, z in enumerate(remaining):
+        causes = [c for c in CAUSES.values() if c.transient and c.name not in self.excluded]
+        for t, z in enumerate(remaining if causes else ()):
             time = self.log.time[self.reduction.samples[t]]
-            tolerance = self.tolerances["push"]["force_N"]
-            out += [push(t, start, duration, tolerance) for start, duration in worst_intervals(time, z[:, 0])]
+            worst = worst_intervals(t, time, z[:, 0], rules.EMPS_PUSH_S, two_sided=True)
+            out += [cause.event(self.tolerances[cause.name], when) for cause in causes for when in worst]
         return out
-
-    def imitators(self, candidate: Candidate) -> list[list[Array]]:
-        """None: there is one force channel, and what a sensor adds to it for a while is a push."""
-        return []
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a push with its interval moved."""
-        at = candidate.transient
-        if at:
-            tolerance = candidate.parameters[0].tolerance
-            return [
-                push(at.trial, start, duration, tolerance)
-                for start, duration in intervals_near(at.start_s, at.duration_s)
-            ]
-        cause = CAUSES[candidate.cause]
+        cause, when = CAUSES[candidate.cause], candidate.transient
+        if when:
+            tolerance = self.tolerances[cause.name]
+            return [cause.event(tolerance, near) for near in intervals_near(when, rules.EMPS_SHORTEST_PUSH_S)]
         shapes = cause.finer(candidate.shape) if finer else cause.shapes(self.hints)
         return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
-
-    def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
-        """None: shapes are chosen from a grid."""
-        return []
-
-    def can_resimulate(self) -> str | None:
-        """Nothing stands against it: every recording has its reference and the loop's gains."""
-        return None
 
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]

@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.engine.explanation import Explanation
+from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Candidate
+from estimator.statistics import rms
 
 Array = NDArray[np.float64]
 Active = Sequence[tuple[Candidate, Array]]
@@ -90,19 +92,13 @@ def errors(rig: EmpsRig, models: Sequence[Active]) -> Errors:
         voltage.append(np.array([np.nan]) if error is None else error["voltage"])
     return Errors(
         100.0 * float(np.linalg.norm(np.concatenate(left)) / np.linalg.norm(force)),
-        1e6 * _rms(position),
-        1e3 * _rms(voltage),
+        1e6 * rms(np.concatenate(position)),
+        1e3 * rms(np.concatenate(voltage)),
     )
 
 
 def _fitted(explanation: Explanation, free: Sequence[int], trials: Sequence[int]) -> Active:
-    problem = explanation.problem
-    fit = problem.fit(free, trials, background=False)
-    return [(problem.candidates[i], fit.part(i)[0] * problem.candidates[i].units) for i in free]
-
-
-def _rms(parts: Sequence[Array]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
+    return Fit.of(explanation.problem, free, trials, background=False).active
 
 
 def format_staircase(steps: Sequence[Step], other: str | None = None) -> str:

@@ -6,13 +6,14 @@ import numpy as np
 
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.engine.explanation import Explanation
+from discrepancy.least_squares.fit import Fit
 from discrepancy.result.traces import Trace
 
 
 def traces(rig: EmpsRig, explanation: Explanation) -> list[Trace]:
     """Residuals of every block: ``before`` as simulated, ``after`` with the named causes and tolerances."""
     fit, problem = explanation.fit, explanation.problem
-    nominal = problem.fit(background=False)
+    nominal = Fit.of(problem, background=False)
     causes = [
         (candidate, fit.coefficients[span] * candidate.units)
         for candidate, span in zip(problem.candidates, problem.spans, strict=True)

@@ -30,7 +30,7 @@ def covariance_with_shape(rig: Rig, fit: Fit, index: int) -> Array:
     if not rig.steps(candidate):
         return np.asarray(covariance * np.outer(units, units))
     others = [i for i in fit.free if i != index]
-    without = problem.fit(others, fixed=(index, np.zeros(len(values))))
+    without = Fit.of(problem, others, fixed=(index, np.zeros(len(values))))
     return without.solution_with(_with_slopes(rig, candidate, values * units))[1]
 
 

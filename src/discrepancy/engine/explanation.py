@@ -8,30 +8,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
-from discrepancy.least_squares.fit import Evidence, Fit
+from discrepancy.least_squares.evidence import Evidence
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate
 
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
-    """A cause that the data speak for.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Named:
+    """A candidate that the data speak for, and why.
 
     Attributes:
+        index: which candidate of the problem.
         candidate: what and where, with its best shape.
-        values: its parameters, in their own units, shape (k,).
-        covariance: of the values and of what is determined of its shape (see ``best_shape``), in their own units.
         evidence: when it was chosen.
         rivals: other candidates then, best first, with the gap of their score [nats].
         in_sample, held_out: share of the nominal model's misfit that it removes (see ``held_out.shares``).
         folds: gain of chi-square on every trial when fitted to the others.
     """
 
+    index: int
     candidate: Candidate
-    values: Array
-    covariance: Array
     evidence: Evidence
     rivals: tuple[tuple[Candidate, float], ...]
     in_sample: float
@@ -39,7 +38,20 @@ class Found:
     folds: tuple[float, ...]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Found(Named):
+    """A named cause with what the last fit says of it.
+
+    Attributes:
+        values: its parameters, in their own units, shape (k,).
+        covariance: of the values and of what is determined of its shape (see ``best_shape``), in their own units.
+    """
+
+    values: Array
+    covariance: Array
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
 class Explanation:
     """What the search found.
 
@@ -49,9 +61,7 @@ class Explanation:
         nominal: misfit of the nominal model, nothing off.
         before, after: misfit with tolerances alone, and with the causes as well.
         plain: misfit with the causes and no tolerances.
-        samples: number of residuals.
         fit: the last fit.
-        problem: the last problem (with the causes' shapes and residual).
         shared, local: displacements of the unknowns with the causes in the model.
     """
 
@@ -61,11 +71,19 @@ class Explanation:
     before: float
     after: float
     plain: float
-    samples: int
     fit: Fit
-    problem: Problem
     shared: Array
     local: tuple[Array, ...]
+
+    @property
+    def problem(self) -> Problem:
+        """The last problem, with the causes' shapes and residual."""
+        return self.fit.problem
+
+    @property
+    def samples(self) -> int:
+        """Number of residuals."""
+        return self.problem.samples
 
     @property
     def explained(self) -> float:

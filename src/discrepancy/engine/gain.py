@@ -10,6 +10,7 @@ from joblib import Parallel, delayed
 from numpy.typing import NDArray
 from scipy.stats import t as student
 
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
 
@@ -90,10 +91,8 @@ def responses(
             # A push says nothing about other trials; its own trial has to tell it.
             if len(used) < len(free):
                 others = list(trials)
-            fit = problem.fit(free, others, background=False)
-            shared, local = fit.coefficients[: problem.shared], fit.local(t)[: rig.local_unknowns]
-            active = [(problem.candidates[i], fit.part(i)[0] * problem.candidates[i].units) for i in free]
-            tasks.append((t, -shared, -local, active))
+            fit = Fit.of(problem, free, others, background=False)
+            tasks.append((t, -fit.shared, -fit.local(t)[: rig.local_unknowns], fit.active))
     run = Parallel(n_jobs=jobs, return_as="generator")
     done = []
     for errors, task in zip(run(delayed(rig.simulation(*task))() for task in tasks), tasks, strict=True):

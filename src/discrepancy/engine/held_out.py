@@ -9,7 +9,6 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate
 
 
 def confirmed(folds: Sequence[float]) -> bool:
@@ -21,18 +20,19 @@ def confirmed(folds: Sequence[float]) -> bool:
     return supporting >= rules.SUPPORTING_TRIALS and harmed <= rules.AGAINST_SHARE * helped
 
 
-def held_out_gains(problem: Problem, free: Sequence[int], index: int, candidate: Candidate) -> list[float]:
+def held_out_gains(problem: Problem, free: Sequence[int], index: int) -> list[float]:
     """How much rather every trial has a cause as the other trials fitted it than all within its tolerance."""
-    if candidate.transient:
-        return _interleaved(problem, free, index, candidate.transient.trial)
+    transient = problem.candidates[index].transient
+    if transient:
+        return _interleaved(problem, free, index, transient.trial)
     trials = range(len(problem.rows))
     if len(problem.rows) < 2:
         return []
     gains = []
     for t in trials:
-        values, _ = problem.fit([*free, index], [k for k in trials if k != t]).part(index)
-        tolerated = problem.fit(free, [t])
-        gains.append(tolerated.misfit - problem.fit(free, [t], fixed=(index, values)).misfit)
+        values, _ = Fit.of(problem, [*free, index], [k for k in trials if k != t]).part(index)
+        tolerated = Fit.of(problem, free, [t])
+        gains.append(tolerated.misfit - Fit.of(problem, free, [t], fixed=(index, values)).misfit)
     return gains
 
 
@@ -43,8 +43,8 @@ def shares(problem: Problem, free: Sequence[int], index: int) -> tuple[float, fl
     cause and every tolerance together leave the data.
     """
     after = [*free, index]
-    full = problem.fit(after)
-    nominal, with_it = (problem.fit(chosen, background=False) for chosen in (free, after))
+    full = Fit.of(problem, after)
+    nominal, with_it = (Fit.of(problem, chosen, background=False) for chosen in (free, after))
     trials = range(len(problem.rows))
     floor = sum(full.held_out(t) for t in trials)
     in_sample = (nominal.misfit - with_it.misfit) / max(nominal.misfit - floor, 1e-9)
@@ -54,9 +54,9 @@ def shares(problem: Problem, free: Sequence[int], index: int) -> tuple[float, fl
     for t in trials:
         others = [k for k in trials if k != t]
         before, after_it, best = (
-            problem.fit(free, others, background=False).held_out(t),
-            problem.fit(after, others, background=False).held_out(t),
-            problem.fit(after, others).held_out(t),
+            Fit.of(problem, free, others, background=False).held_out(t),
+            Fit.of(problem, after, others, background=False).held_out(t),
+            Fit.of(problem, after, others).held_out(t),
         )
         gained, room = gained + before - after_it, room + before - best
     return float(np.clip(in_sample, 0.0, 1.0)), float(np.clip(gained / max(room, 1e-9), 0.0, 1.0))
@@ -78,9 +78,7 @@ def _interleaved(
         out[inside[(np.arange(len(inside)) // width) % blocks == b]] = True
         apart = np.einsum("nck,ncl->kl", rows[out], rows[out], optimize=True)
         gram = problem.grams.sum(axis=0) - apart
-        ends = []
-        for fit in (Fit.of(problem, gram, tuple(free), held=(index,)), Fit.of(problem, gram, (*free, index))):
-            x = np.append(-fit.coefficients, 1.0)
-            ends.append(float(x @ apart @ x))
-        gains.append(ends[0] - ends[1])
+        without = Fit.of_gram(problem, gram, free, held=(index,))
+        with_it = Fit.of_gram(problem, gram, [*free, index])
+        gains.append(without.chi2_of(apart) - with_it.chi2_of(apart))
     return gains

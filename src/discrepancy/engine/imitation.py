@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from discrepancy import rules
-from discrepancy.engine.leaders import Leader
+from discrepancy.engine.leaders import Leader, price
+from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Rig
 
 
@@ -20,10 +20,8 @@ def imitated(rig: Rig, leader: Leader, free: Sequence[int]) -> bool:
     candidate, problem = leader.candidate, leader.problem
     if not candidate.transient:
         return False
-    without = problem.fit(free, fixed=(leader.evidence.index, np.zeros(len(candidate.parameters))))
-    price = rules.COMPLEXITY * np.log(problem.samples)
-    own = without.fall_with(rig.columns(candidate)) - price * len(candidate.parameters)
-    others = (
-        without.fall_with(columns) - price * columns[0].shape[2] for columns in rig.imitators(candidate)
-    )
+    without = Fit.of(problem, free, fixed=(leader.evidence.index, np.zeros(len(candidate.parameters))))
+    each = price(problem)
+    own = without.fall_with(rig.columns(candidate)) - each * len(candidate.parameters)
+    others = (without.fall_with(columns) - each * columns[0].shape[2] for columns in rig.imitators(candidate))
     return any(other > own for other in others)

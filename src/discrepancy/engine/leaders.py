@@ -10,15 +10,21 @@ from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.engine.best_shape import nearest_shape
-from discrepancy.least_squares.fit import Evidence, Fit
+from discrepancy.least_squares.evidence import Evidence
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
 
 Array = NDArray[np.float64]
 
 
-Shaped = tuple[Evidence, Candidate, list[Array]]
-"""A candidate in one shape: its evidence and its columns."""
+@dataclass(frozen=True, eq=False)
+class Shaped:
+    """A candidate in one shape: its evidence and its columns, shape (n, C, k) per trial."""
+
+    evidence: Evidence
+    candidate: Candidate
+    columns: list[Array]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,38 +42,39 @@ class Leader:
     misfit: float
 
     @property
+    def index(self) -> int:
+        """Which candidate of the problem."""
+        return self.evidence.index
+
+    @property
     def candidate(self) -> Candidate:
         """Cause, place and shape."""
-        return self.problem.candidates[self.evidence.index]
+        return self.problem.candidates[self.index]
 
 
-def leaders(
-    rig: Rig, problem: Problem, free: Sequence[int], evidence: Sequence[Evidence], inflation: float
-) -> list[Leader]:
-    """Significant candidates at their best, the least misfit first."""
-    significant = [e for e in evidence if log10_p(problem, e) <= rules.SIGNIFICANT_LOG10_P][: rules.LEADERS]
+def leaders(rig: Rig, fit: Fit, evidence: Sequence[Evidence], inflation: float) -> list[Leader]:
+    """Significant candidates at their best beside those that are free, the least misfit first."""
+    significant = [e for e in evidence if log10_p(fit.problem, e) <= rules.SIGNIFICANT_LOG10_P]
     found = []
-    for first in significant:
-        index = first.index
-        best = _sharpened(rig, problem, free, index, inflation)
+    for first in significant[: rules.LEADERS]:
+        best = _sharpened(rig, fit, first.index, inflation)
         if best is None or log10_p(best.problem, best.evidence) > rules.SIGNIFICANT_LOG10_P:
             continue
-        values, covariance = best.problem.fit([*free, index]).part(index)
+        values, covariance = Fit.of(best.problem, [*fit.free, best.index]).part(best.index)
         units = best.candidate.units
         if rig.possible(best.candidate, values * units, covariance * np.outer(units, units)):
             found.append(best)
     return sorted(found, key=lambda leader: leader.misfit)
 
 
-def _sharpened(
-    rig: Rig, problem: Problem, free: Sequence[int], index: int, inflation: float
-) -> Leader | None:
+def _sharpened(rig: Rig, fit: Fit, index: int, inflation: float) -> Leader | None:
     """A candidate in its best shape: the catalogue's first, then ever finer around the best."""
+    problem = fit.problem
     start = problem.candidates[index]
     if not start.transient and any(u.shape[2] for u in rig.unknowns(start)):
-        return _best_with_unknowns(rig, problem, free, index, inflation)
+        return _best_with_unknowns(rig, fit, index, inflation)
     # What it would add to a model without it: no need to build the problem anew for every shape.
-    without = problem.fit(free, fixed=(index, np.zeros(len(start.parameters))))
+    without = Fit.of(problem, fit.free, fixed=(index, np.zeros(len(start.parameters))))
     best: Shaped | None = None
     shapes = [start, *rig.refinements(start)]
     for _ in range(rules.FINER_ROUNDS + 1):
@@ -75,67 +82,67 @@ def _sharpened(
         for shape in shapes:
             columns = rig.columns(shape)
             judged = without.evidence_with(index, columns, inflation)
-            if judged is not None and (best is None or judged.fall > best[0].fall):
-                best = judged, shape, columns
+            if judged is not None and (best is None or judged.fall > best.evidence.fall):
+                best = Shaped(judged, shape, columns)
         if best is None or best is last:
             break
-        shapes = rig.refinements(best[1], finer=True)
+        shapes = rig.refinements(best.candidate, finer=True)
     if best is None:
         return None
     best = _polished(rig, without, best, inflation)
-    evidence, shape, columns = best
-    changed = problem if shape is start else problem.with_columns(index, shape, columns)
-    penalty = rules.COMPLEXITY * np.log(problem.samples) * evidence.parameters
-    return Leader(evidence, changed, without.misfit - evidence.fall + penalty)
+    changed = problem
+    if best.candidate is not start:
+        changed = problem.with_columns(index, best.candidate, best.columns)
+    penalty = price(problem) * best.evidence.parameters
+    return Leader(best.evidence, changed, without.misfit - best.evidence.fall + penalty)
 
 
 def _polished(rig: Rig, without: Fit, best: Shaped, inflation: float) -> Shaped:
     """The best of a grid of shapes, moved to where the data want it."""
-    for _ in range(rules.POLISH_ROUNDS if rig.steps(best[1]) else 0):
-        evidence, shape, _ = best
-        nearer = nearest_shape(rig, without, shape, evidence.values * shape.units)
+    for _ in range(rules.POLISH_ROUNDS if rig.steps(best.candidate) else 0):
+        values = best.evidence.values * best.candidate.units
+        nearer = nearest_shape(rig, without, best.candidate, values)
         columns = rig.columns(nearer)
-        judged = without.evidence_with(evidence.index, columns, inflation)
-        if judged is None or judged.fall <= evidence.fall:
+        judged = without.evidence_with(best.evidence.index, columns, inflation)
+        if judged is None or judged.fall <= best.evidence.fall:
             break
-        best = judged, nearer, columns
+        best = Shaped(judged, nearer, columns)
     return best
 
 
-def _best_with_unknowns(
-    rig: Rig, problem: Problem, free: Sequence[int], index: int, inflation: float
-) -> Leader | None:
+def _best_with_unknowns(rig: Rig, fit: Fit, index: int, inflation: float) -> Leader | None:
     """The same for a candidate that leaves something open in every trial, such as friction at rest.
 
     What it leaves open stays in the model, but it is ranked without the price of that where the price is too high:
     friction that is all viscous is nothing at rest, and a hundred open knots would cost more than it explains.
     """
-    start = problem.candidates[index]
+    start = fit.problem.candidates[index]
     best: Leader | None = None
     for shape in (start, *rig.refinements(start)):
-        changed = problem
+        changed = fit.problem
         if shape is not start:
-            changed = problem.with_columns(index, shape, rig.columns(shape))
+            changed = changed.with_columns(index, shape, rig.columns(shape))
         unknowns = rig.unknowns(shape)
         opened = changed.with_unknowns(unknowns)
-        judged = opened.fit(free).evidence_of(index, inflation)
+        judged = Fit.of(opened, fit.free).evidence_of(index, inflation)
         if judged is None:
             continue
-        price = rules.COMPLEXITY * np.log(problem.samples)
-        misfit = price * judged.parameters + min(
-            opened.fit([*free, index]).misfit + price * sum(u.shape[2] for u in unknowns),
-            changed.fit([*free, index]).misfit,
+        each, free = price(changed), [*fit.free, index]
+        misfit = each * judged.parameters + min(
+            Fit.of(opened, free).misfit + each * sum(u.shape[2] for u in unknowns),
+            Fit.of(changed, free).misfit,
         )
         if best is None or misfit < best.misfit:
             best = Leader(judged, opened, misfit)
     return best
 
 
-def in_best_shapes(rig: Rig, problem: Problem, fit: Fit) -> Problem:
+def in_best_shapes(rig: Rig, fit: Fit) -> Problem:
     """Events in the shape that tells most of what is left: in another they may not be seen at all.
 
     A cause with a tolerance keeps its shape, since it is in the model.
     """
+    problem = fit.problem
     for index, candidate in enumerate(problem.candidates):
         if index in fit.free or candidate.transient or any(p.tolerance > 0 for p in candidate.parameters):
             continue
@@ -151,22 +158,23 @@ def in_best_shapes(rig: Rig, problem: Problem, fit: Fit) -> Problem:
     return problem
 
 
-def with_transients(
-    rig: Rig, problem: Problem, fit: Fit, evidence: list[Evidence], inflation: float
-) -> tuple[Problem, list[Evidence]]:
-    """Add the best transient to the problem."""
+def with_transient(rig: Rig, fit: Fit) -> Fit:
+    """The same fit with the best transient among the problem's candidates; as it is where there is none."""
     best: tuple[float, Problem] | None = None
+    problem = fit.problem
     for candidate in rig.transients([fit.remaining(t) for t in range(len(problem.rows))]):
         if any(c.transient and c.transient == candidate.transient for c in problem.candidates):
             continue
         wider = problem.extended(candidate, rig.columns(candidate))
-        last = len(wider.candidates) - 1
-        misfit = wider.fit([*fit.free, last]).misfit
+        misfit = Fit.of(wider, [*fit.free, len(wider.candidates) - 1]).misfit
         if best is None or misfit < best[0]:
             best = (misfit, wider)
-    if best is None:
-        return problem, evidence
-    return best[1], best[1].fit(fit.free).evidence(inflation)
+    return fit if best is None else Fit.of(best[1], fit.free)
+
+
+def price(problem: Problem) -> float:
+    """Penalty per parameter, on the scale of chi-square."""
+    return float(rules.COMPLEXITY * np.log(problem.samples))
 
 
 def log10_p(problem: Problem, evidence: Evidence) -> float:

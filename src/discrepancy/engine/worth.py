@@ -11,14 +11,14 @@ from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Rig
 
 
-def worth_naming(rig: Rig, fit: Fit, leader: Leader, *, first: bool) -> bool:
+def worth_naming(rig: Rig, fit: Fit, leader: Leader) -> bool:
     """Whether a candidate takes away enough of what is left, if much is left.
 
     Of a further cause only the channels count that it mostly acts on: what a loose grasp leaves in the poses says
     nothing against a torque's zero.
     """
-    transient = leader.candidate.transient is not None
-    if first and not transient:
+    first = not fit.free
+    if first and leader.candidate.transient is None:
         return True
     excess = max(fit.misfit - rules.CLEAN_CHI2_PER_N * fit.problem.samples, 0.0)
     if not first:
@@ -31,8 +31,8 @@ def is_another(fit: Fit, leader: Leader) -> bool:
 
     Friction about one of two parallel axes is divided among both at will: the second makes the first unknown.
     """
-    both = leader.problem.fit([*fit.free, leader.evidence.index])
-    alone = leader.problem.fit(fit.free)
+    both = Fit.of(leader.problem, [*fit.free, leader.evidence.index])
+    alone = Fit.of(leader.problem, fit.free)
     most = rules.LOOK_ALIKE_GROWTH**2
     return all(np.all(np.diag(both.part(i)[1]) < most * np.diag(alone.part(i)[1])) for i in fit.free)
 
@@ -40,7 +40,7 @@ def is_another(fit: Fit, leader: Leader) -> bool:
 def _channels_of(rig: Rig, fit: Fit, leader: Leader) -> NDArray[np.bool_]:
     """Channels of the kind that a candidate mostly acts on, shape (C,)."""
     index = leader.evidence.index
-    values = leader.problem.fit([*fit.free, index]).part(index)[0]
+    values = Fit.of(leader.problem, [*fit.free, index]).part(index)[0]
     span = leader.problem.spans[index]
     traces = [rows[..., span] @ values for rows in leader.problem.rows]
     energy = np.sum([np.sum(x**2, axis=0) for x in traces], axis=0)

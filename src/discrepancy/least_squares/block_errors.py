@@ -3,35 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.fit import Fit
 
 Array = NDArray[np.float64]
-
-
-def with_block_errors(explanation: Explanation, rows_per_block: int) -> Explanation:
-    """The explanation with the causes' covariances from ``block_covariance``.
-
-    A transient fits into a block or two, which says nothing of how it would scatter; it keeps the fit's own covariance,
-    scaled by what is left.
-    """
-    if not explanation.found:
-        return explanation
-    inflation = max(1.0, explanation.after / explanation.samples)
-    covariance = block_covariance(explanation.fit, rows_per_block)
-    found = []
-    for index, item in zip(explanation.fit.free, explanation.found, strict=True):
-        units = explanation.problem.candidates[index].units
-        part = part_of(explanation.fit, covariance, index)
-        if item.candidate.transient:
-            part = inflation * explanation.fit.part(index)[1]
-        found.append(replace(item, covariance=part * np.outer(units, units)))
-    return replace(explanation, found=tuple(found))
 
 
 def block_covariance(fit: Fit, rows_per_block: int) -> Array:
@@ -64,5 +42,5 @@ def block_scores(fit: Fit, rows_per_block: int) -> Iterator[Array]:
 
 def part_of(fit: Fit, covariance: Array, index: int) -> Array:
     """One candidate's part of a covariance of a fit's solution, shape (k, k)."""
-    at = np.searchsorted(fit.used, np.arange(*fit.problem.spans[index].indices(1 << 30)))
+    at = fit.at(index)
     return np.asarray(covariance[np.ix_(at, at)], dtype=np.float64)

@@ -4,44 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from discrepancy import rules
+from discrepancy.least_squares.evidence import Evidence, visible
 from discrepancy.least_squares.gram import flat_inverse, gram_of, project
-
-if TYPE_CHECKING:
-    from discrepancy.least_squares.problem import Problem
+from discrepancy.least_squares.problem import Problem
+from discrepancy.rig import Candidate
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Evidence:
-    """What the data say about one candidate.
-
-    Attributes:
-        index: which candidate.
-        gain: how much chi-square falls when its parameters leave their tolerance.
-        fall: how much it falls when they are free in place of nought (the same where there is no tolerance).
-        parameters: how many of them (or of their combinations) the data can see.
-        log10_p: of such a gain on clean data.
-        score: gain less the penalty for parameters.
-        values: parameters in units, MAP with their own prior removed, shape (k,).
-        covariance: of the values, shape (k, k).
-    """
-
-    index: int
-    gain: float
-    fall: float
-    parameters: int
-    log10_p: float
-    score: float
-    values: Array
-    covariance: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,14 +44,41 @@ class Fit:
     def of(
         cls,
         problem: Problem,
-        gram: Array,
-        free: tuple[int, ...],
+        free: Sequence[int] = (),
+        trials: Sequence[int] | None = None,
         *,
         background: bool = True,
-        held: tuple[int, ...] = (),
+        fixed: tuple[int, Array] | None = None,
     ) -> Fit:
-        """Solve; see ``Problem.fit``."""
-        columns = gram.shape[0] - 1
+        """Least squares with tolerances as priors, except for the candidates in ``free``.
+
+        Args:
+            problem: what to solve.
+            free: indices of candidates whose parameters may leave their tolerance.
+            trials: which trials count; None for all.
+            background: whether the other candidates are in the model, within their tolerances.
+            fixed: a candidate held at given values (in units) instead.
+        """
+        grams = problem.grams if trials is None else problem.grams[list(trials)]
+        gram, held = grams.sum(axis=0), ()
+        if fixed is not None:
+            index, values = fixed
+            held, residual = (index,), np.eye(len(gram))
+            residual[problem.spans[index], -1] = -values  # without what the fixed values explain
+            gram = residual.T @ gram @ residual
+        return cls.of_gram(problem, gram, free, background=background, held=held)
+
+    @classmethod
+    def of_gram(
+        cls,
+        problem: Problem,
+        gram: Array,
+        free: Sequence[int],
+        *,
+        background: bool = True,
+        held: Sequence[int] = (),
+    ) -> Fit:
+        """The same for the Gram matrix of any of the problem's rows; candidates in ``held`` are not in the model."""
         prior = np.concatenate([np.zeros(problem.shared), problem.tolerant.astype(float)])
         used = np.concatenate([np.ones(problem.shared, dtype=bool), problem.tolerant & background])
         for index in held:
@@ -86,11 +87,11 @@ class Fit:
             prior[problem.spans[index]] = 0.0
             used[problem.spans[index]] = True
         at = np.flatnonzero(used)
-        H = gram[np.ix_(at, at)] + np.diag(prior[at])
-        covariance = flat_inverse(H)
-        b = gram[at, columns]
+        covariance = flat_inverse(gram[np.ix_(at, at)] + np.diag(prior[at]))
+        b = gram[at, -1]
         solution = covariance @ b
-        return cls(problem, free, at, solution, covariance, float(gram[-1, -1] - b @ solution), gram)
+        misfit = float(gram[-1, -1] - b @ solution)
+        return cls(problem, tuple(free), at, solution, covariance, misfit, gram)
 
     @property
     def coefficients(self) -> Array:
@@ -99,9 +100,30 @@ class Fit:
         full[self.used] = self.solution
         return full
 
+    @property
+    def shared(self) -> Array:
+        """Values of the shared unknowns, shape (s,)."""
+        return self.coefficients[: self.problem.shared]
+
+    @property
+    def active(self) -> list[tuple[Candidate, Array]]:
+        """Candidates without a prior, and their values in their own units."""
+        candidates = self.problem.candidates
+        return [(candidates[i], self.part(i)[0] * candidates[i].units) for i in self.free]
+
+    @property
+    def inflation(self) -> float:
+        """By which the noise's variance looks larger than believed, at least 1; clean data count as believed."""
+        return max(1.0, self.misfit / (rules.CLEAN_CHI2_PER_N * self.problem.samples))
+
+    def at(self, index: int) -> NDArray[np.intp]:
+        """Where one candidate's parameters are in the solution, shape (k,); it must be in the model."""
+        span = self.problem.spans[index]
+        return np.searchsorted(self.used, np.arange(span.start, span.stop))
+
     def part(self, index: int) -> tuple[Array, Array]:
         """Values and covariance of one candidate's parameters, in units; it must be in the model."""
-        at = np.searchsorted(self.used, np.arange(*self.problem.spans[index].indices(1 << 30)))
+        at = self.at(index)
         return self.solution[at], self.covariance[np.ix_(at, at)]
 
     @property
@@ -118,8 +140,12 @@ class Fit:
 
     def held_out(self, trial: int) -> float:
         """Chi-square of one trial under this solution, without the priors' part."""
+        return self.chi2_of(self.problem.grams[trial])
+
+    def chi2_of(self, gram: Array) -> float:
+        """The same of any rows, by their Gram matrix."""
         x = np.append(-self.coefficients, 1.0)
-        return float(x @ self.problem.grams[trial] @ x)
+        return float(x @ gram @ x)
 
     def local(self, trial: int) -> Array:
         """Values of a trial's own unknowns that go with the solution, shape (l,)."""
@@ -143,10 +169,7 @@ class Fit:
 
     def evidence_of(self, index: int, inflation: float = 1.0) -> Evidence | None:
         """Evidence of one candidate; None if it is free already or undecidable."""
-        if index in self.free:
-            return None
-        information, score, tolerant = self._information(self.problem.spans[index])
-        return self._judged(index, information, score, inflation, tolerant=tolerant)
+        return None if index in self.free else self._judged(index, self._told(index), inflation)
 
     def evidence_with(self, index: int, columns: Sequence[Array], inflation: float = 1.0) -> Evidence | None:
         """Evidence of a candidate that is not in the model, if its columns were others, shape (n, C, k) per trial.
@@ -154,15 +177,12 @@ class Fit:
         The same as that of ``Problem.with_columns``, without changing the problem.
         """
         units = self.problem.candidates[index].units
-        information, score = self._told_by([new * units for new in columns])
-        return self._judged(index, information, score, inflation, tolerant=self._tolerant(index))
+        return self._judged(index, self._told_by([new * units for new in columns]), inflation)
 
     def fall_with(self, columns: Sequence[Array]) -> float:
         """How much chi-square falls with further columns, shape (n, C, k) per trial, whose values are free."""
-        information, score = self._told_by(columns)
-        eigenvalues, vectors = np.linalg.eigh(information)
-        keep = eigenvalues > rules.LEAST_INFORMATION
-        return float(np.sum((vectors[:, keep].T @ score) ** 2 / eigenvalues[keep]))
+        lam, _, z = visible(*self._told_by(columns))
+        return float(np.sum(z**2 / lam))
 
     def solution_with(self, columns: Sequence[Array]) -> tuple[Array, Array]:
         """Values (k,) and covariance (k, k) of further columns, shape (n, C, k) per trial, beside all in the model."""
@@ -182,32 +202,9 @@ class Fit:
         cross = edge[self.used].T
         return information - cross @ self.covariance @ cross.T, edge[-1] - cross @ self.solution
 
-    def _judged(
-        self, index: int, information: Array, score: Array, inflation: float, *, tolerant: bool
-    ) -> Evidence | None:
-        eigenvalues, vectors = np.linalg.eigh(information)
-        keep = eigenvalues > rules.LEAST_INFORMATION
-        if not keep.any():
-            return None
-        lam, V = eigenvalues[keep], vectors[:, keep]
-        z = V.T @ score
-        fall = float(np.sum(z**2 / lam))
-        gain = (float(np.sum(z**2 / (lam * (1.0 + lam)))) if tolerant else fall) / inflation
-        k = len(lam)
-        return Evidence(
-            index,
-            gain,
-            fall,
-            k,
-            float(chi2.logsf(gain, k) / np.log(10.0)),
-            gain - rules.COMPLEXITY * k * np.log(self.problem.samples),
-            V @ (z / lam),
-            (V / lam) @ V.T,
-        )
-
-    def _tolerant(self, index: int) -> bool:
-        span, start = self.problem.spans[index], self.problem.shared
-        return bool(self.problem.tolerant[span.start - start : span.stop - start].all())
+    def _judged(self, index: int, told: tuple[Array, Array], inflation: float) -> Evidence | None:
+        tolerant, samples = self.problem.has_tolerance(index), self.problem.samples
+        return Evidence.of(index, told, tolerant=tolerant, inflation=inflation, samples=samples)
 
     def limits(self, gain: float) -> list[Array]:
         """Size of every candidate's parameters, each alone, that raises the evidence by ``gain``; infinite if none.
@@ -215,23 +212,21 @@ class Fit:
         In the parameters' own units; one array (k,) per candidate.
         """
         out = []
-        for candidate, span in zip(self.problem.candidates, self.problem.spans, strict=True):
-            information, _, tolerant = self._information(span)
-            lam, V = np.linalg.eigh(information)
-            keep = lam > rules.LEAST_INFORMATION
-            weight = lam[keep] / (1.0 + lam[keep]) if tolerant else lam[keep]
-            power = np.einsum("ik,k,ik->i", V[:, keep], weight, V[:, keep])
+        for index, candidate in enumerate(self.problem.candidates):
+            lam, V, _ = visible(*self._told(index))
+            weight = lam / (1.0 + lam) if self.problem.has_tolerance(index) else lam
+            power = np.einsum("ik,k,ik->i", V, weight, V)
             size = np.sqrt(gain / np.maximum(power, 1e-300))
             out.append(np.where(power > 0, candidate.units * size, np.inf))
         return out
 
-    def _information(self, span: slice) -> tuple[Array, Array, bool]:
-        """Information about a candidate given all else in the model, its score vector, and whether it has a prior."""
-        start = self.problem.shared
-        if self.problem.tolerant[span.start - start : span.stop - start].all():
-            at = np.searchsorted(self.used, np.arange(span.start, span.stop))
-            inverse = np.linalg.inv(self.covariance[np.ix_(at, at)])
-            return inverse - np.eye(len(at)), inverse @ self.solution[at], True
+    def _told(self, index: int) -> tuple[Array, Array]:
+        """Information about a candidate given all else in the model, and its score vector."""
+        if self.problem.has_tolerance(index):
+            values, covariance = self.part(index)
+            inverse = np.linalg.inv(covariance)
+            return inverse - np.eye(len(values)), inverse @ values
+        span = self.problem.spans[index]
         cross = self.gram[span][:, self.used]
         information = self.gram[span, span] - cross @ self.covariance @ cross.T
-        return information, self.gram[span, -1] - cross @ self.solution, False
+        return information, self.gram[span, -1] - cross @ self.solution

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.gram import gram_of, orthonormal, project
 from discrepancy.rig import Candidate, Rows
 
@@ -75,6 +74,11 @@ class Problem:
         """Number of whitened residuals in all trials."""
         return sum(r.shape[0] * r.shape[1] for r in self.rows)
 
+    def has_tolerance(self, index: int) -> bool:
+        """Whether a candidate has a tolerance; a cause has one for all of its parameters or for none."""
+        span = self.spans[index]
+        return bool(self.tolerant[span.start - self.shared : span.stop - self.shared].all())
+
     def index_of(self, candidate: Candidate) -> int | None:
         """Where a candidate of the same cause and place (and interval) is, or None."""
         for index, other in enumerate(self.candidates):
@@ -140,29 +144,3 @@ class Problem:
             (*self.candidates, candidate), tuple(raw), tuple(rows), self.local, self.explicable, np.array(grams),
             self.shared, (*self.spans, span), tolerant,
         )  # fmt: skip
-
-    def fit(
-        self,
-        free: Sequence[int] = (),
-        trials: Sequence[int] | None = None,
-        *,
-        background: bool = True,
-        fixed: tuple[int, Array] | None = None,
-    ) -> Fit:
-        """Least squares with tolerances as priors, except for the candidates in ``free``.
-
-        Args:
-            free: indices of candidates whose parameters may leave their tolerance.
-            trials: which trials count; None for all.
-            background: whether the other candidates are in the model, within their tolerances.
-            fixed: a candidate held at given values (in units) instead.
-        """
-        total = self.grams.sum(axis=0) if trials is None else self.grams[list(trials)].sum(axis=0)
-        held: tuple[int, ...] = ()
-        if fixed is not None:
-            index, values = fixed
-            held, span = (index,), self.spans[index]
-            full = np.eye(len(total))
-            full[span, -1] = -values  # the residual without what the fixed values explain
-            total = full.T @ total @ full
-        return Fit.of(self, total, tuple(free), background=background, held=held)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
+from scipy.linalg import solve_toeplitz, solve_triangular
 
 from discrepancy import rules
 
@@ -46,14 +46,14 @@ class Whitening:
         if order and moving > rules.ROWS_PER_COEFFICIENT * order:
             flat = _per_row(chol_moving, draws[:, :moving].reshape(-1, channels))
             white = flat.reshape(len(draws), moving, channels)
-            lag = [np.mean(white[:, k:] * white[:, : moving - k], axis=(0, 1)) for k in range(order + 1)]
+            lag = np.array(
+                [np.mean(white[:, k:] * white[:, : moving - k], axis=(0, 1)) for k in range(order + 1)]
+            )
             for c in range(channels):
-                if lag[0][c] < 1e-12:  # a channel without noise
+                if lag[0, c] < 1e-12:  # a channel without noise
                     continue
-                toeplitz = np.array([[lag[abs(i - j)][c] for j in range(order)] for i in range(order)])
-                right = np.array([lag[i + 1][c] for i in range(order)])
-                ar[c] = np.linalg.solve(toeplitz, right)
-                innovation[c] = np.sqrt(max(lag[0][c] - ar[c] @ right, 1e-6))
+                ar[c] = solve_toeplitz(lag[:order, c], lag[1:, c])  # Yule and Walker
+                innovation[c] = np.sqrt(max(lag[0, c] - ar[c] @ lag[1:, c], 1e-6))
         return cls(moving, chol_moving, chol_alone, ar, innovation)
 
     def __call__(self, x: Array) -> Array:
@@ -93,13 +93,9 @@ def _cholesky(draws: Array) -> Array:
 
 
 def _per_row(chol: Array, x: Array) -> Array:
-    """chol^-1 applied to axis -2 or, for plain rows, the last axis: shapes (..., C) or (n, C, k)."""
+    """chol^-1 applied to the channels of every row, shape (n, C, ...)."""
     if not x.size:
         return np.array(x, dtype=np.float64)
-    channels = len(chol)
-    axis = 1 if x.ndim > 2 and x.shape[1] == channels else x.ndim - 1
-    flat = np.moveaxis(x, axis, 0)
-    moved = np.moveaxis(
-        solve_triangular(chol, flat.reshape(channels, -1), lower=True).reshape(flat.shape), 0, axis
-    )
-    return moved.astype(np.float64)
+    by_channel = np.moveaxis(x, 1, 0)
+    solved = solve_triangular(chol, by_channel.reshape(len(chol), -1), lower=True).reshape(by_channel.shape)
+    return np.moveaxis(solved, 0, 1).astype(np.float64)

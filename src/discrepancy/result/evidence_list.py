@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from discrepancy import rules
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Candidate
@@ -24,7 +23,7 @@ def evidence_list(explanation: Explanation) -> dict[str, Any]:
     """
     problem = explanation.problem
     return {
-        "before": _strongest(explanation, problem.fit()),
+        "before": _strongest(explanation, Fit.of(problem)),
         "after": _strongest(explanation, explanation.fit) if explanation.fit.free else None,
         "by_chance": BY_CHANCE,
     }
@@ -32,8 +31,7 @@ def evidence_list(explanation: Explanation) -> dict[str, Any]:
 
 def _strongest(explanation: Explanation, fit: Fit) -> list[dict[str, Any]]:
     problem = explanation.problem
-    inflation = max(1.0, fit.misfit / (rules.CLEAN_CHI2_PER_N * problem.samples))
-    strongest = sorted(fit.evidence(inflation), key=lambda e: -e.gain)[:MOST]
+    strongest = sorted(fit.evidence(fit.inflation), key=lambda e: -e.gain)[:MOST]
     return [
         place_of(problem.candidates[e.index])
         | {

@@ -43,15 +43,16 @@ notes               sentences
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from discrepancy.causes.words import Words
-from discrepancy.engine.diagnose import Alternative, Diagnosis
+from discrepancy.engine.confirm import Alternative
+from discrepancy.engine.diagnose import Diagnosis
 from discrepancy.engine.explanation import Explanation, Found
 from discrepancy.engine.gain import Gain, Response
+from discrepancy.least_squares.fit import Fit
 from discrepancy.result.evidence_list import evidence_list, place_of
 from discrepancy.result.read import FORMAT, VERSION
 from discrepancy.result.sensitivity import blind_spots, detection_limits
@@ -73,7 +74,7 @@ def diagnosis_to_dict(
         estimates: what the rig estimates ``before`` and ``after``, plain JSON values; ``errors`` may lie beside them.
     """
     explanation = diagnosis.explanation
-    nominal = explanation.problem.fit(background=False)
+    nominal = Fit.of(explanation.problem, background=False)
     gain = None if diagnosis.gain is None else _gain(diagnosis.gain, rig, words)
     if estimates is not None:
         gain = gain or {
@@ -104,12 +105,12 @@ def diagnosis_to_dict(
         "detection_limits": detection_limits(explanation),
         "residual": {
             "chi2_per_n": explanation.after / explanation.samples,
-            "signature": plain(signature(rig, explanation)),
+            "signature": plain(signature(rig, explanation.fit)),
             "chi2_per_n_tolerated": explanation.before / explanation.samples,
             "tolerances": dict(zip(("chi2", "freedom", "log10_p"), _strain(explanation), strict=True)),
             "nominal": {
                 "chi2_per_n": nominal.misfit / explanation.samples,
-                "signature": plain(signature(rig, replace(explanation, fit=nominal))),
+                "signature": plain(signature(rig, nominal)),
             },
         },
         "notes": list(diagnosis.notes),

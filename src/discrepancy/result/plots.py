@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from discrepancy.causes.words import Words
 from discrepancy.result.plots_against import against_figure
 from discrepancy.result.plots_evidence import closed_loop_figure, evidence_figure
+from discrepancy.result.residual_statistics import running_rms
 from discrepancy.result.traces import Group, Trace, groups
 
 Array = NDArray[np.float64]
@@ -23,7 +24,6 @@ Array = NDArray[np.float64]
 PLOTS = ("residual_*.png", "evidence.png", "closed_loop.png")
 BEFORE, AFTER, CLEAN_BAND = "#c8553d", "#2f6fd0", "#d9dde3"
 COMPONENTS = ("#7a5195", "#d99a2b", "#2a9d8f")
-RUNNING_S = 1.0
 
 
 def save_plots(
@@ -111,17 +111,13 @@ def _components(axis: Axes, trace: Trace, group: Group, values: Array, scale: fl
 
 
 def _multiples(axis: Axes, trace: Trace, group: Group, *, named: bool) -> None:
-    width = max(1, round(RUNNING_S * trace.rate_hz))
     series = [("as simulated", trace.white_before, BEFORE)]
     series += [("with causes", trace.white_after, AFTER)] if named else []
     top = 1.0
     for label, white, colour in series:
         square = np.mean(white[:, list(group.columns)] ** 2, axis=1)
-        moving = square[: trace.moving]
-        if len(moving) > width:
-            moving = np.convolve(np.pad(moving, width // 2, mode="edge"), np.ones(width) / width, mode="same")
-            moving = moving[width // 2 : width // 2 + trace.moving]
-        rms = np.sqrt(np.concatenate([moving, square[trace.moving :]]))
+        moving = running_rms(square[: trace.moving], trace.rate_hz)
+        rms = np.concatenate([moving, np.sqrt(square[trace.moving :])])
         top = max(top, float(rms.max()))
         axis.plot(_broken(trace, trace.time), _broken(trace, rms), color=colour, linewidth=1.1, label=label)
         axis.plot(trace.time[trace.moving :], rms[trace.moving :], "o", color=colour, markersize=3)

@@ -7,21 +7,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.engine.explanation import Explanation
+from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Rig
 
 Array = NDArray[np.float64]
 
 
-def signature(rig: Rig, explanation: Explanation) -> dict[str, Any]:
-    """Describe what the causes leave of the whitened residual beyond noise, as plain numbers.
+def signature(rig: Rig, fit: Fit) -> dict[str, Any]:
+    """Describe what a fit leaves of the whitened residual beyond noise, as plain numbers.
 
     Returns:
         ``chi2_per_n`` in all and by ``kind`` of channel, ``robot``, ``trial``; ``moving_share``: part of the excess
         while the rig moves; ``correlation`` of its size with the rig's explanatory quantities; ``frequency_hz``:
         median frequency of the worst channel; ``along``: the source along which most of it points; ``sentence``.
     """
-    fit = explanation.fit
     z = [fit.remaining(t) for t in range(len(rig.trials))]
     squares = np.concatenate([(x**2) for x in z])
     out: dict[str, Any] = {"chi2_per_n": float(squares.mean())}

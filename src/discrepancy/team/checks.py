@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from discrepancy import rules
 from estimator.errors import InputError
-from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import CONTRADICTION
 from estimator.recording.model import Recording
@@ -45,29 +44,6 @@ def check_recordings(recordings: Sequence[Recording]) -> None:
             raise InputError(
                 f"{other.name} and {first.name} are of robots of different design; diagnose one at a time"
             )
-
-
-def check_masses(recordings: Sequence[Recording]) -> None:
-    """Recordings without a label may still be of different payloads in the same grasps.
-
-    Raises:
-        InputError: two of them do not say the same mass, each on its own.
-    """
-    masses = []
-    for recording in recordings if len(recordings) > 1 else ():
-        try:
-            alone = estimate_payload([recording])
-        except InputError:  # too little motion to tell on its own
-            continue
-        if alone.mass is not None:
-            masses.append((alone.mass.mass, alone.mass.se, recording.name))
-    if not masses:
-        return
-    (low, low_se, light), (high, high_se, heavy) = min(masses), max(masses)
-    if high - low > max(rules.MASS_TOLERANCE_SHARE * high, rules.MASS_TOLERANCE_SE * (low_se + high_se)):
-        raise InputError(
-            f"{light} says {low:.2f} kg and {heavy} says {high:.2f} kg; recordings must be of one payload"
-        )
 
 
 def check_estimate(estimate: PayloadEstimate) -> None:

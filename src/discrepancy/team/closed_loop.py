@@ -10,13 +10,19 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from discrepancy import rules
+from discrepancy.rig import Candidate
+from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes.base import Context
+from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.residual import Bases, Shared
+from discrepancy.team.linear.signals import Signals
 from estimator.errors import InputError
 from estimator.estimate.principal import inertia_matrix
 from estimator.recording.model import Recording
 from mocobot_sim.effects.base import Effect
-from mocobot_sim.effects.catalogue import apply_effects
+from mocobot_sim.effects.catalogue import apply_effects, make_effect
 from mocobot_sim.errors import TrialError
+from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.payload_mjcf import payload_mjcf
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.resimulate import predicted, resimulate
@@ -49,6 +55,55 @@ def team_of(
     mounts = RigidTransform.from_components(p, Rotation.from_matrix(bases.R))
     scene = build_team(payload, mounts=mounts, initial=initial, timestep_s=rules.TEAM_TIMESTEP_S)
     return apply_effects(scene, effects)
+
+
+def effect_of(candidate: Candidate, values: Array, context: Context) -> Effect | None:
+    """The simulator's effect, or None where the values are none that it can have (a negative play)."""
+    cause = CAUSES[candidate.cause]
+    parameters = cause.physical(values, context)
+    for name in cause.clipped:
+        parameters[name] = max(parameters[name], 0.0)
+    try:
+        return make_effect(candidate.cause, parameters, candidate.robot, candidate.joint)
+    except InputError:
+        return None
+
+
+def named_effect(candidate: Candidate, effect: Effect | None) -> Effect:
+    """The effect of a named cause.
+
+    Raises:
+        InputError: there is none.
+    """
+    if effect is None:
+        raise InputError(f"{candidate.label}: no effect has the values found; nothing to extend")
+    return effect
+
+
+def why_not(recording: Recording) -> str | None:
+    """Why a recording cannot be resimulated, or None."""
+    if recording.ref is None:
+        return f"{recording.name} has no commands (ref_x, ref_y, ref_z)"
+    if not recording.metadata.control or "feed_forward_N" not in recording.metadata.control:
+        return f"{recording.name} has no control gains and feed-forward in its metadata"
+    if recording.metadata.design != omnid_design():
+        return f"{recording.name} is of another design than the simulated Omnid"
+    return None
+
+
+def scale_of_response(noise: Noise, signals: Signals) -> dict[str, tuple[Array, Array]]:
+    """Standard deviation of the noise and of the motion, by channel, shape (N, 3) each."""
+    floors = {"phi": rules.PHI_FLOOR_RAD, "theta": rules.THETA_FLOOR_RAD, "tau": rules.TAU_FLOOR_NM}
+    out = {}
+    for k, (name, floor) in enumerate(floors.items()):
+        sigma = np.sqrt(noise.sigma[k] ** 2 + noise.step[k] ** 2 / 12.0 + floor**2)
+        out[name] = sigma, np.std(getattr(signals, name)[signals.keep], axis=0)
+    return out
+
+
+def impossible() -> None:
+    """What comes of a simulation with an effect that cannot be."""
+    return None
 
 
 def physical_inertia(inertia: Array) -> Array:

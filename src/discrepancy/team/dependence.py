@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.least_squares.whitening import Whitening
+from discrepancy.team.linear.slots import PHI, TAU, THETA
 from discrepancy.team.linear.trial_linear import TrialLinear
 
 Array = NDArray[np.float64]
@@ -19,7 +20,7 @@ def quantities_of(linear: TrialLinear) -> dict[str, Array]:
     return {
         "speed": np.sqrt(np.mean(twist[..., 3:] ** 2, axis=(1, 2))),
         "position": np.sqrt(np.mean((h - h.mean(axis=0)) ** 2, axis=(1, 2))),
-        "load": np.sqrt(np.mean(linear.s[at, :, 18:] ** 2, axis=(1, 2))),
+        "load": np.sqrt(np.mean(linear.s[at, :, TAU] ** 2, axis=(1, 2))),
     }
 
 
@@ -28,11 +29,12 @@ def directions_of(linear: TrialLinear, white: Whitening) -> dict[str, Array]:
     at = linear.reduction.sample
     out = {}
     for robot in range(linear.robots):
-        J = linear.J[robot][at]
+        whose, J = f"robot {robot + 1}'s", linear.J[robot][at]
+        tau, phi, theta = (J[:, :, kind] for kind in (TAU, PHI, THETA))
         for k in range(3):
-            out[f"robot {robot + 1}'s torque channel {k + 1}"] = _unit(white.rows_only(J[:, :, 18 + k]))
-            out[f"robot {robot + 1}'s driven angle {k + 1}"] = _unit(white.rows_only(J[:, :, k]))
-            out[f"robot {robot + 1}'s gimbal angle {'zyx'[k]}"] = _unit(white.rows_only(J[:, :, 9 + k]))
+            out[f"{whose} torque channel {k + 1}"] = _unit(white.rows_only(tau[..., k]))
+            out[f"{whose} driven angle {k + 1}"] = _unit(white.rows_only(phi[..., k]))
+            out[f"{whose} gimbal angle {'zyx'[k]}"] = _unit(white.rows_only(theta[..., k]))
     return out
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.result.diagnosed import Diagnosed
-from discrepancy.team.checks import check_estimate, check_masses, check_recordings
+from discrepancy.team.checks import check_estimate, check_recordings
 from discrepancy.team.estimates import errors, estimates
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
@@ -46,8 +46,7 @@ def diagnose_team(
     """
     check_recordings(recordings)
     say("estimate")
-    estimate = estimate_payload(recordings)
-    check_masses(recordings)
+    estimate = estimate_payload(recordings, compare_masses=True)
     check_estimate(estimate)
     say("linearise")
     known = read_tolerances(None) if tolerances is None else tolerances

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from discrepancy.engine.explanation import Explanation
+from discrepancy.least_squares.fit import Fit
 from discrepancy.team.linear.residual import Shared
 from discrepancy.team.rig import TeamRig
 from estimator.estimate.principal import inertia_matrix
@@ -25,11 +26,10 @@ def estimates(rig: TeamRig, explanation: Explanation) -> dict[str, Estimate]:
         Two dictionaries ``mass_kg``, ``p_1c_m`` [3], ``principal_inertia_kgm2`` [3] ascending, and ``grasps``: a list
         of ``p_1i_m`` [3] and ``R_1i_rotvec_deg`` [3].
     """
-    problem = explanation.problem
     out = {}
     for name, free in (("before", ()), ("after", explanation.fit.free)):
-        fit = problem.fit(free, background=False)
-        out[name] = to_dict(rig.linear[0].shared.moved(-fit.coefficients[: problem.shared]))
+        fit = Fit.of(explanation.problem, free, background=False)
+        out[name] = to_dict(rig.linear[0].shared.moved(-fit.shared))
     return out
 
 

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
-from discrepancy import rules
+from discrepancy.causes.excluded import excluded_from
 from discrepancy.engine.explanation import Explanation
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.rig import Candidate, Channel, Rows
+from discrepancy.rig import Candidate, Channel, Rig, Rows
 from discrepancy.team.candidates import (
     every_candidate,
     nearby_events,
@@ -25,29 +25,31 @@ from discrepancy.team.candidates import (
 )
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
-from discrepancy.team.closed_loop import resimulation_errors, team_of
+from discrepancy.team.closed_loop import (
+    effect_of,
+    impossible,
+    named_effect,
+    resimulation_errors,
+    scale_of_response,
+    team_of,
+    why_not,
+)
 from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.imitators import wrong_torques
-from discrepancy.team.linear.adjust import with_adjusted_torques
 from discrepancy.team.linear.noise import Noise
-from discrepancy.team.linear.reduction import Reduction
-from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.start import exact_residual, gauss_newton, linearised, start_shared
-from discrepancy.team.linear.trial_linear import TrialLinear, start_bases
+from discrepancy.team.linear.start import exact_residual, linearised_trials
+from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.undecidable import statements
-from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from mocobot_sim.effects.base import Effect
-from mocobot_sim.effects.catalogue import make_effect
 from mocobot_sim.extended.extended import write_extended
-from mocobot_sim.scene.models import omnid_design
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class TeamRig:
+class TeamRig(Rig):
     """Recordings of one payload, linearised around the best unknowns without any cause.
 
     Attributes:
@@ -83,44 +85,9 @@ class TeamRig:
             InputError: the recordings do not determine the grasps, the mass and the centre of mass, or a cause to
                 be excluded does not exist.
         """
-        unknown = sorted(set(excluded) - set(CAUSES))
-        if unknown:
-            raise InputError(f"cause {unknown[0]!r} does not exist; the causes are {', '.join(CAUSES)}")
-        shared = start_shared(estimate)
-        design = recordings[0].metadata.design
-        signals = [Signals.of(recording) for recording in recordings]
-        noise = Noise.of(signals)
-        reductions = [Reduction.of(s) for s in signals]
-        for recording, reduction in zip(recordings, reductions, strict=True):
-            if len(reduction.time) < 4:
-                raise InputError(f"{recording.name}: too short to diagnose")
-        bases = [start_bases(s, shared, design) for s in signals]
-        run = Parallel(n_jobs=jobs, prefer="processes" if jobs > 1 else "threads")
-        tasks = [(s, b, r, k) for k, (s, b, r) in enumerate(zip(signals, bases, reductions, strict=True))]
-        linear, whitening, torque_noise = zip(
-            *run(delayed(linearised)(s, shared, b, design, r, noise, k) for s, b, r, k in tasks), strict=True
-        )
-        for _ in range(2):
-            shared, bases = gauss_newton(linear, whitening)
-            linear = tuple(
-                replace(
-                    t,
-                    shared=shared,
-                    bases=b,
-                    residual=exact_residual(t.signals, shared, b, design, t.reduction),
-                )
-                for t, b in zip(linear, bases, strict=True)
-            )
-        linear = [with_adjusted_torques(*pair) for pair in zip(linear, torque_noise, strict=True)]
-        return cls(
-            tuple(recordings),
-            estimate,
-            noise,
-            tuple(linear),
-            tuple(whitening),
-            tolerances,
-            frozenset(excluded),
-        )
+        left_out = excluded_from(CAUSES, excluded)
+        noise, linear, whitening = linearised_trials(recordings, estimate, jobs)
+        return cls(tuple(recordings), estimate, noise, linear, whitening, tolerances, left_out)
 
     @property
     def trials(self) -> Sequence[str]:
@@ -167,25 +134,16 @@ class TeamRig:
         self, candidate: Candidate, values: Array, covariance: Array
     ) -> tuple[dict[str, float], dict[str, float]]:
         """Parameters of the simulator's effect, and their standard errors."""
-        pi = self.linear[0].shared.pi
-        context = Context(
-            pi[1:4] / pi[0],
-            self.linear[0].design.home_height_m,
-            candidate.shape,
-            candidate.transient.trial + 1 if candidate.transient else None,
-        )
-        return CAUSES[candidate.cause].report(values, covariance, context)
+        return CAUSES[candidate.cause].report(values, covariance, self._context(candidate))
+
+    def _context(self, candidate: Candidate) -> Context:
+        pi, at = self.linear[0].shared.pi, candidate.transient
+        height, trial = self.linear[0].design.home_height_m, None if at is None else at.trial + 1
+        return Context(pi[1:4] / pi[0], height, candidate.shape, trial)
 
     def effect(self, candidate: Candidate, values: Array) -> Effect | None:
-        """The simulator's effect, or None where the values are none that it can have (a negative friction)."""
-        k = len(values)
-        parameters = self.effect_parameters(candidate, values, np.zeros((k, k)))[0]
-        for name in CAUSES[candidate.cause].clipped:
-            parameters[name] = max(parameters[name], 0.0)
-        try:
-            return make_effect(candidate.cause, parameters, candidate.robot, candidate.joint)
-        except InputError:
-            return None
+        """The simulator's effect, or None where the values are none that it can have (a negative play)."""
+        return effect_of(candidate, values, self._context(candidate))
 
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         """Whether such values can be: no negative stiffness or friction, no mass that swings outside the payload."""
@@ -194,14 +152,7 @@ class TeamRig:
 
     def can_resimulate(self) -> str | None:
         """Why the recordings cannot be resimulated, or None."""
-        for recording in self.recordings:
-            if recording.ref is None:
-                return f"{recording.name} has no commands (ref_x, ref_y, ref_z)"
-            if not recording.metadata.control or "feed_forward_N" not in recording.metadata.control:
-                return f"{recording.name} has no control gains and feed-forward in its metadata"
-            if recording.metadata.design != omnid_design():
-                return f"{recording.name} is of another design than the simulated Omnid"
-        return None
+        return next(filter(None, map(why_not, self.recordings)), None)
 
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
@@ -214,7 +165,7 @@ class TeamRig:
         linear = self.linear[trial]
         effects = [self.effect(candidate, values) for candidate, values in active]
         if any(effect is None for effect in effects):
-            return _impossible
+            return impossible
         return partial(
             resimulation_errors,
             self.recordings[trial],
@@ -227,15 +178,7 @@ class TeamRig:
 
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
         """Standard deviation of the noise and of the motion, by channel, shape (N, 3) each."""
-        linear, floor = (
-            self.linear[trial],
-            {"phi": rules.PHI_FLOOR_RAD, "theta": rules.THETA_FLOOR_RAD, "tau": rules.TAU_FLOOR_NM},
-        )
-        out = {}
-        for k, name in enumerate(("phi", "theta", "tau")):
-            noise = np.sqrt(self.noise.sigma[k] ** 2 + self.noise.step[k] ** 2 / 12.0 + floor[name] ** 2)
-            out[name] = noise, np.std(getattr(linear.signals, name)[linear.signals.keep], axis=0)
-        return out
+        return scale_of_response(self.noise, self.linear[trial].signals)
 
     def unknowns(self, candidate: Candidate) -> list[Array]:
         """What a cause leaves open in every trial, whitened columns, shape (n, C, k) each."""
@@ -326,16 +269,12 @@ class TeamRig:
         Raises:
             InputError: the folder cannot be written, or a cause has values that no effect can have.
         """
-        effects = []
-        for found in explanation.found:
-            effect = self.effect(found.candidate, found.values)
-            if effect is None:
-                raise InputError(
-                    f"{found.candidate.label}: no effect has the values found; nothing to extend"
-                )
-            effects.append(effect)
-        fit = explanation.problem.fit(explanation.fit.free, background=False)
-        shared = self.linear[0].shared.moved(-fit.coefficients[: explanation.problem.shared])
+        effects = [
+            named_effect(found.candidate, self.effect(found.candidate, found.values))
+            for found in explanation.found
+        ]
+        fit = Fit.of(explanation.problem, explanation.fit.free, background=False)
+        shared = self.linear[0].shared.moved(-fit.shared)
         bases = self.linear[0].bases.moved(-fit.local(0)[: self.local_unknowns])
         first = self.recordings[0]
         scene = team_of(shared, bases, effects, (first.phi[0], first.theta[0]))
@@ -345,7 +284,3 @@ class TeamRig:
     def undecidable(self) -> list[dict[str, Any]]:
         """What recordings of a parked team with a rigid payload cannot decide."""
         return statements(self.robots)
-
-
-def _impossible() -> None:
-    return None

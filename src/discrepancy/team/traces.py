@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from discrepancy.engine.explanation import Explanation
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.result.traces import Trace
 from discrepancy.team.rig import TeamRig
@@ -16,7 +17,7 @@ Array = NDArray[np.float64]
 
 def traces(rig: TeamRig, explanation: Explanation) -> list[Trace]:
     """Residuals of every trial: ``before`` as simulated, ``after`` with the named causes and tolerances."""
-    nominal, out = explanation.problem.fit(background=False), []
+    nominal, out = Fit.of(explanation.problem, background=False), []
     for t, (linear, white) in enumerate(zip(rig.linear, rig.whitening, strict=True)):
         before, after = nominal.remaining(t), explanation.fit.remaining(t)
         sigma = np.empty_like(before)

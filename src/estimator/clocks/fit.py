@@ -24,6 +24,7 @@ from estimator import so3
 from estimator.arm.gimbal import rate_matrix
 from estimator.estimate.grasps import pair_rotation
 from estimator.filtering import differentiate
+from estimator.statistics import rms
 
 Array = NDArray[np.float64]
 
@@ -145,7 +146,7 @@ def fit_clock(
         if abs(shift) + abs(stretch) < _CONVERGED_S:
             break
     residual = q_1 - q_i @ R.T
-    rms_q = float(np.sqrt(np.mean(q_1**2)))
+    rms_q = rms(q_1)
     return ClockFit(
         offset_s=float(here + drift * (middle_s - centre)),
         drift=float(drift),
@@ -155,7 +156,7 @@ def fit_clock(
         residual=residual,
         rotated_rate=_determined(_turning(q_i @ R.T)),
         change=q_dot @ R.T,
-        mismatch=float(np.sqrt(np.mean(residual**2))) / rms_q if rms_q > 0 else np.inf,
+        mismatch=rms(residual) / rms_q if rms_q > 0 else np.inf,
     )
 
 

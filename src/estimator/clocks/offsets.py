@@ -24,6 +24,7 @@ from estimator.clocks.search import likely_lags
 from estimator.estimate.identifiability import StepReport, judge
 from estimator.estimate.uncertainty import WINDOW_S, window_covariance, window_normals, windows
 from estimator.recording.model import Recording
+from estimator.statistics import rms
 
 Array = NDArray[np.float64]
 
@@ -238,7 +239,7 @@ def _excitation(first: Rates, fit: ClockFit, robot: int, *, with_drift: bool = T
         f"clock of robot {robot}",
         ("offset", "drift")[: columns.shape[1]],
         columns.T @ columns / len(time),
-        float(np.sqrt(np.mean(disagreement**2))),
+        rms(disagreement),
         unit="rad/s^2",
         reason="the payload's angular velocity changes too little, too evenly or not alike at both grasps",
         floor=max(_RATE_FLOOR, _TRANSIENTS * float(np.linalg.norm(fit.change)) / len(time) ** 0.5),

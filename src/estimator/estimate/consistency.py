@@ -23,6 +23,7 @@ from estimator.estimate.inertia import InertiaEstimate, inertia_regressor
 from estimator.estimate.principal import inertia_parameters
 from estimator.signals.grasp_data import GraspData
 from estimator.signals.holds import STILL_RATE_RADPS, STILL_SPEED_MPS
+from estimator.statistics import rms_length
 
 Array = NDArray[np.float64]
 
@@ -163,10 +164,10 @@ def wrench_balance(
     force = motion.force - mass * (motion.acceleration + lever + data.gravity_mps2 * motion.up)
     weight = mass * data.gravity_mps2
     if inertia is None:
-        return _rms(force) / weight, None
+        return rms_length(force) / weight, None
     X = inertia_regressor(motion.omega, motion.alpha)
     moment = motion.moment - np.cross(p_1c, motion.force) - X @ inertia_parameters(inertia.inertia)
-    return _rms(force) / weight, _rms(moment) / weight
+    return rms_length(force) / weight, rms_length(moment) / weight
 
 
 def balance_flags(name: str, force: float, moment_m: float | None, grasps: GraspEstimate) -> list[str]:
@@ -184,10 +185,6 @@ def balance_flags(name: str, force: float, moment_m: float | None, grasps: Grasp
             "check the torques' columns."
         )
     return flags
-
-
-def _rms(vectors: Array) -> float:
-    return float(np.sqrt(np.mean(np.sum(vectors**2, axis=1))))
 
 
 def _disagreement(a: GraspEstimate, b: GraspEstimate) -> str | None:

@@ -30,6 +30,7 @@ from estimator.estimate.grasp_estimate import GraspEstimate, single_robot
 from estimator.estimate.identifiability import StepReport, cross_information, judge
 from estimator.estimate.uncertainty import WINDOW_S, window_covariance, windows
 from estimator.signals.grasp_data import GraspData
+from estimator.statistics import rms
 
 Array = NDArray[np.float64]
 
@@ -109,8 +110,8 @@ def estimate_grasps(
     pair_rms = np.zeros((2, N, N))
     for (i, j), e in zip(_pairs(N), _residuals(V, R, p), strict=True):
         pair_rms[:, i, j] = pair_rms[:, j, i] = np.sqrt(np.sum(e**2, axis=(1, 2)) / mean)
-    rms = np.sqrt(np.sum(V.reshape(-1, N, 2, 3) ** 2, axis=(0, 3)) / mean)
-    estimate = GraspEstimate(R, p, covariance, pair_rms[0], pair_rms[1], rms[:, 0], rms[:, 1])
+    motion = np.sqrt(np.sum(V.reshape(-1, N, 2, 3) ** 2, axis=(0, 3)) / mean)
+    estimate = GraspEstimate(R, p, covariance, pair_rms[0], pair_rms[1], motion[:, 0], motion[:, 1])
     return estimate, tuple(reports)
 
 
@@ -152,10 +153,10 @@ def _excitation(V_1: Array, V_j: Array, R: Array, p: Array, robot: int, samples:
 def _weights(V: Array, R: Array, p: Array) -> Array:
     """Weights (2, 1, 1) of angular and linear residuals: the inverse of their rms, the first scaled to 1."""
     r = _residuals(V, R, p)
-    motion = np.sqrt(np.mean(V[..., :3] ** 2)), np.sqrt(np.mean(V[..., 3:] ** 2))
+    motion = rms(V[..., :3]), rms(V[..., 3:])
     # The guard keeps exact data from dividing by zero.
-    rms = [max(float(np.sqrt(np.mean(r[:, k] ** 2))), 1e-12 * motion[k], 1e-300) for k in (0, 1)]
-    return np.array([1.0, rms[0] / rms[1]])[:, None, None]
+    left = [max(rms(r[:, k]), 1e-12 * motion[k], 1e-300) for k in (0, 1)]
+    return np.array([1.0, left[0] / left[1]])[:, None, None]
 
 
 def _refine(V: Array, R: Array, p: Array, weights: Array) -> tuple[Array, Array]:

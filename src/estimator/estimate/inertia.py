@@ -28,6 +28,7 @@ from estimator.estimate.uncertainty import (
     windows,
 )
 from estimator.signals.grasp_data import GraspData
+from estimator.statistics import rms
 
 Array = NDArray[np.float64]
 
@@ -123,19 +124,19 @@ def estimate_inertia(
     """
     parts = [_equations(trial, grasps, p_1c) for trial in trials]
     X, y = np.concatenate([part[0] for part in parts]), np.concatenate([part[1] for part in parts])
-    alpha_noise = float(np.sqrt(np.mean([acceleration_noise(trial, grasps) ** 2 for trial in trials])))
+    alpha_noise = rms([acceleration_noise(trial, grasps) for trial in trials])
     report = rotational_excitation(X, alpha_noise, step)
     if not report.determined:
         return None, report
     parameters = _solve(X, y)
     residual = y - X @ parameters
-    noise, signal = float(np.sqrt(np.mean(residual**2))), float(np.sqrt(np.mean((X @ parameters) ** 2)))
+    noise, signal = rms(residual), rms(X @ parameters)
     if signal < noise:
         why = f"the moments do not follow the motion (explained {signal:.2g} N m, left {noise:.2g} N m)"
         return None, refuse(report, np.eye(6), why)
 
     covariance = window_covariance(*window_normals(X, residual, trial_windows(trials, window_s)))
-    moment_scale, alpha_scale = np.sqrt(np.mean(y**2)), np.sqrt(np.mean(X[:, 0, 0] ** 2 + X[:, 1, 1] ** 2))
+    moment_scale, alpha_scale = rms(y), np.sqrt(np.mean(X[:, 0, 0] ** 2 + X[:, 1, 1] ** 2))
     typical = moment_scale / alpha_scale
     values, vectors = np.linalg.eigh(covariance)
     uncertain = vectors[:, np.sqrt(np.maximum(values, 0.0)) > SE_LIMIT * typical]

@@ -40,6 +40,7 @@ from estimator.estimate.principal import (
 from estimator.estimate.statics import ComEstimate, MassEstimate, weak_com_reason
 from estimator.estimate.uncertainty import WINDOW_S, numerical_jacobian, window_covariance, window_normals
 from estimator.signals.grasp_data import GraspData
+from estimator.statistics import rms
 
 Array = NDArray[np.float64]
 
@@ -100,7 +101,7 @@ def estimate_joint(
     motions = [fuse(trial, grasps) for trial in trials]
     Y, w, used = _equations(motions, trials)
     gravity = trials[0].gravity_mps2
-    alpha_noise = float(np.sqrt(np.mean([acceleration_noise(trial, grasps) ** 2 for trial in trials])))
+    alpha_noise = rms([acceleration_noise(trial, grasps) for trial in trials])
     inertia_report = rotational_excitation(Y[:, 3:, 4:], alpha_noise, step)
     # Directions without excitation leave the fit, the others of an open inertia stay: they explain moments.
     turning = _excited(inertia_report)
@@ -112,18 +113,18 @@ def estimate_joint(
             "check the sign of the torques"
         )
     residual = w - _spanned(Y, basis) @ theta
-    rms = np.sqrt(np.mean(residual.reshape(-1, 2, 3) ** 2, axis=(0, 2)))  # force, moment
+    force_rms, moment_rms = (rms(part) for part in (residual[:, :3], residual[:, 3:]))
     com_report = judge(
         "centre of mass p_1c",
         ("x", "y", "z"),
         cross_information(Y[:, :3, 0]) / gravity**2,
-        max(float(rms[1]) / (theta[0] * gravity), _tilt_noise(trials, grasps)),
+        max(moment_rms / (theta[0] * gravity), _tilt_noise(trials, grasps)),
         unit="rad",
         words="along",
         frame="{1}",
         floor=1e-9,
         reason=weak_com_reason(
-            "the payload hardly tilts about any axis across it", float(rms[1]), theta[0] * gravity
+            "the payload hardly tilts about any axis across it", moment_rms, theta[0] * gravity
         ),
     )
     if not com_report.determined:
@@ -156,16 +157,16 @@ def estimate_joint(
     covariance = own_covariance + J @ grasps.covariance @ J.T
 
     values = _centred(theta, K)
-    mass = MassEstimate(float(values[0]), float(np.sqrt(covariance[0, 0])), float(rms[0]))
+    mass = MassEstimate(float(values[0]), float(np.sqrt(covariance[0, 0])), force_rms)
     com = inertia = None
     if K >= 4:
         com = ComEstimate(
-            float(values[0]), values[1:4], covariance[:4, :4], own_covariance[:4, :4], J[1:4], float(rms[1])
+            float(values[0]), values[1:4], covariance[:4, :4], own_covariance[:4, :4], J[1:4], moment_rms
         )
     if K == 10:
         matrix, projected = project_positive(inertia_matrix(values[4:]))
         of_inertia = covariance[4:, 4:]
-        explained = float(np.sqrt(np.mean((Y[:, 3:, 4:] @ theta[4:]) ** 2)))
+        explained = rms(Y[:, 3:, 4:] @ theta[4:])
         eigenvalues, vectors = np.linalg.eigh(of_inertia)
         uncertain = vectors[:, np.sqrt(np.maximum(eigenvalues, 0.0)) > SE_LIMIT * np.trace(matrix) / 3]
         if uncertain.size:
@@ -173,7 +174,12 @@ def estimate_joint(
             inertia_report = refuse(inertia_report, uncertain.T, why)
         else:
             inertia = InertiaEstimate(
-                matrix, of_inertia, principal_inertia(matrix, of_inertia), projected, float(rms[1]), explained
+                matrix,
+                of_inertia,
+                principal_inertia(matrix, of_inertia),
+                projected,
+                moment_rms,
+                explained,
             )
     return JointEstimate(mass, com, inertia, covariance), (com_report, inertia_report)
 
@@ -224,8 +230,8 @@ def _weighted_solve(Y: Array, w: Array) -> tuple[Array, Array]:
     floor = 1e-9 * np.sqrt(np.mean(w.reshape(-1, 2, 3) ** 2, axis=(0, 2))) + 1e-12
     for _ in range(2):
         residual = (w - Y @ _solve(Y, w, weights)).reshape(-1, 2, 3)
-        rms = np.maximum(np.sqrt(np.mean(residual**2, axis=(0, 2))), floor)
-        weights = np.repeat(rms[0] / rms, 3)
+        left = np.maximum(np.sqrt(np.mean(residual**2, axis=(0, 2))), floor)
+        weights = np.repeat(left[0] / left, 3)
     return _solve(Y, w, weights), weights
 
 

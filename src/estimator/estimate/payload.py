@@ -23,8 +23,9 @@ from estimator.estimate.grasps import estimate_grasps
 from estimator.estimate.identifiability import StepReport
 from estimator.estimate.inertia import InertiaEstimate, estimate_inertia
 from estimator.estimate.joint import estimate_joint
+from estimator.estimate.one_payload import check_one_payload, mass_alone
 from estimator.estimate.result import PayloadEstimate, RecordingEstimate
-from estimator.estimate.statics import CONTRADICTION, ComEstimate, MassEstimate, estimate_com, estimate_mass
+from estimator.estimate.statics import CONTRADICTION, ComEstimate, estimate_from_holds
 from estimator.estimate.uncertainty import WINDOW_S
 from estimator.recording.model import Recording
 from estimator.signals.holds import Hold, find_holds
@@ -43,6 +44,8 @@ def estimate_payload(
     trim_s: float = 2.0,
     window_s: float = WINDOW_S,
     say: Callable[[str], object] = lambda _: None,
+    *,
+    compare_masses: bool = False,
 ) -> PayloadEstimate:
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
 
@@ -56,6 +59,7 @@ def estimate_payload(
         trim_s: time dropped at both ends of each recording [s].
         window_s: length of the windows for standard errors [s].
         say: takes the name of the stage that begins.
+        compare_masses: also refuse recordings that, each alone, say different masses (see ``check_one_payload``).
 
     Raises:
         InputError: the recordings do not belong together or contradict each other, the method needs what
@@ -69,7 +73,7 @@ def estimate_payload(
                 names.append(recording.name)
                 trials.append(_trial(recording, cutoff_hz, trim_s))
                 del recording  # or the next one would be read before this one is let go
-            return estimate_from_trials(trials, method, window_s, say)
+            return estimate_from_trials(trials, method, window_s, say, compare_masses=compare_masses)
     except (FloatingPointError, np.linalg.LinAlgError) as error:
         raise InputError(
             f"{', '.join(names)}: the equations cannot be solved ({error}); are the numbers in 'design' plausible?"
@@ -88,6 +92,8 @@ def estimate_from_trials(
     method: Method = "auto",
     window_s: float = WINDOW_S,
     say: Callable[[str], object] = lambda _: None,
+    *,
+    compare_masses: bool = False,
 ) -> PayloadEstimate:
     """The same from processed data; see ``estimate_payload``."""
     if method not in ("auto", "staged", "joint"):
@@ -107,7 +113,7 @@ def estimate_from_trials(
 
     say("mass and centre of mass")
     every_hold = [hold for found in holds for hold in found]
-    mass, com, com_step = _from_holds(every_hold, grasps, trials[0].data.gravity_mps2)
+    mass, com, com_step = estimate_from_holds(every_hold, grasps, trials[0].data.gravity_mps2)
     if method == "staged" and not every_hold:
         raise InputError(
             "method 'staged' needs static holds and the recordings have none; use 'joint' or 'auto'"
@@ -146,6 +152,12 @@ def estimate_from_trials(
     flags += [f"No centre of mass, and a doubtful mass: {doubt}." for doubt in sorted(doubts)[:1]]
     if mass is None and inertia is None and (grasps is None or grasps.robots == 1):
         raise InputError(f"nothing can be estimated from these recordings: {_why(steps)}")
+    if compare_masses and len(trials) > 1:
+        say("the mass of each recording")
+        check_one_payload(
+            (trial.name, mass_alone(trial.data, found, record.grasps, window_s))
+            for trial, found, record in zip(trials, holds, records, strict=True)
+        )
     return PayloadEstimate(
         payload=payload,
         robots=trials[0].data.robots,
@@ -176,17 +188,6 @@ def _grasps(
     check_agreement([name for name, _ in found], [grasps for _, grasps in found])
     pooled, steps = estimate_grasps([trial.data for trial in trials], window_s)
     return pooled, list(steps)
-
-
-def _from_holds(
-    holds: Sequence[Hold], grasps: GraspEstimate | None, gravity_mps2: float
-) -> tuple[MassEstimate | None, ComEstimate | None, StepReport | None]:
-    if not holds:
-        return None, None, None
-    mass = estimate_mass(holds, gravity_mps2)
-    if grasps is None:
-        return mass, None, None
-    return mass, *estimate_com(holds, mass, grasps, gravity_mps2)
 
 
 def _moving(trials: Sequence[Trial], holds: Sequence[Sequence[Hold]]) -> list[int]:

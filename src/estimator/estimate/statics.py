@@ -27,6 +27,7 @@ from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.identifiability import StepReport, cross_information, judge
 from estimator.estimate.uncertainty import numerical_jacobian
 from estimator.signals.holds import Hold
+from estimator.statistics import rms
 
 Array = NDArray[np.float64]
 
@@ -88,7 +89,7 @@ def estimate_mass(holds: Sequence[Hold], gravity_mps2: float) -> MassEstimate:
     residual = vertical - vertical.mean()
     between = _between(residual @ residual, len(holds) - 1, float(np.mean(within)))
     se = np.sqrt(np.mean(within) + between) / np.sqrt(len(holds)) / gravity_mps2
-    return MassEstimate(mass, float(se), float(np.sqrt(np.mean(residual**2))))
+    return MassEstimate(mass, float(se), rms(residual))
 
 
 def estimate_com(
@@ -152,8 +153,23 @@ def estimate_com(
     J = numerical_jacobian(com, np.zeros(len(grasps.covariance)))
     total = covariance.copy()
     total[1:, 1:] += J @ grasps.covariance @ J.T
-    rms = float(np.sqrt(np.mean(residual**2)))
-    return ComEstimate(mass.mass, p_1c, total, covariance, J, rms), report
+    return ComEstimate(mass.mass, p_1c, total, covariance, J, rms(residual)), report
+
+
+def estimate_from_holds(
+    holds: Sequence[Hold], grasps: GraspEstimate | None, gravity_mps2: float
+) -> tuple[MassEstimate | None, ComEstimate | None, StepReport | None]:
+    """Mass and centre of mass as far as there are holds and grasps for them.
+
+    Raises:
+        InputError: the robots do not carry anything.
+    """
+    if not holds:
+        return None, None, None
+    mass = estimate_mass(holds, gravity_mps2)
+    if grasps is None:
+        return mass, None, None
+    return mass, *estimate_com(holds, mass, grasps, gravity_mps2)
 
 
 def weak_com_reason(tilt: str, moment_rms: float, weight: float) -> str:

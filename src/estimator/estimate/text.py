@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from estimator.estimate.result import PayloadEstimate
+from estimator.numbers import measured
 
 
 def format_estimate(estimate: PayloadEstimate) -> str:
@@ -97,8 +98,8 @@ def _inertia(estimate: PayloadEstimate) -> list[str]:
 
 def _line(name: str, value: float, se: float, unit: str, *, percent: bool = True) -> str:
     share = f" ({100 * se / abs(value):.2g} %)" if percent and value else ""
-    digits = 6 if se <= 0 else int(np.clip(1 - np.floor(np.log10(se)), 0, 9))
-    return f"    {name + ':':<14}{value:>14.{digits}f} +- {se:.{digits}f} {unit}{share}"
+    shown, error = measured(value, se) if 0 < se < np.inf else (f"{value:.6f}", f"{se:.6f}")
+    return f"    {name + ':':<14}{shown:>14} +- {error} {unit}{share}"
 
 
 def _none(name: str) -> str:

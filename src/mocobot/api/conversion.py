@@ -14,7 +14,7 @@ from mocobot_logs import convert as below
 from mocobot_logs.convert_report import format_conversion
 from mocobot_logs.map.files import read_map
 from mocobot_logs.open_log import open_log
-from mocobot_logs.resample.resample import MAX_GAP_S, RATE_HZ
+from mocobot_logs.resample.log import MAX_GAP_S, RATE_HZ
 from mocobot_sim.scene.models import omnid_design
 
 

@@ -91,7 +91,7 @@ def diagnose(
     Args:
         recordings: of one payload, or paths of their files; several, so that what is named can be validated.
         truth: of the payload, for the errors of the estimates; it is not looked at before the verdict.
-        tolerances: TOML file that says how far a healthy robot may be off (docs/diagnosis.md); None for the defaults.
+        tolerances: TOML file: how far a healthy robot may be off (docs/diagnosis/guide.md); None for the defaults.
         exclude: causes not to consider.
         closed_loop: whether to run the recorded commands again, without and with what is found.
         jobs: parallel processes.

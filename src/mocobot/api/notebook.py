@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 from xml.etree import ElementTree
 
-import numpy as np
-
 from estimator.estimate.result import PayloadEstimate
-from mocobot_report.blocks.blocks import Entry, Num, bullets, component, measurement, quantity, table, tidy
 from mocobot_report.blocks.html import Child, Node, el
-from mocobot_report.blocks.numbers import NONE, percent, plain
+from mocobot_report.blocks.numbers import percent, plain
+from mocobot_report.blocks.payload import distance, mass, moment, place
+from mocobot_report.blocks.prose import bullets, tidy
+from mocobot_report.blocks.tables import Entry, Num, measurement, quantity, table
 
 Values = Mapping[str, Any]
 STYLE = (
@@ -24,23 +24,10 @@ STYLE = (
 def estimate_html(estimate: PayloadEstimate) -> str:
     """Mass, centre of mass, principal moments and grasps with standard errors, then doubts."""
     e = estimate
-    rows: list[list[Entry]] = [["mass", measurement(e.mass.mass, e.mass.se) if e.mass else Num(NONE), "kg"]]
-    rows += [
-        [quantity(f"p_1c {axis}"), component(e.p_1c, e.p_1c_se_m, k, 1e3), "mm"]
-        for k, axis in enumerate("xyz")
-    ]
-    moments = e.inertia.principal if e.inertia else None
-    for k in range(3):
-        value = component(moments.moments, moments.moments_se, k) if moments else Num(NONE)
-        rows.append([f"principal moment {k + 1}", value, "kg m²"])
-    for j in range(2, e.robots + 1):
-        pair = e.grasps.pair(1, j) if e.grasps else None
-        distance = (
-            measurement(1e3 * float(np.linalg.norm(pair.p_ij)), 1e3 * pair.distance_se_m)
-            if pair
-            else Num(NONE)
-        )
-        rows.append([quantity(f"distance p_1{j}"), distance, "mm"])
+    rows: list[list[Entry]] = [["mass", mass(e), "kg"]]
+    rows += [[quantity(f"p_1c {axis}"), place(e, k), "mm"] for k, axis in enumerate("xyz")]
+    rows += [[f"principal moment {k + 1}", moment(e, k), "kg m²"] for k in range(3)]
+    rows += [[quantity(f"distance p_1{j}"), distance(e, 1, j), "mm"] for j in range(2, e.robots + 1)]
     title = f"Payload ({e.payload})" if e.payload is not None else "Payload"
     said = f"{len(e.recordings)} recording{'s' * (len(e.recordings) != 1)}, {e.method}; p in {{1}}"
     doubts = [*e.flags, *(f"Not determined: {weak}." for weak in e.undetermined)]

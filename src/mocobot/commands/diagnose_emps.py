@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from discrepancy.causes.tolerances_file import read_tolerances
-from discrepancy.emps.catalogue import DEFAULTS
+from discrepancy.emps.catalogue import default_tolerances
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.diagnosis import diagnose_emps
 from discrepancy.emps.recording.axis_log import AxisLog
@@ -30,7 +30,7 @@ def run(options: Diagnose) -> None:
             f"{len(options.rec)} recordings are given; the emps rig takes one and cuts it into blocks that validate "
             "each other"
         )
-    tolerances = read_tolerances(options.tolerances, DEFAULTS)
+    tolerances = read_tolerances(options.tolerances, default_tolerances())
 
     def diagnosed(log: AxisLog, say: Say, simulated: Count) -> Diagnosed:
         return diagnose_emps(

@@ -1,1 +1,1 @@
-"""Stamps and channels."""
+"""Stamps and channels of one robot: rates, gaps, frozen sensors, resolution."""

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.quantisation import quantisation_step
 from mocobot_inspect.stream.frozen import Frozen, frozen
-from mocobot_inspect.stream.resolution import noise_level, quantisation_step
+from mocobot_inspect.stream.noise import noise_level
 from mocobot_logs.log import NS, Stamps
 
 Array = NDArray[np.float64]

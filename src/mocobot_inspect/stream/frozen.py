@@ -8,7 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from mocobot_inspect.stream.resolution import noise_level, quantisation_step
+from estimator.quantisation import quantisation_step
+from mocobot_inspect.stream.noise import noise_level
 
 Array = NDArray[np.float64]
 

@@ -23,8 +23,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.statistics import rms
 from mocobot_inspect.wiring.motion import Fault, Grasp
-from mocobot_inspect.wiring.rigid_body import FARTHEST_M, Body, cross, rigid_body, rms
+from mocobot_inspect.wiring.rigid_body import FARTHEST_M, Body, cross, rigid_body
 
 Array = NDArray[np.float64]
 

@@ -20,6 +20,7 @@ from estimator.arm.dynamics import arm_torque
 from estimator.arm.gimbal import angular_motion, rotation
 from estimator.arm.wrist_level import driven_motion
 from estimator.recording.checks import TORQUE_FACTOR
+from estimator.statistics import rms
 from mocobot_inspect.signals import Signals, noise_gains
 
 Array = NDArray[np.float64]
@@ -155,14 +156,14 @@ def grasp_motion(
     value, rate, _ = noise_gains()
     lever = 1.0 if wrist else design.proximal_length_m  # of driven rates and torques, in order of magnitude
     of_theta, of_position, of_effort = (
-        _rms(signals.group(kind).noise[robot]) for kind in ("theta", "position", "effort")
+        rms(signals.group(kind).noise[robot]) for kind in ("theta", "position", "effort")
     )
     # A wrong posture turns and stretches forces, too: by as much as it is off, in order of magnitude.
     off = value * (of_position / design.proximal_length_m if wrist else of_position)
     noise = [
         rate * of_theta,
         rate * lever * of_position,
-        float(np.hypot(value * of_effort / lever, _POSTURE * off * _rms(force))),
+        float(np.hypot(value * of_effort / lever, _POSTURE * off * rms(force))),
         value * of_theta,
     ]
     grasp = Grasp(
@@ -219,7 +220,3 @@ def _solve(matrix: Array, right: Array) -> Array:
 
 def _into(R_bi: Array, vector: Array) -> Array:
     return np.einsum("qji,qj->qi", R_bi, vector)
-
-
-def _rms(x: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(x))))

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from estimator.estimate.identifiability import FACTOR, cross_information
 from estimator.estimate.joint import newton_euler_regressor
+from estimator.so3 import chordal_mean
+from estimator.statistics import rms
 from mocobot_inspect.wiring.motion import Grasp
 
 Array = NDArray[np.float64]
@@ -111,10 +113,7 @@ def rigid_body(told: Sequence[Grasp], most_noise: Array | None = None) -> Body |
 
 def rotation_onto(a: Array, b: Array) -> Array:
     """The rotation R that brings the vectors b nearest to a in the mean, shapes (Q, 3)."""
-    U, _, V_T = np.linalg.svd(a.T @ b)
-    turn = np.ones(3)
-    turn[2] = np.sign(np.linalg.det(U @ V_T))
-    return np.asarray((U * turn) @ V_T, dtype=np.float64)
+    return chordal_mean((a.T @ b)[None])
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -122,11 +121,6 @@ def cross(a: Array, b: Array) -> Array:
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     u, v, w = b[..., 0], b[..., 1], b[..., 2]
     return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
-
-
-def rms(x: Array) -> float:
-    """Root mean square of all entries."""
-    return float(np.sqrt(np.mean(np.square(x))))
 
 
 def _position(w: Array, difference: Array) -> Array:

@@ -2,7 +2,7 @@
 
 Channels are found by a map: a topic and a joint of its sensor_msgs/msg/JointState, or a dotted path in any other
 message. Time is the messages' ``header.stamp``, or when they were logged if the map says so. Where channels of one
-robot come from several topics, these are brought onto the stamps of the fastest (``bag_align``); commands that a log
+robot come from several topics, these are brought onto the stamps of the fastest (``align``); commands that a log
 may lack are left out if they are not stamped together with the samples. A joint that single messages lack gives NaN.
 
 A bag is read once from front to back, a few MiB at a time, however long it is.

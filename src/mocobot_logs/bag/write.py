@@ -13,13 +13,11 @@ times are the recording's times. The maps ``mocobot-ros2`` and ``omnid-ros2`` re
 
 from __future__ import annotations
 
-import os
-import shutil
 import sqlite3
-import uuid
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -41,6 +39,7 @@ from rosbags.typesys.store import Typestore
 
 from estimator.arm.wrist_level import wrist_of
 from estimator.errors import InputError
+from estimator.files import whole_file, whole_folder
 from estimator.recording.model import Recording
 from mocobot_logs.bag.mcap_writer import ChecksummedMcap
 from mocobot_logs.bag.messages import Topic
@@ -103,25 +102,26 @@ def write_bag(
             raise InputError(f"{path}: {what} is {value!r:.40}; it must be one of {', '.join(allowed)}")
     single = _check_target(path, storage)
     stamps = _stamps(recording)
-    temporary = path.parent / f".{uuid.uuid4().hex}.tmp"
     name = path.stem if single else path.name
+    plugin = StoragePlugin[storage.upper()]
     try:
-        temporary.mkdir()
-        with _Writer(
-            temporary / name, version=_VERSION, storage_plugin=StoragePlugin[storage.upper()]
-        ) as bag:
-            _write(recording, stamps, level, bag, advance)
-        if single:
-            os.replace(temporary / name / f"{name}{SUFFIXES[storage]}", path)
-        else:
-            os.replace(temporary / name, path)  # takes the place of an empty folder
+        with (
+            whole_file(path) if single else whole_folder(path) as target,
+            TemporaryDirectory(dir=path.parent, prefix=".") as scratch,
+        ):
+            folder = Path(scratch) / name  # a bag's files are named like its folder
+            with _Writer(folder, version=_VERSION, storage_plugin=plugin) as bag:
+                _write(recording, stamps, level, bag, advance)
+            for file in folder.iterdir():
+                if not single:
+                    file.replace(target / file.name)
+                elif file.suffix == SUFFIXES[storage]:
+                    file.replace(target)
     except InputError:
         raise
     except (OSError, ValueError, sqlite3.Error, WriterError) as error:
         detail = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be written ({detail})") from error
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
 
 
 def _check_target(path: Path, storage: Storage) -> bool:

@@ -8,6 +8,7 @@ from importlib import resources
 from pathlib import Path
 
 from estimator.errors import InputError
+from mocobot_logs.claims import read_small
 from mocobot_logs.faults import detail_of
 from mocobot_logs.map.log_map import ChannelMap, CsvMap, LogMap, TimeMap
 from mocobot_logs.map.parse import parse_map
@@ -66,11 +67,7 @@ def _read(path: Path) -> str:
             raise InputError(f"map {path}: there is no such file, and the built-in maps are {names}")
         if not path.is_file():
             raise InputError(f"map {path}: is not a file; name a TOML file or one of {names}")
-        with path.open("rb") as file:
-            content = file.read(_LARGEST_BYTES + 1)
-        if len(content) > _LARGEST_BYTES:
-            raise InputError(f"map {path}: is larger than {_LARGEST_BYTES >> 20} MiB, which no map is")
-        return content.decode("utf-8")
+        return read_small(path, _LARGEST_BYTES, f"map {path}", "map").decode("utf-8")
     except UnicodeDecodeError as error:
         raise InputError(f"map {path}: is not a text file in UTF-8 ({error.reason})") from error
     except (OSError, ValueError) as error:

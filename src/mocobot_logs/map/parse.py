@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-import difflib
 import re
-import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any, Literal, get_args
 
 from estimator.errors import InputError
 from estimator.recording.metadata import TRIALS
+from estimator.strict import Fields, check_known
 from mocobot_logs.log import CHANNELS, REF, Level
 from mocobot_logs.map.log_map import PLACEHOLDERS, ChannelMap, CsvMap, LogMap, TimeMap
 from mocobot_logs.map.units import COUNTS, TIME_UNITS, si_factor, units_of
 
 VERSION = 1
 MAX_ROBOTS = 1000
-_TOP = ("version", "level", "robots", "trial", "time", "csv", "defaults", "channels", "robot")
+_REQUIRED = ("version", "level", "channels")
+_OPTIONAL = ("robots", "trial", "time", "csv", "defaults", "robot")
 _TIME = ("column", "unit", "clock")
 _CSV = ("delimiter", "decimal")
 _CHANNEL = ("topic", "joint", "field", "column", "unit", "sign", "offset", "counts_per_turn", "optional")
-KEYS = (*_TOP, *_TIME, *_CSV, *_CHANNEL)
+KEYS = (*_REQUIRED, *_OPTIONAL, *_TIME, *_CSV, *_CHANNEL)
 """Every key of a map but the channels' names."""
 _JOINT_FIELDS = ("position", "velocity", "effort")
-_LARGEST = sys.float_info.max
 
 Values = Mapping[str, Any]
 
@@ -42,17 +41,14 @@ def parse_map(values: Values, name: str) -> LogMap:
     version = values.get("version", VERSION)
     if type(version) is not int or version != VERSION:  # before all else: other versions may have other keys
         raise InputError(f"{where}: version is {version!r:.40}; this program reads version {VERSION}")
-    _known(values, _TOP, where)
-    _present(values, ("version", "level", "channels"), where)
-    level: Level = _one_of(values, "level", get_args(Level), where)
+    top = Fields(values, _REQUIRED, where, _OPTIONAL)
+    level: Level = top.one_of("level", get_args(Level))
     robots = values.get("robots")
     if robots is not None and (type(robots) is not int or not 1 <= robots <= MAX_ROBOTS):
-        raise InputError(
-            f"{where}: robots is {robots!r:.40}; it must be a whole number from 1 to {MAX_ROBOTS}"
-        )
-    trial = _one_of(values, "trial", TRIALS, where) if "trial" in values else None
+        top.refuse("robots", f"a whole number from 1 to {MAX_ROBOTS}")
+    trial = top.one_of("trial", TRIALS) if "trial" in top else None
     defaults = _table(values, "defaults", where)
-    _known(defaults, _CHANNEL, f"{where}: defaults")
+    check_known(defaults, _CHANNEL, f"{where}: defaults")
     common, own = _channels(values, level, defaults, where), _overrides(values, robots, where)
     return LogMap(
         name=name,
@@ -78,15 +74,12 @@ def parse_map(values: Values, name: str) -> LogMap:
 
 
 def _channels(values: Values, level: Level, defaults: Values, where: str) -> dict[str, dict[str, Any]]:
-    tables = _table(values, "channels", where)
-    inside = f"{where}: channels"
-    _known(tables, (*CHANNELS[level], *REF), inside)
-    _present(tables, CHANNELS[level], inside)
-    if any(name in tables for name in REF):
-        _present(tables, REF, inside)
+    tables, inside = _table(values, "channels", where), f"{where}: channels"
+    with_commands = any(name in tables for name in REF)
+    Fields(tables, (*CHANNELS[level], *(REF if with_commands else ())), inside, () if with_commands else REF)
     found = {name: _table(tables, name, inside) for name in tables}
     for name, table in found.items():
-        _known(table, _CHANNEL, f"{inside}.{name}")
+        check_known(table, _CHANNEL, f"{inside}.{name}")
         if "unit" not in table and "unit" not in defaults:
             units = ", ".join(units_of(name))
             raise InputError(f"{inside}.{name}: missing key 'unit'; it is one of {units}")
@@ -102,16 +95,16 @@ def _overrides(values: Values, robots: int | None, where: str) -> dict[int, dict
             raise InputError(f"{inside}: there is no such robot; robots are counted from 1 to {last}")
         if not isinstance(table, dict):
             raise InputError(f"{inside} is {table!r:.40}; it must be a table with the key channels")
-        _known(table, ("channels",), inside)
+        check_known(table, ("channels",), inside)
         channels = _table(table, "channels", inside)
         own[int(key)] = {name: _table(channels, name, f"{inside}.channels") for name in channels}
         for name, entry in own[int(key)].items():
-            _known(entry, _CHANNEL, f"{inside}.channels.{name}")
+            check_known(entry, _CHANNEL, f"{inside}.channels.{name}")
     return own
 
 
 def _mapped(name: str, common: Values, where: str) -> bool:
-    _known({name: None}, tuple(common), where)
+    check_known((name,), tuple(common), where)
     return True
 
 
@@ -125,7 +118,8 @@ def _merged(*tables: Values) -> dict[str, Any]:
 
 
 def _channel(name: str, values: Values, where: str) -> ChannelMap:
-    parts = {key: _text(values, key, where) for key in ("topic", "joint", "field", "column")}
+    fields = Fields(values, ("unit",), where, _CHANNEL)
+    parts = {key: _text(fields, key) for key in ("topic", "joint", "field", "column")}
     if parts["column"] is None and (parts["topic"] is None or parts["field"] is None):
         missing = (
             "topic" if parts["field"] is not None else "field" if parts["topic"] is not None else "column"
@@ -139,72 +133,48 @@ def _channel(name: str, values: Values, where: str) -> ChannelMap:
         )
     sign = values.get("sign", 1)
     if type(sign) is not int or sign not in (1, -1):
-        raise InputError(f"{where}: sign is {sign!r:.40}; it must be 1 or -1")
-    unit, per_turn = values["unit"], values.get("counts_per_turn")
-    if per_turn is not None:
+        fields.refuse("sign", "1 or -1")
+    unit, per_turn = values["unit"], None
+    if "counts_per_turn" in fields:
         if unit != COUNTS:
             raise InputError(f"{where}: counts_per_turn goes with unit 'counts' only, not with {unit!r:.40}")
-        if _number(values, "counts_per_turn", where) < 1.0:
-            raise InputError(
-                f"{where}: counts_per_turn is {per_turn!r:.40}; it must be a number of at least 1"
-            )
+        per_turn = fields.number("counts_per_turn", 1.0)
     if not isinstance(unit, str):
-        raise InputError(f"{where}: unit is {unit!r:.40}; it must be one of {', '.join(units_of(name))}")
+        fields.refuse("unit", f"one of {', '.join(units_of(name))}")
     optional = values.get("optional", False)
     if type(optional) is not bool or (optional and name not in REF):
-        raise InputError(
-            f"{where}: optional is {optional!r:.40}; it is true or false, and true for {', '.join(REF)} only"
-        )
+        fields.refuse("optional", f"true or false, and true for {', '.join(REF)} only")
     return ChannelMap(
         **parts,
         scale=sign * si_factor(name, unit, per_turn, where),
-        offset=_number(values, "offset", where) if "offset" in values else 0.0,
+        offset=fields.number("offset") if "offset" in fields else 0.0,
         optional=optional,
     )
 
 
 def _time(values: Values, where: str) -> TimeMap:
-    _known(values, _TIME, where)
-    if "column" in values:
-        _present(values, ("unit",), where)
+    fields = Fields(values, ("unit",) if "column" in values else (), where, _TIME)
     return TimeMap(
-        column=_text(values, "column", where),
-        unit=_one_of(values, "unit", tuple(TIME_UNITS), where) if "unit" in values else "s",
-        clock=_one_of(values, "clock", ("header", "log"), where) if "clock" in values else "header",
+        column=_text(fields, "column"),
+        unit=fields.one_of("unit", TIME_UNITS) if "unit" in fields else "s",
+        clock=fields.one_of("clock", ("header", "log")) if "clock" in fields else "header",
     )
 
 
 def _csv(values: Values, where: str) -> CsvMap:
-    _known(values, _CSV, where)
+    fields = Fields(values, (), where, _CSV)
     delimiter = values.get("delimiter")
-    decimal: Literal[".", ","] = _one_of(values, "decimal", (".", ","), where) if "decimal" in values else "."
+    decimal: Literal[".", ","] = fields.one_of("decimal", (".", ",")) if "decimal" in fields else "."
     if delimiter is not None and (
         not isinstance(delimiter, str)
         or len(delimiter) != 1
         or delimiter in '"\r\n.'
         or not delimiter.isascii()
     ):
-        raise InputError(
-            f'{where}: delimiter is {delimiter!r:.40}; it must be one character such as ",", ";" or "\\t"'
-        )
+        fields.refuse("delimiter", 'one character such as ",", ";" or "\\t"')
     if delimiter is not None and delimiter == decimal:
         raise InputError(f"{where}: delimiter and decimal are both {decimal!r}; they must differ")
     return CsvMap(delimiter, decimal)
-
-
-def _known(values: Values, valid: Iterable[str], where: str) -> None:
-    valid = tuple(valid)
-    for key in values:
-        if key not in valid:
-            close = difflib.get_close_matches(key, valid, n=1)
-            hint = f" (did you mean {close[0]!r}?)" if close else ""
-            raise InputError(f"{where}: unknown key {key!r:.60}{hint}; the keys are {', '.join(valid)}")
-
-
-def _present(values: Values, required: tuple[str, ...], where: str) -> None:
-    for key in required:
-        if key not in values:
-            raise InputError(f"{where}: missing key {key!r}; required are {', '.join(required)}")
 
 
 def _table(values: Values, key: str, where: str) -> dict[str, Any]:
@@ -214,32 +184,14 @@ def _table(values: Values, key: str, where: str) -> dict[str, Any]:
     return table
 
 
-def _one_of(values: Values, key: str, allowed: tuple[Any, ...], where: str) -> Any:
-    value = values[key]
-    if not isinstance(value, str) or value not in allowed:
-        raise InputError(
-            f"{where}: {key} is {value!r:.40}; it must be one of {', '.join(map(repr, allowed))}"
-        )
-    return value
-
-
-def _number(values: Values, key: str, where: str) -> float:
-    value = values[key]
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _LARGEST:
-        raise InputError(f"{where}: {key} is {value!r:.40}; it must be a finite number")
-    return float(value)
-
-
-def _text(values: Values, key: str, where: str) -> str | None:
-    if key not in values:
+def _text(fields: Fields, key: str) -> str | None:
+    if key not in fields:
         return None
-    value = values[key]
-    if not isinstance(value, str) or not value or not value.isprintable():
-        raise InputError(f"{where}: {key} is {value!r:.60}; it must be printable text")
-    for placeholder in re.findall(r"\{([^{}]*)\}", value):
+    text = fields.text(key)
+    for placeholder in re.findall(r"\{([^{}]*)\}", text):
         if placeholder not in PLACEHOLDERS:
             valid = ", ".join(f"{{{name}}}" for name in PLACEHOLDERS)
             raise InputError(
-                f"{where}: {key} holds the placeholder '{{{placeholder:.40}}}'; the placeholders are {valid}"
+                f"{fields.where}: {key} holds the placeholder '{{{placeholder:.40}}}'; the placeholders are {valid}"
             )
-    return value
+    return text

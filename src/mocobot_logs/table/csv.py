@@ -14,6 +14,7 @@ import pyarrow.csv as pcsv
 
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
+from mocobot_logs.faults import detail_of
 from mocobot_logs.map.log_map import CsvMap
 from mocobot_logs.table.stamps import from_text
 from mocobot_logs.table.table import Block
@@ -23,6 +24,10 @@ MAX_LINE_BYTES = 1 << 20
 DELIMITERS = (",", ";", "\t", "|", " ")
 EMPTY = ["", " ", "NA", "N/A", "n/a", "NULL", "null", "None", "-"]
 """Cells that stand for no value."""
+_NUMBER = re.compile(
+    r"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf(inity)?|nan(\(\w*\))?)", re.ASCII | re.IGNORECASE
+)
+"""As pyarrow reads them."""
 
 
 class CsvTable:
@@ -77,95 +82,78 @@ class CsvTable:
         if self._empty:
             return
         row = before = 0
-        with self._readable() as source:
-            reader = self._reader(source, types)
-            while (batch := self._next(reader)) is not None:
-                yield Block(
-                    {
-                        # A cell without a value is NaN.
-                        name: pc.fill_null(batch.column(f"{index[name]}"), float("nan")).to_numpy(
-                            zero_copy_only=False
-                        )
-                        for name in columns
-                    },
-                    {
-                        name: from_text(
-                            self._point(batch.column(f"{index[name]}")),
-                            unit_ns,
-                            f"{self.name}: column {name!r}",
-                            row,
-                        )
-                        for name in clocks
-                    },
-                )
-                row += batch.num_rows
-                advance(source.tell() - before)
-                before = source.tell()
-
-    def _readable(self) -> pa.NativeFile:
-        try:
-            return pa.OSFile(str(self._path), "rb")
-        except OSError as error:
-            raise InputError(f"{self.name}: cannot be read ({error.strerror or error})") from error
-
-    def _reader(self, source: pa.NativeFile, types: dict[str, pa.DataType]) -> pcsv.CSVStreamingReader:
-        try:
-            return pcsv.open_csv(
-                source,
-                read_options=pcsv.ReadOptions(
-                    use_threads=False,
-                    block_size=BLOCK_BYTES,
-                    skip_rows=self._lines_before,
-                    column_names=[f"{k}" for k in range(len(self._names))],
-                ),
-                parse_options=pcsv.ParseOptions(delimiter=self._delimiter),
-                convert_options=pcsv.ConvertOptions(
-                    column_types=types,
-                    include_columns=list(types),
-                    null_values=EMPTY,
-                    strings_can_be_null=True,
-                    quoted_strings_can_be_null=True,
-                    decimal_point=self._decimal,
-                ),
+        for batch, end in self._batches(types):
+            yield Block(
+                {
+                    # A cell without a value is NaN.
+                    name: pc.fill_null(batch.column(f"{index[name]}"), float("nan")).to_numpy(
+                        zero_copy_only=False
+                    )
+                    for name in columns
+                },
+                {
+                    name: from_text(
+                        self._point(batch.column(f"{index[name]}")),
+                        unit_ns,
+                        f"{self.name}: column {name!r}",
+                        row,
+                    )
+                    for name in clocks
+                },
             )
+            row += batch.num_rows
+            advance(end - before)
+            before = end
+
+    def _batches(self, types: Mapping[str, pa.DataType]) -> Iterator[tuple[pa.RecordBatch, int]]:
+        """Rows of some columns, and how far in the file they end."""
+        rows = 0
+        try:
+            with pa.OSFile(str(self._path), "rb") as source:
+                for batch in pcsv.open_csv(
+                    source,
+                    read_options=pcsv.ReadOptions(
+                        use_threads=False,
+                        block_size=BLOCK_BYTES,
+                        skip_rows=self._lines_before,
+                        column_names=[f"{k}" for k in range(len(self._names))],
+                    ),
+                    parse_options=pcsv.ParseOptions(delimiter=self._delimiter),
+                    convert_options=pcsv.ConvertOptions(
+                        column_types=types,
+                        include_columns=list(types),
+                        null_values=EMPTY,
+                        strings_can_be_null=True,
+                        quoted_strings_can_be_null=True,
+                        decimal_point=self._decimal,
+                    ),
+                ):
+                    yield batch, source.tell()
+                    rows += batch.num_rows
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-            raise self._complaint(error) from error
+            numbers = [int(column) for column, kind in types.items() if kind == pa.float64()]
+            raise InputError(f"{self.name}: {self._first_fault(numbers, rows) or _plain(error)}") from error
 
-    def _next(self, reader: pcsv.CSVStreamingReader) -> pa.RecordBatch | None:
-        try:
-            return reader.read_next_batch()
-        except StopIteration:
-            return None
-        except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
-            raise self._complaint(error) from error
-
-    def _complaint(self, error: Exception) -> InputError:
-        text = str(error)
-        row = re.search(r"Row #(\d+)", text)
-        line = f" in line {self._line_of(int(row[1]))}" if row else ""
-        if found := re.search(r"In CSV column #(\d+).*invalid value '(.*)", text, re.DOTALL):
-            column, cell = self._names[int(found[1])], found[2].removesuffix("'")
-            return InputError(
-                f"{self.name}: column {column!r:.80} holds {cell!r:.60}{line}; it must hold numbers"
-            )
-        if found := re.search(r"Expected (\d+) columns, got (\d+)", text):
-            return InputError(
-                f"{self.name}: {found[2]} cells{line}; every row must have {found[1]}, like the header"
-            )
-        if "straddling" in text:
-            return InputError(
-                f"{self.name}: a row is longer than {BLOCK_BYTES >> 20} MiB; this is no table of samples"
-            )
-        return InputError(f"{self.name}: cannot be read as CSV ({' '.join(text.split())!r:.200})")
-
-    def _line_of(self, row: int) -> int:
-        """Line of the file, given the row as pyarrow counts it: without the blank lines after the header."""
+    def _first_fault(self, numbers: list[int], good: int) -> str:
+        """The first row that does not fit the header or has no number where one must be, after so many good rows."""
         with contextlib.suppress(OSError), self._path.open("rb") as file:
-            for number, line in enumerate(file, 1):
-                row += number > self._lines_before and not line.strip(b"\r\n")
-                if number >= row:
-                    break
-        return row
+            for line, content in enumerate(iter(lambda: file.readline(BLOCK_BYTES + 1), b""), 1):
+                if len(content) > BLOCK_BYTES:
+                    return f"a row is longer than {BLOCK_BYTES >> 20} MiB; this is no table of samples"
+                text = content.decode(errors="replace").strip("\r\n")
+                if line <= self._lines_before or not text:
+                    continue
+                good -= 1
+                cells = _cut(text, self._delimiter, strict=False) if good < 0 else self._names
+                if len(cells) != (count := len(self._names)):
+                    return f"{len(cells)} cells in line {line}; every row must have {count}, like the header"
+                for k in numbers if good < 0 else ():
+                    if cells[k] not in EMPTY and not _is_number(cells[k], self._decimal):
+                        column, cell = self._names[k], cells[k]
+                        return (
+                            f"column {column!r:.80} holds {cell!r:.60} in line {line}; it must hold numbers"
+                        )
+        return ""
 
     def _index(self, name: str) -> int:
         if (count := self._names.count(name)) > 1:
@@ -219,16 +207,16 @@ def _find_delimiter(header: str, row: str, decimal: str) -> str:
     return best or next((d for d in DELIMITERS if d != decimal and len(_cut(header, d)) > 1), ",")
 
 
-def _cut(line: str, delimiter: str) -> list[str]:
+def _cut(line: str, delimiter: str, *, strict: bool = True) -> list[str]:
     try:
-        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, strict=True), [])]
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, strict=strict), [])]
     except csv.Error:  # such as an unmatched quotation mark
         return []
 
 
 def _is_number(cell: str, decimal: str) -> bool:
-    try:
-        float(cell.replace(decimal, "."))
-    except ValueError:
-        return False
-    return True
+    return _NUMBER.fullmatch(cell.replace(decimal, "\0").replace(".", "?").replace("\0", ".")) is not None
+
+
+def _plain(error: Exception) -> str:
+    return f"cannot be read as CSV ({detail_of(error)!r})"

@@ -8,18 +8,20 @@ Features are columns of lists; ``meta/info.json`` names their numbers. Several e
 from __future__ import annotations
 
 import json
-import string
+import re
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyarrow as pa
+import pyarrow.compute as pc
+import pyarrow.dataset as ds
 
 from estimator.errors import InputError
-from estimator.recording.metadata import RecordingMetadata
+from mocobot_logs.claims import check_claim, read_small
 from mocobot_logs.faults import detail_of
-from mocobot_logs.table.parquet import ParquetTable, opened
+from mocobot_logs.table.parquet import ParquetTable, told_in_one_sentence
 from mocobot_logs.table.stamps import LARGEST_NS
 from mocobot_logs.table.table import Block
 
@@ -29,6 +31,10 @@ EPISODE, FRAME, TIMESTAMP = "episode_index", "frame_index", "timestamp"
 NAME_COLUMNS = (EPISODE, "data/chunk_index", "data/file_index")
 CLOSE_FRAMES = 0.01
 """Of a frame: so far a timestamp may be from ``frame_index / fps`` and still be its rounded value."""
+_DATA_PATH = re.compile(r"(?!/)([^{}]|\{(chunk_index|file_index)(:0[36]d)?\})+")
+_SCAN = ds.ParquetFragmentScanOptions(
+    use_buffered_stream=True, pre_buffer=False, page_checksum_verification=True
+)
 
 Files = Mapping[Path, set[int] | None]
 """Data files, each with its episodes where the dataset says."""
@@ -68,13 +74,16 @@ class LeRobotTable(ParquetTable):
         info = _read_info(root, name)
         files: Files = _data_files(root, info, name) if path.is_dir() else {path: None}
         self._fps = info["fps"]
-        self._episode, chosen = _choose(files, episode, name)
-        super().__init__(chosen, name)
-        self.metadata: RecordingMetadata | None = None
-        self.sparse = True
+        episode, chosen = _choose(files, episode, name)
+        self._data = _dataset(chosen, name)
         for column in (EPISODE, FRAME, TIMESTAMP):
-            if column not in self.shapes:
+            if column not in self._data.schema.names:
                 raise InputError(f"{name}: its Parquet files have no column {column!r}")
+        self._filter = pc.field(EPISODE) == episode
+        with told_in_one_sentence(name):
+            size = self._data.count_rows(filter=self._filter)
+        self._set_up(name, self._data.schema, size, *_extent(self._data))
+        self.metadata, self.sparse = None, True
         self.aliases: Mapping[str, tuple[str, tuple[int, ...]]] = _aliases(info["features"], self.shapes)
 
     def blocks(
@@ -89,16 +98,15 @@ class LeRobotTable(ParquetTable):
         Raises:
             InputError: a file is damaged, or holds what is not a number.
         """
-        extra = (EPISODE, FRAME) if TIMESTAMP in clocks else (EPISODE,)
-        for block in super().blocks((*columns, *extra), clocks, unit_ns, advance):
-            keep = block.columns[EPISODE].reshape(-1) == self._episode
-            if not keep.any():
-                continue
-            stamps = {name: (stamp[keep], given[keep]) for name, (stamp, given) in block.clocks.items()}
-            if TIMESTAMP in stamps:
-                stamp, given = stamps[TIMESTAMP]
-                stamps[TIMESTAMP] = self._exact(stamp, block.columns[FRAME].reshape(-1)[keep]), given
-            yield Block({name: block.columns[name][keep] for name in columns}, stamps)
+        for block in super().blocks((*columns, FRAME), clocks, unit_ns, advance):
+            if TIMESTAMP in clocks:
+                stamp, given = block.clocks[TIMESTAMP]
+                exact = self._exact(stamp, block.columns[FRAME].reshape(-1))
+                block = Block(block.columns, {**block.clocks, TIMESTAMP: (exact, given)})
+            yield block
+
+    def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
+        return _read(self._data, self.name, columns=names, filter=self._filter, batch_size=rows)
 
     def _exact(self, stamp: np.ndarray, frame: np.ndarray) -> np.ndarray:
         exact_ns = frame.astype(np.float64) * (1e9 / self._fps)
@@ -110,15 +118,10 @@ class LeRobotTable(ParquetTable):
 
 def _read_info(root: Path, name: str) -> dict[str, Any]:
     where = f"{name}: {INFO}"
+    content = read_small(root / INFO, MAX_INFO_BYTES, where, "dataset's description")
     try:
-        with (root / INFO).open("rb") as file:
-            content = file.read(MAX_INFO_BYTES + 1)
-        if len(content) > MAX_INFO_BYTES:
-            raise InputError(f"{where} is larger than {MAX_INFO_BYTES >> 20} MiB")
         info = json.loads(content)
-    except InputError:
-        raise
-    except (OSError, ValueError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:
         raise InputError(f"{where} cannot be read ({detail_of(error)})") from error
     if not isinstance(info, dict):
         raise InputError(f"{where} must be a JSON object, not {info!r:.60}")
@@ -138,43 +141,28 @@ def _read_info(root: Path, name: str) -> dict[str, Any]:
 
 def _data_files(root: Path, info: dict[str, Any], name: str) -> Files:
     """Data files and, where ``meta/episodes`` says so, the episodes in each; all under ``data`` otherwise."""
-    files: dict[Path, set[int] | None] = {}
+    files: dict[Path, set[int]] = {}
     listings = sorted((root / "meta" / "episodes").glob("*/*.parquet"))
     template = _template(info.get("data_path"), name) if listings else ""
-    for listing in listings:
-        with opened(listing, f"{name}: {listing.relative_to(root)}") as file:
-            missing = [column for column in NAME_COLUMNS if column not in file.schema_arrow.names]
-            if missing:
-                raise InputError(f"{name}: {listing.relative_to(root)} has no column {missing[0]!r}")
-            rows = file.read(columns=list(NAME_COLUMNS)).to_pydict()
-        for episode, chunk, number in zip(*(rows[column] for column in NAME_COLUMNS), strict=True):
-            if not all(type(value) is int and 0 <= value < 10**9 for value in (episode, chunk, number)):
-                raise InputError(
-                    f"{name}: {listing.relative_to(root)} holds {episode!r}, {chunk!r}, {number!r:.40}"
-                )
-            path = root / template.format(chunk_index=chunk, file_index=number)
-            found = files.setdefault(path, set())
-            if found is not None:
-                found.add(episode)
+    if listings:
+        where = f"{name}: {listings[0].parents[1].relative_to(root)}"
+        data = _dataset(listings, where)
+        missing = [column for column in NAME_COLUMNS if column not in data.schema.names]
+        if missing:
+            raise InputError(f"{where} has no column {missing[0]!r}")
+        for batch in _read(data, where, columns=list(NAME_COLUMNS)):
+            for place in zip(*batch.to_pydict().values(), strict=True):
+                if not all(type(value) is int and 0 <= value < 10**9 for value in place):
+                    raise InputError(f"{where} holds {', '.join(f'{value!r:.40}' for value in place)}")
+                episode, chunk, number = place
+                path = root / template.format(chunk_index=chunk, file_index=number)
+                files.setdefault(path, set()).add(episode)
     return files or dict.fromkeys(sorted((root / "data").glob("*/*.parquet")))
 
 
 def _template(data_path: Any, name: str) -> str:
     """The dataset's own pattern of file names, unless it could lead anywhere else."""
-    valid = (
-        isinstance(data_path, str) and not Path(data_path).is_absolute() and ".." not in Path(data_path).parts
-    )
-    if valid:
-        try:
-            fields = [
-                (field, spec)
-                for _, field, spec, _ in string.Formatter().parse(data_path)
-                if field is not None
-            ]
-        except ValueError:
-            fields = [("", "")]
-        valid = all(f in ("chunk_index", "file_index") and (s or "") in ("", "03d", "06d") for f, s in fields)
-    if not valid:
+    if not isinstance(data_path, str) or not _DATA_PATH.fullmatch(data_path) or ".." in Path(data_path).parts:
         raise InputError(
             f"{name}: {INFO}: data_path is {data_path!r:.80}; it must be like "
             "'data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet'"
@@ -185,8 +173,8 @@ def _template(data_path: Any, name: str) -> str:
 def _choose(files: Files, episode: int | None, name: str) -> tuple[int, list[Path]]:
     if not files:
         raise InputError(f"{name}: has no Parquet files under data")
-    inside = {path: known if known is not None else _episodes_in(path, name) for path, known in files.items()}
-    every = sorted({number for numbers in inside.values() for number in numbers})
+    told = [known for known in files.values() if known is not None]
+    every = sorted(set[int]().union(*told) if told else _episodes_in(list(files), name))
     if not every:
         raise InputError(f"{name}: has no episodes")
     listed = f"{every[0]}" if len(every) == 1 else f"{every[0]} to {every[-1]}"
@@ -196,19 +184,43 @@ def _choose(files: Files, episode: int | None, name: str) -> tuple[int, list[Pat
         episode = every[0]
     if episode not in every:
         raise InputError(f"{name}: there is no episode {episode}; it holds {len(every)}, {listed}")
-    return episode, [path for path, numbers in inside.items() if episode in numbers]
+    return episode, [path for path, known in files.items() if known is None or episode in known]
 
 
-def _episodes_in(path: Path, name: str) -> set[int]:
-    with opened(path, name) as file:
-        if EPISODE not in file.schema_arrow.names or not pa.types.is_integer(
-            file.schema_arrow.field(EPISODE).type
-        ):
-            raise InputError(f"{name}: its Parquet files have no column {EPISODE!r} of whole numbers")
-        found: set[int] = set()
-        for batch in file.iter_batches(columns=[EPISODE], use_threads=False):
-            found.update(number for number in batch.column(0).unique().to_pylist() if number is not None)
-    return found
+def _episodes_in(paths: list[Path], name: str) -> set[int]:
+    data = _dataset(paths, name)
+    if EPISODE not in data.schema.names or not pa.types.is_integer(data.schema.field(EPISODE).type):
+        raise InputError(f"{name}: its Parquet files have no column {EPISODE!r} of whole numbers")
+    batches = _read(data, name, columns=[EPISODE])
+    return {n for batch in batches for n in batch.column(0).unique().to_pylist() if n is not None}
+
+
+def _dataset(paths: list[Path], name: str) -> ds.Dataset:
+    """Files of the same columns as one.
+
+    Raises:
+        InputError: a file cannot be read, their columns differ, or they claim more than measured samples can take.
+    """
+    with told_in_one_sentence(name):
+        data = ds.dataset(
+            [str(path) for path in paths], format=ds.ParquetFileFormat(default_fragment_scan_options=_SCAN)
+        )
+        if any(not part.physical_schema.equals(data.schema) for part in data.get_fragments()):
+            raise InputError(f"{name}: its Parquet files have different columns")
+        rows, stored_bytes = _extent(data)
+    check_claim(8 * len(NAME_COLUMNS) * rows, stored_bytes, name)
+    return data
+
+
+def _extent(data: ds.Dataset) -> tuple[int, int]:
+    """Number of rows and bytes of all files."""
+    return data.count_rows(), sum(Path(file).stat().st_size for file in data.files)
+
+
+def _read(data: ds.Dataset, name: str, **what: Any) -> Iterator[pa.RecordBatch]:
+    """Batches in the order of the files, as few as possible in memory; row groups of other episodes are left out."""
+    with told_in_one_sentence(name):
+        yield from data.to_batches(**what, use_threads=False, batch_readahead=0, fragment_readahead=0)
 
 
 def _aliases(

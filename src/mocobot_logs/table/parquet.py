@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -24,40 +24,46 @@ Clock = tuple[Stamps, NDArray[np.bool_]]
 
 
 class ParquetTable:
-    """One or more Parquet files of the same columns as a ``Table``.
+    """A Parquet file as a ``Table``.
 
     Columns may hold numbers or lists of always as many numbers; time may also be a timestamp, whose unit is its own.
     """
 
     aliases: Mapping[str, tuple[str, tuple[int, ...]]] = {}
     time_column = "time"
-    sparse = True
 
-    def __init__(self, files: Sequence[Path], name: str) -> None:
-        """Look at the files' footers.
+    def __init__(self, path: Path, name: str) -> None:
+        """Look at the file's footer.
 
         Raises:
-            InputError: a file cannot be read, or their columns differ.
+            InputError: the file cannot be read.
         """
-        self.name, self._files = name, tuple(files)
-        self.metadata: RecordingMetadata | None = None
-        self.size = 0
-        schemas: list[pa.Schema] = []
-        for path in self._files:
-            with opened(path, name) as file:
-                self.size += file.metadata.num_rows
-                schemas.append(file.schema_arrow)
-        self._schema = schemas[0]
-        if any(not schema.equals(self._schema) for schema in schemas):
-            raise InputError(f"{name}: its Parquet files have different columns")
-        repeated = next((n for n in self._schema.names if self._schema.names.count(n) > 1), None)
+        self._path = path
+        with opened(path, name) as file:
+            rows, schema = file.metadata.num_rows, file.schema_arrow
+        self._set_up(name, schema, rows, rows, path.stat().st_size)
+
+    def _set_up(self, name: str, schema: pa.Schema, size: int, rows: int, stored_bytes: int) -> None:
+        """Take the columns.
+
+        Args:
+            name: what to call the table in messages.
+            schema: its columns.
+            size: number of its rows.
+            rows: number of rows to go through for them.
+            stored_bytes: what these take.
+        """
+        self.name, self.size = name, size
+        self._schema, self._rows, self._stored_bytes = schema, rows, stored_bytes
+        repeated = next((n for n in schema.names if schema.names.count(n) > 1), None)
         if repeated is not None:
             raise InputError(f"{name}: column {repeated!r:.80} appears more than once")
-        text = (self._schema.metadata or {}).get(METADATA_KEY)
-        if text is not None:
-            self.metadata = RecordingMetadata.from_json(text, where=f"{name}: metadata")
-            # Rows without any value are part of a broken recording, which is to be seen as it is.
-            self.sparse = False
+        text = (schema.metadata or {}).get(METADATA_KEY)
+        where = f"{name}: metadata"
+        told = None if text is None else RecordingMetadata.from_json(text, where=where)
+        self.metadata: RecordingMetadata | None = told
+        # Rows without any value are part of a broken recording, which is to be seen as it is.
+        self.sparse = self.metadata is None
         self.shapes: Mapping[str, tuple[int, ...]] = self._row_shapes()
 
     def blocks(
@@ -67,26 +73,26 @@ class ParquetTable:
         unit_ns: int,
         advance: Callable[[int], object],
     ) -> Iterator[Block]:
-        """Rows in the order of the files, see ``Table.blocks``.
+        """Rows in the order of the file, see ``Table.blocks``.
 
         Raises:
-            InputError: a file is damaged, or holds what is not a number.
+            InputError: the file is damaged, or holds what is not a number.
         """
         names = list(dict.fromkeys([*columns, *clocks]))
         for name in names:
             self._check_type(name, time=name in clocks)
         cells = sum(int(np.prod(self.shapes[name], dtype=np.int64)) for name in names)
+        check_claim(8 * cells * self._rows, self._stored_bytes, f"{self.name}: the table")
         row = 0
-        for path in self._files:
-            with opened(path, self.name) as file:
-                check_claim(
-                    8 * cells * file.metadata.num_rows, path.stat().st_size, f"{self.name}: the table"
-                )
-                for batch in file.iter_batches(rows_at_a_time(cells), columns=names, use_threads=False):
-                    yield self._block(batch, columns, clocks, unit_ns, row)
-                    row += batch.num_rows
-                    advance(batch.num_rows)
+        for batch in self._batches(names, rows_at_a_time(cells)):
+            yield self._block(batch, columns, clocks, unit_ns, row)
+            row += batch.num_rows
+            advance(batch.num_rows)
         pa.default_memory_pool().release_unused()
+
+    def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
+        with opened(self._path, self.name) as file:
+            yield from file.iter_batches(rows, columns=names, use_threads=False)
 
     def _block(
         self, batch: pa.RecordBatch, columns: tuple[str, ...], clocks: tuple[str, ...], unit_ns: int, row: int
@@ -113,11 +119,8 @@ class ParquetTable:
         """Lists whose length the schema does not fix are measured in the first row."""
         shapes = {field.name: _fixed_shape(field.type) for field in self._schema}
         open_names = [name for name, shape in shapes.items() if shape is None]
-        if open_names and self.size:
-            with opened(next(path for path in self._files), self.name) as file:
-                first = next(file.iter_batches(1, columns=open_names, use_threads=False), None)
-            for name in open_names if first is not None and first.num_rows else ():
-                shapes[name] = np.shape(first.column(name)[0].as_py()) if first is not None else ()
+        if open_names and (first := next(self._batches(open_names, 1), None)) is not None and len(first):
+            shapes |= {name: np.shape(first.column(name)[0].as_py()) for name in open_names}
         return {name: shape or () for name, shape in shapes.items()}
 
 
@@ -128,12 +131,23 @@ def opened(path: Path, name: str) -> Iterator[pq.ParquetFile]:
     Raises:
         InputError: the file is not Parquet, or damaged, or cannot be read.
     """
+    # Not pre-buffered: that would hold a whole row group, which may be a whole log.
+    with (
+        told_in_one_sentence(name),
+        pq.ParquetFile(path, page_checksum_verification=True, pre_buffer=False, buffer_size=1 << 20) as file,
+    ):
+        yield file
+
+
+@contextmanager
+def told_in_one_sentence(name: str) -> Iterator[None]:
+    """Whatever pyarrow raises inside the block, as one sentence.
+
+    Raises:
+        InputError: a file is not Parquet, or damaged, or cannot be read.
+    """
     try:
-        # Not pre-buffered: that would hold a whole row group, which may be a whole log.
-        with pq.ParquetFile(
-            path, page_checksum_verification=True, pre_buffer=False, buffer_size=1 << 20
-        ) as file:
-            yield file
+        yield
     except InputError:
         raise
     except PermissionError as error:

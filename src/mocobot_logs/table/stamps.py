@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
+
 import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
@@ -62,23 +64,28 @@ def from_text(values: pa.Array, unit_ns: int, where: str, row: int = 0) -> tuple
     exact = pa.decimal128(38, _DIGITS[unit_ns])
     try:
         decimals = pc.cast(values, exact, safe=False)
-    except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
-        raise InputError(_first_bad(values, exact, where, row)) from None
-    given = decimals.is_valid().to_numpy(zero_copy_only=False)
-    if not len(values):
-        return np.empty(0, np.int64), given
-    # A decimal is 128 bits, low word first; its digits without the point are the nanoseconds.
-    buffer = decimals.buffers()[1]
-    words = np.frombuffer(buffer, np.int64).reshape(-1, 2)[decimals.offset : decimals.offset + len(values)]
-    low, high = np.where(given[:, None], words, 0).T
-    beyond = high != (low >> 63)
-    if beyond.any():
-        text = values[int(np.flatnonzero(beyond)[0])].as_py()
-        raise InputError(_range(where, row + int(np.flatnonzero(beyond)[0]), text))
-    return low.copy(), given
+    except pa.ArrowInvalid:
+        # The first count of texts that do not cast ends with the one that is no number.
+        bad = bisect_left(range(1, len(values)), True, key=lambda count: not _casts(values[:count], exact))
+        text = values[bad].as_py()
+        raise InputError(f"{where} is {text!r:.60} in row {row + bad}; a time must be a number") from None
+    ns = decimals.view(pa.decimal128(38, 0))  # the digits without the point are the nanoseconds
+    size = pc.call_function("abs", [ns])
+    beyond = pc.fill_null(pc.call_function("greater", [size, pa.scalar(LARGEST_NS)]), False)
+    _refuse(values, beyond.to_numpy(zero_copy_only=False), where, row)
+    given = ns.is_valid().to_numpy(zero_copy_only=False)
+    return pc.fill_null(ns, 0).cast(pa.int64()).to_numpy(zero_copy_only=False), given
 
 
-def _refuse(values: NDArray, beyond: Given, where: str, row: int) -> None:
+def _casts(values: pa.Array, kind: pa.DataType) -> bool:
+    try:
+        pc.cast(values, kind, safe=False)
+    except pa.ArrowInvalid:
+        return False
+    return True
+
+
+def _refuse(values: NDArray | pa.Array, beyond: Given, where: str, row: int) -> None:
     if beyond.any():
         first = int(np.flatnonzero(beyond)[0])
         raise InputError(_range(where, row + first, values[first]))
@@ -86,13 +93,3 @@ def _refuse(values: NDArray, beyond: Given, where: str, row: int) -> None:
 
 def _range(where: str, row: int, value: object) -> str:
     return f"{where} is {value!s:.40} in row {row}; a time must be finite and within 292 years (is its unit right?)"
-
-
-def _first_bad(values: pa.Array, exact: pa.DataType, where: str, row: int) -> str:
-    for index, value in enumerate(values):
-        try:
-            pc.cast(pa.array([value.as_py()], values.type), exact, safe=False)
-        except (pa.ArrowInvalid, pa.ArrowNotImplementedError):
-            text = value.as_py()
-            return f"{where} is {text!r:.60} in row {row + index}; a time must be a number"
-    return f"{where} holds what is not a number"

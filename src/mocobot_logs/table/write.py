@@ -2,11 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-import uuid
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +11,7 @@ import pyarrow.csv as pcsv
 
 from estimator.arm.wrist_level import wrist_of
 from estimator.errors import InputError
+from estimator.files import whole_file
 from estimator.recording.model import Recording
 from mocobot_logs.log import Level
 from mocobot_logs.table.npz import METADATA_NAME
@@ -38,7 +34,7 @@ def write_csv(recording: Recording, path: Path, level: Level = "joint") -> None:
     """
     columns = replace(recording, metadata=replace(recording.metadata, level=level)).file_columns()
     table = pa.table({name: np.ascontiguousarray(values) for name, values in columns.items()})
-    with _whole_file(path) as temporary:
+    with whole_file(path) as temporary:
         pcsv.write_csv(table, temporary, pcsv.WriteOptions(batch_size=_ROWS, quoting_style="none"))
 
 
@@ -66,19 +62,5 @@ def write_npz(recording: Recording, path: Path, level: Level = "joint") -> None:
         arrays["ref"] = recording.ref
     rows = {name: np.ascontiguousarray(array) for name, array in arrays.items()}  # readers stream rows
     rows[METADATA_NAME] = np.array(replace(recording.metadata, level=level).to_json())
-    with _whole_file(path) as temporary, temporary.open("wb") as file:
+    with whole_file(path) as temporary, temporary.open("wb") as file:
         np.savez(file, allow_pickle=False, **rows)
-
-
-@contextmanager
-def _whole_file(path: Path) -> Iterator[Path]:
-    """A temporary file that takes the place of ``path`` when the block ends without an error."""
-    temporary = path.parent / f".{uuid.uuid4().hex}.tmp"
-    try:
-        yield temporary
-        os.replace(temporary, path)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)

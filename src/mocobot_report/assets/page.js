@@ -20,16 +20,6 @@
   button.addEventListener("click", () => { chosen = dark() ? "light" : "dark"; store(chosen); setTheme(); });
   system.addEventListener("change", setTheme);
 
-  // Colours are {colour: name}, arrays that several lines share {shared: name}.
-  const themed = (value, style, arrays) => {
-    if (Array.isArray(value)) return value.map((item) => themed(item, style, arrays));
-    if (value && typeof value === "object") {
-      if ("colour" in value) return style.getPropertyValue("--" + value.colour).trim();
-      if ("shared" in value) return arrays[value.shared];
-      return Object.fromEntries(Object.entries(value).map(([key, item]) => [key, themed(item, style, arrays)]));
-    }
-    return value;
-  };
   const config = {
     responsive: true, displaylogo: false, displayModeBar: !narrow.matches && "hover",
     modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["resetScale2d"]],  // none that sends anything anywhere
@@ -38,26 +28,32 @@
   const hiddenGroups = (plot) => new Set(
     [...plot.closest("figure").querySelectorAll('.legend button[aria-pressed="false"]')].map((b) => b.dataset.group));
 
+  const set = (values, path, value) => {  // at a dotted path
+    const keys = path.split(".");
+    const last = keys.pop();
+    keys.reduce((at, key) => (at[key] ??= {}), values)[last] = value;
+  };
   function draw(plot) {
     const figure = figures.get(plot);
     const style = getComputedStyle(root);
-    const data = themed(figure.data, style, figure.arrays);
-    const layout = themed(figure.layout, style);
-    layout.font.family = getComputedStyle(document.body).fontFamily;
-    layout.dragmode = narrow.matches ? false : "zoom";  // a finger scrolls the page
-    if (narrow.matches && figure.narrow) {
-      for (const [path, value] of Object.entries(figure.narrow)) {
-        const keys = path.split(".");
-        const last = keys.pop();
-        keys.reduce((at, key) => (at[key] ??= {}), layout)[last] = value;
-      }
-    }
     const hidden = hiddenGroups(plot);
-    for (const line of data) if (hidden.has(line.legendgroup)) line.visible = false;
+    const data = figure.data.map((line) => ({ ...line, visible: !hidden.has(line.legendgroup) }));
+    const layout = {
+      ...structuredClone(figure.layout),
+      template: templates[root.dataset.theme], colorway: data.map((line) => style.getPropertyValue(`--${line.meta}`).trim()),
+      font: { family: getComputedStyle(document.body).fontFamily },
+      dragmode: narrow.matches ? false : "zoom",  // a finger scrolls the page
+      uirevision: "keep",
+    };
+    if (narrow.matches) for (const [path, value] of Object.entries(figure.narrow)) set(layout, path, value);
     Plotly.react(plot, data, layout, config).then(() => { plot.dataset.drawn = "yes"; });
   }
+  const block = (name) => JSON.parse(document.getElementById(name).textContent);
+  const templates = block("templates");
   for (const plot of document.querySelectorAll(".plot")) {
-    figures.set(plot, JSON.parse(document.getElementById(plot.dataset.figure).textContent));
+    const figure = block(plot.dataset.figure);
+    for (const line of figure.data) if (typeof line.x === "number") line.x = figure.arrays[line.x];
+    figures.set(plot, figure);
   }
   const near = new IntersectionObserver((entries) => {
     for (const entry of entries) {

@@ -1,49 +1,66 @@
-"""Interactive plots: plotly figures as plain JSON, with legends of buttons that keyboards reach."""
+"""Interactive plots: plotly figures without colours of their own, which the page's theme gives them."""
 
 from __future__ import annotations
 
-import base64
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+import plotly.graph_objects as go
+from numpy.typing import ArrayLike
 
-from mocobot_report.blocks.blocks import spelled_text
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Child, Node, data_block, el
+from mocobot_report.blocks.legend import Key, legend
+from mocobot_report.blocks.theme import TEMPLATES
+from mocobot_report.blocks.units import spelled_text
 
-Json = dict[str, Any]
-CLEAR = "rgba(0,0,0,0)"
+Axis = dict[str, Any]
+"""Properties of ``go.layout.XAxis`` or ``YAxis``, which checks them."""
 
 
-@dataclass(frozen=True)
-class Key:
-    """One entry of a legend.
+def chart(
+    book: Book, title: str, shown: go.Figure, *, height: int, label: str, keys: Sequence[Key] = (), note: Child = None,
+    narrow: Mapping[str, float] | None = None,
+) -> Node:  # fmt: skip
+    """A figure with caption, legend and plot; drawn when the reader comes near.
 
-    Attributes:
-        group: the lines it shows and hides; empty for what cannot be hidden.
-        label: what they are.
-        colour: name in the palette.
-        symbol: ``line``, ``dash``, ``band`` or the name of a marker.
+    Args:
+        book: gives ids.
+        title: of the caption.
+        shown: the plot.
+        height: of the plot [px].
+        label: what it shows, for those who do not see it.
+        keys: the legend.
+        note: below the title.
+        narrow: what changes in the layout on phones, by dotted path.
     """
-
-    group: str
-    label: str
-    colour: str
-    symbol: str = "line"
-
-
-def paint(name: str) -> Json:
-    """A colour of the palette; the page puts in that of its theme."""
-    return {"colour": name}
+    name = book.identity("figure")
+    plot = el(
+        "div", class_="plot", id=f"{name}-plot", style=f"height:{height}px", role="img", aria_label=label,
+        data_figure=name,
+    )  # fmt: skip
+    caption = el("figcaption", el("b", spelled_text(title)), note)
+    values = data_block(name, _values(shown) | {"narrow": dict(narrow or {})})
+    return el("figure", caption, legend(keys), plot, values, class_="chart")
 
 
-def shared(name: str) -> Json:
-    """One of the figure's ``arrays``."""
-    return {"shared": name}
+def _values(shown: go.Figure) -> dict[str, Any]:
+    """A figure as JSON without its template; arrays that traces share as ``x`` stand in ``arrays``, once."""
+    values, arrays = shown.to_plotly_json(), []
+    del values["layout"]["template"]
+    for trace in values["data"]:
+        if isinstance(trace["x"], dict):
+            if trace["x"] not in arrays:
+                arrays.append(trace["x"])
+            trace["x"] = arrays.index(trace["x"])
+    return values | {"arrays": arrays}
+
+
+def figure(traces: Sequence[go.Scatter | go.Bar], **layout: Any) -> go.Figure:
+    """A figure in the page's style, with more of the layout's properties."""
+    return go.Figure(traces, go.Layout(template=TEMPLATES["light"], **layout))
 
 
 def literal(text: str, most: int = 200) -> str:
@@ -53,179 +70,68 @@ def literal(text: str, most: int = 200) -> str:
     return escape(text, quote=False)
 
 
-def chart(
-    book: Book,
-    title: str,
-    figure: Json,
-    *,
-    height: int,
-    label: str,
-    keys: Sequence[Key] = (),
-    note: Child = None,
-) -> Node:
-    """A figure with caption, legend and plot; drawn when the reader comes near.
-
-    Args:
-        book: gives ids.
-        title: of the caption.
-        figure: ``data`` and ``layout`` of plotly, ``arrays`` that lines share;
-            ``narrow`` changes the layout on phones, by dotted path.
-        height: of the plot [px].
-        label: what it shows, for those who do not see it.
-        keys: the legend.
-        note: below the title.
-    """
-    name = book.identity("figure")
-    entries = [
-        el("button", _swatch(key), key.label, type="button", aria_pressed="true", data_group=key.group)
-        if key.group
-        else el("span", _swatch(key), key.label, class_="key")
-        for key in keys
-    ]
-    return el(
-        "figure",
-        el("figcaption", el("b", spelled_text(title)), note),
-        el("div", *entries, class_="legend", role="group", aria_label="Shown lines; press to hide")
-        if entries
-        else None,
-        el(
-            "div",
-            class_="plot",
-            id=f"{name}-plot",
-            style=f"height:{height}px",
-            role="img",
-            aria_label=label,
-            data_figure=name,
-        ),
-        data_block(name, figure),
-        class_="chart",
-    )
+def axis(title: str, **more: Any) -> Axis:
+    """An axis with a title; a bracketed unit is printed with superscripts."""
+    return {"title_text": spelled_text(title), **more}
 
 
-def shared_legend(keys: Sequence[Key]) -> Node:
-    """What lines and points mean in several small plots."""
-    return el(
-        "div", *(el("span", _swatch(key), key.label, class_="key") for key in keys), class_="legend shared"
-    )
+def log_axis(title: str, values: Iterable[float | None], **more: Any) -> Axis:
+    """A logarithmic axis of all positive values, with labels that do not crowd."""
+    seen = [v for v in values if v is not None and v > 0] or [1e-3, 1.0]
+    low, high = float(np.log10(min(seen))) - 0.15, float(np.log10(max(seen))) + 0.15
+    if high - low < 2.5:  # 1, 2, 5, 10, 20, 50 ...
+        powers = range(int(np.floor(low)), int(np.ceil(high)) + 1)
+        at = [m * 10.0**p for p in powers for m in (1, 2, 5) if low <= np.log10(m * 10.0**p) <= high]
+        ticks: Axis = {"tickvals": at, "ticktext": [f"{v:g}" for v in at]}
+    else:  # plotly writes powers larger than other labels
+        ticks = {
+            "tickfont_size": 9.5,
+            "exponentformat": "power",
+            "minexponent": 3,
+            "dtick": 1 if high - low < 7 else 2,
+        }
+    return axis(title, type="log", range=[low, high], **ticks, **more)
 
 
-def layout(**more: Any) -> Json:
-    """A plotly layout in the page's style."""
+def row_axis(names: Sequence[str], most: int = 26) -> Axis:
+    """A vertical axis of named rows: the first, at 0, on top; names of up to ``most`` letters."""
+    return {**_named([literal(name, most) for name in names]), "range": [len(names) - 0.4, -0.6]}
+
+
+def column_axis(names: Sequence[str]) -> Axis:
+    """A horizontal axis of named columns, the first at 0; names may hold markup."""
+    return {**_named(names), "range": [-0.6, len(names) - 0.4], "showgrid": False, "tickangle": 0}
+
+
+def _named(names: Sequence[str]) -> Axis:
     return {
-        "autosize": True,
-        "showlegend": False,
-        "paper_bgcolor": CLEAR,
-        "plot_bgcolor": CLEAR,
-        "font": {"color": paint("text"), "size": 12},
-        "margin": {"l": 58, "r": 14, "t": 10, "b": 44},
-        "hovermode": "closest",
-        "hoverlabel": {
-            "bgcolor": paint("card"),
-            "bordercolor": paint("line"),
-            "font": {"color": paint("text")},
-        },
-        "modebar": {"bgcolor": CLEAR, "color": paint("soft"), "activecolor": paint("link")},
-        "uirevision": "keep",
-        **more,
+        "tickvals": list(range(len(names))),
+        "ticktext": list(names),
+        "zeroline": False,
+        "fixedrange": True,
     }
-
-
-def axis(title: str = "", **more: Any) -> Json:
-    """An axis in the page's style."""
-    named: Json = (
-        {"title": {"text": spelled_text(title), "standoff": 8, "font": {"size": 12}}} if title else {}
-    )
-    return {
-        **named,
-        "gridcolor": paint("grid"),
-        "linecolor": paint("line"),
-        "zerolinecolor": paint("line"),
-        "tickfont": {"color": paint("soft"), "size": 11},
-        "automargin": True,
-        **more,
-    }
-
-
-def log_axis(title: str, low: float, high: float, **more: Any) -> Json:
-    """A logarithmic axis from below ``low`` to above ``high``, with labels that do not crowd."""
-    ends = [float(np.log10(low)) - 0.15, float(np.log10(high)) + 0.15]
-    decades = ends[1] - ends[0]
-    if decades < 2.5:  # 1, 2, 5, 10, 20, 50 ...
-        powers = range(int(np.floor(ends[0])), int(np.ceil(ends[1])) + 1)
-        at = [m * 10.0**p for p in powers for m in (1, 2, 5) if ends[0] <= np.log10(m * 10.0**p) <= ends[1]]
-        return axis(title, type="log", range=ends, tickvals=at, ticktext=[f"{v:g}" for v in at], **more)
-    ticks: Json = {"dtick": 1 if decades < 7 else 2}
-    # Plotly writes powers larger than other labels.
-    style = {"tickfont": {"color": paint("soft"), "size": 9.5}, "exponentformat": "power", "minexponent": 3}
-    return axis(title, type="log", range=ends, **style, **ticks, **more)
 
 
 def dots(
-    x: Sequence[float], y: Sequence[float | None], key: Key, *, up: Sequence[float | None] | None = None,
-    text: Sequence[str] | None = None, size: int = 9, **more: Any,
-) -> Json:  # fmt: skip
-    """Points, with whiskers of so much upward (on a logarithmic axis downward has no meaning)."""
-    trace: Json = {
-        "type": "scatter",
-        "mode": "markers",
-        "x": list(x),
-        "y": list(y),
-        "name": key.label,
-        "legendgroup": key.group,
-        "marker": {"symbol": key.symbol, "color": paint(key.colour), "size": size},
-        **more,
-    }
-    if text is not None:
-        trace |= {"text": [literal(t) for t in text], "hovertemplate": "%{text}<extra></extra>"}
-    if up is not None and any(up):
-        trace["error_y"] = {
-            "type": "data", "symmetric": False, "array": [u or 0.0 for u in up], "arrayminus": [0.0] * len(up),
-            "color": paint(key.colour), "thickness": 1.3, "width": 3,
-        }  # fmt: skip
-    return trace
+    x: Iterable[float | None],
+    y: Iterable[float | None],
+    key: Key,
+    text: Iterable[str],
+    *,
+    size: int = 9,
+    **more: Any,
+) -> go.Scatter:
+    """Points of one entry of a legend, with a text of others for each."""
+    return go.Scatter(
+        x=list(x), y=list(y), mode="markers", name=literal(key.label), legendgroup=key.group, meta=key.colour,
+        marker={"symbol": key.symbol, "size": size}, text=[literal(t) for t in text],
+        hovertemplate="%{text}<extra></extra>", **more,
+    )  # fmt: skip
 
 
-def numbers(values: ArrayLike) -> Json:
-    """An array as plotly reads it fastest and smallest: float32, base64; NaN breaks a line."""
-    array = np.ascontiguousarray(values, dtype="<f4")
-    return {"dtype": "f4", "bdata": base64.b64encode(array.tobytes()).decode("ascii")}
-
-
-def finite(values: Sequence[float] | NDArray[Any]) -> list[float | None]:
-    """Plain numbers; what is not finite becomes null."""
-    return [float(v) if np.isfinite(v) else None for v in values]
-
-
-def rule(axis_name: str, at: float, **more: Any) -> Json:
-    """A dashed line across the plot: at a value of ``y`` (or ``y2`` ...), or of ``x``."""
-    line = {"color": paint("text"), "width": 1.2, "dash": "dash"}
-    if axis_name.startswith("y"):
-        return {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": axis_name, "y0": at, "y1": at,
-                "line": line, **more}  # fmt: skip
-    return {"type": "line", "yref": "paper", "y0": 0, "y1": 1, "xref": axis_name, "x0": at, "x1": at,
-            "line": line, **more}  # fmt: skip
-
-
-_SHAPES: Mapping[str, tuple[str, Mapping[str, str]]] = {
-    "line": ("path", {"d": "M1 6H15", "stroke-width": "2.4"}),
-    "dash": ("path", {"d": "M1 6H15", "stroke-width": "2", "stroke-dasharray": "4 3"}),
-    "band": ("rect", {"x": "1", "y": "2", "width": "14", "height": "8"}),
-    "circle": ("circle", {"cx": "8", "cy": "6", "r": "4.5"}),
-    "circle-open": ("circle", {"cx": "8", "cy": "6", "r": "4", "fill": "none", "stroke-width": "1.8"}),
-    "square": ("rect", {"x": "4", "y": "2", "width": "8", "height": "8"}),
-    "diamond": ("path", {"d": "M8 0.5L13.5 6L8 11.5L2.5 6Z"}),
-    "triangle-down": ("path", {"d": "M2.5 2H13.5L8 11Z"}),
-    "triangle-up": ("path", {"d": "M2.5 10H13.5L8 1Z"}),
-    "x": ("path", {"d": "M4 2L12 10M12 2L4 10", "stroke-width": "2.4"}),
-}
-
-
-def _swatch(key: Key) -> Node:
-    name, shape = _SHAPES[key.symbol]
-    paint = f"var(--{key.colour})"
-    drawn = el(name)
-    for attribute, value in ({"fill": paint, "stroke": paint, "stroke-width": "0"} | dict(shape)).items():
-        drawn.set(attribute, value)
-    swatch = el("svg", drawn, width=16, height=12, aria_hidden="true")
-    swatch.set("viewBox", "0 0 16 12")
-    return swatch
+def line(x: ArrayLike, y: ArrayLike, key: Key, hover: str, *, width: float = 1.2, **more: Any) -> go.Scatter:
+    """A line of one entry of a legend, in single precision; NaN breaks it."""
+    return go.Scatter(
+        x=np.asarray(x, "<f4"), y=np.asarray(y, "<f4"), name=literal(key.label), legendgroup=key.group, meta=key.colour,
+        hovertemplate=f"{hover}<extra></extra>", **{"mode": "lines", "line": {"width": width}} | more,
+    )  # fmt: skip

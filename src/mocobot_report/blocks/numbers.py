@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from estimator.numbers import decimals
+
 MINUS, PLUS_MINUS, NONE, THIN = "\u2212", "\u00b1", "\u2013", "\u00a0"
 LEAST_POWER = -999
 """Power of ten below which a probability's size says no more."""
@@ -31,7 +33,7 @@ def measured(value: float | None, se: float | None) -> tuple[str, str]:
         return NONE, ""
     if se is None or not math.isfinite(se) or se <= 0:
         return plain(value, 4), ""
-    digits = 1 - math.floor(math.log10(se))
+    digits = decimals(se)
     if digits > 9:  # too fine for a fixed point
         return plain(value, 4), plain(se, 2)
     rounded = round(value, digits)

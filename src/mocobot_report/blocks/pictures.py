@@ -13,6 +13,7 @@ from PIL import Image
 
 from estimator.errors import InputError
 from mocobot_report.blocks.html import Node, add, el
+from mocobot_report.blocks.prose import verdict
 from mocobot_view.pictures.render import Shot, render_shots
 
 WIDTH, HEIGHT, QUALITY = 1120, 700, 84
@@ -39,7 +40,7 @@ class Gallery:
             try:
                 shot = make()
             except InputError as error:
-                add(group, _why_not(f"No picture: {caption}", str(error)))
+                add(group, verdict("warn", f"No picture: {caption}", str(error)))
                 continue
             place = el("figure", class_="picture")
             add(group, place)
@@ -56,7 +57,7 @@ class Gallery:
                     for child in mine:
                         group.remove(child)
                     group.set("class", "single")
-                    add(group, _why_not("No pictures", made))
+                    add(group, verdict("warn", "No pictures", made))
             return
         for (place, shot, caption), pixels in zip(self.asked, made, strict=True):
             image = el(
@@ -64,10 +65,6 @@ class Gallery:
                 decoding="async",
             )  # fmt: skip
             add(place, el("figcaption", el("b", caption), shot.says), image)
-
-
-def _why_not(label: str, why: str) -> Node:
-    return el("div", el("p", label, class_="label"), el("p", why), class_="verdict warn")
 
 
 def data_uri(pixels: NDArray[np.uint8]) -> str:

@@ -7,16 +7,21 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 
 import numpy as np
+import plotly.graph_objects as go
 from numpy.typing import NDArray
 
-from mocobot_report.blocks.blocks import spelled_text
-from mocobot_report.blocks.charts import Json, Key, axis, layout, literal, log_axis, numbers, paint, shared
+from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.charts import Axis, axis, chart, figure, line, literal, log_axis
+from mocobot_report.blocks.html import Node
+from mocobot_report.blocks.legend import Key
 
 Array = NDArray[np.float64]
 
 MOST = 1600
 """Points that a line keeps at most, about two per pixel of a wide plot."""
 ROW_PX, FOOT_PX = 122, 56
+GAP = 0.15
+"""Between panels, as a share of a row."""
 
 
 @dataclass(frozen=True)
@@ -59,79 +64,60 @@ class Panel:
     log: bool = False
 
 
-def height(panels: Sequence[Panel]) -> int:
-    """Of the stack [px]."""
-    return ROW_PX * len(panels) + FOOT_PX
+def stacked_chart(
+    book: Book,
+    title: str,
+    panels: Sequence[Panel],
+    *,
+    keys: Sequence[Key],
+    label: str,
+    note: str | None = None,
+) -> Node:
+    """Panels above each other over one time axis [s]; zooming one in time zooms all. Arguments as of ``chart``."""
+    height = ROW_PX * len(panels) + FOOT_PX
+    return chart(
+        book,
+        title,
+        _stacked(panels),
+        height=height,
+        label=label,
+        keys=keys,
+        note=note,
+        narrow={"margin.r": 6},
+    )
 
 
-def stacked(panels: Sequence[Panel], x_title: str = "time [s]") -> Json:
-    """A plotly figure of panels above each other; zooming one in time zooms all."""
-    count = len(panels)
-    gap = 0.16 / max(count, 1)
-    tall = (1.0 - gap * (count - 1)) / max(count, 1)
-    data, shapes, arrays = [], [], {}
-    known: dict[bytes, str] = {}
-
-    def once(values: Array) -> Json:
-        packed = np.ascontiguousarray(values, dtype="<f4").tobytes()
-        if packed not in known:
-            known[packed] = f"t{len(known)}"
-            arrays[known[packed]] = numbers(values)
-        return shared(known[packed])
-
-    axes: Json = {}
-    for k, panel in enumerate(panels):
-        number = "" if k == 0 else str(k + 1)
-        top = 1.0 - k * (tall + gap)
-        domain = [max(0.0, top - tall), top]
-        title = f"{literal(panel.title, 24)}<br>[{panel.unit}]" if panel.unit else literal(panel.title, 24)
-        style = {"domain": domain, "anchor": "x", "zeroline": not panel.log, "nticks": 5}
-        if panel.log and panel.limits is not None:
-            axes[f"yaxis{number}"] = log_axis(title, *panel.limits, **(style | {"nticks": 4}))
-        else:
-            limits = {} if panel.limits is None else {"range": list(panel.limits)}
-            axes[f"yaxis{number}"] = axis(title, **style, **limits)
-        axes[f"yaxis{number}"]["title"] = {"text": spelled_text(title), "standoff": 6, "font": {"size": 11}}
+def _stacked(panels: Sequence[Panel]) -> go.Figure:
+    names = [f"y{k}" if k > 1 else "y" for k in range(1, len(panels) + 1)]
+    axes = {f"yaxis{name[1:]}": _vertical(panel) for name, panel in zip(names, panels, strict=True)}
+    shown = figure(
+        [_trace(panel, one, name) for name, panel in zip(names, panels, strict=True) for one in panel.lines],
+        grid={"rows": len(panels), "columns": 1, "subplots": [[f"x{name}"] for name in names], "ygap": GAP},
+        xaxis=axis("time [s]", anchor=names[-1], zeroline=False),
+        margin_l=74,
+        **axes,
+    )
+    for name, panel in zip(names, panels, strict=True):
+        across = {"xref": "paper", "x0": 0, "x1": 1, "yref": name}
         if panel.band:
-            shapes.append(
-                {"type": "rect", "xref": "paper", "x0": 0, "x1": 1, "yref": f"y{number}", "y0": -panel.band,
-                 "y1": panel.band, "fillcolor": paint("band"), "line": {"width": 0}, "layer": "below"}
-            )  # fmt: skip
+            shown.add_shape(type="rect", y0=-panel.band, y1=panel.band, layer="below", line_width=0, **across)
         if panel.rule is not None:
-            shapes.append(
-                {"type": "line", "xref": "paper", "x0": 0, "x1": 1, "yref": f"y{number}", "y0": panel.rule,
-                 "y1": panel.rule, "line": {"color": paint("text"), "width": 1, "dash": "dash"}}
-            )  # fmt: skip
-        for line in panel.lines:
-            trace: Json = {
-                "type": "scatter",
-                "mode": "markers" if line.points else "lines",
-                "x": once(line.time),
-                "y": numbers(line.values),
-                "yaxis": f"y{number}",
-                "name": literal(line.key.label),
-                "legendgroup": line.key.group,
-                "hovertemplate": f"{literal(panel.title)}, {literal(line.key.label)}<br>%{{x:.2f}}: %{{y:.3g}} "
-                f"{panel.unit}<extra></extra>",
-            }
-            if line.points:
-                trace["marker"] = {"color": paint(line.key.colour), "size": 6}
-            else:
-                dash = {"dash": "dash"} if line.key.symbol == "dash" else {}
-                trace["line"] = {"color": paint(line.key.colour), "width": 1.2, **dash}
-            data.append(trace)
-    last = "y" if count == 1 else f"y{count}"
-    return {
-        "data": data,
-        "arrays": arrays,
-        "layout": layout(
-            xaxis=axis(x_title, anchor=last, zeroline=False),
-            **axes,
-            shapes=shapes,
-            margin={"l": 74, "r": 12, "t": 8, "b": 44},
-        ),
-        "narrow": {"margin.r": 6},
-    }
+            shown.add_shape(type="line", y0=panel.rule, y1=panel.rule, line_width=1, **across)
+    return shown
+
+
+def _vertical(panel: Panel) -> Axis:
+    title = literal(panel.title, 24) + (f"<br>[{panel.unit}]" if panel.unit else "")
+    style: Axis = {"anchor": "x", "title_font_size": 11, "title_standoff": 6}
+    if panel.log and panel.limits is not None:
+        return log_axis(title, panel.limits, nticks=4, zeroline=False, **style)
+    return axis(title, nticks=5, range=panel.limits, **style)
+
+
+def _trace(panel: Panel, one: Line, name: str) -> go.Scatter:
+    hover = f"{literal(panel.title)}, {literal(one.key.label)}<br>%{{x:.2f}}: %{{y:.3g}} {panel.unit}"
+    points = {"mode": "markers", "marker": {"size": 6}} if one.points else {}
+    return line(one.time, one.values, one.key, hover, yaxis=name, **points)
 
 
 def runs(time: Array, step_s: float) -> Array:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 
+from mocobot_report.blocks.numbers import spelled
+
 TOKENS = {
     "Nm": "N m", "Nms": "N m s", "Ns": "N s", "mps": "m/s", "rad": "rad", "rad3": "rad³", "m": "m", "N": "N", "s": "s",
     "kg": "kg", "kgm": "kg m", "V": "V", "Vs": "V s", "Hz": "Hz", "deg": "deg", "m2": "m²",
@@ -36,3 +38,8 @@ def short_names(names: list[str]) -> list[str]:
             next(s for k in range(len(names) + 1) if (s := stem if not k else f"{stem} ({k + 1})") not in out)
         )
     return out
+
+
+def spelled_text(text: str) -> str:
+    """Text whose bracketed unit is printed with superscripts and does not break."""
+    return re.sub(r"\[(.*?)\]", lambda m: f"[{spelled(m[1])}]", text)

@@ -5,19 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import plotly.graph_objects as go
+
 from discrepancy.result.evidence_list import label, relation
-from mocobot_report.blocks.blocks import paragraph, section, tidy
 from mocobot_report.blocks.book import Book
-from mocobot_report.blocks.charts import Json, Key, axis, chart, dots, layout, literal, log_axis, paint
+from mocobot_report.blocks.charts import Axis, axis, chart, dots, figure, log_axis, row_axis
 from mocobot_report.blocks.html import Node, el
+from mocobot_report.blocks.legend import Key
 from mocobot_report.blocks.numbers import percent, plain
+from mocobot_report.blocks.prose import paragraph, tidy
+from mocobot_report.blocks.sections import section
+from mocobot_report.diagnosis.keys import CLEAN, misfits
 from mocobot_report.folder import Diagnosed
 
 Values = Mapping[str, Any]
-BEFORE = Key("before", "as simulated", "before", "square")
-AFTER = Key("after", "with causes and tolerances", "after", "circle")
-TOLERATED = Key("after", "with tolerances", "after", "circle")
-CLEAN = Key("", "clean data", "text", "dash")
 CHANCE = Key("", "what chance can do", "text", "dash")
 RELATIONS = (
     Key("named", "named", "before", "square"),
@@ -29,152 +30,106 @@ RELATIONS = (
 def evidence_sections(book: Book, diagnosed: Diagnosed, names: Sequence[str]) -> list[Node]:
     """Misfit by place, and the evidence for the strongest candidates."""
     values = diagnosed.values
-    keys = (BEFORE, AFTER if values["causes"] else TOLERATED)
+    keys = misfits(named=bool(values["causes"]))
     nominal, left = values["residual"]["nominal"]["signature"], values["residual"]["signature"]
-    charts: list[Node] = []
+    charts = []
     if nominal.get("channel") and left.get("channel"):
-        charts.append(_misfit(book, "Misfit by channel", nominal["channel"], left["channel"], None, keys))
+        charts.append(_misfit(book, "Misfit by channel", (nominal["channel"], left["channel"]), {}, keys))
     if nominal.get("trial") and left.get("trial") and len(nominal["trial"]) > 1:
         shown = dict(zip(values["recordings"], names, strict=True))
-        charts.append(_misfit(book, "Misfit by trial", nominal["trial"], left["trial"], shown, keys))
+        charts.append(_misfit(book, "Misfit by trial", (nominal["trial"], left["trial"]), shown, keys))
     if nominal.get("along"):
         charts.append(_along(book, "Where the misfit as simulated points", nominal["along"], "before"))
     if left.get("along") and values["verdict"] != "consistent":
         charts.append(_along(book, "Where what is left points", left["along"], "after"))
-    said = paragraph(f"As simulated: {tidy(nominal['sentence'], inside=True)}", kind="note")
-    out = [section(book, "Where the misfit sits", said, el("div", *charts, class_="pair"))] if charts else []
-    return [*out, *_map(book, values)]
+    said = f"As simulated: {tidy(nominal['sentence'], inside=True)}"
+    return [*_section(book, "Where the misfit sits", said, charts), *_strongest_sections(book, values)]
+
+
+def _section(book: Book, title: str, said: str, charts: Sequence[Node]) -> list[Node]:
+    if not charts:
+        return []
+    return [section(book, title, paragraph(said, kind="note"), el("div", *charts, class_="pair"))]
 
 
 def _misfit(
-    book: Book,
-    title: str,
-    before: Values,
-    after: Values,
-    shown: Mapping[str, str] | None,
-    keys: Sequence[Key],
+    book: Book, title: str, both: Sequence[Values], shown: Mapping[str, str], keys: Sequence[Key]
 ) -> Node:
     """chi2/n of every channel or trial, before and after."""
-    rows = list(before)
-    data, seen = [], [1.0]
-    for key, values in zip(keys, (before, after), strict=True):
-        numbers = [values.get(name) for name in rows]
-        seen += [v for v in numbers if v]
-        text = [
-            f"{(shown or {}).get(n, n)}, {key.label}: {plain(v)}" for n, v in zip(rows, numbers, strict=True)
-        ]
-        trace = dots([], [], key, text=text) | {"x": numbers, "y": list(range(len(rows)))[::-1]}
-        data.append(trace)
-    names = [(shown or {}).get(name, name) for name in rows]
-    figure: Json = {
-        "data": data,
-        "layout": _sideways(names, log_axis("chi²/n", min(seen), max(seen)), rule=1.0),
-        "narrow": {"yaxis.tickfont.size": 10},
-    }
-    return chart(
-        book, title, figure, height=24 * len(rows) + 76, keys=[*keys, CLEAN],
-        label=f"{title}: chi-square per number, before and after, one row each.",
-    )  # fmt: skip
+    rows = list(both[0])
+    names = [shown.get(row, row) for row in rows]
+    traces, seen = [], [1.0]
+    for key, values in zip(keys, both, strict=True):
+        numbers = [values.get(row) for row in rows]
+        seen += numbers
+        text = [f"{name}, {key.label}: {plain(v)}" for name, v in zip(names, numbers, strict=True)]
+        traces.append(dots(numbers, range(len(rows)), key, text))
+    label = f"{title}: chi-square per number, before and after, one row each."
+    across = log_axis("chi²/n", seen)
+    return _rows_chart(book, title, traces, names, across, label, rule=1.0, keys=[*keys, CLEAN])
 
 
 def _along(book: Book, title: str, shares: Values, colour: str) -> Node:
     """Share of the squared residual along single sources."""
-    names = list(shares)
-    key = Key("share", "", colour)
-    data = [
-        {
-            "type": "bar", "orientation": "h", "x": [100.0 * v for v in shares.values()],
-            "y": list(range(len(names)))[::-1], "marker": {"color": paint(key.colour)}, "width": 0.62,
-            "text": [percent(v) for v in shares.values()], "textposition": "auto", "insidetextanchor": "end",
-            "insidetextfont": {"color": paint("card")}, "outsidetextfont": {"color": paint("text")},
-            "cliponaxis": False,
-            "hovertemplate": "%{text}<extra></extra>",
-        }
-    ]  # fmt: skip
-    top = max([100.0 * v for v in shares.values()], default=1.0)
-    figure: Json = {
-        "data": data,
-        "layout": _sideways(names, axis("share of the misfit [%]", range=[0, 1.14 * top], nticks=5)),
-        "narrow": {"yaxis.tickfont.size": 10},
-    }
-    return chart(
-        book, title, figure, height=30 * len(names) + 66,
-        label=f"{title}: share of the squared residual along single sources: "
-        + ", ".join(f"{name} {percent(v)}" for name, v in shares.items()),
-        note="share of the squared residual along what one source alone can do",
+    names, shown = list(shares), [100.0 * v for v in shares.values()]
+    bars = go.Bar(
+        x=shown, y=list(range(len(names))), orientation="h", width=0.62, meta=colour, cliponaxis=False,
+        text=[percent(v) for v in shares.values()], textposition="auto", insidetextanchor="end",
+        hovertemplate="%{text}<extra></extra>",
     )  # fmt: skip
+    across = axis("share of the misfit [%]", range=[0, 1.14 * max(shown)], nticks=5)
+    said = ", ".join(f"{name} {percent(v)}" for name, v in shares.items())
+    label = f"{title}: share of the squared residual along single sources: {said}"
+    note = "share of the squared residual along what one source alone can do"
+    return _rows_chart(book, title, [bars], names, across, label, row_px=30, note=note)
 
 
-def _sideways(
-    names: Sequence[str], horizontal: Json, rule: float | None = None, *, left: int = 120, most: int = 26
-) -> Json:
-    """Layout of one row per name; ``left`` pixels hold names of up to ``most`` letters."""
-    lines = [] if rule is None else [
-        {"type": "line", "xref": "x", "x0": rule, "x1": rule, "yref": "paper", "y0": 0, "y1": 1,
-         "line": {"color": paint("text"), "width": 1.2, "dash": "dash"}}
-    ]  # fmt: skip
-    count = len(names)
-    return layout(
-        xaxis=horizontal,
-        yaxis=axis(
-            tickvals=list(range(count))[::-1], ticktext=[literal(name, most) for name in names],
-            range=[-0.6, count - 0.4], zeroline=False, fixedrange=True, ticks="",
-        ),
-        shapes=lines,
-        margin={"l": left, "r": 14, "t": 8, "b": 44},
-    )  # fmt: skip
+def _rows_chart(
+    book: Book, title: str, traces: Sequence[go.Scatter | go.Bar], names: Sequence[str], across: Axis, label: str, *,
+    rule: float | None = None, row_px: int = 24, left_px: int = 120, most: int = 26, font_px: int = 10, **more: Any,
+) -> Node:  # fmt: skip
+    """One row per name, of up to ``most`` letters in ``left_px`` pixels; a dashed line at ``rule``."""
+    shown = figure(traces, xaxis=across, yaxis=row_axis(names, most), margin_l=left_px)
+    if rule is not None:
+        shown.add_vline(rule)
+    narrow = {"yaxis.tickfont.size": font_px, "margin.l": min(left_px, 155)}
+    return chart(book, title, shown, height=row_px * len(names) + 76, label=label, narrow=narrow, **more)
 
 
-def _map(book: Book, values: Values) -> list[Node]:
+def _strongest_sections(book: Book, values: Values) -> list[Node]:
     """The evidence for the strongest candidates, before and after what is named is in the model."""
     evidence = values.get("evidence")
     if not isinstance(evidence, Mapping):  # a diagnosis of an earlier version
         return []
-    panels = [("Nothing is named yet", evidence["before"])]
-    if evidence["after"] is not None:
-        panels.append(("What is named is in the model", evidence["after"]))
+    panels = {"Nothing is named yet": evidence["before"], "What is named is in the model": evidence["after"]}
     charts = [
         _strongest(book, title, entries, values["causes"], evidence["by_chance"])
-        for title, entries in panels
+        for title, entries in panels.items()
         if entries
     ]
-    said = paragraph(
+    said = (
         "How much chi-square falls if a cause leaves its tolerance, for the strongest candidates. Chance can do what "
-        "is left of the dashed line.",
-        kind="note",
+        "is left of the dashed line."
     )
-    return [section(book, "Evidence", said, el("div", *charts, class_="pair"))] if charts else []
+    return _section(book, "Evidence", said, charts)
 
 
 def _strongest(
     book: Book, title: str, entries: Sequence[Values], causes: Sequence[Values], by_chance: float
 ) -> Node:
-    names = [label(entry) for entry in entries]
-    data, keys = [], []
+    names, gains = [label(entry) for entry in entries], [entry["gain"] for entry in entries]
+    traces, keys = [], []
     for key in RELATIONS if causes else RELATIONS[-1:]:
         rows = [k for k, entry in enumerate(entries) if not causes or relation(entry, causes) == key.group]
-        if not rows:
-            continue
-        keys.append(key)
-        text = [
-            f"{names[k]}: gain {plain(entries[k]['gain'])}, by chance 10^{entries[k]['log10_p']:.0f}"
-            for k in rows
-        ]
-        trace = dots([], [], key, text=text)
-        data.append(
-            trace
-            | {"x": [max(entries[k]["gain"], 1.0) for k in rows], "y": [len(names) - 1 - k for k in rows]}
-        )
-    seen = [by_chance, 1.0, *(entry["gain"] for entry in entries)]
-    figure: Json = {
-        "data": data,
-        "layout": _sideways(
-            names, log_axis("gain of chi-square", 1.0, max(seen)), rule=by_chance, left=190, most=40
-        ),
-        "narrow": {"yaxis.tickfont.size": 9, "margin.l": 155},
-    }
-    return chart(
-        book, title, figure, height=24 * len(names) + 76, keys=[*keys, CHANCE] if causes else [CHANCE],
-        label=f"{title}: gain of chi-square of the strongest candidates, "
-        + ", ".join(f"{name} {plain(entry['gain'])}" for name, entry in zip(names, entries, strict=True)),
+        if rows:
+            keys.append(key)
+            text = [
+                f"{names[k]}: gain {plain(gains[k])}, by chance 10^{entries[k]['log10_p']:.0f}" for k in rows
+            ]
+            traces.append(dots([max(gains[k], 1.0) for k in rows], rows, key, text))
+    said = ", ".join(f"{name} {plain(gain)}" for name, gain in zip(names, gains, strict=True))
+    return _rows_chart(
+        book, title, traces, names, log_axis("gain of chi-square", [1.0, max(1.0, by_chance, *gains)]),
+        f"{title}: gain of chi-square of the strongest candidates, {said}",
+        rule=by_chance, left_px=190, most=40, font_px=9, keys=[*keys, CHANCE] if causes else [CHANCE],
     )  # fmt: skip

@@ -10,27 +10,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discrepancy.result.read import VERDICTS, read_diagnosis
+from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
-from mocobot_report.blocks.blocks import (
-    Entry,
-    Num,
-    bullets,
-    facts,
-    folded,
-    measurement,
-    paragraph,
-    section,
-    table,
-    tidy,
-    tiles,
-    value,
-    verdict,
-)
 from mocobot_report.blocks.book import Book
-from mocobot_report.blocks.html import Node, el
+from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import NONE, fitting, percent, plain, power
 from mocobot_report.blocks.pictures import ASPECT
+from mocobot_report.blocks.prose import bullets, facts, folded, paragraph, tidy, tiles, verdict
+from mocobot_report.blocks.sections import section
+from mocobot_report.blocks.tables import Entry, Num, measurement, table, value
 from mocobot_report.blocks.units import parameter, short_names
 from mocobot_report.diagnosis.evidence import evidence_sections
 from mocobot_report.diagnosis.gain import gain_section
@@ -75,21 +64,20 @@ def answer(diagnosed: Diagnosed) -> list[Node]:
         what = "One recording of a team that carries a payload is"
     else:
         what = f"{count} recordings of a team that carries one payload are"
-    lede = paragraph(
-        f"{what} held against the simulation: where do they part, which physical cause does it, and "
-        "what is it worth to "
-        "have it in the simulation?",
-        kind="lede",
+    lede = (
+        f"{what} held against the simulation: where do they part, which physical cause does it, and what is it worth "
+        "to have it in the simulation?"
     )
     meaning = MEANING[values["verdict"]]
     if len(values["causes"]) == 1:
         meaning = meaning.replace("causes explain", "cause explains").replace("causes are", "cause is")
-    box = verdict(KINDS[values["verdict"]], VERDICTS[values["verdict"]], meaning)
+    said = None
     if values["causes"]:
-        box.append(bullets([tidy(cause["sentence"]) for cause in values["causes"]]))
+        said = bullets([tidy(cause["sentence"]) for cause in values["causes"]])
     elif values["verdict"] != "consistent":
-        box.append(el("p", tidy(values["residual"]["nominal"]["signature"]["sentence"])))
-    return [lede, box, tiles(_tiles(values))]
+        said = tidy(values["residual"]["nominal"]["signature"]["sentence"])
+    box = verdict(KINDS[values["verdict"]], VERDICTS[values["verdict"]], meaning, said)
+    return [paragraph(lede, kind="lede"), box, tiles(_tiles(values))]
 
 
 def _tiles(values: Values) -> list[tuple[str, str, str]]:
@@ -121,36 +109,38 @@ def sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
     book.say("diagnosis")
     values = diagnosed.values
     names = short_names(list(values["recordings"]))
-    blocks = []
+    picture = _picture(book, diagnosed)
+    first = None
     if values["causes"]:
-        blocks.append(section(book, "Causes", *_picture(book, diagnosed), *_causes(book, values)))
-    elif picture := _picture(book, diagnosed):
-        blocks.append(section(book, "The machine", *picture))
-    gain = gain_section(book, values, names)
-    blocks += [gain] if gain is not None else []
-    blocks += residual_sections(book, diagnosed, names)
-    blocks += evidence_sections(book, diagnosed, names)
-    blocks += rest_sections(book, diagnosed)
-    return blocks
+        first = section(book, "Causes", picture, _causes(values))
+    elif picture is not None:
+        first = section(book, "The machine", picture)
+    return [
+        *(node for node in (first, gain_section(book, values, names)) if node is not None),
+        *residual_sections(book, diagnosed, names),
+        *evidence_sections(book, diagnosed, names),
+        *rest_sections(book, diagnosed),
+    ]
 
 
-def _picture(book: Book, diagnosed: Diagnosed) -> list[Node]:
+def _picture(book: Book, diagnosed: Diagnosed) -> Node | None:
     if is_axis(diagnosed):
-        return [book.gallery.ask([("The axis", partial(axis_shot, ASPECT))])]
+        return book.gallery.ask([("The axis", partial(axis_shot, ASPECT))])
     estimates = (diagnosed.values["gain"] or {}).get("estimates")
     if not estimates:
-        return []
+        return None
     causes = read_diagnosis(diagnosed.folder).causes
-    caption = "Where the causes sit" if causes else "The team"
     said = []
     for source in sources(diagnosed.provenance, diagnosed.folder):
-        recording = source.read()
-        if not isinstance(recording, str):
-            made = partial(diagnosis_shot, recording, _grasped(estimates["after"]), causes, aspect=ASPECT)
-            return [book.gallery.ask([(caption, made)])]
-        said.append(recording)
+        try:
+            recording = source.recording()
+        except InputError as error:
+            said.append(str(error))
+            continue
+        made = partial(diagnosis_shot, recording, _grasped(estimates["after"]), causes, aspect=ASPECT)
+        return book.gallery.ask([("Where the causes sit" if causes else "The team", made)])
     return (
-        [verdict("warn", "No picture", f"It needs one of the recordings: {'; '.join(said)}.")] if said else []
+        verdict("warn", "No picture", f"It needs one of the recordings: {'; '.join(said)}.") if said else None
     )
 
 
@@ -168,79 +158,69 @@ def _grasped(values: Values) -> PayloadEstimate:
     return PayloadEstimate(None, count, "staged", found, None, None, None, None, (), (), ())
 
 
-def _causes(book: Book, values: Values) -> list[Node]:
-    head = ["cause", "place", "parameter", "value ± standard error", "unit"]
-    rows: list[list[Entry]] = []
+def _causes(values: Values) -> list[Node]:
+    """What is named and what supports it."""
+    sizes: list[list[Entry]] = []
+    support: list[list[Entry]] = []
     for cause in values["causes"]:
+        who = (cause["cause"], cause["place"])
         for k, (name, entry) in enumerate(cause["parameters"].items()):
             words, unit = parameter(name)
-            first = (cause["cause"], cause["place"]) if k == 0 else ("", "")
-            scale = 1.0
-            if unit in ("s", "m", "rad"):
-                unit, scale = fitting(unit, abs(entry["value"]))
+            unit, scale = fitting(unit, abs(entry["value"])) if unit in ("s", "m", "rad") else (unit, 1.0)
             se = None if entry["se"] is None else scale * entry["se"]
-            rows.append([*first, words, measurement(scale * entry["value"], se), unit])
-    out = [table("What is named", head, rows, groups=True)]
-    head = ["cause", "place", "in sample [%]", "held out [%]", "folds better", "by chance"]
-    rows = []
-    for cause in values["causes"]:
-        inside, held = cause["explained"]["in_sample"], cause["explained"]["held_out"]
-        better = sum(gain > 0 for gain in cause["folds"])
-        rows.append(
-            [
-                cause["cause"], cause["place"], Num(_share(inside)), Num(_share(held)),
-                Num(f"{better} of {len(cause['folds'])}" if cause["folds"] else NONE), Num(power(cause["log10_p"])),
-            ]
-        )  # fmt: skip
+            sizes.append(
+                [*(who if k == 0 else ("", "")), words, measurement(scale * entry["value"], se), unit]
+            )
+        shares = (Num(_share(cause["explained"][kind])) for kind in ("in_sample", "held_out"))
+        folds = cause["folds"]
+        better = f"{sum(gain > 0 for gain in folds)} of {len(folds)}" if folds else NONE
+        support.append([*who, *shares, Num(better), Num(power(cause["log10_p"]))])
     note = (
-        "share of the misfit as simulated that goes away; held out: fitted to the other trials; by "
-        "chance: probability of so "
-        "much evidence in clean data"
+        "share of the misfit as simulated that goes away; held out: fitted to the other trials; by chance: probability "
+        "of so much evidence in clean data"
     )
-    out.append(table("What supports it", head, rows, note=note))
-    return [*out, *_rivals(values), *_shapes(values["causes"])]
+    head = ["cause", "place", "parameter", "value ± standard error", "unit"]
+    supports = ["cause", "place", "in sample [%]", "held out [%]", "folds better", "by chance"]
+    return [
+        table("What is named", head, sizes, groups=True),
+        table("What supports it", supports, support, note=note),
+        *_rivals(values["causes"]),
+        *_shapes(values["causes"]),
+    ]
 
 
 def _share(share: float | None) -> str:
     return percent(share).removesuffix("\u00a0%")
 
 
-def _rivals(values: Values) -> list[Node]:
+def _label(cause: Values) -> str:
+    return f"{cause['cause']} ({cause['place']})"
+
+
+def _rivals(causes: Sequence[Values]) -> list[Node]:
     rows: list[list[Entry]] = []
     advice: dict[str, None] = {}
-    for cause in values["causes"]:
-        label = f"{cause['cause']} ({cause['place']})"
+    for cause in causes:
         alike = [rival for rival in cause["alternatives"] if rival["ambiguous"]]
         if alike:
             advice |= dict.fromkeys(text for entry in [cause, *alike] if (text := entry["separate"]))
         for k, rival in enumerate(cause["alternatives"]):
-            rows.append(
-                [
-                    label if k == 0 else "", f"{rival['cause']} ({rival['place']})", value(rival["evidence_gap"], 3),
-                    value(rival["chi2_per_n"], 3), "cannot be told apart" if rival["ambiguous"] else "fits worse",
-                ]
-            )  # fmt: skip
+            gap, chi2 = value(rival["evidence_gap"]), value(rival["chi2_per_n"])
+            said = "cannot be told apart" if rival["ambiguous"] else "fits worse"
+            rows.append([_label(cause) if k == 0 else "", _label(rival), gap, chi2, said])
     if not rows:
-        return [
-            paragraph(
-                "No other cause comes near." if len(values["causes"]) == 1 else "No other causes come near."
-            )
-        ]
+        return [paragraph(f"No other {'cause comes' if len(causes) == 1 else 'causes come'} near.")]
     head = ["named", "alternative", "behind by [nats]", "closed loop chi²/n", "verdict"]
     out = [table("Alternatives", head, rows, note="how much less the rows speak for it", groups=True)]
-    if advice:
-        box = verdict("warn", "What would tell them apart")
-        box.append(bullets(list(advice)))
-        out.append(box)
-    return out
+    return [*out, verdict("warn", "What would tell them apart", bullets(list(advice)))] if advice else out
 
 
 def _shapes(causes: Sequence[Values]) -> list[Node]:
     """Numbers that change a cause's columns and were chosen, not fitted."""
     entries = []
     for cause in causes:
-        named = [(*parameter(name), number) for name, number in cause["shape"].items()]
+        named = ((*parameter(name), number) for name, number in cause["shape"].items())
         said = ", ".join(f"{words} {plain(number, 4)} {unit}".rstrip() for words, unit, number in named)
         if said:
-            entries.append((f"{cause['cause']} ({cause['place']})", said))
+            entries.append((_label(cause), said))
     return [folded("Shape parameters", facts(entries))] if entries else []

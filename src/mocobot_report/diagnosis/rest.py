@@ -6,10 +6,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from mocobot_report.blocks.blocks import Entry, Num, bullets, folded, paragraph, section, table, tidy
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Child, Node, el
 from mocobot_report.blocks.numbers import plain, size
+from mocobot_report.blocks.prose import bullets, folded, paragraph, tidy
+from mocobot_report.blocks.sections import section
+from mocobot_report.blocks.tables import Entry, Num, table
 from mocobot_report.blocks.units import parameter
 from mocobot_report.folder import Diagnosed
 
@@ -19,32 +21,25 @@ EXTENDED = "extended"
 
 def rest_sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
     """Detection limits, undecidable questions, the extended model's files, notes."""
-    values, out = diagnosed.values, []
-    if values["detection_limits"]:
-        limits = _limits(values)
-        if values["verdict"] != "consistent":
-            limits = folded("Show the limits", limits)
-        out.append(section(book, "What would have been noticed", limits))
-    if values["undecidable"]:
-        entries = [
-            item
-            for entry in values["undecidable"]
-            for item in (
-                el("dt", tidy(entry["what"])),
-                el("dd", tidy(f"{entry['why']}; needs {entry['remedy']}.")),
-            )
-        ]
-        out.append(section(book, "What such recordings cannot decide", el("dl", *entries, class_="list")))
-    model = _extended(diagnosed.folder / EXTENDED)
-    if model is not None:
-        out.append(section(book, "The extended model", *model))
-    notes = list(values["notes"])
+    values = diagnosed.values
+    limits = _limits(values) if values["detection_limits"] else None
+    if limits is not None and values["verdict"] != "consistent":
+        limits = folded("Show the limits", limits)
+    entries = [
+        (el("dt", tidy(entry["what"])), el("dd", tidy(f"{entry['why']}; needs {entry['remedy']}.")))
+        for entry in values["undecidable"]
+    ]
+    notes = [tidy(note) for note in values["notes"]]
     if values["rejected"]:
         names = ", ".join(f"{c['cause']} ({c['place']})" for c in values["rejected"])
         notes.append(f"Looked likely, but did not hold on other trials: {names}.")
-    if notes:
-        out.append(section(book, "Notes", bullets([tidy(note) for note in notes])))
-    return out
+    outline = [
+        ("What would have been noticed", limits),
+        ("What such recordings cannot decide", el("dl", entries, class_="list") if entries else None),
+        ("The extended model", _extended(diagnosed.folder / EXTENDED)),
+        ("Notes", bullets(notes) if notes else None),
+    ]
+    return [section(book, name, content) for name, content in outline if content is not None]
 
 
 def _limits(values: Values) -> Node:
@@ -79,7 +74,7 @@ def _extended(folder: Path) -> list[Node] | None:
         return None
     if not files:
         return None
-    rows: list[list[Entry]] = [
+    rows = [
         [el("code", path.relative_to(folder.parent).as_posix()), Num(size(path.stat().st_size))]
         for path in files
     ]

@@ -10,12 +10,15 @@ from scipy.signal import welch
 
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
-from estimator.recording.model import Recording
-from mocobot_report.blocks.blocks import Entry, bullets, paragraph, table, tabs, value, verdict
+from estimator.statistics import rms_length
 from mocobot_report.blocks.book import Book
-from mocobot_report.blocks.charts import Json, Key, chart, layout, log_axis, numbers, paint, shared
+from mocobot_report.blocks.charts import chart, figure, line, log_axis
 from mocobot_report.blocks.html import Node, el
-from mocobot_report.blocks.series import Line, Panel, height, stacked, thinned
+from mocobot_report.blocks.legend import Key
+from mocobot_report.blocks.prose import bullets, paragraph, verdict
+from mocobot_report.blocks.sections import tabs
+from mocobot_report.blocks.series import Line, Panel, stacked_chart, thinned
+from mocobot_report.blocks.tables import Entry, table, value
 from mocobot_report.sources import Source
 from mocobot_view.replay.replay_trial import ReplayTrial, replay_trial
 
@@ -47,58 +50,40 @@ class Left:
 def signal_sections(book: Book, found: list[Source], e: PayloadEstimate) -> list[Node]:
     """Plots of every recording that is still there, and what is missing."""
     if not found:
-        return [
-            verdict(
-                "warn", "No plots over time",
-                "The file does not say which recordings it was made from; estimate again with this version "
-                "of mocobot.",
-            )
-        ]  # fmt: skip
+        said = "The file does not say which recordings it was made from; estimate again with this version of mocobot."
+        return [verdict("warn", "No plots over time", said)]
     panels: list[tuple[str, list[Node]]] = []
     rows: list[list[Entry]] = []
     missing: list[str] = []
     head: list[str] = []
     for source in found:
         book.say(f"signals of {source.name}")
-        recording = source.read()
-        if isinstance(recording, str):
-            missing.append(recording)
-            continue
         try:
-            trial = replay_trial(recording, source.name, e)
+            trial = replay_trial(source.recording(), source.name, e)
         except InputError as error:
-            missing.append(str(error))
+            missing.append(f"{error}.")
             continue
         left = _left(trial)
         if not left:
-            missing.append(f"{source.name}: nothing can be said without grasps and a centre of mass")
+            missing.append(f"{source.name}: nothing can be said without grasps and a centre of mass.")
             continue
         head = ["recording", *(f"{one.name} [{one.unit}]" for one in left)]
-        rows.append([source.name, *(value(rms(one.values), 2) for one in left)])
-        panels.append((source.name, _plots(book, recording, left, list(trial.notes))))
+        rows.append([source.name, *(value(rms_length(one.values), 2) for one in left)])
+        panels.append((source.name, _plots(book, source.name, left, list(trial.notes))))
     out: list[Node] = []
     if panels:
-        out.append(
-            paragraph(
-                "With the estimated grasps, flanges and grasps must stay together, and the robots' forces and "
-                "moments must add up to what the payload's motion needs. What is left over is noise if the "
-                "estimate is right and the robots are as designed; a pattern in it is something that the model "
-                "does not have.",
-                kind="note",
-            )
+        said = (
+            "With the estimated grasps, flanges and grasps must stay together, and the robots' forces and moments must "
+            "add up to what the payload's motion needs. What is left over is noise if the estimate is right and the "
+            "robots are as designed; a pattern in it is something that the model does not have."
         )
+        out.append(paragraph(said, kind="note"))
         if len({len(row) for row in rows}) == 1:
             out.append(table("Left over, rms", head, rows))
         out += tabs(book, "Recording", panels)
     if missing:
-        out.append(verdict("warn", "Not all recordings could be shown"))
-        out[-1].append(bullets([f"{text}." for text in missing]))
+        out.append(verdict("warn", "Not all recordings could be shown", bullets(missing)))
     return out
-
-
-def rms(values: Array) -> float:
-    """Root mean square of the rows' lengths."""
-    return float(np.sqrt(np.mean(np.sum(values**2, axis=1))))
 
 
 def _left(trial: ReplayTrial) -> list[Left]:
@@ -114,57 +99,50 @@ def _left(trial: ReplayTrial) -> list[Left]:
     return out
 
 
-def _plots(book: Book, recording: Recording, left: list[Left], notes: list[str]) -> list[Node]:
+def _plots(book: Book, name: str, left: list[Left], notes: list[str]) -> list[Node]:
     gaps, balance = [one for one in left if one.keys is not AXES], [one for one in left if one.keys is AXES]
     out: list[Node] = []
     if gaps:
-        out.append(_over_time(book, "Flanges and grasps apart", gaps, recording))
+        out.append(_over_time(book, "Flanges and grasps apart", gaps, name))
     if balance:
-        out.append(_over_time(book, "Wrenches minus what the motion needs, in {1}", balance, recording))
-        spectra = [_spectrum(book, one) for one in balance]
-        out.append(el("div", *spectra, class_="pair"))
+        out.append(_over_time(book, "Wrenches minus what the motion needs, in {1}", balance, name))
+        out.append(el("div", *(_spectrum(book, one) for one in balance), class_="pair"))
     return [*out, *([bullets(notes)] if notes else [])]
 
 
-def _over_time(book: Book, title: str, left: list[Left], recording: Recording) -> Node:
+def _over_time(book: Book, title: str, left: list[Left], name: str) -> Node:
     panels = []
     for one in left:
         time, values = thinned(one.time, one.values)
-        lines = [Line(key, time, values[:, k]) for k, key in enumerate(one.keys)]
-        panels.append(Panel(one.name, one.unit, lines))
-    keys = left[0].keys
-    return chart(
-        book, title, stacked(panels), height=height(panels), keys=keys,
-        label=f"{title}, over time, {recording.name}; rms values are in the table.",
-    )  # fmt: skip
+        panels.append(
+            Panel(one.name, one.unit, [Line(key, time, values[:, k]) for k, key in enumerate(one.keys)])
+        )
+    label = f"{title}, over time, {name}; rms values are in the table."
+    return stacked_chart(book, title, panels, keys=left[0].keys, label=label)
 
 
 def _spectrum(book: Book, one: Left) -> Node:
     """Amplitude density of each component."""
     step = float(np.median(np.diff(one.time)))
-    frequency, power = welch(
-        one.values, 1.0 / step, nperseg=min(len(one.time), round(SEGMENT_S / step)), axis=0
+    segment = min(len(one.time), round(SEGMENT_S / step))
+    frequency, power = welch(one.values, 1.0 / step, nperseg=segment, axis=0)
+    frequency, density = frequency[1:], np.maximum(np.sqrt(power[1:]), 1e-12)
+    shown = figure(
+        [
+            line(
+                frequency,
+                density[:, k],
+                key,
+                f"{key.label}, %{{x:.2f}} Hz: %{{y:.2g}} {one.unit}/√Hz",
+                width=1.4,
+            )
+            for k, key in enumerate(one.keys)
+        ],
+        xaxis=log_axis("frequency [Hz]", [float(frequency[0]), float(frequency[-1])]),
+        yaxis=log_axis(f"{one.unit}/√Hz", [float(np.percentile(density, 2)), float(density.max())]),
+        margin_l=64,
     )
-    density = np.sqrt(power[1:])
-    shown = np.maximum(density, 1e-12)
-    data: list[Json] = [
-        {
-            "type": "scatter", "mode": "lines", "x": shared("f"), "y": numbers(shown[:, k]), "name": key.label,
-            "legendgroup": key.group, "line": {"color": paint(key.colour), "width": 1.4},
-            "hovertemplate": f"{key.label}, %{{x:.2f}} Hz: %{{y:.2g}} {one.unit}/√Hz<extra></extra>",
-        }
-        for k, key in enumerate(one.keys)
-    ]  # fmt: skip
-    figure: Json = {
-        "data": data,
-        "arrays": {"f": numbers(frequency[1:])},
-        "layout": layout(
-            xaxis=log_axis("frequency [Hz]", float(frequency[1]), float(frequency[-1])),
-            yaxis=log_axis(f"{one.unit}/√Hz", float(np.percentile(shown, 2)), float(shown.max())),
-            margin={"l": 64, "r": 12, "t": 8, "b": 44},
-        ),
-    }
     return chart(
-        book, f"Spectrum of the {one.name} left over", figure, height=260, keys=one.keys,
+        book, f"Spectrum of the {one.name} left over", shown, height=260, keys=one.keys,
         label=f"Amplitude spectral density of the {one.name} that is left over.", note="filtered at 5 Hz",
     )  # fmt: skip

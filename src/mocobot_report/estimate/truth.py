@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from estimator.estimate.result import PayloadEstimate
-from mocobot_report.blocks.blocks import Entry, Num, quantity, table, value
 from mocobot_report.blocks.html import Node
-from mocobot_report.blocks.numbers import NONE, plain
+from mocobot_report.blocks.numbers import NONE
+from mocobot_report.blocks.tables import Entry, Num, quantity, table, value
 from mocobot_sim.paper.scoring import rotation_error_deg
 from mocobot_view.facts.body_facts import BodyFacts
 
@@ -19,16 +19,15 @@ def errors_table(e: PayloadEstimate, truth: BodyFacts) -> Node:
     def row(
         name: str, unit: str, true: float, found: float | None, se: float | None, scale: float = 1.0
     ) -> None:
-        error = None if found is None else found - true
-        share = None if error is None or true == 0 else 100.0 * abs(error / true)
-        ratio = None if error is None or not se else abs(error) / se
-        rows.append(
-            [
-                quantity(name), unit, value(scale * true, 5),
-                value(None if error is None else scale * error, 2), value(share, 2),
-                Num(NONE if ratio is None else plain(ratio, 2)),
+        known: list[float | None] = [None, None, None]
+        if found is not None:
+            error = found - true
+            known = [
+                scale * error,
+                100.0 * abs(error / true) if true else None,
+                abs(error) / se if se else None,
             ]
-        )  # fmt: skip
+        rows.append([quantity(name), unit, value(scale * true, 5), *(value(v, 2) for v in known)])
 
     if truth.mass_kg is not None:
         row("mass", "kg", truth.mass_kg, e.mass and e.mass.mass, e.mass and e.mass.se)
@@ -52,7 +51,5 @@ def errors_table(e: PayloadEstimate, truth: BodyFacts) -> Node:
             if e.grasps is not None:
                 angle = rotation_error_deg(truth.grasps.R_1i[j - 1], e.grasps.R_1i[j - 1])
                 rows.append([quantity(f"R_1{j}"), "deg", Num(NONE), value(angle, 2), Num(NONE), Num(NONE)])
-    return table(
-        "Estimate against truth", ["", "unit", "truth", "error", "error [%]", "in standard errors"], rows,
-        note="error of a rotation: its angle",
-    )  # fmt: skip
+    head = ["", "unit", "truth", "error", "error [%]", "in standard errors"]
+    return table("Estimate against truth", head, rows, note="error of a rotation: its angle")

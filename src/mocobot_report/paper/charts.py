@@ -2,127 +2,85 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle, groupby
 
 import numpy as np
+import plotly.graph_objects as go
 
 from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks import palette
-from mocobot_report.blocks.blocks import spelled_text
 from mocobot_report.blocks.book import Book
-from mocobot_report.blocks.charts import Json, Key, axis, chart, dots, layout, log_axis, paint
+from mocobot_report.blocks.charts import chart, column_axis, dots, figure, log_axis, row_axis
 from mocobot_report.blocks.html import Node
+from mocobot_report.blocks.legend import Key
 from mocobot_report.blocks.numbers import PLUS_MINUS, plain
+from mocobot_report.blocks.units import spelled_text
 from mocobot_sim.paper.published import payload_truth
-from mocobot_sim.paper.tables import MOMENTS, PaperTable, Row
+from mocobot_sim.paper.tables import MOMENTS, PaperTable
 
 LEAST = 1e-7
 """Errors below this share of a unit are drawn at it: a logarithmic axis has no zero."""
-SPREAD = 0.16
+NARROW = {"margin.l": 46, "xaxis.tickfont.size": 9}
 
 
 def keys(columns: Sequence[str]) -> list[Key]:
     """Legend of the paper's column and the presets'; presets that nobody knows yet get what is left."""
     left = zip(cycle(palette.OTHER_COLOURS), cycle(palette.OTHER_MARKERS))
+    known = palette.PRESETS
     return [
-        Key(name, name, name, palette.PRESETS[name])
-        if name in palette.PRESETS
-        else Key(name, name, *next(left))
+        Key(name, name, name, known[name]) if name in known else Key(name, name, *next(left))
         for name in columns
     ]
 
 
 def table_chart(book: Book, table: PaperTable, title: str, note: str) -> Node:
     """One column per row of a table of one unit, one dot per preset; whiskers reach up by the spread."""
-    legend, rows = keys(table.columns), table.rows
-    unit, data, seen = rows[0].unit, [], []
+    legend, rows, unit = keys(table.columns), table.rows, spelled_text(f"[{table.rows[0].unit}]")
+    traces, seen = [], []
     for k, key in enumerate(legend):
-        at = [n + SPREAD * (k - (len(legend) - 1) / 2) for n in range(len(rows))]
         cells = [row.cells[k] for row in rows]
-        values = [None if c.value is None else max(c.value, LEAST) for c in cells]
-        seen += [v + (c.spread or 0.0) for v, c in zip(values, cells, strict=True) if v is not None]
-        seen += [v for v in values if v is not None]
+        values, spreads = [_drawn(c.value) for c in cells], [c.spread or 0.0 for c in cells]
+        seen += [
+            v + s for v, spread in zip(values, spreads, strict=True) if v is not None for s in (0.0, spread)
+        ]
         text = [
             f"{key.label}, payload ({row.payload}), {row.quantity}: {plain(c.value)}"
             + ("" if c.spread is None else f" {PLUS_MINUS} {plain(c.spread, 2)}")
-            + f" {spelled_text(f'[{unit}]')}"
+            + f" {unit}"
             for row, c in zip(rows, cells, strict=True)
         ]
-        data.append(dots(at, values, key, up=[c.spread for c in cells], text=text))
-    figure: Json = {
-        "data": data,
-        "layout": layout(
-            xaxis=_columns(rows),
-            yaxis=log_axis(f"error [{unit}]", min(seen, default=1e-3), max(seen, default=1.0)),
-            shapes=_bands(rows),
-            margin={"l": 58, "r": 10, "t": 8, "b": 40},
-        ),
-        "narrow": {"margin.l": 46, "xaxis.tickfont.size": 9},
-    }
+        # Downward a whisker has no meaning on a logarithmic axis.
+        up = (
+            {"array": spreads, "arrayminus": [0.0] * len(rows), "thickness": 1.3, "width": 3}
+            if any(spreads)
+            else None
+        )
+        traces.append(
+            dots([n + _aside(k, legend, 0.16) for n in range(len(rows))], values, key, text, error_y=up)
+        )
+    shown = _by_payload(traces, [(row.payload, row.quantity) for row in rows], f"error {unit}", seen)
     label = f"{title}. The numbers are in Table {table.number} below."
-    return chart(book, title, figure, height=330, label=label, keys=legend, note=note)
-
-
-def _columns(rows: Sequence[Row]) -> Json:
-    """Ticks that name the quantity, and the payload once per group."""
-    names = []
-    for _, group in groupby(rows, key=lambda row: row.payload):
-        each = list(group)
-        for k, row in enumerate(each):
-            head = f"({row.payload})" if k == len(each) // 2 or len(each) == 1 else ""
-            names.append(f"{row.quantity}<br><b>{head}</b>" if len(each) > 1 else f"<b>{head}</b>")
-    return axis(
-        tickvals=list(range(len(rows))), ticktext=names, range=[-0.6, len(rows) - 0.4], showgrid=False, zeroline=False,
-        tickangle=0, fixedrange=True, ticklabelstep=1,
-    )  # fmt: skip
-
-
-def _bands(rows: Sequence[Row]) -> list[Json]:
-    """Every second payload on a shade."""
-    shapes, start = [], 0
-    for k, (_, group) in enumerate(groupby(rows, key=lambda row: row.payload)):
-        end = start + len(list(group))
-        if k % 2:
-            shapes.append(
-                {"type": "rect", "xref": "x", "yref": "paper", "x0": start - 0.5, "x1": end - 0.5, "y0": 0, "y1": 1,
-                 "fillcolor": paint("sunk"), "line": {"width": 0}, "layer": "below"}
-            )  # fmt: skip
-        start = end
-    return shapes
+    return chart(book, title, shown, height=330, label=label, keys=legend, note=note, narrow=NARROW)
 
 
 def summary_chart(book: Book, table: PaperTable) -> Node:
     """The largest errors in percent or degrees, one line per quantity."""
-    rows = [row for row in table.rows if row.unit in ("%", "deg")][::-1]
-    legend, data, seen = keys(table.columns), [], []
+    rows = [row for row in table.rows if row.unit in ("%", "deg")]
+    legend, traces, seen = keys(table.columns), [], []
     for k, key in enumerate(legend):
         values = [row.cells[k].value for row in rows]
-        shown = [None if v is None else max(v, LEAST) for v in values]
-        seen += [v for v in shown if v is not None]
         text = [
             f"{key.label}, {row.quantity}: {plain(v)} {row.unit}" for row, v in zip(rows, values, strict=True)
         ]
-        trace = dots([], [], key, text=text, size=11)
-        trace |= {"x": shown, "y": list(range(len(rows)))}
-        data.append(trace)
-    names = [f"{row.quantity} [{row.unit}]" for row in rows]
-    figure: Json = {
-        "data": data,
-        "layout": layout(
-            xaxis=log_axis(
-                "largest error over the payloads", min(seen, default=1e-3), max(seen, default=1.0)
-            ),
-            yaxis=axis(
-                tickvals=list(range(len(rows))), ticktext=names, range=[-0.6, len(rows) - 0.4], zeroline=False,
-                fixedrange=True,
-            ),
-            margin={"l": 150, "r": 14, "t": 8, "b": 44},
-        ),
-        "narrow": {"yaxis.tickfont.size": 10},
-    }  # fmt: skip
+        traces.append(dots([*map(_drawn, values)], range(len(rows)), key, text, size=11))
+        seen += map(_drawn, values)
+    shown = figure(
+        traces, xaxis=log_axis("largest error over the payloads", seen),
+        yaxis=row_axis([f"{row.quantity} [{row.unit}]" for row in rows], 40), margin_l=150,
+    )  # fmt: skip
     return chart(
-        book, "Largest errors at a glance", figure, height=300, keys=legend,
+        book, "Largest errors at a glance", shown, height=300, keys=legend, narrow={"yaxis.tickfont.size": 10},
         label="Largest error of every quantity, the paper's beside ours; the numbers are in the first table.",
     )  # fmt: skip
 
@@ -130,42 +88,56 @@ def summary_chart(book: Book, table: PaperTable) -> Node:
 def trial_chart(book: Book, estimates: Mapping[tuple[str, str], PayloadEstimate]) -> Node | None:
     """Errors of the principal moments from every single recording."""
     payloads = list(dict.fromkeys(payload for payload, _ in estimates))
-    presets = list(dict.fromkeys(preset for _, preset in estimates))
-    rows = [Row(payload, name, "%", ()) for payload in payloads for name in MOMENTS]
-    data, seen = [], []
-    legend = keys(presets)
+    legend, traces, seen = keys(list(dict.fromkeys(preset for _, preset in estimates))), [], []
     for p, key in enumerate(legend):
         x, y, text = [], [], []
         for k, payload in enumerate(payloads):
-            if (estimate := estimates.get((payload, key.group))) is None:
-                continue
             truth = payload_truth(payload).principal_moments
-            for recording in estimate.recordings:
+            found = estimates.get((payload, key.group))
+            for recording in () if found is None else found.recordings:
                 if recording.inertia is None:
                     continue
                 share = 100.0 * np.abs(recording.inertia.principal.moments / truth - 1.0)
-                x += [3 * k + m + 0.22 * (p - (len(legend) - 1) / 2) for m in range(3)]
-                y += [max(float(s), LEAST) for s in share]
+                x += [3 * k + m + _aside(p, legend, 0.22) for m in range(3)]
+                y += [_drawn(float(s)) for s in share]
                 text += [
                     f"{key.label}, payload ({payload}), {recording.trial} trial, {name}: {plain(float(s))} %"
                     for name, s in zip(MOMENTS, share, strict=True)
                 ]
         seen += y
-        data.append(dots(x, y, key, text=text, size=7, opacity=0.8))
+        traces.append(dots(x, y, key, text, size=7, opacity=0.8))
     if not seen:
         return None
-    figure: Json = {
-        "data": data,
-        "layout": layout(
-            xaxis=_columns(rows),
-            yaxis=log_axis("|error| [%]", min(seen), max(seen)),
-            shapes=_bands(rows),
-            margin={"l": 58, "r": 10, "t": 8, "b": 40},
-        ),
-        "narrow": {"margin.l": 46, "xaxis.tickfont.size": 9},
-    }
+    columns = [(payload, name) for payload in payloads for name in MOMENTS]
     return chart(
-        book, "Principal moments from every trial on its own", figure, height=330, keys=legend,
+        book, "Principal moments from every trial on its own", _by_payload(traces, columns, "|error| [%]", seen),
+        height=330, keys=legend, narrow=NARROW,
         label="Relative error of the principal moments of inertia that each recording alone gives.",
         note="one dot per recording with motion; Table V averages them with their signs",
     )  # fmt: skip
+
+
+def _drawn(value: float | None) -> float | None:
+    return None if value is None else max(value, LEAST)
+
+
+def _aside(k: int, legend: Sequence[Key], apart: float) -> float:
+    """How far the dots of an entry of the legend stand from the middle of their column."""
+    return apart * (k - (len(legend) - 1) / 2)
+
+
+def _by_payload(
+    traces: Sequence[go.Scatter], columns: Sequence[tuple[str, str]], title: str, seen: Iterable[float | None]
+) -> go.Figure:
+    """Columns of (payload, quantity) over a logarithmic axis: the payload named once, every second one shaded."""
+    names, shaded = [], []
+    for k, (payload, group) in enumerate(groupby(columns, key=lambda column: column[0])):
+        each, start = list(group), len(names)
+        for n, (_, quantity) in enumerate(each):
+            head = f"<b>({payload})</b>" if n == len(each) // 2 else "<b></b>"
+            names.append(f"{quantity}<br>{head}" if len(each) > 1 else head)
+        shaded += [(start - 0.5, len(names) - 0.5)] if k % 2 else []
+    shown = figure(traces, xaxis=column_axis(names), yaxis=log_axis(title, seen))
+    for x0, x1 in shaded:
+        shown.add_vrect(x0, x1, layer="below", line_width=0, opacity=0.5)
+    return shown

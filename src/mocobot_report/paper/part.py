@@ -2,30 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
-from mocobot_report.blocks.blocks import (
-    Entry,
-    Num,
-    bullets,
-    component,
-    folded,
-    measurement,
-    paragraph,
-    quantity,
-    section,
-    table,
-    tabs,
-    tiles,
-    value,
-    verdict,
-)
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Node, el
-from mocobot_report.blocks.numbers import NONE, about, plain, spelled
+from mocobot_report.blocks.numbers import about, plain, spelled
+from mocobot_report.blocks.payload import distance, mass, moment, place
 from mocobot_report.blocks.pictures import ASPECT
+from mocobot_report.blocks.prose import bullets, folded, paragraph, tiles, verdict
+from mocobot_report.blocks.sections import section, tabs
+from mocobot_report.blocks.tables import Entry, Num, quantity, table, value
 from mocobot_report.folder import Paper
 from mocobot_report.paper.charts import summary_chart, table_chart, trial_chart
 from mocobot_sim.paper.published import payload_truth
@@ -47,23 +35,23 @@ def title(paper: Paper) -> str:
 
 def answer(paper: Paper) -> list[Node]:
     """What came out, in a few sentences."""
-    summary = summary_table(paper.scores)
-    presets = [name for name in summary.columns if name != "paper"]
-    payloads = list(next(iter(paper.scores.values())))
+    summary, payloads = summary_table(paper.scores), _payloads(paper)
     names = ", ".join(f"({name})" for name in payloads)
-    out = [
-        paragraph(
-            f"Simulated teams of three mobile cobots carry payload{'s' * (len(payloads) > 1)} {names} and "
-            "estimate grasps, mass, centre of mass and inertia from joint sensors alone. The errors "
-            "stand beside those "
-            "that Zhang, Liu, Elwin, Freeman and Lynch measured on hardware (IEEE RA-L 2025, Tables II-V).",
-            kind="lede",
-        )
+    lede = paragraph(
+        f"Simulated teams of three mobile cobots carry payload{'s' * (len(payloads) > 1)} {names} and estimate grasps, "
+        "mass, centre of mass and inertia from joint sensors alone. The errors stand beside those that Zhang, Liu, "
+        "Elwin, Freeman and Lynch measured on hardware (IEEE RA-L 2025, Tables II-V).",
+        kind="lede",
+    )
+    against = [
+        item for name in summary.columns if name != "paper" and (item := _against(summary, name)) is not None
     ]
-    box = verdict("plain", "Our largest errors beside the paper's")
-    box.append(bullets([item for name in presets if (item := _against(summary, name)) is not None]))
-    out.append(box)
-    return [*out, _trust(paper), _summary(summary)]
+    box = verdict("plain", "Our largest errors beside the paper's", bullets(against))
+    return [lede, box, _trust(paper), _summary(summary)]
+
+
+def _payloads(paper: Paper) -> list[str]:
+    return list(next(iter(paper.scores.values())))
 
 
 def _against(summary: PaperTable, preset: str) -> Node | None:
@@ -74,14 +62,13 @@ def _against(summary: PaperTable, preset: str) -> Node | None:
     if not ratios:
         return None
     low, high = min(ratios), max(ratios)
-    what = SENSORS.get(preset, "sensors of that name")
     if low >= 1.0:
         said = f"{about(low)} to {about(high)} times smaller than the paper's"
     elif high <= 1.0:
         said = f"{about(1 / high)} to {about(1 / low)} times the paper's"
     else:
         said = f"between {about(1 / high)} and {about(1 / low)} times the paper's"
-    return el("span", el("b", preset), f" ({what}): {said}.")
+    return el("span", el("b", preset), f" ({SENSORS.get(preset, 'sensors of that name')}): {said}.")
 
 
 def _trust(paper: Paper) -> Node:
@@ -91,65 +78,57 @@ def _trust(paper: Paper) -> Node:
             "The trials' checks are not here",
             "trials.json is missing from the folder, so nothing says whether the simulated physics held.",
         )
-    rod = max(t["rod_error_m"] for t in paper.trials)
-    weld = max(t["weld_error_m"] for t in paper.trials)
-    angle = max(t["weld_error_deg"] for t in paper.trials)
-    limits = (ROD_LIMIT_M, WELD_LIMIT_M, float(np.rad2deg(WELD_LIMIT_RAD)))
-    good = rod <= limits[0] and weld <= limits[1] and angle <= limits[2]
-    count = len(paper.trials)
-    held = f"All {count} trials can be trusted" if good else f"Some of the {count} trials cannot be trusted"
+    rod, weld, angle = (
+        max(t[key] for t in paper.trials) for key in ("rod_error_m", "weld_error_m", "weld_error_deg")
+    )
+    most_deg, count = float(np.rad2deg(WELD_LIMIT_RAD)), len(paper.trials)
+    good = rod <= ROD_LIMIT_M and weld <= WELD_LIMIT_M and angle <= most_deg
     return verdict(
         "good" if good else "bad",
-        held,
-        f"Their rods opened by at most {plain(1e3 * rod, 2)} mm (limit {1e3 * limits[0]:g} mm), grasps by "
-        f"{plain(1e3 * weld, 2)} mm (limit {1e3 * limits[1]:g} mm) and {plain(angle, 2)} deg "
-        f"(limit {limits[2]:g} deg).",
+        f"All {count} trials can be trusted" if good else f"Some of the {count} trials cannot be trusted",
+        f"Their rods opened by at most {plain(1e3 * rod, 2)} mm (limit {1e3 * ROD_LIMIT_M:g} mm), grasps by "
+        f"{plain(1e3 * weld, 2)} mm (limit {1e3 * WELD_LIMIT_M:g} mm) and {plain(angle, 2)} deg "
+        f"(limit {most_deg:g} deg).",
     )
 
 
 def sections(book: Book, paper: Paper) -> list[Node]:
     """Everything below the answer."""
     book.say("paper's tables")
-    summary = summary_table(paper.scores)
     two, three, four, five = paper_tables(paper.scores)
-    whisker = "whisker: mean + standard deviation"
-    blocks = [
-        section(book, "Largest errors", summary_chart(book, summary), identity="largest"),
-        section(
-            book, "Grasps", table_chart(book, two, "Table II: rotation error [deg]", whisker), _table(two),
-            table_chart(book, three.part("%"), "Table III: position error [% of |p|]", whisker), _table(three),
-            identity="grasps",
-        ),
-        section(
-            book, "Mass and centre of mass", *_table_four(book, four), _table(four), identity="mass",
-        ),
-        section(
-            book, "Inertia",
-            table_chart(book, five.part("%"), "Table V: |mean error| of the principal moments [%]",
-                        "whisker: plus the standard deviation of the estimates"),
-            _table(five), trial_chart(book, paper.estimates), identity="inertia",
-        ),
+    shown, above = partial(table_chart, book), "whisker: mean + standard deviation"
+    grasps = [
+        shown(two, "Table II: rotation error [deg]", above), _table(two),
+        shown(three.part("%"), "Table III: position error [% of |p|]", above), _table(three),
     ]  # fmt: skip
-    if paper.estimates:
-        blocks.append(
-            section(book, "Estimates against the truth", *_estimates(book, paper), identity="estimates")
-        )
-    if paper.trials:
-        blocks.append(section(book, "Trial checks", *_trials(paper), identity="trials"))
-    payloads = list(next(iter(paper.scores.values())))
-    shots = [(f"Payload ({name})", lambda name=name: team_shot(name, ASPECT)) for name in payloads]
-    blocks.append(section(book, "The teams and their payloads", book.gallery.ask(shots), identity="teams"))
-    return blocks
-
-
-def _table_four(book: Book, four: PaperTable) -> list[Node]:
-    kinds = (("m", "Table IV: mass error [%]"), ("p1c", "Table IV: centre-of-mass error [% of |p1c|]"))
-    charts = []
-    for name, title in kinds:
-        rows = tuple(row for row in four.part("%").rows if row.quantity == name)
-        part = PaperTable(four.number, four.title, four.note, four.columns, rows)
-        charts.append(table_chart(book, part, title, "one set of six static holds"))
-    return [el("div", *charts, class_="pair")]
+    holds = [
+        shown(four.part("%", "m"), "Table IV: mass error [%]", "one set of six static holds"),
+        shown(
+            four.part("%", "p1c"),
+            "Table IV: centre-of-mass error [% of |p1c|]",
+            "one set of six static holds",
+        ),
+    ]
+    inertia = [
+        shown(five.part("%"), "Table V: |mean error| of the principal moments [%]",
+              "whisker: plus the standard deviation of the estimates"),
+        _table(five), trial_chart(book, paper.estimates),
+    ]  # fmt: skip
+    teams = [(f"Payload ({name})", partial(team_shot, name, ASPECT)) for name in _payloads(paper)]
+    outline = [
+        ("largest", "Largest errors", summary_chart(book, summary_table(paper.scores))),
+        ("grasps", "Grasps", grasps),
+        ("mass", "Mass and centre of mass", [el("div", *holds, class_="pair"), _table(four)]),
+        ("inertia", "Inertia", inertia),
+        ("estimates", "Estimates against the truth", _estimates(book, paper) if paper.estimates else None),
+        ("trials", "Trial checks", _trials(paper) if paper.trials else None),
+        ("teams", "The teams and their payloads", book.gallery.ask(teams)),
+    ]
+    return [
+        section(book, name, blocks, identity=identity)
+        for identity, name, blocks in outline
+        if blocks is not None
+    ]
 
 
 def _table(shown: PaperTable) -> Node:
@@ -160,20 +139,14 @@ def _table(shown: PaperTable) -> Node:
         rows.append([head, quantity(row.quantity), spelled(row.unit), *map(_cell, row.cells)])
         last = row.payload
     caption = f"Table {shown.number}. {shown.title}".replace("[kg m^2]", "[kg m²]")
-    return table(
-        caption, ["payload", "", "unit", *shown.columns], rows, note=shown.note.replace("+-", "±"), headers=2,
-        groups=True,
-    )  # fmt: skip
+    head, note = ["payload", "", "unit", *shown.columns], shown.note.replace("+-", "±")
+    return table(caption, head, rows, note=note, headers=2, groups=True)
 
 
 def _summary(shown: PaperTable) -> Node:
-    rows: list[list[Entry]] = [
-        [row.quantity, spelled(row.unit), *map(_cell, row.cells)] for row in shown.rows
-    ]
-    return table(
-        "Largest error over the payloads", ["", "unit", *shown.columns], rows,
-        note="the largest mean error of every kind, over payloads and pairs or moments",
-    )  # fmt: skip
+    rows = [[row.quantity, spelled(row.unit), *map(_cell, row.cells)] for row in shown.rows]
+    note = "the largest mean error of every kind, over payloads and pairs or moments"
+    return table("Largest error over the payloads", ["", "unit", *shown.columns], rows, note=note)
 
 
 def _cell(cell: Cell) -> Num:
@@ -181,11 +154,10 @@ def _cell(cell: Cell) -> Num:
 
 
 def _estimates(book: Book, paper: Paper) -> list[Node]:
-    payloads = list(dict.fromkeys(payload for payload, _ in paper.estimates))
+    payloads = dict.fromkeys(payload for payload, _ in paper.estimates)
     panels = [(f"payload ({payload})", _against_truth(paper, payload)) for payload in payloads]
     note = paragraph(
-        "Value ± standard error; the truth is Table I of the paper. Standard errors cover noise "
-        "and quantisation, not "
+        "Value ± standard error; the truth is Table I of the paper. Standard errors cover noise and quantisation, not "
         "calibration: on uncalibrated robots they are far too small.",
         kind="note",
     )
@@ -194,67 +166,40 @@ def _estimates(book: Book, paper: Paper) -> list[Node]:
 
 def _against_truth(paper: Paper, payload: str) -> Node:
     truth = payload_truth(payload)
-    presets = [preset for p, preset in paper.estimates if p == payload]
-    found = [paper.estimates[payload, preset] for preset in presets]
-    masses = [measurement(e.mass.mass, e.mass.se) if e.mass else Num(NONE) for e in found]
-    rows: list[list[Entry]] = [["mass", "kg", value(truth.mass, 5), *masses]]
+    found = {preset: e for (p, preset), e in paper.estimates.items() if p == payload}
+    rows: list[list[Entry]] = [["mass", "kg", value(truth.mass, 5), *map(mass, found.values())]]
     for k, name in enumerate("xyz"):
-        places = [component(e.p_1c, e.p_1c_se_m, k, 1e3) for e in found]
-        rows.append([quantity(f"p_1c {name}"), "mm", value(1e3 * float(truth.p_1c[k]), 4), *places])
+        true = value(1e3 * float(truth.p_1c[k]), 4)
+        rows.append([quantity(f"p_1c {name}"), "mm", true, *(place(e, k) for e in found.values())])
     for k in range(3):
-        principal = [None if e.inertia is None else e.inertia.principal for e in found]
-        moments = [component(p.moments, p.moments_se, k) if p else Num(NONE) for p in principal]
         true = value(float(truth.principal_moments[k]), 4)
-        rows.append([f"principal moment {k + 1}", "kg m²", true, *moments])
+        rows.append([f"principal moment {k + 1}", "kg m²", true, *(moment(e, k) for e in found.values())])
     for j in (2, 3):
         true = value(1e3 * float(np.linalg.norm(truth.T(1, j)[:3, 3])), 5)
-        pairs = [e.grasps.pair(1, j) if e.grasps is not None and e.robots >= j else None for e in found]
-        lengths = [
-            measurement(1e3 * float(np.linalg.norm(pair.p_ij)), 1e3 * pair.distance_se_m)
-            if pair
-            else Num(NONE)
-            for pair in pairs
-        ]
-        rows.append([quantity(f"|p_1{j}|"), "mm", true, *lengths])
-    return table(f"Payload ({payload})", ["", "unit", "truth", *presets], rows)
+        rows.append([quantity(f"|p_1{j}|"), "mm", true, *(distance(e, 1, j) for e in found.values())])
+    return table(f"Payload ({payload})", ["", "unit", "truth", *found], rows)
 
 
-def _trials(paper: Paper) -> Sequence[Node]:
-    trials = paper.trials
-    worst = {key: max(t[key] for t in trials) for key in trials[0] if key != "name"}
-    head = [
-        "trial",
-        "rotation [deg]",
-        "torque [N m]",
-        "rod error [µm]",
-        "weld error [µm]",
-        "weld angle [µdeg]",
+def _trials(paper: Paper) -> list[Node]:
+    trials, micro = paper.trials, 1e6
+    columns = {
+        "rotation [deg]": ("rotation_deg", 1.0), "torque [N m]": ("torque_Nm", 1.0),
+        "rod error [µm]": ("rod_error_m", micro), "weld error [µm]": ("weld_error_m", micro),
+        "weld angle [µdeg]": ("weld_error_deg", micro),
+    }  # fmt: skip
+    worst = {key: max(t[key] for t in trials) for key, _ in columns.values()}
+    rod, weld = (f"≤ {plain(micro * worst[key], 2)} µm" for key in ("rod_error_m", "weld_error_m"))
+    shown = tiles([
+        ("trials", str(len(trials)), ""),
+        ("payload rotation", f"≤ {plain(worst['rotation_deg'])} deg", ""),
+        ("spring torque", f"≤ {plain(worst['torque_Nm'])} N m", ""),
+        ("rod error", rod, f"limit {micro * ROD_LIMIT_M:g} µm"),
+        ("grasp error", weld, f"limit {micro * WELD_LIMIT_M:g} µm"),
+    ])  # fmt: skip
+    rows = [
+        [t["name"], *(value(scale * t[k], mark=t[k] == worst[k]) for k, scale in columns.values())]
+        for t in trials
     ]
-    scales = (("rotation_deg", 1.0), ("torque_Nm", 1.0), ("rod_error_m", 1e6), ("weld_error_m", 1e6),
-              ("weld_error_deg", 1e6))  # fmt: skip
-    rows: list[list[Entry]] = [
-        [t["name"], *(value(s * t[k], mark=t[k] == worst[k]) for k, s in scales)] for t in trials
-    ]
-    shown = tiles(
-        [
-            ("trials", str(len(trials)), ""),
-            ("payload rotation", f"≤ {plain(worst['rotation_deg'])} deg", ""),
-            ("spring torque", f"≤ {plain(worst['torque_Nm'])} N m", ""),
-            ("rod error", f"≤ {plain(1e6 * worst['rod_error_m'], 2)} µm", f"limit {1e6 * ROD_LIMIT_M:g} µm"),
-            (
-                "grasp error",
-                f"≤ {plain(1e6 * worst['weld_error_m'], 2)} µm",
-                f"limit {1e6 * WELD_LIMIT_M:g} µm",
-            ),
-        ]
-    )
-    listed = folded(
-        f"Every trial ({len(trials)})",
-        table(
-            "Extremes of every trial",
-            head,
-            rows,
-            note="payload, kind, number, least ideal preset; largest in bold",
-        ),
-    )
-    return [shown, listed]
+    note = "payload, kind, number, least ideal preset; largest in bold"
+    listed = table("Extremes of every trial", ["trial", *columns], rows, note=note)
+    return [shown, folded(f"Every trial ({len(trials)})", listed)]

@@ -58,9 +58,9 @@ class PaperTable:
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
 
-    def part(self, unit: str) -> PaperTable:
-        """The rows of one unit only."""
-        rows = tuple(row for row in self.rows if row.unit == unit)
+    def part(self, unit: str, quantity: str | None = None) -> PaperTable:
+        """The rows of one unit only, or of one quantity in it."""
+        rows = tuple(row for row in self.rows if row.unit == unit and quantity in (None, row.quantity))
         return PaperTable(self.number, self.title, self.note, self.columns, rows)
 
 

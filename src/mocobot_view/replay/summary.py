@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from discrepancy.result.read import VERDICTS, WrittenDiagnosis
+from estimator.statistics import rms, rms_length
 from mocobot_view import colours
 from mocobot_view.colours import Colour
 from mocobot_view.replay.replay_trial import ReplayTrial
@@ -99,13 +100,13 @@ def _estimate(trial: ReplayTrial) -> str:
 def _residuals(trial: ReplayTrial) -> str:
     lines = []
     if trial.motion is not None and trial.robots > 1:
-        position = 1e3 * _rms(trial.motion.gap_position_m)
-        rotation = 1e3 * _rms(trial.motion.gap_rotation_rad)
+        position = 1e3 * rms(trial.motion.gap_position_m)
+        rotation = 1e3 * rms(trial.motion.gap_rotation_rad)
         lines.append(f"- flange against grasp frame: {position:.3g} mm, {rotation:.3g} mrad")
     if trial.balance is not None:
-        text = f"- wrench balance: {_rms(np.linalg.norm(trial.balance.force, axis=1)):.3g} N"
+        text = f"- wrench balance: {rms_length(trial.balance.force):.3g} N"
         if trial.balance.moment is not None:
-            text += f", {_rms(np.linalg.norm(trial.balance.moment, axis=1)):.3g} N m about the centre of mass"
+            text += f", {rms_length(trial.balance.moment):.3g} N m about the centre of mass"
         lines.append(text)
     return "**What one rigid payload leaves over (rms)**\n\n" + "\n".join(lines) if lines else ""
 
@@ -160,10 +161,6 @@ def _vector(values: Array, digits: int) -> str:
 def _fixed(value: float, digits: int) -> str:
     """Fixed digits, and no minus before a zero."""
     return f"{round(float(value), digits) + 0.0:.{digits}f}"
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def _plain(text: str | None) -> str:

@@ -12,10 +12,11 @@ import pytest
 
 from diagnose_run import refused, run
 from discrepancy.emps.causes import CAUSES
+from discrepancy.emps.causes.base import Cause
 from discrepancy.emps.diagnosis import also_fitted, diagnose_axis
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.staircase import format_staircase, staircase
-from discrepancy.emps.words import SENTENCES, EmpsWords
+from discrepancy.emps.words import EmpsWords
 from discrepancy.engine.diagnose import Diagnosis
 from discrepancy.result.traces_file import load_traces
 from emps_made import nominal, recorded, written
@@ -41,7 +42,8 @@ def rubbing() -> tuple[EmpsRig, Diagnosis]:
 
 
 def test_every_cause_has_a_sentence() -> None:
-    assert set(SENTENCES) == set(CAUSES)
+    for cause in CAUSES.values():
+        assert type(cause).sentence is not Cause.sentence, cause.name
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from scipy.io import savemat
 
 from discrepancy.emps.recording.axis_log import AxisLog
-from discrepancy.emps.recording.preflight import checked, resolution, stuck
+from discrepancy.emps.recording.preflight import checked, stuck
 from discrepancy.emps.recording.reader import read_emps
 from emps_made import GAIN, KP, KV, as_mat, reference, written
 from estimator.errors import InputError
@@ -190,11 +191,15 @@ def test_an_axis_that_does_not_move_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("step", [1e-5, 6.1e-5, 1e-3 / 3])
 def test_resolution_is_read_off(step: float) -> None:
-    assert resolution(np.round(axis().position / step) * step).step_m == pytest.approx(step, rel=1e-6)
+    made = axis()
+    read = replace(made, position=np.round(made.position / step) * step)
+    assert read.step_m == pytest.approx(step, rel=1e-6)
 
 
 def test_a_smooth_position_has_no_steps() -> None:
-    assert resolution(axis().position + 1e-9 * np.random.default_rng(0).standard_normal(7200)).step_m == 0.0
+    made = axis()
+    noise = 1e-9 * np.random.default_rng(0).standard_normal(7200)
+    assert replace(made, position=made.position + noise).step_m == 0.0
 
 
 def test_a_coarse_position_and_saturation_are_said(tmp_path: Path) -> None:

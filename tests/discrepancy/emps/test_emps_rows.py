@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from discrepancy.emps.blocks import blocks, period_of
-from discrepancy.emps.catalogue import DEFAULTS, candidate_of
+from discrepancy.emps.catalogue import candidate_of
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.noise import repeated
 from discrepancy.emps.pulse_search import pulse_train, rectangle
@@ -16,8 +16,10 @@ from discrepancy.emps.recording.axis_log import AxisLog
 from discrepancy.emps.recording.signals import Signals, at_delay
 from discrepancy.emps.reduction import Reduction
 from discrepancy.emps.rig import EmpsRig
+from discrepancy.engine.block_errors import with_block_errors
 from discrepancy.engine.search import search
-from discrepancy.least_squares.block_errors import block_covariance, with_block_errors
+from discrepancy.least_squares.block_errors import block_covariance
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Parameter, Rows
 from emps_errors import bootstrap
@@ -225,7 +227,7 @@ def test_whitened_noise_is_white_and_of_unit_size() -> None:
 
 
 def test_a_rig_is_linear_in_its_causes(clean: EmpsRig) -> None:
-    causes = [candidate_of(n, clean.hints, DEFAULTS) for n in ("mass", "viscous_friction", "position_gain")]
+    causes = [candidate_of(n, clean.hints) for n in ("mass", "viscous_friction", "position_gain")]
     values = [np.array([3.0]), np.array([20.0]), np.array([1.0])]
     rows = clean.rows(causes)
     left = clean.residual(np.zeros(0), [], list(zip(causes, values, strict=True)))
@@ -235,10 +237,10 @@ def test_a_rig_is_linear_in_its_causes(clean: EmpsRig) -> None:
 
 
 def test_negative_friction_and_invisible_play_cannot_be(clean: EmpsRig) -> None:
-    friction = candidate_of("coulomb_friction", clean.hints, DEFAULTS)
+    friction = candidate_of("coulomb_friction", clean.hints)
     assert clean.possible(friction, np.array([-0.1]), np.array([[1.0]]))
     assert not clean.possible(friction, np.array([-5.0]), np.array([[1.0]]))
-    play = candidate_of("backlash", clean.hints, DEFAULTS)
+    play = candidate_of("backlash", clean.hints)
     assert not clean.possible(play, np.array([4e-7]), np.array([[1e-16]]))  # two steps of the encoder
     assert clean.possible(play, np.array([4e-5]), np.array([[1e-16]]))
 
@@ -290,7 +292,7 @@ def correlated(rng: np.random.Generator, phi: float, trials: int = 4, n: int = 5
 def test_block_errors_are_the_scatter_of_many_data_sets(phi: float) -> None:
     values, block, naive = [], [], []
     for seed in range(120):
-        fit = correlated(np.random.default_rng(seed), phi, trials=2, n=300).fit([0, 1])
+        fit = Fit.of(correlated(np.random.default_rng(seed), phi, trials=2, n=300), [0, 1])
         values.append(fit.solution)
         block.append(np.diag(block_covariance(fit, 50)))
         naive.append(np.diag(fit.covariance))
@@ -300,7 +302,7 @@ def test_block_errors_are_the_scatter_of_many_data_sets(phi: float) -> None:
 
 
 def test_block_errors_are_those_of_a_bootstrap() -> None:
-    fit = correlated(np.random.default_rng(5), 0.8).fit([0, 1])
+    fit = Fit.of(correlated(np.random.default_rng(5), 0.8), [0, 1])
     drawn = bootstrap(fit, 50, np.random.default_rng(0), draws=800)
     np.testing.assert_allclose(np.sqrt(np.diag(block_covariance(fit, 50))), drawn, rtol=0.15)
 

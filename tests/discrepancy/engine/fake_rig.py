@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from discrepancy.rig import Candidate, Channel, Parameter, Rows, Transient
+from discrepancy.rig import Candidate, Channel, Parameter, Rig, Rows, Transient
 
 ROWS, CHANNELS, RATE_HZ = 120, 4, 12.5
 
@@ -21,7 +21,7 @@ TWINS = {4: (2, 0.005)}  # cause 4 leaves the trace of cause 2, but for half a p
 
 
 @dataclass
-class FakeRig:
+class FakeRig(Rig):
     """Data are noise + unknowns + causes in place, all linear.
 
     Attributes:
@@ -112,26 +112,11 @@ class FakeRig:
             out.append(x)
         return out
 
-    def unknowns(self, candidate):
-        return [np.zeros((ROWS, CHANNELS, 0)) for _ in self.trials]
-
-    def possible(self, candidate, values, covariance):
-        return True
-
     def transients(self, remaining):
         if not self.burst:
             return []
         when = Transient(self.burst[0], 3.2, 4.0)
         return [cause("push", None, 0.0, self.burst[2], "push", when)]
-
-    def steps(self, candidate):
-        return []
-
-    def imitators(self, candidate):
-        return []
-
-    def refinements(self, candidate, *, finer=False):
-        return []
 
     def can_resimulate(self):
         return None if self.loop else "it is made up"
@@ -151,17 +136,11 @@ class FakeRig:
     def row_rate_hz(self, trial):
         return RATE_HZ
 
-    def directions(self, trial):
-        return {}
-
     def effect_parameters(self, candidate, values, covariance):
         return {p.name: v for p, v in zip(candidate.parameters, values, strict=True)}, {}
 
     def write_extended(self, explanation, folder):
         raise NotImplementedError
-
-    def undecidable(self):
-        return []
 
 
 def names(found):

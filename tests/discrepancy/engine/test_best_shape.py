@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from discrepancy.engine.search import search
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from fake_rig import CATALOGUE, CHANNELS, RATE_HZ, ROWS, FakeRig, cause
 
@@ -70,8 +71,8 @@ def test_solution_with_further_columns_is_that_of_the_extended_problem():
     columns = [rng.standard_normal((ROWS, CHANNELS, 2)) for _ in rig.trials]
     event = cause("event", tolerance=0.0, parameters=2)
     wider = problem.extended(event, columns)
-    expected = wider.fit([2, len(wider.candidates) - 1]).part(len(wider.candidates) - 1)
-    got = problem.fit([2]).solution_with(columns)
+    expected = Fit.of(wider, [2, len(wider.candidates) - 1]).part(len(wider.candidates) - 1)
+    got = Fit.of(problem, [2]).solution_with(columns)
     np.testing.assert_allclose(got[0], expected[0], rtol=1e-8)
     np.testing.assert_allclose(got[1], expected[1], rtol=1e-8)
 
@@ -79,7 +80,7 @@ def test_solution_with_further_columns_is_that_of_the_extended_problem():
 def test_column_that_tells_nothing_gets_nothing():
     """No division by nought, and the others as without it."""
     rig = FakeRig({2: 25.0})
-    fit = Problem.of(rig.rows(rig.candidates()), rig.candidates()).fit([2])
+    fit = Fit.of(Problem.of(rig.rows(rig.candidates()), rig.candidates()), [2])
     rng = np.random.default_rng(4)
     columns = [rng.standard_normal((ROWS, CHANNELS, 1)) for _ in rig.trials]
     empty = [np.concatenate([c, np.zeros_like(c)], axis=2) for c in columns]

@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discrepancy.engine.diagnose import _confirm, diagnose
-from discrepancy.engine.search import refitted, search
+from discrepancy.engine.confirm import confirm
+from discrepancy.engine.diagnose import diagnose
+from discrepancy.engine.refit import explanation_of, refit
+from discrepancy.engine.search import search
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from fake_rig import CATALOGUE, TWINS, FakeRig, names
 
@@ -98,7 +101,7 @@ def test_every_trial_is_simulated_with_what_the_others_say():
         rest.trials = tuple(n for k, n in enumerate(rest.trials) if k != t)
         # Alone in the model: no other cause within its tolerance shares the work.
         problem = Problem.of(rest.rows(rest.candidates()), rest.candidates())
-        assert value == pytest.approx(problem.fit([2], background=False).part(2)[0][0], rel=1e-9)
+        assert value == pytest.approx(Fit.of(problem, [2], background=False).part(2)[0][0], rel=1e-9)
         assert value == pytest.approx(whole, rel=0.1)
 
 
@@ -107,13 +110,12 @@ def test_what_a_replaced_cause_left_goes_with_it():
     (found,) = search(FakeRig({2: 25.0}, twins=TWINS)).found
     other = found.rivals[0][0]
     rig = FakeRig({2: 25.0}, twins=TWINS, loop=lambda c, t: 1.1 if other.cause in c else 9.0)
-    second = replace(found, candidate=CATALOGUE[6], rivals=())
-    explanation = search(rig)
-    both = replace(explanation, found=(found, second))
-    both = refitted(rig, both, [explanation.fit.free[0], 6])
-    rest, alternatives, gain, notes = _confirm(rig, both, 1, None)
-    assert names(rest.found) == [other.cause]
-    assert [a.candidate.cause for (a,) in alternatives] == [found.candidate.cause]
-    assert [r.chi2_per_n for r in gain.after] == pytest.approx([1.1] * 4)
-    assert notes[1] == "cause 6 (robot 1): tells nothing any more beside that, so it is not named."
+    second = replace(found, index=6, candidate=CATALOGUE[6], rivals=())
+    fit = refit(rig, search(rig).problem, [found.index, second.index])
+    both = explanation_of(rig, fit, [found, second], [], nominal=1e5, before=1e5)
+    confirmed = confirm(rig, both)
+    assert names(confirmed.explanation.found) == [other.cause]
+    assert [a.candidate.cause for (a,) in confirmed.alternatives] == [found.candidate.cause]
+    assert [r.chi2_per_n for r in confirmed.gain.after] == pytest.approx([1.1] * 4)
+    assert confirmed.notes[1] == "cause 6 (robot 1): tells nothing any more beside that, so it is not named."
     assert rig.calls[-1][1] == (other.cause,)  # simulated again without it

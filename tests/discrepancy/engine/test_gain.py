@@ -5,6 +5,7 @@ import pytest
 from scipy import stats
 
 from discrepancy.engine.gain import Gain, Response, mean_chi2, responses
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from fake_rig import FakeRig
 
@@ -118,4 +119,4 @@ def test_single_trial_predicts_itself():
     rig = ThreeChannels({2: 25.0}, trials=("only",))
     problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
     responses(rig, problem, [[2]])
-    assert rig.calls[0][3][0][1][0] == pytest.approx(problem.fit([2], background=False).part(2)[0][0])
+    assert rig.calls[0][3][0][1][0] == pytest.approx(Fit.of(problem, [2], background=False).part(2)[0][0])

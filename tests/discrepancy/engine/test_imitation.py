@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from discrepancy.engine.search import search
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Transient
 from discrepancy.team.causes import CAUSES
@@ -58,8 +59,8 @@ def test_fall_is_that_of_the_extended_problem():
     event = rig.transients([])[0]
     columns = rig.columns(event)
     wider = problem.extended(event, columns)
-    fit = problem.fit([2])
-    expected = fit.misfit - wider.fit([2, len(wider.candidates) - 1]).misfit
+    fit = Fit.of(problem, [2])
+    expected = fit.misfit - Fit.of(wider, [2, len(wider.candidates) - 1]).misfit
     assert expected > 100.0
     assert fit.fall_with(columns) == pytest.approx(expected, rel=1e-7)
     twice = [np.concatenate([c, c[..., :1]], axis=2) for c in columns]  # a column that tells nothing new

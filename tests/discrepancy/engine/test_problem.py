@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, kstest, ncx2
 
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Transient
 from linear_problem import CANDIDATES, brute, candidate, random_rows, with_residuals
@@ -40,13 +41,13 @@ def same_problem(a, b):
 @pytest.mark.parametrize("background", [True, False])
 @pytest.mark.parametrize("trials", [None, [1], [2, 0]])
 def test_solution_is_that_of_augmented_least_squares(rows, free, background, trials):
-    fit = Problem.of(rows, CANDIDATES).fit(free, trials, background=background)
+    fit = Fit.of(Problem.of(rows, CANDIDATES), free, trials, background=background)
     same_fit(fit, brute(rows, CANDIDATES, free, trials, background))
 
 
 def test_covariance_is_the_inverse_of_the_augmented_normal_matrix(rng):
     rows = random_rows(rng, local=0)
-    fit = Problem.of(rows, CANDIDATES).fit([2])
+    fit = Fit.of(Problem.of(rows, CANDIDATES), [2])
     columns = []
     for r in rows:
         units = [c.units for c in CANDIDATES[:4]]
@@ -60,7 +61,7 @@ def test_covariance_is_the_inverse_of_the_augmented_normal_matrix(rng):
 
 def test_what_a_solution_leaves_and_its_local_unknowns(rows):
     problem = Problem.of(rows, CANDIDATES)
-    fit, expected = problem.fit([1]), brute(rows, CANDIDATES, [1])
+    fit, expected = Fit.of(problem, [1]), brute(rows, CANDIDATES, [1])
     for t, row in enumerate(rows):
         np.testing.assert_allclose(fit.local(t), expected.local[t], rtol=1e-7)
         assert np.sum(fit.remaining(t) ** 2) == pytest.approx(expected.data_misfit[t])
@@ -72,7 +73,7 @@ def test_what_a_solution_leaves_and_its_local_unknowns(rows):
 
 
 def test_held_out_trial_fits_its_own_unknowns_and_nothing_else(rows):
-    fit = Problem.of(rows, CANDIDATES).fit([2], [0, 1])
+    fit = Fit.of(Problem.of(rows, CANDIDATES), [2], [0, 1])
     expected = brute(rows, CANDIDATES, [2], [0, 1])
     left = rows[2].residual - rows[2].shared @ expected.shared
     for index, values in expected.causes.items():
@@ -86,18 +87,18 @@ def test_fixed_values_take_a_candidate_out_of_the_fit(rows):
     problem, values = Problem.of(rows, CANDIDATES), np.array([0.7, -1.3])
     for trials in (None, [1]):
         same_fit(
-            problem.fit([0], trials, fixed=(1, values)),
+            Fit.of(problem, [0], trials, fixed=(1, values)),
             brute(rows, CANDIDATES, [0], trials, fixed=(1, values)),
         )
     # Held at the values that the fit itself chooses, it changes nothing.
-    best = problem.fit([4], background=False)
-    held = problem.fit([], fixed=(4, best.part(4)[0]), background=False)
+    best = Fit.of(problem, [4], background=False)
+    held = Fit.of(problem, [], fixed=(4, best.part(4)[0]), background=False)
     assert held.misfit == pytest.approx(best.misfit)
 
 
 @pytest.mark.parametrize("free", [(), (0,), (4,)])
 def test_evidence_is_the_fall_of_the_misfit_without_the_prior(rows, free):
-    fit = Problem.of(rows, CANDIDATES).fit(free)
+    fit = Fit.of(Problem.of(rows, CANDIDATES), free)
     found = {e.index: e for e in fit.evidence()}
     assert set(found) == set(range(len(CANDIDATES))) - set(free)
     start = brute(rows, CANDIDATES, free).misfit
@@ -115,12 +116,12 @@ def test_evidence_is_the_fall_of_the_misfit_without_the_prior(rows, free):
 def test_evidence_is_the_distance_over_uncertainty_and_tolerance(rows):
     problem = Problem.of(rows, CANDIDATES)
     for index in (0, 1, 3):
-        values, covariance = problem.fit([index]).part(index)
-        evidence = problem.fit().evidence_of(index)
+        values, covariance = Fit.of(problem, [index]).part(index)
+        evidence = Fit.of(problem).evidence_of(index)
         distance = values @ np.linalg.solve(covariance + np.eye(len(values)), values)
         assert evidence.gain == pytest.approx(distance, rel=1e-6)
         np.testing.assert_allclose(evidence.covariance, covariance, rtol=1e-6, atol=1e-12)
-    assert problem.fit([1]).evidence_of(1) is None
+    assert Fit.of(problem, [1]).evidence_of(1) is None
 
 
 @pytest.mark.parametrize("free", [(), (0,), (4,)])
@@ -129,18 +130,18 @@ def test_evidence_with_other_columns_is_that_of_the_changed_problem(rng, rows, f
     problem = Problem.of(rows, CANDIDATES)
     columns = [rng.standard_normal((*r.residual.shape, len(CANDIDATES[index].parameters))) for r in rows]
     columns[1][:] = 0.0  # as of a transient that another trial has
-    without = problem.fit(free, fixed=(index, np.zeros(len(CANDIDATES[index].parameters))))
+    without = Fit.of(problem, free, fixed=(index, np.zeros(len(CANDIDATES[index].parameters))))
     changed = problem.with_columns(index, CANDIDATES[index], columns)
-    expected, found = changed.fit(free).evidence_of(index), without.evidence_with(index, columns)
+    expected, found = Fit.of(changed, free).evidence_of(index), without.evidence_with(index, columns)
     for name in ("gain", "fall", "log10_p", "score", "parameters"):
         assert getattr(found, name) == pytest.approx(getattr(expected, name)), name
     np.testing.assert_allclose(found.values, expected.values)
     np.testing.assert_allclose(found.covariance, expected.covariance, atol=1e-12)
-    assert found.fall == pytest.approx(without.misfit - changed.fit([*free, index]).misfit)
+    assert found.fall == pytest.approx(without.misfit - Fit.of(changed, [*free, index]).misfit)
 
 
 def test_inflated_noise_divides_the_gain(rows):
-    fit = Problem.of(rows, CANDIDATES).fit()
+    fit = Fit.of(Problem.of(rows, CANDIDATES))
     plain, inflated = fit.evidence_of(1), fit.evidence_of(1, 4.0)
     assert inflated.gain == pytest.approx(plain.gain / 4.0)
     assert inflated.log10_p == pytest.approx(np.log10(chi2.sf(plain.gain / 4.0, 2)))
@@ -185,14 +186,14 @@ def test_problem_without_candidates_can_be_extended(rng):
 
 def test_trials_without_own_unknowns_and_with_dependent_ones(rng):
     rows = random_rows(rng, local=0)
-    same_fit(Problem.of(rows, CANDIDATES).fit([2]), brute(rows, CANDIDATES, [2]))
+    same_fit(Fit.of(Problem.of(rows, CANDIDATES), [2]), brute(rows, CANDIDATES, [2]))
     twice = [_with_local(r, np.repeat(r.shared[..., :1] * 3.0 + 1.0, 2, axis=2)) for r in rows]
-    same_fit(Problem.of(twice, CANDIDATES).fit([2]), brute(twice, CANDIDATES, [2]))
+    same_fit(Fit.of(Problem.of(twice, CANDIDATES), [2]), brute(twice, CANDIDATES, [2]))
 
 
 def test_values_of_no_own_unknowns(rng):
     """A single robot's trials have none."""
-    assert Problem.of(random_rows(rng, local=0), CANDIDATES).fit().local(0).shape == (0,)
+    assert Fit.of(Problem.of(random_rows(rng, local=0), CANDIDATES)).local(0).shape == (0,)
 
 
 def test_index_tells_places_and_intervals_apart(rows):
@@ -217,7 +218,7 @@ def test_undecidable_directions_are_left_out(rows):
         weak = 1e-5 * r.causes[1][..., :1]
         spoiled.append(_with_causes(r, [half, r.local[..., :1], shadow, weak]))
     candidates = (group, hidden, event, candidate("weak", (0.3, 1.0)))
-    fit = Problem.of(spoiled, candidates).fit()
+    fit = Fit.of(Problem.of(spoiled, candidates))
     assert [e.index for e in fit.evidence()] == [0]
     only = fit.evidence_of(0)
     assert only.parameters == 1
@@ -225,7 +226,7 @@ def test_undecidable_directions_are_left_out(rows):
     single = Problem.of(
         [_with_causes(r, [r.causes[0][..., :1]]) for r in alone], (candidate("x", (0.3, 1.0)),)
     )
-    assert only.gain == pytest.approx(single.fit().evidence_of(0).gain, rel=1e-6)
+    assert only.gain == pytest.approx(Fit.of(single).evidence_of(0).gain, rel=1e-6)
     limits = fit.limits(38.0)
     assert np.isfinite(limits[0][0])
     assert limits[0][0] < 10.0
@@ -245,14 +246,14 @@ def draws(rows, problem, rng, count, fits):
             x += problem.raw[t][..., :-1] @ np.append(unknowns, values)
             x += row.local @ rng.uniform(-50.0, 50.0, row.local.shape[2])
             residuals.append(x)
-        fits(problem.with_residual(residuals).fit())
+        fits(Fit.of(problem.with_residual(residuals)))
 
 
 def test_gain_on_clean_draws_is_chi_square_distributed(rng):
     # Weak columns: tolerance and uncertainty are of one size, so both matter.
     rows = random_rows(rng, trials=2, n=12)
     problem = Problem.of(rows, CANDIDATES)
-    information = np.diag(problem.fit().covariance)[2:5]
+    information = np.diag(Fit.of(problem).covariance)[2:5]
     assert np.all((information > 0.001) & (information < 0.999))
     gains = []
     draws(rows, problem, rng, 1200, lambda fit: gains.append([fit.evidence_of(i).gain for i in range(5)]))
@@ -265,7 +266,7 @@ def test_gain_on_clean_draws_is_chi_square_distributed(rng):
 def test_limits_are_found_nine_times_in_ten(rng):
     rows = random_rows(rng, trials=2, n=12)
     problem = Problem.of(rows, CANDIDATES)
-    limits = problem.fit().limits(38.0)
+    limits = Fit.of(problem).limits(38.0)
     assert 1.0 - ncx2.cdf(24.0, 1, 38.0) == pytest.approx(0.9, abs=0.01)
     for index, parameter in ((0, 0), (1, 1), (2, 0), (4, 1)):
         k = len(CANDIDATES[index].parameters)
@@ -282,11 +283,11 @@ def _gain_with(rows, problem, rng, index, values):
     for t, row in enumerate(rows):
         x = rng.standard_normal(row.residual.shape) + row.causes[index] @ values
         residuals.append(x + problem.raw[t][..., problem.shared : -1] @ tolerated)
-    return problem.with_residual(residuals).fit().evidence_of(index).gain
+    return Fit.of(problem.with_residual(residuals)).evidence_of(index).gain
 
 
 def test_strain_of_the_tolerances_by_hand(rows):
-    fit = Problem.of(rows, CANDIDATES).fit([0])
+    fit = Fit.of(Problem.of(rows, CANDIDATES), [0])
     expected = brute(rows, CANDIDATES, [0])
     values = np.concatenate([expected.causes[1], expected.causes[3]])
     value, freedom, log10_p = fit.strain

@@ -7,7 +7,9 @@ import pytest
 
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.engine.held_out import confirmed
-from discrepancy.engine.search import _idle, refitted, search, without_idle
+from discrepancy.engine.refit import explanation_of, idlest, refit, without_idle
+from discrepancy.engine.search import search
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rules import CLEAN_CHI2_PER_N
 from fake_rig import CATALOGUE, TWINS, FakeRig, cause, names
@@ -99,7 +101,7 @@ def test_event_is_found_in_a_shape_that_is_not_the_catalogues():
     assert names(explanation.found) == ["event"]
     assert explanation.found[0].candidate.shape == {"right": 1.0}
     assert explanation.found[0].values[0] == pytest.approx(8.0, abs=0.5)
-    unseen = Problem.of(rig.rows(rig.candidates()), rig.candidates()).fit().evidence_of(len(CATALOGUE))
+    unseen = Fit.of(Problem.of(rig.rows(rig.candidates()), rig.candidates())).evidence_of(len(CATALOGUE))
     assert unseen.log10_p > -2  # the scan alone would not have
 
 
@@ -201,7 +203,7 @@ def test_rows_gap_is_half_the_difference_of_misfits():
     found = explanation.found[0]
     rival, gap = found.rivals[0]
     problem = explanation.problem
-    misfits = [problem.fit([problem.index_of(c)]).misfit for c in (found.candidate, rival)]
+    misfits = [Fit.of(problem, [problem.index_of(c)]).misfit for c in (found.candidate, rival)]
     assert gap == pytest.approx(0.5 * (misfits[1] - misfits[0]), rel=1e-6)
 
 
@@ -224,13 +226,20 @@ def test_progress_is_told():
 def test_what_tells_nothing_beside_the_others_is_dropped():
     """The last one named is never the idle one; of the others the one without evidence is."""
     rig = FakeRig({2: 20.0, 5: [40.0, -30.0]})
+    explanation = search(rig)
     problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
-    assert _idle(problem, [2, 5], range(1)) == []
-    assert _idle(problem, [5, 2], range(1)) == []
-    assert _idle(problem, [6, 5, 2], range(2)) == [0]
-    assert _idle(problem, [5, 6, 2], range(2)) == [1]
-    assert _idle(problem, [5, 2, 6], range(2)) == []
-    assert _idle(problem, [5, 2, 6], range(3)) == [2]
+
+    def idle(free, among):
+        named = [replace(explanation.found[0], index=index) for index in among]
+        found = idlest(Fit.of(problem, free), named)
+        return None if found is None else found.index
+
+    assert idle([2, 5], [2]) is None
+    assert idle([5, 2], [5]) is None
+    assert idle([6, 5, 2], [6, 5]) == 6
+    assert idle([5, 6, 2], [5, 6]) == 6
+    assert idle([5, 2, 6], [5, 2]) is None
+    assert idle([5, 2, 6], [5, 2, 6]) == 6
 
 
 def test_what_a_replaced_cause_left_goes_with_it():
@@ -238,14 +247,15 @@ def test_what_a_replaced_cause_left_goes_with_it():
     rig = FakeRig({2: 20.0, 5: [40.0, -30.0]})
     explanation = search(rig)
     assert names(explanation.found) == ["cause 5", "cause 2"]
-    three = replace(explanation, found=(explanation.found[0], *explanation.found))
-    rest, places = without_idle(rig, refitted(rig, three, [6, 5, 2]))
-    assert places == [1, 2]
+    none = replace(explanation.found[0], index=6, candidate=CATALOGUE[6])
+    fit = refit(rig, explanation.problem, [6, 5, 2])
+    three = explanation_of(rig, fit, [none, *explanation.found], [], nominal=1e5, before=1e5)
+    rest = without_idle(rig, three)
     assert names(rest.found) == ["cause 5", "cause 2"]
     assert rest.fit.free == (5, 2)
     assert rest.after == pytest.approx(explanation.after, rel=1e-6)
     np.testing.assert_allclose(rest.found[1].values, explanation.found[1].values, rtol=1e-3)
-    assert without_idle(rig, explanation) == (explanation, [0, 1])
+    assert without_idle(rig, explanation) is explanation
 
 
 def test_what_is_left_open_at_rest_is_not_charged_where_it_tells_nothing():

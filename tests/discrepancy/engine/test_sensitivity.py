@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 
 from discrepancy.engine.search import search
+from discrepancy.least_squares.fit import Fit
 from discrepancy.result.sensitivity import blind_spots, detection_limits
 from discrepancy.rules import NOTICED_CHI2
 from fake_rig import CATALOGUE, FakeRig, cause
@@ -20,7 +21,7 @@ def test_cause_of_the_size_of_its_limit_gains_what_is_needed_to_notice_it():
     for index in (0, 3):
         column = rig.columns(CATALOGUE[index])
         pure = problem.with_residual([c[..., 0] * limits[CATALOGUE[index].cause]["p0"] for c in column])
-        gain = pure.fit().misfit - pure.fit([index]).misfit
+        gain = Fit.of(pure).misfit - Fit.of(pure, [index]).misfit
         assert gain == pytest.approx(NOTICED_CHI2, rel=1e-6)
 
 

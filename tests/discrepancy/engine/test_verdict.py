@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discrepancy.engine.diagnose import _verdict, diagnose
+from discrepancy.engine.diagnose import diagnose
 from discrepancy.engine.search import search
+from discrepancy.engine.verdict import verdict_of
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Transient
 from discrepancy.rules import CLEAN_CHI2_PER_N
@@ -34,10 +36,10 @@ def test_misfits_are_those_of_four_fits():
     rig = FakeRig({2: 25.0})
     explanation = search(rig)
     problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
-    assert explanation.nominal == pytest.approx(problem.fit(background=False).misfit)
-    assert explanation.before == pytest.approx(problem.fit().misfit)
-    assert explanation.plain == pytest.approx(problem.fit([2], background=False).misfit)
-    assert explanation.after == pytest.approx(problem.fit([2]).misfit)
+    assert explanation.nominal == pytest.approx(Fit.of(problem, background=False).misfit)
+    assert explanation.before == pytest.approx(Fit.of(problem).misfit)
+    assert explanation.plain == pytest.approx(Fit.of(problem, [2], background=False).misfit)
+    assert explanation.after == pytest.approx(Fit.of(problem, [2]).misfit)
 
 
 @pytest.mark.parametrize(
@@ -56,15 +58,15 @@ def test_verdict_boundaries(nominal, plain, after, causes, expected):
     explanation = search(FakeRig({2: 25.0}))
     n = explanation.samples
     sizes = {"nominal": nominal * n, "plain": plain * n, "after": after * n}
-    assert _verdict(replace(explanation, found=explanation.found[:causes], **sizes)) == expected
+    assert verdict_of(replace(explanation, found=explanation.found[:causes], **sizes)) == expected
 
 
 def test_three_causes_at_one_robot_only_add_up():
     explanation = search(FakeRig({k: 30.0 for k in (1, 2, 3)}))
     assert len(explanation.found) == 3
     assert explanation.clean
-    assert _verdict(explanation) == "unexplained"
-    assert _verdict(replace(explanation, found=explanation.found[:2])) == "explained"
+    assert verdict_of(explanation) == "unexplained"
+    assert verdict_of(replace(explanation, found=explanation.found[:2])) == "explained"
 
 
 def test_of_three_at_one_robot_a_transient_goes_first():
@@ -89,7 +91,7 @@ def test_three_causes_at_several_robots_are_believed_if_they_are_of_three_famili
             replace(found, candidate=replace(found.candidate, robot=robot, family=family))
             for robot, (found, family) in enumerate(zip((first, *others), families, strict=True), start=1)
         ]
-        return _verdict(replace(explanation, found=tuple(moved)))
+        return verdict_of(replace(explanation, found=tuple(moved)))
 
     assert verdict("a", "b", "c") == "explained"
     assert verdict("a", "b", "a") == "unexplained"
@@ -99,10 +101,10 @@ def test_strained_tolerances_are_not_clean():
     """Six causes at 3.5 times their tolerance: none stands out, together they are no chance."""
     rig = FakeRig({k: 4.5 for k in range(5)})
     problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
-    explanation = replace(search(FakeRig({})), fit=problem.fit())
+    explanation = replace(search(FakeRig({})), fit=Fit.of(problem))
     assert explanation.after <= CLEAN_CHI2_PER_N * explanation.samples
     assert not explanation.clean
-    assert _verdict(explanation) == "unexplained"
+    assert verdict_of(explanation) == "unexplained"
 
 
 def test_three_transients_are_not_dropped_into_silence():

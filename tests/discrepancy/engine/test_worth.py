@@ -6,6 +6,7 @@ import pytest
 from discrepancy.engine.leaders import Leader
 from discrepancy.engine.search import search
 from discrepancy.engine.worth import is_another
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from fake_rig import CATALOGUE, CHANNELS, ROWS, FakeRig, cause
 
@@ -49,8 +50,8 @@ def test_what_makes_a_named_cause_unknown_is_no_other(other, apart, expected):
     """Columns alike to half a percent divide a value at will; with one within its tolerance the other is known."""
     rig = FakeRig({2: 25.0}, twins={} if apart is None else {other: (2, apart)})
     problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
-    fit = problem.fit([2])
+    fit = Fit.of(problem, [2])
     evidence = fit.evidence_of(other)
     assert is_another(fit, Leader(evidence, problem, 0.0)) is expected
-    nothing_named = problem.fit()
+    nothing_named = Fit.of(problem)
     assert is_another(nothing_named, Leader(evidence, problem, 0.0))

@@ -11,7 +11,7 @@ from discrepancy.team.linear.adjust import TorqueNoise, with_adjusted_torques
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.residual import balance, grasp_data
 from discrepancy.team.linear.signals import with_rates
-from discrepancy.team.linear.trial_linear import noise_rows
+from discrepancy.team.linear.start import noise_rows
 from team_case import DESIGN, exact, residual_of
 
 DRAWS = 12

@@ -9,9 +9,12 @@ import pytest
 
 from estimator.errors import InputError
 from estimator.estimate.consistency import Trial
+from estimator.estimate.one_payload import check_one_payload, mass_alone
 from estimator.estimate.payload import estimate_from_trials, estimate_payload
 from estimator.estimate.result import PayloadEstimate
+from estimator.estimate.statics import MassEstimate
 from estimator.estimate.text import format_estimate
+from estimator.signals.holds import find_holds
 from recorded_team import COM, GRASPS, INERTIA, MASS, Sines, carry
 from rigid_body_data import make_body, moving, still
 
@@ -172,6 +175,42 @@ def test_another_payload_under_the_same_name_is_an_error():
     trials = [*team(), trial("random", name="intruder", body=make_body(3, seed=9))]
     with pytest.raises(InputError, match=r"intruder disagrees.*same payload and grasps"):
         estimate_from_trials(trials)
+
+
+def test_a_heavier_payload_in_the_same_grasps_shows_only_where_masses_are_compared():
+    heavier = replace(BODY, mass=1.2 * BODY.mass, inertia=1.2 * BODY.inertia)
+    trials = [trial("random", payload=None), trial("static", payload=None, name="other", body=heavier)]
+    assert estimate_from_trials(trials).mass is not None
+    low, high = BODY.mass, 1.2 * BODY.mass
+    message = (
+        rf"^random1 says {low:.1f}\d kg and other says {high:.1f}\d kg; recordings must be of one payload"
+    )
+    with pytest.raises(InputError, match=message):
+        estimate_from_trials(trials, compare_masses=True)
+
+
+def test_one_payload_has_one_mass_by_each_recording_alone():
+    """The mass that is compared is that of an estimate from the recording alone, to the last bit."""
+    trials = [*team(), still_trial()]
+    estimate = estimate_from_trials(trials, compare_masses=True)
+    for one, record in zip(trials, estimate.recordings, strict=True):
+        alone = estimate_from_trials([one])
+        assert mass_alone(one.data, find_holds(one.data), record.grasps) == alone.mass
+
+
+def test_masses_are_compared_by_share_and_by_error():
+    def masses(*values):
+        return [(f"r{k}", m and MassEstimate(*m, 0.0)) for k, m in enumerate(values)]
+
+    check_one_payload(masses((10.0, 0.01), None, (10.49, 0.01)))
+    check_one_payload(masses((10.0, 0.1), (11.1, 0.1)))
+    check_one_payload(masses(None, None))
+    with pytest.raises(
+        InputError, match=r"^r2 says 10\.00 kg and r0 says 10\.60 kg; recordings must be of one"
+    ):
+        check_one_payload(masses((10.6, 0.01), None, (10.0, 0.01)))
+    with pytest.raises(InputError, match=r"r0 says 10.00 kg and r1 says 11.30 kg"):
+        check_one_payload(masses((10.0, 0.1), (11.3, 0.1)))
 
 
 def test_an_exchange_in_the_only_recording_is_a_renumbering():

@@ -15,7 +15,7 @@ from scipy.signal import firwin
 from array_log import ArrayLog, stream, tones
 from mocobot_logs.log import Samples
 from mocobot_logs.resample.filter import low_pass_taps
-from mocobot_logs.resample.resample import Resampled, resample
+from mocobot_logs.resample.log import Resampled, resample
 
 EPOCH_NS = 1_700_000_000_123_456_789
 BAND_HZ = (0.7, 3.0, 5.0, 19.0)

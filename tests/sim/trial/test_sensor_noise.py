@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from discrepancy.team.linear.noise import ANGLE_FLOOR_RAD, TORQUE_FLOOR_NM, Noise
+from discrepancy.rules import ANGLE_FLOOR_RAD, TORQUE_FLOOR_NM
+from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.signals import Signals
 
 RATE = 100.0

@@ -1,28 +1,30 @@
-"""The catalogue: one file per cause."""
+"""The catalogue: one file per cause, and its name here."""
 
-from discrepancy.emps.causes.asymmetric_coulomb import AsymmetricCoulomb
-from discrepancy.emps.causes.asymmetric_viscous import AsymmetricViscous
-from discrepancy.emps.causes.backlash import Backlash
+from importlib import import_module
+
 from discrepancy.emps.causes.base import Cause
-from discrepancy.emps.causes.coulomb_friction import CoulombFriction
-from discrepancy.emps.causes.delay import Delay
-from discrepancy.emps.causes.force_offset import ForceOffset
-from discrepancy.emps.causes.injected_force import InjectedForce
-from discrepancy.emps.causes.injected_voltage import InjectedVoltage
-from discrepancy.emps.causes.mass import Mass
-from discrepancy.emps.causes.position_force import PositionForce
-from discrepancy.emps.causes.position_gain import PositionGain
-from discrepancy.emps.causes.push import Push
-from discrepancy.emps.causes.stribeck import Stribeck
-from discrepancy.emps.causes.velocity_gain import VelocityGain
-from discrepancy.emps.causes.velocity_lag import VelocityLag
-from discrepancy.emps.causes.viscous_friction import ViscousFriction
+
+NAMES = (
+    "mass",
+    "coulomb_friction",
+    "viscous_friction",
+    "asymmetric_coulomb",
+    "asymmetric_viscous",
+    "stribeck",
+    "force_offset",
+    "position_force",
+    "backlash",
+    "delay",
+    "position_gain",
+    "velocity_gain",
+    "velocity_lag",
+    "injected_voltage",
+    "injected_force",
+    "push",
+)
+"""In the order of the documentation; the class in ``velocity_lag.py`` is ``VelocityLag``."""
 
 CAUSES: dict[str, Cause] = {
-    cause.name: cause()
-    for cause in (
-        Mass, CoulombFriction, ViscousFriction, AsymmetricCoulomb, AsymmetricViscous, Stribeck, ForceOffset,
-        PositionForce, Backlash, Delay, PositionGain, VelocityGain, VelocityLag, InjectedVoltage, InjectedForce, Push,
-    )
-}  # fmt: skip
-"""Every cause by its name, in the order of the documentation."""
+    name: getattr(import_module(f"{__name__}.{name}"), name.title().replace("_", ""))() for name in NAMES
+}
+"""Every cause by its name."""

@@ -5,7 +5,6 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.emps.causes.base import Cause, force
 from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG
-from discrepancy.emps.recording.preflight import resolution
 from estimator.filtering import differentiate, low_pass
 
 
@@ -19,6 +18,9 @@ class Backlash(Cause):
     positive = ("play_m",)
     separate = "A scale or a dial gauge on the carriage while the motor reverses."
 
+    def sentence(self, n):
+        return f"motor and carriage have a play of {n('play_m', 'um', 1e6)} in all"
+
     def columns(self, signals, shape):
         # The side on which motor and carriage touch is that of the force passed on.
         passed = signals.force - (1.0 - rules.CARRIAGE_SHARE) * FIRST_GUESS_KG * signals.a
@@ -29,4 +31,4 @@ class Backlash(Cause):
 
     def visible(self, signals, hints, values):
         # Rounding by whole steps has a hysteresis of its own.
-        return abs(values[0]) > rules.PLAY_STEPS * resolution(signals.log.position).step_m
+        return abs(values[0]) > rules.PLAY_STEPS * signals.log.step_m

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from abc import abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.causes import base
+from discrepancy.causes.base import Shape
 from discrepancy.emps.recording.signals import Signals, smooth
 
 Array = NDArray[np.float64]
-Shape = Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,26 +33,10 @@ class Hints:
     force_spread: float
 
 
-class Cause(ABC):
-    """One physical cause: what it adds to the nominal residual per unit of each parameter.
+class Cause(base.Cause):
+    """One physical cause: what it adds to the nominal residual per unit of each parameter."""
 
-    Attributes:
-        name: as in the verdict.
-        family: causes of one family look alike.
-        where: part of the machine.
-        parameters: units as suffix.
-        scales: typical sizes.
-        positive: parameters that cannot be negative.
-        separate: what experiment would tell it from its look-alikes.
-    """
-
-    name: ClassVar[str]
-    family: ClassVar[str]
-    where: ClassVar[str] = "axis"
-    parameters: ClassVar[tuple[str, ...]]
-    scales: ClassVar[tuple[float, ...]]
-    positive: ClassVar[tuple[str, ...]] = ()
-    separate: ClassVar[str] = ""
+    where = "axis"
 
     @abstractmethod
     def columns(self, signals: Signals, shape: Shape) -> Array:

@@ -14,6 +14,9 @@ class CoulombFriction(Cause):
     positive = ("coulomb_N",)
     separate = "A steady motion at several speeds in one direction."
 
+    def sentence(self, n):
+        return f"rubs with {n('coulomb_N', 'N')} (Coulomb, while it moves)"
+
     def columns(self, signals, shape):
         return force(filtered(signals, direction(signals, shape["slow_mps"])))
 

@@ -15,6 +15,10 @@ class Delay(Cause):
     scales = (1e-4,)
     separate = "A step of the voltage with the loop open."
 
+    def sentence(self, n):
+        later = n.either("delay_s", "later", "earlier")
+        return f"the force follows the voltage {n('delay_s', 'ms', 1e3)} {later} than its hold alone would"
+
     def columns(self, signals, shape):
         return force(differentiate(signals.force, signals.log.rate_hz))
 

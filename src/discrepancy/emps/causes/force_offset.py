@@ -17,5 +17,9 @@ class ForceOffset(Cause):
         "force shifts both, friction that differs does not push."
     )
 
+    def sentence(self, n):
+        resists = n.either("resisting_N", "resists", "helps")
+        return f"a constant force of {n('resisting_N', 'N')} {resists} forward motion"
+
     def columns(self, signals, shape):
         return force(np.ones(len(signals.x)))

@@ -1,6 +1,7 @@
 """Rectangular pulses of force on the carriage, past the drive."""
 
 from discrepancy.emps.causes.base import Cause, filtered, force
+from discrepancy.emps.causes.train import sharper, train
 from discrepancy.emps.pulse_search import rectangle
 
 
@@ -13,6 +14,10 @@ class InjectedForce(Cause):
     scales = (1.0,)
     separate = "The law's inputs and its output, logged separately."
 
+    def sentence(self, n):
+        resists = n.either("resisting_N", "resists", "helps")
+        return f"something {resists} forward motion with {n('resisting_N', 'N')}: {train(n)}"
+
     def columns(self, signals, shape):
         return force(filtered(signals, rectangle(signals.log.time, **shape)))
 
@@ -24,8 +29,4 @@ class InjectedForce(Cause):
         return [dict(hints.force_train)]
 
     def finer(self, shape):
-        return [
-            dict(shape) | {name: shape[name] + off}
-            for name in ("start_s", "width_s")
-            for off in (-1e-3, 1e-3)
-        ]
+        return sharper(shape)

@@ -1,6 +1,7 @@
 """Rectangular pulses that someone adds to the loop's voltage."""
 
 from discrepancy.emps.causes.base import Cause, filtered, voltage
+from discrepancy.emps.causes.train import sharper, train
 from discrepancy.emps.pulse_search import rectangle
 
 
@@ -14,6 +15,9 @@ class InjectedVoltage(Cause):
     scales = (0.1,)
     separate = "The law's inputs and its output, logged separately."
 
+    def sentence(self, n):
+        return f"something adds {n('size_V', 'V', signed=True)} between the law and the drive: {train(n)}"
+
     def columns(self, signals, shape):
         return voltage(filtered(signals, rectangle(signals.log.time, **shape)))
 
@@ -25,8 +29,4 @@ class InjectedVoltage(Cause):
         return [dict(hints.voltage_train)]
 
     def finer(self, shape):
-        return [
-            dict(shape) | {name: shape[name] + off}
-            for name in ("start_s", "width_s")
-            for off in (-1e-3, 1e-3)
-        ]
+        return sharper(shape)

@@ -15,6 +15,12 @@ class PositionForce(Cause):
     scales = (1.0, 1.0)
     separate = "The same way at several speeds: what depends on the place stays there."
 
+    def sentence(self, n):
+        return (
+            f"a force repeats along the way every {n.values['wavelength_m'] * 1e3:.4f} mm, with "
+            f"{n('cosine_N', 'N', signed=True)} (cosine) and {n('sine_N', 'N', signed=True)} (sine)"
+        )
+
     def columns(self, signals, shape):
         angle = 2.0 * np.pi * signals.x / shape["wavelength_m"]
         return force(np.cos(angle), np.sin(angle))

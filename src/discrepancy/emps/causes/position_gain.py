@@ -14,6 +14,10 @@ class PositionGain(Cause):
     scales = (1.0,)
     separate = "A motion at constant speed, where the tracking error is the speed over this gain."
 
+    def sentence(self, n):
+        above = n.either("excess_per_s", "above", "below")
+        return f"the position loop's gain is {n('excess_per_s', '1/s')} {above} its nominal value"
+
     def columns(self, signals, shape):
         return voltage(signals.log.kv_Vs_per_m * signals.error)
 

@@ -9,8 +9,15 @@ class Push(Cause):
     name = "push"
     family = "push"
     parameters = ("force_N",)
+    transient = True
     scales = (1.0,)
     separate = "The same motion again: a push does not repeat."
+
+    def sentence(self, n):
+        return (
+            f"something pushed with {n('force_N', 'N', signed=True)} from {n.values['start_s']:.3f} s on for "
+            f"{n.values['duration_s']:.3f} s"
+        )
 
     def columns(self, signals, shape):
         time = signals.log.time

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
+from discrepancy.causes.free_while import free_while
 from discrepancy.emps.recording.signals import Signals
 
 Array = NDArray[np.float64]
@@ -22,11 +23,4 @@ def direction(signals: Signals, slow: float) -> Array:
 def rests(signals: Signals, slow: float) -> list[Array]:
     """One indicator (Q,) per interval of rest: there friction has an unknown value of its own."""
     still = np.abs(signals.v) < slow
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int))).reshape(-1, 2)
-    out = []
-    for start, stop in edges:
-        if stop - start >= rules.EMPS_SHORTEST_REST_S * signals.log.rate_hz:
-            indicator = np.zeros(len(signals.v))
-            indicator[start:stop] = 1.0
-            out.append(indicator)
-    return out
+    return free_while(still, signals.log.rate_hz, np.inf, rules.EMPS_SHORTEST_REST_S)

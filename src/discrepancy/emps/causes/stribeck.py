@@ -16,6 +16,12 @@ class Stribeck(Cause):
     scales = (1.0,)
     separate = "Steady motions at low speeds."
 
+    def sentence(self, n):
+        return (
+            f"near standstill dry friction is {n('excess_N', 'N')} {n.either('excess_N', 'larger', 'smaller')} than in "
+            f"fast motion, fading over {n('speed_mps', 'mm/s', 1e3)}"
+        )
+
     def columns(self, signals, shape):
         fade = np.exp(-np.abs(signals.v) / shape["speed_mps"])
         return force(filtered(signals, direction(signals, rules.SLOW_MPS) * fade))

@@ -14,6 +14,10 @@ class VelocityGain(Cause):
     scales = (1.0,)
     separate = "The drive's voltage against the loop's own velocity error."
 
+    def sentence(self, n):
+        above = n.either("excess_Vs_per_m", "above", "below")
+        return f"the velocity loop's gain is {n('excess_Vs_per_m', 'V s/m')} {above} its nominal value"
+
     def columns(self, signals, shape):
         return voltage(signals.log.kp_per_s * signals.error - signals.v)
 

@@ -14,6 +14,11 @@ class VelocityLag(Cause):
     scales = (1e-4,)
     separate = "The loop's own velocity signal in the log."
 
+    def sentence(self, n):
+        return (
+            f"the velocity that the loop uses is {n('lag_s', 'ms', 1e3)} {n.either('lag_s', 'old', 'ahead')}"
+        )
+
     def columns(self, signals, shape):
         return voltage(signals.log.kv_Vs_per_m * signals.a)
 

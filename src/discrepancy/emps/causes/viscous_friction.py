@@ -13,5 +13,8 @@ class ViscousFriction(Cause):
     positive = ("viscous_Ns_per_m",)
     separate = "A steady motion at several speeds in one direction."
 
+    def sentence(self, n):
+        return f"rubs with {n('viscous_Ns_per_m', 'N s/m')} (viscous)"
+
     def columns(self, signals, shape):
         return force(signals.v)

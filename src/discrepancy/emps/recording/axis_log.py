@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.quantisation import quantisation_step
+
 Array = NDArray[np.float64]
 
 LIMIT_V = 10.0
@@ -57,3 +59,8 @@ class AxisLog:
     def period_s(self) -> float:
         """Sampling period [s]."""
         return 1.0 / self.rate_hz
+
+    @property
+    def step_m(self) -> float:
+        """Step in which the position is read [m]; 0 where none shows."""
+        return quantisation_step(self.position) or 0.0

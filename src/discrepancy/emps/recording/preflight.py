@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,13 +13,6 @@ from estimator.errors import InputError
 from estimator.filtering import differentiate, low_pass
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Resolution:
-    """Smallest step of the measured position [m]; 0 where none shows."""
-
-    step_m: float
 
 
 def checked(log: AxisLog) -> AxisLog:
@@ -49,7 +42,7 @@ def checked(log: AxisLog) -> AxisLog:
         )
     log = replace(log, position=position)
     _check_sign(log, usable)
-    step = resolution(log.position).step_m
+    step = log.step_m
     if step > rules.COARSE_M:
         notes.append(
             f"qm comes in steps of {1e6 * step:.3g} um, so what moves less, and forces that change quickly, are lost "
@@ -72,16 +65,6 @@ def stuck(log: AxisLog) -> list[tuple[int, int]]:
         for a, b in edges
         if (b - a) * log.period_s >= rules.STUCK_S and np.ptp(log.reference[a : b + 1]) >= rules.STUCK_WHILE_M
     ]
-
-
-def resolution(position: Array) -> Resolution:
-    """Resolution of a quantised position; 0 if the readings lie on no common grid."""
-    steps = np.abs(np.diff(np.unique(position)))
-    steps = steps[steps > 1e-12 * np.ptp(position)]
-    least = float(steps.min()) if len(steps) else 0.0
-    multiples = steps / max(least, 1e-300)
-    common = len(steps) > 10 and np.all(np.abs(multiples - np.round(multiples)) < 0.02)
-    return Resolution(least if common else 0.0)
 
 
 def _bridge(position: Array, reference: Array, start: int, stop: int) -> None:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from discrepancy.team.causes.base import Cause, stack
+from discrepancy.team.linear.slots import PHI
 from estimator.arm.delta import jacobian_of, leg_geometry
 
 
@@ -46,7 +47,7 @@ class BaseTilt(Cause):
         raw[:, -6:-3] = mass * g * up
         raw[:, -3:] = np.cross(mass_c, g * up)
         # The arm's own weight, which the balance takes off the torques.
-        legs = leg_geometry(trial.s[:, robot, :3], design)
+        legs = leg_geometry(trial.s[:, robot, PHI], design)
         at_knee = (
             design.proximal_mass_kg * design.proximal_com_m / design.proximal_length_m
             + 0.5 * design.rod_mass_kg

@@ -4,6 +4,7 @@ import numpy as np
 
 from discrepancy.team.causes.base import Cause, stack
 from discrepancy.team.causes.sliding import rests, sliding
+from discrepancy.team.linear.slots import THETA
 from estimator.arm.gimbal import rate_matrix
 
 
@@ -41,7 +42,7 @@ class GimbalFriction(Cause):
 
 def _moment(trial, robot, joint, torque):
     """The payload is turned by less than the balance believes: an outside moment against the axis."""
-    axes_T = np.swapaxes(rate_matrix(trial.s[:, robot, 9:12]), -1, -2)
+    axes_T = np.swapaxes(rate_matrix(trial.s[:, robot, THETA]), -1, -2)
     moment = np.linalg.solve(axes_T, np.tile(np.eye(3)[joint][:, None], (len(torque), 1, 1)))[..., 0]
     moment = moment @ trial.shared.grasps.R_1i[robot].T
     return trial.of_wrench(np.zeros_like(moment), -moment * torque[:, None])

@@ -3,6 +3,7 @@
 import numpy as np
 
 from discrepancy.team.causes.base import Cause, one_joint, one_robot, stack
+from discrepancy.team.linear.slots import PHI, TAU
 from estimator.arm.delta import LEG_DIRECTIONS, leg_geometry
 
 
@@ -32,7 +33,7 @@ class LinkLength(Cause):
         return "the leg deviates from its design: " + (", ".join(words) or "by nothing that shows")
 
     def columns(self, trial, robot, joint, shape):
-        phi, tau = trial.s[:, robot, :3], trial.s[:, robot, 18:]
+        phi, tau = trial.s[:, robot, PHI], trial.s[:, robot, TAU]
         angle, torque = _errors(phi, tau, joint, trial.design)
         return stack(
             [

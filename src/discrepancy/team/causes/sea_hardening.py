@@ -1,6 +1,7 @@
 """A spring that grows stiffer with deflection."""
 
 from discrepancy.team.causes.base import Cause, one_joint, one_robot, stack
+from discrepancy.team.linear.slots import TAU
 
 
 class SeaHardening(Cause):
@@ -18,7 +19,7 @@ class SeaHardening(Cause):
 
     def columns(self, trial, robot, joint, shape):
         return stack(
-            [trial.of_signals(robot, tau=one_joint(_error(trial.s[:, robot, 18 + joint], trial), joint))]
+            [trial.of_signals(robot, tau=one_joint(_error(trial.s[:, robot, TAU][:, joint], trial), joint))]
         )
 
     def undo(self, signals, trial, robot, joint, values, shape):

@@ -1,6 +1,7 @@
 """Stiffness of a spring: scale of a torque reading."""
 
 from discrepancy.team.causes.base import Cause, one_joint, one_robot, stack
+from discrepancy.team.linear.slots import TAU
 
 
 class SeaScale(Cause):
@@ -20,7 +21,7 @@ class SeaScale(Cause):
         return f"the spring is {n('scale', '%', 1e2)} {stiffer} than assumed, so the torque is read {small}"
 
     def columns(self, trial, robot, joint, shape):
-        return stack([trial.of_signals(robot, tau=one_joint(-trial.s[:, robot, 18 + joint], joint))])
+        return stack([trial.of_signals(robot, tau=one_joint(-trial.s[:, robot, TAU][:, joint], joint))])
 
     def undo(self, signals, trial, robot, joint, values, shape):
         error = one_joint(-values[0] * signals.tau[:, robot, joint], joint)

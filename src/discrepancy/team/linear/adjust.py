@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.team.linear.residual import balance
+from discrepancy.team.linear.slots import TAU
 from discrepancy.team.linear.trial_linear import TrialLinear
 
 Array = NDArray[np.float64]
@@ -57,6 +58,6 @@ def with_adjusted_torques(linear: TrialLinear, noise: TorqueNoise) -> TrialLinea
     s = linear.s.copy()
     for rows, variance, information in zip((~held, held), noise.variance, noise.information, strict=True):
         weighed = residual[rows] @ information
-        moved = np.einsum("iqcs,qc->qis", linear.J[:, rows, -6:, 18:], weighed, optimize=True)
-        s[rows, :, 18:] -= variance * moved
+        moved = np.einsum("iqcs,qc->qis", linear.J[:, rows, -6:, TAU], weighed, optimize=True)
+        s[rows, :, TAU] -= variance * moved
     return replace(linear, s=s)

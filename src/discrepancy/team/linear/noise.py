@@ -11,6 +11,7 @@ from scipy.signal import butter, sosfiltfilt
 from discrepancy import rules
 from discrepancy.team.linear.signals import Signals
 from estimator.filtering import low_pass
+from estimator.quantisation import quantisation_step
 
 Array = NDArray[np.float64]
 
@@ -67,15 +68,8 @@ def _phase(x: Array, rng: np.random.Generator) -> Array:
 
 
 def _step(x: Array) -> float:
-    """Rounding step of a channel, or 0 if its values do not lie on a grid."""
-    values = np.unique(x)
-    gaps = np.diff(values)
-    gaps = gaps[gaps > 1e-9 * max(np.abs(values).max(), 1e-12)]
-    if len(values) > 0.9 * len(x) or not len(gaps):
-        return 0.0
-    step = float(np.median(gaps[gaps < 1.5 * gaps.min()]))
-    on_grid = np.abs((values - values[0]) / step - np.round((values - values[0]) / step)) < 0.02
-    return step if on_grid.mean() > 0.99 else 0.0
+    """Rounding step of a channel, or 0 without one; where values hardly repeat, rounding is as good as noise."""
+    return 0.0 if len(np.unique(x)) > 0.9 * len(x) else quantisation_step(x, levels=2) or 0.0
 
 
 def _white(x: Array, rate_hz: float) -> Array:

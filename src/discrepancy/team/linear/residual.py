@@ -27,8 +27,6 @@ from estimator.signals.grasp_data import GraspData
 
 Array = NDArray[np.float64]
 
-SIGNALS = 21  # phi, its rate and acceleration, theta, rate, acceleration, tau: three each
-
 
 @dataclass(frozen=True, eq=False)
 class Shared:
@@ -87,7 +85,7 @@ def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:
 
 
 def robot_data(s: Array, design: OmnidDesign) -> tuple[Array, Array, Array, Array, Array]:
-    """R_bi, h, twist, twist_dot and wrench of robots whose signals are s, shape (Q, ..., 21)."""
+    """R_bi, h, twist, twist_dot and wrench of robots whose signals are s (``slots``), shape (Q, ..., 21)."""
     phi, phi_dot, phi_ddot, theta, theta_dot, theta_ddot, tau = np.moveaxis(
         s.reshape(*s.shape[:-1], 7, 3), -2, 0
     )

@@ -3,22 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from discrepancy import rules
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.team.linear.adjust import TorqueNoise
+from discrepancy.team.linear.adjust import TorqueNoise, with_adjusted_torques
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.residual import Bases, Shared, balance, grasp_data, pose_residual
 from discrepancy.team.linear.signals import Signals, with_rates
-from discrepancy.team.linear.trial_linear import TrialLinear, linearise, noise_rows
+from discrepancy.team.linear.trial_linear import TrialLinear, linearise
+from estimator import so3
+from estimator.arm.delta import forward_kinematics
 from estimator.arm.design import OmnidDesign
+from estimator.arm.gimbal import rotation
 from estimator.errors import InputError
 from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
+from estimator.recording.model import Recording
 
 Array = NDArray[np.float64]
 
@@ -47,6 +54,54 @@ def start_shared(estimate: PayloadEstimate) -> Shared:
     inertia = estimate.inertia.inertia if estimate.inertia else np.zeros((3, 3))
     about_1 = inertia + mass.mass * (c @ c * np.eye(3) - np.outer(c, c))
     return Shared(grasps, np.concatenate([[mass.mass], mass.mass * c, inertia_parameters(about_1)]))
+
+
+def linearised_trials(
+    recordings: Sequence[Recording], estimate: PayloadEstimate, jobs: int = 1
+) -> tuple[Noise, tuple[TrialLinear, ...], tuple[Whitening, ...]]:
+    """The sensors' noise, and every trial linearised around the best unknowns, with its whitening.
+
+    Raises:
+        InputError: the recordings do not determine the grasps, the mass and the centre of mass, or one is too short.
+    """
+    shared = start_shared(estimate)
+    design = recordings[0].metadata.design
+    signals = [Signals.of(recording) for recording in recordings]
+    noise = Noise.of(signals)
+    reductions = [Reduction.of(s) for s in signals]
+    for recording, reduction in zip(recordings, reductions, strict=True):
+        if len(reduction.time) < 4:
+            raise InputError(f"{recording.name}: too short to diagnose")
+    bases = [start_bases(s, shared, design) for s in signals]
+    run = Parallel(n_jobs=jobs, prefer="processes" if jobs > 1 else "threads")
+    tasks = [(s, b, r, k) for k, (s, b, r) in enumerate(zip(signals, bases, reductions, strict=True))]
+    linear, whitening, torque_noise = zip(
+        *run(delayed(linearised)(s, shared, b, design, r, noise, k) for s, b, r, k in tasks), strict=True
+    )
+    for _ in range(2):
+        shared, bases = gauss_newton(linear, whitening)
+        linear = tuple(
+            replace(
+                t, shared=shared, bases=b, residual=exact_residual(t.signals, shared, b, design, t.reduction)
+            )
+            for t, b in zip(linear, bases, strict=True)
+        )
+    pairs = zip(linear, torque_noise, strict=True)
+    return noise, tuple(with_adjusted_torques(*pair) for pair in pairs), tuple(whitening)
+
+
+def start_bases(signals: Signals, shared: Shared, design: OmnidDesign) -> Bases:
+    """Poses of the bases from the grasps and the mean of what the joints say."""
+    keep = signals.keep
+    R, h = rotation(signals.theta[keep]), forward_kinematics(signals.phi[keep], design)
+    N = R.shape[1]
+    turns, places = [np.eye(3)], [np.zeros(3)]
+    for i in range(1, N):
+        mean = so3.chordal_mean(R[:, 0] @ shared.grasps.R_1i[i] @ np.swapaxes(R[:, i], -1, -2))
+        yaw = np.arctan2(mean[1, 0] - mean[0, 1], mean[0, 0] + mean[1, 1])
+        turns.append(Rotation.from_rotvec([0.0, 0.0, yaw]).as_matrix())
+        places.append(np.mean(h[:, 0] + R[:, 0] @ shared.grasps.p_1i[i] - h[:, i] @ turns[i].T, axis=0))
+    return Bases(np.array(turns), np.array(places))
 
 
 def linearised(
@@ -95,3 +150,20 @@ def gauss_newton(linear: Sequence[TrialLinear], whitening: Sequence[Whitening]) 
         trial.bases.moved(step[shared_columns + own * t : shared_columns + own * (t + 1)])
         for t, trial in enumerate(linear)
     ]
+
+
+def noise_rows(
+    trial: TrialLinear, noise: Noise, rng: np.random.Generator, draws: int = rules.NOISE_DRAWS
+) -> tuple[Array, Array]:
+    """What the sensors' errors alone would leave: residuals (draws, n, C), and the torques' own (draws, n, N, 3)."""
+    out, torques = [], []
+    for _ in range(draws):
+        errors = noise.draw(trial.signals, rng)
+        out.append(
+            sum(
+                trial.of_signals(i, errors.phi[:, i], errors.theta[:, i], errors.tau[:, i])
+                for i in range(trial.robots)
+            )
+        )
+        torques.append(trial.reduction(errors.tau))
+    return np.array(out), np.array(torques)

@@ -7,25 +7,21 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from discrepancy import rules
-from discrepancy.team.linear.noise import Noise
+from discrepancy.team.linear.jacobian import by_signals, needed_wrench
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.residual import (
-    SIGNALS,
     Bases,
     Shared,
     balance,
     grasp_data,
     pose_error,
     pose_residual,
-    robot_data,
 )
 from discrepancy.team.linear.signals import Signals, with_rates
+from discrepancy.team.linear.slots import COUNT, PHI, TAU, THETA, with_its_rates
 from estimator.arm.design import OmnidDesign
-from estimator.estimate.fusion import fuse, fusion_matrix
-from estimator.estimate.principal import inertia_matrix
+from estimator.estimate.fusion import fusion_matrix
 from estimator.signals.grasp_data import GraspData
 
 Array = NDArray[np.float64]
@@ -82,17 +78,17 @@ class TrialLinear:
         """
         rate, samples = self.signals.rate_hz, len(self.signals.time)
         total = np.zeros((samples, self.channels))
-        for at, error in ((0, phi), (9, theta)):
+        for angle, error in ((PHI, phi), (THETA, theta)):
             if error is None:
                 continue
             if error.ndim == 1:
-                total += self.J[robot, :, :, at : at + 3] @ error
+                total += self.J[robot, :, :, angle] @ error
             else:
                 parts = with_rates(error, rate).transpose(1, 0, 2).reshape(samples, 9)
-                total += np.einsum("qcs,qs->qc", self.J[robot, :, :, at : at + 9], parts)
+                total += np.einsum("qcs,qs->qc", self.J[robot, :, :, with_its_rates(angle)], parts)
         if tau is not None:
             tau = np.broadcast_to(tau, (samples, 3))
-            total += np.einsum("qcs,qs->qc", self.J[robot, :, :, 18:], tau)
+            total += np.einsum("qcs,qs->qc", self.J[robot, :, :, TAU], tau)
         return self.reduction(total)
 
     def of_wrench(self, force: Array, moment: Array) -> Array:
@@ -150,7 +146,9 @@ class TrialLinear:
                 along = self.data.R_bi[:, i, k]  # unit vector k of {b_i}, in {i}
                 none, turned = np.zeros_like(along), -np.cross(omega, along)
                 for column, (v, v_dot) in ((k, (along, turned)), (3 + k, (none, along))):
-                    needed = _needed(motion, v @ G[:, at].T, v_dot @ G[:, at].T, none, self.shared, self.data)
+                    needed = needed_wrench(
+                        motion, v @ G[:, at].T, v_dot @ G[:, at].T, none, self.shared, self.data
+                    )
                     out[i, :, :, column] = -np.concatenate(needed, axis=1)
         return out
 
@@ -163,7 +161,7 @@ def linearise(
     Q, N = signals.phi.shape[:2]
     phi, theta = with_rates(signals.phi, rate), with_rates(signals.theta, rate)
     tau = with_rates(signals.tau, rate)[:1]
-    s = np.concatenate([phi, theta, tau]).transpose(1, 2, 0, 3).reshape(Q, N, SIGNALS)
+    s = np.concatenate([phi, theta, tau]).transpose(1, 2, 0, 3).reshape(Q, N, COUNT)
     data = grasp_data(s, design, rate)
     force, Y = balance(data, shared)
     pose = pose_residual(signals.phi, signals.theta, shared, bases, design)
@@ -187,128 +185,9 @@ def linearise(
         for at[k] in (1e-5, -1e-5):
             ends.append(pose_error(data.R_bi, data.p_bi, shared, bases.moved(at)))
         by_bases[:, :, k] = (ends[0] - ends[1]) / 2e-5
-    J = _by_signals(s, data, shared, bases, design) if full else np.zeros((N, 0, C, SIGNALS))
+    J = by_signals(s, data, shared, bases, design) if full else np.zeros((N, 0, C, COUNT))
     padded = np.zeros((len(reduction.sample), C, by_bases.shape[2]))
     padded[:, :split] = reduction(by_bases)
     return TrialLinear(
         signals, s, data, shared, bases, design, reduction, residual, J, reduction(by_shared), padded
     )
-
-
-_STEPS = np.repeat([1e-6, 1e-5, 1e-4, 1e-6, 1e-5, 1e-4, 1e-4], 3)
-
-
-def _by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, design: OmnidDesign) -> Array:
-    """Derivative of the residual by every robot's signals, shape (N, Q, C, 21).
-
-    Central differences through one robot's own formulas, then by hand through what is linear in the robots;
-    evaluated at 25 Hz.
-    """
-    samples, every = len(s), max(1, round(data.rate_hz / rules.TEAM_JACOBIAN_HZ))
-    knots = np.arange(0, samples, every)
-    s = s[knots]
-    data = _thinned(data, knots)
-    Q, N = s.shape[:2]
-    grasps = shared.grasps
-    motion = fuse(data, grasps)
-    fused = data.twist.reshape(Q, -1) @ fusion_matrix(grasps).T
-    J = np.zeros((N, Q, 6 * N, SIGNALS))
-    for i in range(N):
-        G = fusion_matrix(grasps)[:, 6 * i : 6 * i + 6]
-        R_1i, p_1i = grasps.R_1i[i], grasps.p_1i[i]
-        for k in range(SIGNALS):
-            ends = []
-            for sign in (1.0, -1.0):
-                moved = s[:, i].copy()
-                moved[:, k] += sign * _STEPS[k]
-                ends.append(robot_data(moved, design))
-            dR, dh, dV, dV_dot, dF = (
-                (a - b) / (2.0 * _STEPS[k]) for a, b in zip(ends[0], ends[1], strict=True)
-            )
-            turn = _vee(dR @ np.swapaxes(data.R_bi[:, i], -1, -2))  # in {b_i}
-            for j in range(1, N):
-                at = 6 * (j - 1)
-                if i == 0:
-                    J[i, :, at : at + 3, k] = -turn
-                    J[i, :, at + 3 : at + 6, k] = -dh - dR @ grasps.p_1i[j]
-                elif i == j:
-                    J[i, :, at : at + 3, k] = turn @ bases.R[j].T
-                    J[i, :, at + 3 : at + 6, k] = dh @ bases.R[j].T
-            d_up = dR[:, 2] @ R_1i.T / N
-            d_up -= np.sum(d_up * motion.up, axis=1, keepdims=True) * motion.up
-            needed = _needed(fused, dV @ G.T, dV_dot @ G.T, d_up, shared, data)
-            d_force, d_moment = dF[:, 3:] @ R_1i.T, dF[:, :3] @ R_1i.T
-            d_moment = d_moment + np.cross(p_1i, d_force)
-            J[i, :, -6:-3, k], J[i, :, -3:, k] = d_force - needed[0], d_moment - needed[1]
-    # It varies as slowly as the motion: a straight line between its values is good to 1e-3.
-    at = np.minimum(np.arange(samples) / every, Q - 1.0)
-    low = np.minimum(at.astype(int), max(Q - 2, 0))
-    weight = (at - low)[None, :, None, None]
-    return J[:, low] * (1.0 - weight) + J[:, np.minimum(low + 1, Q - 1)] * weight
-
-
-def _needed(
-    motion: Array, twist: Array, twist_dot: Array, up: Array, shared: Shared, data: GraspData
-) -> tuple[Array, Array]:
-    """Force and moment that a change of the payload's motion asks for, in {1}, shape (Q, 3) each.
-
-    Args:
-        motion: its twist, shape (Q, 6).
-        twist, twist_dot, up: changes of its twist, of that one's rate, and of the vertical.
-        shared: its inertia.
-        data: for gravity.
-    """
-    mass, mass_c, inertia = shared.pi[0], shared.pi[1:4], inertia_matrix(shared.pi[4:])
-    omega, v = motion[:, :3], motion[:, 3:]
-    d_omega, d_alpha = twist[:, :3], twist_dot[:, :3]
-    accel = twist_dot[:, 3:] + np.cross(d_omega, v) + np.cross(omega, twist[:, 3:]) + data.gravity_mps2 * up
-    force = mass * accel + np.cross(d_alpha, mass_c)
-    force += np.cross(d_omega, np.cross(omega, mass_c)) + np.cross(omega, np.cross(d_omega, mass_c))
-    moment = np.cross(mass_c, accel) + d_alpha @ inertia
-    return force, moment + np.cross(d_omega, omega @ inertia) + np.cross(omega, d_omega @ inertia)
-
-
-def _thinned(data: GraspData, rows: NDArray[np.intp]) -> GraspData:
-    arrays = {f: getattr(data, f)[rows] for f in ("time", "R_bi", "p_bi", "twist", "twist_dot", "wrench")}
-    return GraspData(**arrays, rate_hz=data.rate_hz, gravity_mps2=data.gravity_mps2)
-
-
-def _vee(A: Array) -> Array:
-    """Vector of the skew part of matrices, shapes (..., 3, 3) -> (..., 3)."""
-    low, high = A[..., (2, 0, 1), (1, 2, 0)], A[..., (1, 2, 0), (2, 0, 1)]
-    return 0.5 * (low - high)
-
-
-def start_bases(signals: Signals, shared: Shared, design: OmnidDesign) -> Bases:
-    """Poses of the bases from the grasps and the mean of what the joints say."""
-    from estimator import so3
-    from estimator.arm.delta import forward_kinematics
-    from estimator.arm.gimbal import rotation
-
-    keep = signals.keep
-    R, h = rotation(signals.theta[keep]), forward_kinematics(signals.phi[keep], design)
-    N = R.shape[1]
-    turns, places = [np.eye(3)], [np.zeros(3)]
-    for i in range(1, N):
-        mean = so3.chordal_mean(R[:, 0] @ shared.grasps.R_1i[i] @ np.swapaxes(R[:, i], -1, -2))
-        yaw = np.arctan2(mean[1, 0] - mean[0, 1], mean[0, 0] + mean[1, 1])
-        turns.append(Rotation.from_rotvec([0.0, 0.0, yaw]).as_matrix())
-        places.append(np.mean(h[:, 0] + R[:, 0] @ shared.grasps.p_1i[i] - h[:, i] @ turns[i].T, axis=0))
-    return Bases(np.array(turns), np.array(places))
-
-
-def noise_rows(
-    trial: TrialLinear, noise: Noise, rng: np.random.Generator, draws: int = rules.NOISE_DRAWS
-) -> tuple[Array, Array]:
-    """What the sensors' errors alone would leave: residuals (draws, n, C), and the torques' own (draws, n, N, 3)."""
-    out, torques = [], []
-    for _ in range(draws):
-        errors = noise.draw(trial.signals, rng)
-        out.append(
-            sum(
-                trial.of_signals(i, errors.phi[:, i], errors.theta[:, i], errors.tau[:, i])
-                for i in range(trial.robots)
-            )
-        )
-        torques.append(trial.reduction(errors.tau))
-    return np.array(out), np.array(torques)

@@ -22,6 +22,7 @@ from mocobot_logs.bag.messages import BLOCK_BYTES, MESSAGE_BYTES, Messages, Stor
 from mocobot_logs.bag.storage.mcap import MAGIC, McapBag
 from mocobot_logs.bag.storage.sqlite import HEAD, SqliteBag
 from mocobot_logs.bag.storage.unpack import UnpackError, unpack_file, unpack_message
+from mocobot_logs.claims import read_small
 from mocobot_logs.faults import detail_of
 
 VERSIONS = range(1, 10)
@@ -182,12 +183,9 @@ def _read_metadata(folder: Path) -> tuple[list[str], bool]:
                 f"{folder}: has no {METADATA}; `ros2 bag reindex` writes it, or name a single file such as "
                 f"{folder / found[0]}"
             )
-        with path.open("rb") as file:
-            content = file.read(_METADATA_BYTES + 1)
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
-    if len(content) > _METADATA_BYTES:
-        raise InputError(f"{path}: is larger than {_METADATA_BYTES >> 20} MiB, which no bag's metadata is")
+    content = read_small(path, _METADATA_BYTES, str(path), "bag's metadata")
     values = _load(content, path).get(_KEY)
     if not isinstance(values, dict):
         raise InputError(f"{path}: has no table {_KEY!r}, so it is not the metadata of a bag")

@@ -1,6 +1,6 @@
 """Are the standard errors right? The sandwich over blocks beside a bootstrap of the same blocks and the naive ones.
 
-python benchmarks/emps_errors.py
+python benchmarks/emps/emps_errors.py
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def bootstrap(fit: Fit, rows_per_block: int, rng: np.random.Generator, draws: in
     solutions = []
     for _ in range(draws):
         gram = blocks[rng.integers(0, len(blocks), len(blocks))].sum(axis=0)
-        solutions.append(Fit.of(fit.problem, gram, fit.free).solution)
+        solutions.append(Fit.of_gram(fit.problem, gram, fit.free).solution)
     return np.std(solutions, axis=0)
 
 
@@ -47,7 +47,7 @@ def main() -> None:
         )
         for index in fit.free:
             candidate = explanation.problem.candidates[index]
-            at = np.searchsorted(fit.used, np.arange(*fit.problem.spans[index].indices(1 << 30)))
+            at = fit.at(index)
             naive = np.sqrt(np.diag(fit.part(index)[1])) * candidate.units
             sandwich = [
                 np.sqrt(np.diag(part_of(fit, block_covariance(fit, round(s * rate)), index)))

@@ -1,4 +1,4 @@
-"""The page's building blocks: sections, tables, tiles, tabs, lists."""
+"""Tables: captions, heads with units, numbers with their errors."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Child, Node, el, words
-from mocobot_report.blocks.numbers import MINUS, NONE, PLUS_MINUS, measured, plain, spelled
+from mocobot_report.blocks.numbers import NONE, PLUS_MINUS, measured, plain
+from mocobot_report.blocks.units import spelled_text
 
 
 @dataclass(frozen=True)
@@ -103,77 +103,3 @@ def quantity(text: str) -> Node:
         out += [text[at : match.start()], el("i", match[1]), el("sub", match[2])]
         at = match.end()
     return el("span", *out, text[at:])
-
-
-def spelled_text(text: str) -> str:
-    """Text whose bracketed unit is printed with superscripts and does not break."""
-    return re.sub(r"\[(.*?)\]", lambda m: f"[{spelled(m[1])}]", text)
-
-
-def section(book: Book, title: str, *children: Child, level: int = 3, identity: str | None = None) -> Node:
-    """A section with its heading."""
-    name = identity or book.identity("part")
-    heading = el(f"h{level}", title, id=f"{name}-title")
-    return el("section", heading, *children, id=name, aria_labelledby=f"{name}-title")
-
-
-def paragraph(*children: Child, kind: str | None = None) -> Node:
-    """A paragraph."""
-    return el("p", *children, class_=kind)
-
-
-def verdict(kind: str, label: str, *sentences: Child) -> Node:
-    """A box that says something first: ``good``, ``warn``, ``bad`` or ``plain``."""
-    return el(
-        "div", el("p", label, class_="label"), *(el("p", s) for s in sentences), class_=f"verdict {kind}"
-    )
-
-
-def tiles(entries: Sequence[tuple[str, str, str]]) -> Node:
-    """Name, value and what goes with it, side by side."""
-    boxes = [
-        el("div", el("dt", n), el("dd", v, el("small", more) if more else None)) for n, v, more in entries
-    ]
-    return el("dl", *boxes, class_="tiles")
-
-
-def tabs(book: Book, name: str, panels: Sequence[tuple[str, Child]]) -> list[Node]:
-    """Panels of which one is shown at a time; radio buttons, so arrow keys choose. A single panel needs no choice."""
-    group = book.identity("choice")
-    shown = [
-        el("div", content, id=f"{group}-{k}", data_panel=True, role="group", aria_label=label)
-        for k, (label, content) in enumerate(panels)
-    ]
-    if len(panels) == 1:
-        return shown
-    inputs = [
-        el(
-            "label",
-            el("input", type="radio", name=group, value=f"{group}-{k}", checked=k == 0, autocomplete="off"),
-            label,
-        )
-        for k, (label, _) in enumerate(panels)
-    ]
-    return [el("fieldset", el("legend", name), *inputs, class_="tabs"), *shown]
-
-
-def bullets(sentences: Sequence[Child]) -> Node:
-    """A list of sentences."""
-    return el("ul", *(el("li", sentence) for sentence in sentences))
-
-
-def folded(title: str, *children: Child) -> Node:
-    """Details that open on demand."""
-    return el("details", el("summary", title), *children)
-
-
-def facts(entries: Sequence[tuple[str, Child]]) -> Node:
-    """Names and what they are."""
-    return el("dl", *((el("dt", n), el("dd", v if v else NONE)) for n, v in entries), class_="facts")
-
-
-def tidy(sentence: str, *, inside: bool = False) -> str:
-    """A sentence of a result in the page's typography: ``+-`` and powers as signs, a capital unless it goes on."""
-    text = sentence.replace(" +- ", f"\u00a0{PLUS_MINUS}\u00a0").replace("chi2/n", "chi²/n")
-    text = re.sub(r"(?<![\w.])-(?=\d)", MINUS, text)
-    return text if inside else text[:1].upper() + text[1:]

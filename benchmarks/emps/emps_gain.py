@@ -1,6 +1,6 @@
 """What every named cause is worth on the EMPS recordings, beside plain least squares.
 
-    python benchmarks/emps_gain.py
+    python benchmarks/emps/emps_gain.py
 
 Force (inverse), position and voltage (reference resimulated in closed loop): in sample, on held-out blocks, and on the
 whole second recording, which nothing was fitted to but the pulses that its own diagnosis finds.
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from discrepancy.emps.catalogue import DEFAULTS, candidate_of
+from discrepancy.emps.catalogue import candidate_of
 from discrepancy.emps.diagnosis import diagnose_axis
 from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.rig import EmpsRig
@@ -24,7 +24,7 @@ FIRST_LAG_S = 1e-3
 
 def plain_fit(rig: EmpsRig, names: tuple[str, ...]) -> Active:
     """Ordinary least squares on the force's rows, nothing whitened."""
-    causes = [candidate_of(name, rig.hints, DEFAULTS) for name in names]
+    causes = [candidate_of(name, rig.hints) for name in names]
     columns = [np.concatenate(rig.physical(cause))[:, 0] for cause in causes]
     force = np.concatenate(rig.reduction(rig.signals.residual))[:, 0]
     values = np.linalg.lstsq(np.concatenate(columns, axis=1), force, rcond=None)[0]
@@ -34,7 +34,7 @@ def plain_fit(rig: EmpsRig, names: tuple[str, ...]) -> Active:
 def given(rig: EmpsRig, values: dict[str, float]) -> Active:
     """A model from known numbers; the mass in whole."""
     known = values | {"mass": values["mass"] - rig.nominal.mass_kg}
-    return [(candidate_of(name, rig.hints, DEFAULTS), np.array([value])) for name, value in known.items()]
+    return [(candidate_of(name, rig.hints), np.array([value])) for name, value in known.items()]
 
 
 def main() -> None:
@@ -46,7 +46,7 @@ def main() -> None:
     found = diagnose_axis(rig).explanation
     print(f"{DATA} diagnosed; {PULSES} with the pulses found there\n")
     print(format_staircase(staircase(rig, found, (other, injected)), PULSES))
-    lag = candidate_of("velocity_lag", rig.hints, DEFAULTS), np.array([FIRST_LAG_S])
+    lag = candidate_of("velocity_lag", rig.hints), np.array([FIRST_LAG_S])
     models = {
         "published four": given(rig, PUBLISHED),
         "plain, offset": plain_fit(rig, ("mass", "coulomb_friction", "viscous_friction", "force_offset")),

@@ -1,4 +1,4 @@
-"""Time to log a replay, and size of its file: python benchmarks/replay_speed.py [REC.parquet]
+"""Time to log a replay, and size of its file: python benchmarks/speed/replay.py [REC.parquet]
 
 Without a recording, a random trial of 110 s with three robots is simulated; `nominal` sensors repeat values, `ideal`
 ones never do, so that their file is as large as such a trial's can be. Reading and estimating are not counted.

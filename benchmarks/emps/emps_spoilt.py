@@ -1,6 +1,6 @@
 """What reader, preflight and verdict say about spoilt copies of the EMPS benchmark's first recording.
 
-    python benchmarks/emps_spoilt.py
+    python benchmarks/emps/emps_spoilt.py
 
 The copies are made in a temporary folder and deleted.
 """

@@ -1,7 +1,7 @@
 """The same fit with ``mujoco.sysid``: same axis, same four numbers (mass, Coulomb, viscous forwards and backwards).
 
     pip install 'mujoco[sysid]'
-    python benchmarks/emps_sysid.py
+    python benchmarks/emps/emps_sysid.py
 
 ``mujoco.sysid`` fits the closed loop of the MJCF by non-linear least squares on position and voltage; the diagnosis'
 problem is linear in the force, whitened as in a diagnosis or plain. All are judged alike: by force, and by the digital
@@ -16,12 +16,13 @@ import mujoco
 import numpy as np
 from mujoco import sysid
 
-from discrepancy.emps.catalogue import DEFAULTS, candidate_of
+from discrepancy.emps.catalogue import candidate_of
 from discrepancy.emps.diagnosis import block_rows
 from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.staircase import Active, errors
 from discrepancy.least_squares.block_errors import block_covariance, part_of
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from emps_data import DATA, PULSES, needed_folder
 from emps_gain import plain_fit
@@ -36,9 +37,9 @@ LAG_S = 1e-3
 def ours(rig: EmpsRig) -> tuple[np.ndarray, np.ndarray, float]:
     """Mass, Coulomb, viscous forwards and backwards, their standard errors, and seconds from the rig's rows on."""
     start = time.perf_counter()
-    candidates = [candidate_of(name, rig.hints, DEFAULTS) for name in (*NAMES, "velocity_lag")]
+    candidates = [candidate_of(name, rig.hints) for name in (*NAMES, "velocity_lag")]
     problem = Problem.of(rig.rows(candidates), candidates)
-    fit = problem.fit(range(len(candidates)))
+    fit = Fit.of(problem, range(len(candidates)))
     covariance = block_covariance(fit, block_rows(rig))
     values = np.array([fit.part(k)[0][0] * candidates[k].units[0] for k in range(4)])
     whole = np.zeros((4, 4))
@@ -118,7 +119,7 @@ def model_of(rig: EmpsRig, numbers: np.ndarray) -> Active:
         LAG_S,
     )
     return [
-        (candidate_of(name, rig.hints, DEFAULTS), np.array([value]))
+        (candidate_of(name, rig.hints), np.array([value]))
         for name, value in zip((*NAMES, "velocity_lag"), values, strict=True)
     ]
 
@@ -127,7 +128,7 @@ def main() -> None:
     """Print both fits side by side."""
     folder = needed_folder()
     rigs = [EmpsRig.of(read_emps(folder / name)) for name in (DATA, PULSES)]
-    injected = candidate_of("injected_voltage", rigs[1].hints, DEFAULTS), np.array([5.0695])
+    injected = candidate_of("injected_voltage", rigs[1].hints), np.array([5.0695])
     a, a_se, a_s = ours(rigs[0])
     start = time.perf_counter()
     plain = np.array([float(values[0]) for _, values in plain_fit(rigs[0], NAMES)])

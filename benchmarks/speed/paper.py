@@ -1,4 +1,4 @@
-"""Wall time of `mocobot paper` with one and with two processes: python benchmarks/paper_speed.py [--quick]
+"""Wall time of `mocobot paper` with one and with two processes: python benchmarks/speed/paper.py [--quick]
 
 --quick runs one payload with two random trials instead of the whole experiment.
 """

@@ -7,7 +7,7 @@ from pathlib import Path
 
 VARIABLE = "MOCOBOT_EMPS_DATA"
 DATA, PULSES = "DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"
-BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data" / "emps"
+BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data" / "emps"
 
 
 def data_folder() -> Path | None:

@@ -1,4 +1,4 @@
-"""Reading of bags against the libraries alone: python benchmarks/bag_speed.py [MINUTES]
+"""Reading of bags against the libraries alone: python benchmarks/speed/bag.py [MINUTES]
 
 Two bags are written in both storages: a trial of 110 s of three robots at 100 Hz with commands, and one minute (or
 MINUTES) of ten robots at 1 kHz without. Every reading happens in a process of its own:

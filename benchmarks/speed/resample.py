@@ -1,4 +1,4 @@
-"""Memory and speed of a long log on its way to a recording: python benchmarks/resample_speed.py [MINUTES [ROBOTS [HZ]]]
+"""Memory and speed of a long log on its way to a recording: python benchmarks/speed/resample.py [MINUTES [ROBOTS [HZ]]]
 
 The log is made up while it is read: stamps with 5 % jitter, 1 % of the samples dropped, chunks of 1000 rows of one
 robot after the other. An hour of ten robots at 1 kHz is the default.
@@ -16,7 +16,7 @@ import numpy as np
 
 from mocobot_logs.log import CHANNELS, Level, Samples
 from mocobot_logs.one_clock import to_recording
-from mocobot_logs.resample.resample import resample
+from mocobot_logs.resample.log import resample
 from mocobot_sim.scene.models import omnid_design
 
 

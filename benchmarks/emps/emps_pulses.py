@@ -1,6 +1,6 @@
 """What is injected in the EMPS benchmark's second recording, from its signals alone; then scored against its log.
 
-python benchmarks/emps_pulses.py
+python benchmarks/emps/emps_pulses.py
 """
 
 from __future__ import annotations

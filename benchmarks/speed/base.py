@@ -1,6 +1,6 @@
 """Speed of released bases: steps of physics with rollers and without, one robot and a team, in processor time.
 
-python benchmarks/base_speed.py
+python benchmarks/speed/base.py
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ What is done to a stream, and its report, follow from its stamps:
 - *filtered*: the same for a grid k times as fine: an FIR low-pass and every k-th sample.
 - *interpolated*: any other stream: a quintic spline onto a finer grid, the low-pass, every k-th sample.
 
-Missing samples are filled in first (``resample_fill``). The anti-alias rule and its numbers are those of
-``resample_filter``. What the low-pass needs, a tenth of a second, is lost at either end.
+Missing samples are filled in first (``fill``). The anti-alias rule and its numbers are those of
+``filter``. What the low-pass needs, a tenth of a second, is lost at either end.
 """
 
 from __future__ import annotations

@@ -1,0 +1,38 @@
+"""The step of a quantised channel, from its samples alone."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_LARGEST_RATIO = 1000.0  # of a difference to the step: rounding spoils larger ones
+_OFF = 0.05  # of a step
+
+
+def quantisation_step(values: Array, levels: int = 8) -> float | None:
+    """The step that all values are multiples of, up to a common offset; None where there is none.
+
+    Differences of neighbouring values are whole steps, however the values are scaled and shifted.
+
+    Args:
+        values: samples, finite, shape (q,).
+        levels: fewest different values that tell a step; 2 where a channel at rest may show no more.
+    """
+    found = np.unique(values)
+    if len(found) < levels:
+        return None
+    gaps = np.diff(found)
+    # One value may come out as two that differ in rounding.
+    gaps = gaps[gaps > 1e-12 * max(abs(found[0]), abs(found[-1]))]
+    if len(gaps) < max(1, levels - 1):
+        return None
+    step = float(gaps.min())
+    step = float(np.median(gaps[gaps < 1.5 * step]))
+    ratio = gaps / step
+    near = ratio < _LARGEST_RATIO
+    whole = np.rint(ratio[near])
+    if 2 * len(whole) < len(gaps) or np.max(np.abs(ratio[near] - whole)) > _OFF:
+        return None
+    return float(np.sum(gaps[near]) / whole.sum())
