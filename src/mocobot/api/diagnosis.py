@@ -43,7 +43,7 @@ class Cause:
     held_out: float | None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis(Diagnosed):
     """A verdict with all that supports it: printable, a table in a notebook, and a folder of files."""
 
@@ -56,6 +56,11 @@ class Diagnosis(Diagnosed):
     def causes(self) -> tuple[Cause, ...]:
         """The named causes, in the order of discovery."""
         return tuple(_cause(entry) for entry in self.to_dict()["causes"])
+
+    def __repr__(self) -> str:
+        """One line."""
+        named = ", ".join(found.candidate.label for found in self.diagnosis.causes) or "nothing named"
+        return f"<Diagnosis of {len(self.rig.trials)} trials: {self.verdict}; {named}>"
 
     def _repr_html_(self) -> str:
         from mocobot.api.notebook import diagnosis_html

@@ -14,7 +14,7 @@ from mocobot.api.given import Given, recordings_of
 from mocobot.api.public import public
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Estimate(PayloadEstimate):
     """Grasps, mass, centre of mass and inertia of one payload, printable, and a table in a notebook.
 
@@ -25,6 +25,11 @@ class Estimate(PayloadEstimate):
     def __str__(self) -> str:
         """The text report."""
         return format_estimate(self)
+
+    def __repr__(self) -> str:
+        """One line."""
+        mass = "mass not determined" if self.mass is None else f"{self.mass.mass:.4g} kg"
+        return f"<Estimate from {len(self.recordings)} recordings: {mass}, {self.method}>"
 
     def _repr_html_(self) -> str:
         from mocobot.api.notebook import estimate_html

@@ -19,7 +19,7 @@ from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Inspection(inspection.Inspection):
     """Stamps, channels, clocks, wiring and excitation of a log: printable, and a table in a notebook.
 
@@ -39,6 +39,10 @@ class Inspection(inspection.Inspection):
     def __str__(self) -> str:
         """The text report."""
         return format_inspection(self)
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"<Inspection of {self.name}: {self.ready_for}>"
 
     def _repr_html_(self) -> str:
         from mocobot.api.notebook import inspection_html

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from mocobot.options import Diagnose
 
 Data = TypeVar("Data")
-Say, Count = Callable[[str], object], Callable[[int], object]
+Say = Callable[[str], object]
+Count = Callable[[int], object]
 
 
 def check_options(options: Diagnose, causes: Collection[str]) -> None:
