@@ -103,14 +103,11 @@ class BaseDrive:
             InputError: a base is parked, or the plan is for another number of bases or another rate.
         """
         index = BaseIndex.of(model)
-        if self._motion.pose.shape[1] != index.robots:
-            raise InputError(
-                f"the plan is for {self._motion.pose.shape[1]} bases; the scene has {index.robots} robots"
-            )
-        if abs(self._motion.rate_hz - rate_hz) > 1e-9 * rate_hz:
-            raise InputError(
-                f"the plan has {self._motion.rate_hz:g} ticks per second; control has {rate_hz:g}"
-            )
+        motion, bases = self._motion, self._motion.pose.shape[1]
+        if bases != index.robots:
+            raise InputError(f"the plan is for {bases} bases; the scene has {index.robots} robots")
+        if abs(motion.rate_hz - rate_hz) > 1e-9 * rate_hz:
+            raise InputError(f"the plan has {motion.rate_hz:g} ticks per second; control has {rate_hz:g}")
         self._index, self._data, self._ticks, self._rate_hz = index, data, ticks, rate_hz
         self._constants = (
             self._gain,
@@ -119,9 +116,7 @@ class BaseDrive:
             self._design.drive_torque_limit_Nm,
             1.0 / rate_hz,
         )
-        self._pose, self._twist = (
-            np.ascontiguousarray(part) for part in (self._motion.pose, self._motion.twist)
-        )
+        self._pose, self._twist = np.ascontiguousarray(motion.pose), np.ascontiguousarray(motion.twist)
         self._odometry = self._pose[0].copy()
         self._angle = data.qpos[index.wheel_qpos].copy()
         self._lag, self._speed = np.zeros((index.robots, 4)), np.zeros((index.robots, 4))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimator.errors import InputError
-from mocobot_sim.base.planar import compose, relative
+from mocobot_sim.base.planar import compose, relative, seen_from
 from mocobot_sim.trial.trajectories import LONGEST_S, minimum_jerk
 
 Array = NDArray[np.float64]
@@ -85,7 +85,8 @@ def plan(start: ArrayLike, legs: Sequence[Leg], rest_s: float, rate_hz: float = 
         within = np.clip(s[on], 0.0, 1.0)
         rate[on] = (30.0 * within**2 * (1.0 - within) ** 2 / leg.duration_s)[:, None] * step
         begin += leg.duration_s + leg.rest_s
-    return PlanarMotion(rate_hz, pose[:, None], _body_twist(pose, rate)[:, None])
+    twist = np.column_stack([rate[:, 2], seen_from(pose[:, 2], rate[:, :2])])
+    return PlanarMotion(rate_hz, pose[:, None], twist[:, None])
 
 
 def carried(motion: PlanarMotion, places: ArrayLike) -> PlanarMotion:
@@ -100,17 +101,7 @@ def carried(motion: PlanarMotion, places: ArrayLike) -> PlanarMotion:
     pose = compose(lead[:, None], held[None])
     # Velocity of the held origins in the moving frame, turned into their own axes.
     x, y, yaw = held.T
-    v_x, v_y = twist[:, 1, None] - twist[:, 0, None] * y, twist[:, 2, None] + twist[:, 0, None] * x
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    turn = np.broadcast_to(twist[:, 0, None], v_x.shape)
-    return PlanarMotion(
-        motion.rate_hz, pose, np.stack([turn, cos * v_x + sin * v_y, cos * v_y - sin * v_x], axis=-1)
-    )
-
-
-def _body_twist(pose: Array, rate: Array) -> Array:
-    """Body twists (T, 3) from poses and their rates (T, 3)."""
-    cos, sin = np.cos(pose[:, 2]), np.sin(pose[:, 2])
-    return np.stack(
-        [rate[:, 2], cos * rate[:, 0] + sin * rate[:, 1], cos * rate[:, 1] - sin * rate[:, 0]], axis=1
-    )
+    turn, v_x, v_y = (part[:, None] for part in twist.T)
+    velocity = seen_from(yaw, np.stack([v_x - turn * y, v_y + turn * x], axis=-1))
+    turns = np.broadcast_to(turn[..., None], (*velocity.shape[:2], 1))
+    return PlanarMotion(motion.rate_hz, pose, np.concatenate([turns, velocity], axis=-1))

@@ -20,15 +20,14 @@ def relative(frame: ArrayLike, pose: ArrayLike) -> Array:
     """Pose of ``pose`` as seen from ``frame``, both in the world, yaw within +-pi; shapes (..., 3) broadcast."""
     frame, pose = np.asarray(frame, dtype=float), np.asarray(pose, dtype=float)
     away = pose - frame
-    cos, sin = np.cos(frame[..., 2]), np.sin(frame[..., 2])
-    return np.stack(
-        [
-            cos * away[..., 0] + sin * away[..., 1],
-            cos * away[..., 1] - sin * away[..., 0],
-            wrapped(away[..., 2]),
-        ],
-        axis=-1,
-    )
+    return np.concatenate([seen_from(frame[..., 2], away[..., :2]), wrapped(away[..., 2:])], axis=-1)
+
+
+def seen_from(yaw: ArrayLike, vector: ArrayLike) -> Array:
+    """Vectors (x, y) in the axes of frames that are turned by ``yaw`` [rad]; shapes (...), (..., 2) -> (..., 2)."""
+    x, y = np.moveaxis(np.asarray(vector, dtype=float), -1, 0)
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    return np.stack([cos * x + sin * y, cos * y - sin * x], axis=-1)
 
 
 def wrapped(angle: ArrayLike) -> Array:

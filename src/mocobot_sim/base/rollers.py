@@ -59,15 +59,12 @@ def release(omnid: mjcf.RootElement, design: BaseDesign) -> None:
         name = f"wheel_{wheel}"
         hub = omnid.find("body", name)
         # What is left of the cylinder is a hub to look at.
-        omnid.find("geom", name).size = [
-            design.wheel_radius_m - 1.8 * design.roller_radius_m,
-            HUB_HALF_WIDTH_M,
-        ]
+        radius = design.wheel_radius_m - 1.8 * design.roller_radius_m
+        omnid.find("geom", name).size = [radius, HUB_HALF_WIDTH_M]
         inertia = np.array(hub.inertial.diaginertia)
         for k in range(design.rollers):
-            inertia -= _add_roller(
-                hub, f"{name}_roller{k + 1}", 2.0 * np.pi * k / design.rollers, hand, design
-            )
+            angle = 2.0 * np.pi * k / design.rollers
+            inertia -= _add_roller(hub, f"{name}_roller{k + 1}", angle, hand, design)
         hub.inertial.mass = hub.inertial.mass - design.rollers * design.roller_mass_kg
         if not (hub.inertial.mass > 0 and (inertia > 0).all() and 2.0 * inertia.max() < inertia.sum()):
             raise InputError(
@@ -102,14 +99,8 @@ def _add_roller(hub: Any, name: str, angle: float, hand: float, design: BaseDesi
     # Solid ellipsoid.
     along, across = mass * 2.0 * r**2 / 5.0, mass * (half**2 + r**2) / 5.0
     roller = hub.add("body", name=name, pos=at, zaxis=axle)
-    roller.add(
-        "joint",
-        name=name,
-        type="hinge",
-        axis=[0.0, 0.0, 1.0],
-        damping=design.roller_damping_Nms_per_rad,
-        armature=0.0,
-    )
+    damping = design.roller_damping_Nms_per_rad
+    roller.add("joint", name=name, type="hinge", axis=[0.0, 0.0, 1.0], damping=damping, armature=0.0)
     roller.add("inertial", pos=[0.0, 0.0, 0.0], mass=mass, diaginertia=[across, across, along])
     roller.add(
         "geom", name=name, type="ellipsoid", size=[r, r, half], contype=0, conaffinity=FLOOR_BIT,

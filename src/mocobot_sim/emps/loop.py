@@ -107,10 +107,12 @@ def _acting(delay_s: float, period_s: float, steps: int) -> Array:
 def _history(start: Start, voltages: int, lag: float) -> tuple[list[float], list[float]]:
     """What the loop remembers, long enough; older than the start's is as old as it gets."""
     need = max(voltages, int(np.ceil(lag)) + 2)
-    volts, speeds = list(start.voltages), list(start.velocities_mps)
-    volts = [volts[0] if volts else 0.0] * max(need - len(volts), 0) + volts
-    speeds = [speeds[0] if speeds else start.velocity_mps] * max(need - len(speeds), 0) + speeds
-    return [float(v) for v in volts], [float(v) for v in speeds]
+
+    def reaching_back(values: Array, otherwise: float) -> list[float]:
+        oldest = values[0] if len(values) else otherwise
+        return [float(v) for v in [*[oldest] * max(need - len(values), 0), *values]]
+
+    return reaching_back(start.voltages, 0.0), reaching_back(start.velocities_mps, start.velocity_mps)
 
 
 def _extra(plant: Plant, time: Array):

@@ -8,6 +8,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from estimator.errors import InputError
@@ -24,6 +25,8 @@ from mocobot_sim.scene.team_index import TeamIndex
 FORMAT = "mocobot-extended-model"
 VERSION = 1
 SCENE, NUMBERS, README = "team.xml", "effects.json", "README.md"
+AS_BUILT, SENSORS = (tuple(entry.name for entry in fields(kind)) for kind in (AsBuilt, SensorEffects))
+INITIAL = ("phi_rad", "theta_rad")
 KEYS = (
     "format", "version", "robots", "effects", "wrist_home_b_m", "theta_home_rad", "grasps", "mounts", "initial",
     "as_built", "sensors", "grasp_slack_m", "extra",
@@ -52,13 +55,9 @@ def write_extended(scene: TeamScene, effects: Sequence[Effect], folder: Path, ex
         "grasps": poses_to_list(scene.X_1i),
         "mounts": poses_to_list(scene.mounts),
         "initial": scene.initial
-        and {
-            name: _list(angles) for name, angles in zip(("phi_rad", "theta_rad"), scene.initial, strict=True)
-        },
+        and {key: np.asarray(part, dtype=float).tolist() for key, part in zip(INITIAL, scene.initial, strict=True)},
         "as_built": [{key: value.tolist() for key, value in asdict(unit).items()} for unit in scene.units],
-        "sensors": {
-            entry.name: list(scene.sensors.of(entry.name, scene.robots)) for entry in fields(SensorEffects)
-        },
+        "sensors": {name: list(scene.sensors.of(name, scene.robots)) for name in SENSORS},
         "grasp_slack_m": list(scene.grasp_slack_m or (0.0,) * scene.robots),
         "extra": extra,
     }
@@ -67,20 +66,9 @@ def write_extended(scene: TeamScene, effects: Sequence[Effect], folder: Path, ex
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(f"{folder}: what is to be kept cannot be written as JSON ({error})") from error
     assets = scene.root.get_assets() if scene.xml is None else scene.assets
-    files = {
-        SCENE: scene.to_xml().encode(),
-        NUMBERS: text.encode(),
-        README: readme(values["effects"], scene.robots).encode(),
-        **assets,
-    }
-    _write_folder(Path(folder), files)
-
-
-def _list(angles: Any) -> list[list[float]]:
-    return [[float(angle) for angle in row] for row in angles]
-
-
-def _write_folder(folder: Path, files: dict[str, bytes]) -> None:
+    page = readme(values["effects"], scene.robots)
+    files = {SCENE: scene.to_xml().encode(), NUMBERS: text.encode(), README: page.encode(), **assets}
+    folder = Path(folder)
     if folder.exists() and not _is_extended(folder):
         raise InputError(f"{folder}: exists and is not an extended model; name a new folder")
     try:
@@ -170,25 +158,21 @@ def _effects(entries: list[Any], where: str) -> list[Effect]:
 
 
 def _units(read: Fields, robots: int) -> tuple[AsBuilt, ...]:
-    names = tuple(entry.name for entry in fields(AsBuilt))
-    entries = [
-        Fields(entry, names, f"{read.where}: as_built[{i}]")
-        for i, entry in enumerate(read.list("as_built", robots), start=1)
-    ]
-    return tuple(AsBuilt(**{name: unit.array(name, (3,)) for name in names}) for unit in entries)
+    entries = enumerate(read.list("as_built", robots), start=1)
+    units = (Fields(entry, AS_BUILT, f"{read.where}: as_built[{i}]") for i, entry in entries)
+    return tuple(AsBuilt(**{name: unit.array(name, (3,)) for name in AS_BUILT}) for unit in units)
 
 
 def _sensors(read: Fields, robots: int) -> SensorEffects:
-    names = tuple(entry.name for entry in fields(SensorEffects))
-    inner = read.within("sensors", names)
-    return SensorEffects(**{name: tuple(inner.array(name, (robots,)).tolist()) for name in names})
+    inner = read.within("sensors", SENSORS)
+    return SensorEffects(**{name: tuple(inner.array(name, (robots,)).tolist()) for name in SENSORS})
 
 
 def _initial(read: Fields, robots: int) -> tuple[NDArray[Any], NDArray[Any]] | None:
     if read.values["initial"] is None:
         return None
-    inner = read.within("initial", ("phi_rad", "theta_rad"))
-    return inner.array("phi_rad", (robots, 3)), inner.array("theta_rad", (robots, 3))
+    inner = read.within("initial", INITIAL)
+    return inner.array(INITIAL[0], (robots, 3)), inner.array(INITIAL[1], (robots, 3))
 
 
 def _check_model(scene: TeamScene, path: Path) -> None:

@@ -66,10 +66,9 @@ class PaperPlan:
         for name, values in (("payload", self.payloads), ("preset", self.presets)):
             if not values or len(set(values)) != len(values):
                 raise InputError(f"{name} is {' '.join(values) or 'empty'!r}; give at least one, each once")
-        if self.seed < 0:
-            raise InputError(f"seed is {self.seed}; it must be at least 0")
-        if self.trials < 1:
-            raise InputError(f"trials is {self.trials}; it must be at least 1")
+        for name, value, least in (("seed", self.seed, 0), ("trials", self.trials, 1)):
+            if value < least:
+                raise InputError(f"{name} is {value}; it must be at least {least}")
 
     @property
     def inertia_trials(self) -> int:
@@ -134,31 +133,32 @@ def run_paper(plan: PaperPlan, jobs: int = 1, progress: Progress | None = None) 
     result = PaperResult()
     teams = list(product(plan.payloads, plan.teams()))
     with Parallel(n_jobs=jobs, return_as="generator") as pool:
+
+        def each(function: Callable[..., Any], tasks: Iterable[tuple[Any, ...]]) -> Iterable[Any]:
+            for outcome in pool(delayed(function)(*task) for task in tasks):
+                progress(1)
+                yield outcome
+
         first = [
             (_request(plan, payload, "random", k), team, None)
             for payload, team in teams
             for k in range(plan.trials)
         ]
-        recordings = _collect(first, _watch(pool(delayed(_trial)(*task) for task in first), progress), result)
+        recordings = _collect(first, each(_trial, first), result)
 
         # Grasps from the random trials, read through the team's last (least ideal) preset.
-        randoms = [recordings[payload, team[-1].name] for payload, team in teams]
-        grasps = list(_watch(pool(delayed(_grasps)(group) for group in randoms), progress))
+        grasps = list(each(_grasps, [(recordings[payload, team[-1].name],) for payload, team in teams]))
         second = [
             (_request(plan, payload, trial, k), team, held)
             for (payload, team), held in zip(teams, grasps, strict=True)
             for trial, count in (("static", 1), ("periodic", plan.inertia_trials))
             for k in range(count)
         ]
-        for key, more in _collect(
-            second, _watch(pool(delayed(_trial)(*task) for task in second), progress), result
-        ).items():
+        for key, more in _collect(second, each(_trial, second), result).items():
             recordings[key] = recordings[key] + more
 
         sets = [(payload, preset) for preset in plan.presets for payload in plan.payloads]
-        estimates = _watch(
-            pool(delayed(estimate_payload)(recordings[key], "staged") for key in sets), progress
-        )
+        estimates = each(estimate_payload, [(recordings[key], "staged") for key in sets])
         for (payload, preset), estimate in zip(sets, estimates, strict=True):
             result.estimates.setdefault(preset, {})[payload] = estimate
             result.recordings.setdefault(preset, {})[payload] = recordings[payload, preset]
@@ -206,9 +206,3 @@ def _grasps(recordings: Sequence[Recording]) -> Grasps:
         weak = [str(direction) for step in steps for direction in step.weak]
         raise InputError(f"the random trials do not determine the grasps: {weak[0]}")
     return estimate.p_1i, estimate.R_1i
-
-
-def _watch(outcomes: Iterable[Any], progress: Progress) -> Iterable[Any]:
-    for outcome in outcomes:
-        progress(1)
-        yield outcome

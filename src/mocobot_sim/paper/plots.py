@@ -28,14 +28,12 @@ def save_plots(scores: Mapping[str, Mapping[str, Scores]], folder: Path) -> list
     tables = {table.number: table for table in paper_tables(scores)}
     columns = tables["II"].columns
 
-    def panel(number: str, unit: str, title: str, quantity: str = "") -> tuple[list[Row], str]:
-        rows = [row for row in tables[number].part(unit).rows if quantity in ("", row.quantity)]
-        return rows, f"Table {number}: {title}"
+    def panel(number: str, unit: str, title: str, quantity: str | None = None) -> tuple[Sequence[Row], str]:
+        return tables[number].part(unit, quantity).rows, f"Table {number}: {title}"
 
-    def picture(name: str, height: float, grid: tuple[int, int], *panels: tuple[list[Row], str]) -> Path:
-        figure = Figure(
-            figsize=(11, height), layout="constrained"
-        )  # without pyplot: no display, no global state
+    def picture(name: str, height: float, grid: tuple[int, int], *panels: tuple[Sequence[Row], str]) -> Path:
+        # Without pyplot: no display, no global state.
+        figure = Figure(figsize=(11, height), layout="constrained")
         axes = np.ravel(np.asarray(figure.subplots(*grid)))
         for axis, (rows, title) in zip(axes, panels, strict=True):
             _dots(axis, columns, rows, title)
@@ -62,11 +60,8 @@ def save_plots(scores: Mapping[str, Mapping[str, Scores]], folder: Path) -> list
 
 def _label(row: Row) -> str:
     """Payload, and the pair or the moment where there are several."""
-    return (
-        f"({row.payload}) {row.quantity.lstrip('Rp')}"
-        if row.quantity not in ("m", "p1c")
-        else f"({row.payload})"
-    )
+    part = "" if row.quantity in ("m", "p1c") else row.quantity.lstrip("Rp")
+    return f"({row.payload}) {part}".rstrip()
 
 
 def _dots(axis: Axes, columns: Sequence[str], rows: Sequence[Row], title: str) -> None:

@@ -80,10 +80,14 @@ def _static_errors(estimate: PayloadEstimate, truth: PayloadTruth) -> dict[str, 
     p = None if estimate.p_1c is None else float(np.linalg.norm(estimate.p_1c - truth.p_1c))
     return {
         "m_kg": m,
-        "m_percent": None if m is None else 100 * m / truth.mass,
+        "m_percent": _percent(m, truth.mass),
         "p1c_m": p,
-        "p1c_percent": None if p is None else 100 * p / float(np.linalg.norm(truth.p_1c)),
+        "p1c_percent": _percent(p, float(np.linalg.norm(truth.p_1c))),
     }
+
+
+def _percent(error: float | None, of: float) -> float | None:
+    return None if error is None else 100 * error / of
 
 
 def _moment_errors(estimates: Sequence[Array], truth: PayloadTruth) -> dict[str, dict[str, float | None]]:
@@ -92,12 +96,11 @@ def _moment_errors(estimates: Sequence[Array], truth: PayloadTruth) -> dict[str,
         true = float(truth.principal_moments[k])
         stats = _mean_std([float(moments[k]) - true for moments in estimates])
         mean = None if stats["mean"] is None else abs(stats["mean"])
-        std = stats["std"]
         result[name] = {
             "mean": mean,
-            "std": std,
-            "percent": None if mean is None else 100 * mean / true,
-            "std_percent": None if std is None else 100 * std / true,
+            "std": stats["std"],
+            "percent": _percent(mean, true),
+            "std_percent": _percent(stats["std"], true),
         }
     return result
 

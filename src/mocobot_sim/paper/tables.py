@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from mocobot_sim.paper.published import published_errors
@@ -13,6 +13,8 @@ MOMENTS = ("Ixx", "Iyy", "Izz")
 PAPER = "paper"
 """Name of the column of published figures."""
 Scores = Mapping[str, Any]
+AllScores = Mapping[str, Mapping[str, Scores]]
+"""By preset, then payload, as in ``paper.json``."""
 
 
 @dataclass(frozen=True)
@@ -61,10 +63,10 @@ class PaperTable:
     def part(self, unit: str, quantity: str | None = None) -> PaperTable:
         """The rows of one unit only, or of one quantity in it."""
         rows = tuple(row for row in self.rows if row.unit == unit and quantity in (None, row.quantity))
-        return PaperTable(self.number, self.title, self.note, self.columns, rows)
+        return replace(self, rows=rows)
 
 
-def paper_tables(scores: Mapping[str, Mapping[str, Scores]]) -> list[PaperTable]:
+def paper_tables(scores: AllScores) -> list[PaperTable]:
     """Tables II, III, IV and V.
 
     Args:
@@ -104,13 +106,10 @@ def paper_tables(scores: Mapping[str, Mapping[str, Scores]]) -> list[PaperTable]
             "Mass and centre of mass: error, and error relative to the truth [%]",
             "one set of six static holds",
             [
-                (quantity, unit, lambda s, key=key: Cell(s[key]))
-                for quantity, unit, key in (
-                    ("m", "kg", "m_kg"),
-                    ("m", "%", "m_percent"),
-                    ("p1c", "m", "p1c_m"),
-                    ("p1c", "%", "p1c_percent"),
-                )
+                ("m", "kg", lambda s: Cell(s["m_kg"])),
+                ("m", "%", lambda s: Cell(s["m_percent"])),
+                ("p1c", "m", lambda s: Cell(s["p1c_m"])),
+                ("p1c", "%", lambda s: Cell(s["p1c_percent"])),
             ],
         ),
         table(
@@ -126,7 +125,7 @@ def paper_tables(scores: Mapping[str, Mapping[str, Scores]]) -> list[PaperTable]
     ]
 
 
-def summary_table(scores: Mapping[str, Mapping[str, Scores]]) -> PaperTable:
+def summary_table(scores: AllScores) -> PaperTable:
     """The largest mean error of every kind over payloads (and pairs or moments), the paper's beside ours."""
     columns, payloads = _columns(scores)
 
@@ -148,10 +147,8 @@ def summary_table(scores: Mapping[str, Mapping[str, Scores]]) -> PaperTable:
     def largest(
         column: Mapping[str, Scores], scale: float, values: Callable[[Scores], list[float | None]]
     ) -> Cell:
-        found = [
-            scale * value for payload in payloads for value in values(column[payload]) if value is not None
-        ]
-        return Cell(max(found, default=None))
+        found = [value for payload in payloads for value in values(column[payload])]
+        return Cell(max((scale * value for value in found if value is not None), default=None))
 
     rows = tuple(
         Row("", quantity, unit, tuple(largest(column, scale, values) for column in columns.values()))
@@ -160,7 +157,7 @@ def summary_table(scores: Mapping[str, Mapping[str, Scores]]) -> PaperTable:
     return PaperTable("", "largest error over the payloads", "", tuple(columns), rows)
 
 
-def format_tables(scores: Mapping[str, Mapping[str, Scores]]) -> str:
+def format_tables(scores: AllScores) -> str:
     """All four tables.
 
     Args:
@@ -178,7 +175,7 @@ def format_tables(scores: Mapping[str, Mapping[str, Scores]]) -> str:
     return "\n\n".join(blocks)
 
 
-def format_summary(scores: Mapping[str, Mapping[str, Scores]]) -> str:
+def format_summary(scores: AllScores) -> str:
     """The summary as text."""
     table = summary_table(scores)
     cells = [[table.title, *table.columns]]
@@ -192,9 +189,7 @@ def format_cell(cell: Cell) -> str:
     return value if cell.spread is None else f"{value} +- {_number(cell.spread)}"
 
 
-def _columns(
-    scores: Mapping[str, Mapping[str, Scores]],
-) -> tuple[dict[str, Mapping[str, Scores]], list[str]]:
+def _columns(scores: AllScores) -> tuple[dict[str, Mapping[str, Scores]], list[str]]:
     """The columns by name, the published figures first, and the payloads."""
     payloads = list(next(iter(scores.values())))
     return {PAPER: {p: published_errors(p) for p in payloads}, **scores}, payloads

@@ -12,7 +12,7 @@ from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.soft import row_compliance
 from mocobot_sim.scene.team_index import TeamIndex
-from mocobot_sim.trial.loops import close, hang, loop_jacobian, open_by, turn_free_directions
+from mocobot_sim.trial.loops import close, hang, loop_jacobian, open_by, static_load, turn_free_directions
 
 Array = NDArray[np.float64]
 
@@ -20,6 +20,10 @@ Array = NDArray[np.float64]
 LARGEST_SHIFT_M = 0.06
 LARGEST_TURN_RAD = 0.2
 UNHELD_NM = 1e-6
+SWINGS = (
+    "the payload cannot rest in the home pose: {:.2g} N m stay unbalanced; with one or two grasps its centre of mass "
+    "must hang under them"
+)
 
 
 def assemble_at_home(scene: TeamScene, model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex) -> Array:
@@ -76,8 +80,8 @@ def _close_arms(
         before = data.qpos.copy()
         gap = close(model, data, arms)
         shift = np.abs(data.qpos[index.slide_qpos] - start[index.slide_qpos]).max()
-        turn = np.abs(data.qpos[index.gimbal_qpos] - start[index.gimbal_qpos]).max()
-        if not (gap <= 1e-9 and shift <= LARGEST_SHIFT_M and turn <= LARGEST_TURN_RAD):
+        near = shift <= LARGEST_SHIFT_M and _turned(data, index, start) <= LARGEST_TURN_RAD
+        if not (gap <= 1e-9 and near):
             data.qpos[:] = before
             raise InputError(
                 f"the team cannot be assembled: a loop stays open by {open_by(model, data):.2g} m; "
@@ -93,8 +97,9 @@ def _settle(
     _, unheld, load = _static_forces(model, data, index, check=False)
     if unheld > UNHELD_NM:
         locked = np.concatenate([index.motor_dof.ravel(), index.spring_dof.ravel()])
-        if not turn_free_directions(model, data, index, locked, arms) or not _near(data, index, start):
-            raise _swings(unheld)
+        found = turn_free_directions(model, data, index, locked, arms)
+        if not found or not _turned(data, index, start) <= LARGEST_TURN_RAD:
+            raise InputError(SWINGS.format(unheld))
         return True
     for dof in index.yielding_dof:
         joint = model.dof_jntid[dof]
@@ -108,23 +113,16 @@ def _settle(
     return moved
 
 
-def _swings(unheld: float) -> InputError:
-    return InputError(
-        f"the payload cannot rest in the home pose: {unheld:.2g} N m stay unbalanced; with one or two "
-        "grasps its centre of mass must hang under them"
-    )
-
-
-def _near(data: mujoco.MjData, index: TeamIndex, start: Array) -> bool:
-    return bool(np.abs(data.qpos[index.gimbal_qpos] - start[index.gimbal_qpos]).max() <= LARGEST_TURN_RAD)
+def _turned(data: mujoco.MjData, index: TeamIndex, start: Array) -> float:
+    """Largest turn of a gimbal since ``start`` [rad]."""
+    return float(np.abs(data.qpos[index.gimbal_qpos] - start[index.gimbal_qpos]).max())
 
 
 def _static_forces(
     model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex, check: bool = True
 ) -> tuple[Array, float, Array]:
     """Spring torques (N, 3) that hold the team, what they leave unheld, and the load on every dof (nv,)."""
-    mujoco.mj_fwdPosition(model, data)
-    mujoco.mj_fwdVelocity(model, data)
+    needed: Array = static_load(model, data)
     spring = index.spring_dof.ravel()
     # The floor carries released bases: their wheels settle in a trial's first milliseconds.
     apart = np.concatenate([index.motor_dof.ravel(), index.yielding_dof, index.hanging_dof, index.base_dof])
@@ -132,14 +130,13 @@ def _static_forces(
     jacobian = loop_jacobian(model, data)[0].T  # (nv, loops)
     constraint = jacobian[rows]
     selection = (rows[:, None] == spring).astype(float)  # (rows, 3 N)
-    needed = data.qfrc_bias - data.qfrc_passive
     # Constraint forces are free, spring torques cost: weigh the former out of the least-norm solution.
     free = 1e4
     forces = np.hstack([free * constraint, selection])
     solution = np.linalg.lstsq(forces, needed[rows])[0]
     unheld = float(np.abs(forces @ solution - needed[rows]).max())
     if check and unheld > UNHELD_NM:
-        raise _swings(unheld)
+        raise InputError(SWINGS.format(unheld))
     load = jacobian @ (free * solution[: jacobian.shape[1]]) - needed
     return solution[jacobian.shape[1] :].reshape(index.spring_dof.shape), unheld, load
 

@@ -25,6 +25,13 @@ def loop_jacobian(model: mujoco.MjModel, data: mujoco.MjData, welds: bool = True
     return dense[rows], data.efc_pos[rows]
 
 
+def static_load(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
+    """What has to hold the team still at ``data.qpos`` on every dof [N or N m], shape (nv,)."""
+    mujoco.mj_fwdPosition(model, data)
+    mujoco.mj_fwdVelocity(model, data)
+    return data.qfrc_bias - data.qfrc_passive
+
+
 def open_by(model: mujoco.MjModel, data: mujoco.MjData) -> float:
     """Largest gap of any loop [m or rad]."""
     mujoco.mj_fwdPosition(model, data)
@@ -78,29 +85,20 @@ def turn_free_directions(
     """
     moving = np.setdiff1d(np.concatenate([arms, index.knee_dof.ravel()]), locked)
     at = model.jnt_qposadr[model.dof_jntid[moving]]
-
-    def free_moment() -> tuple[Array, Array]:
-        mujoco.mj_fwdPosition(model, data)
-        mujoco.mj_fwdVelocity(model, data)
-        jacobian = loop_jacobian(model, data)[0][:, moving]
-        _, size, axes = np.linalg.svd(jacobian)
-        rank = int(np.sum(size > 1e-6 * size.max()))
-        free = axes[rank:]
-        return free, free @ (data.qfrc_bias - data.qfrc_passive)[moving]
-
     for _ in range(20):
-        free, moment = free_moment()
+        load = static_load(model, data)[moving]
+        _, size, axes = np.linalg.svd(loop_jacobian(model, data)[0][:, moving])
+        free = axes[int(np.sum(size > 1e-6 * size.max())) :]
         if not len(free):
             return False
+        moment = free @ load
         if np.abs(moment).max() < 1e-10:
             return True
         start = data.qpos.copy()
         slope = np.empty((len(free), len(free)))
         for k, direction in enumerate(free):
             data.qpos[at] = start[at] + 1e-5 * direction
-            mujoco.mj_fwdPosition(model, data)
-            mujoco.mj_fwdVelocity(model, data)
-            slope[:, k] = (free @ (data.qfrc_bias - data.qfrc_passive)[moving] - moment) / 1e-5
+            slope[:, k] = (free @ static_load(model, data)[moving] - moment) / 1e-5
         step = np.linalg.lstsq(slope, -moment, rcond=1e-9)[0]
         size = np.abs(step @ free).max()
         data.qpos[:] = start

@@ -72,17 +72,15 @@ def resimulate(
 
 
 def _feed_forward(recording: Recording) -> Array:
-    control = recording.metadata.control or {}
-    given = control.get("feed_forward_N")
-    robots = recording.metadata.robots
+    given, robots = (recording.metadata.control or {}).get("feed_forward_N"), recording.metadata.robots
     try:
         force = np.array(given, dtype=float)
     except (TypeError, ValueError, OverflowError):
         force = np.array(np.nan)
     if force.shape != (robots, 3) or not np.isfinite(force).all():
-        text = json.dumps(given)
         raise InputError(
-            f"{recording.name}: control.feed_forward_N is {text:.60}; it must be {robots} x 3 finite numbers"
+            f"{recording.name}: control.feed_forward_N is {json.dumps(given):.60}; "
+            f"it must be {robots} x 3 finite numbers"
         )
     return force
 

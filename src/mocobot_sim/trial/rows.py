@@ -11,7 +11,7 @@ from mocobot_sim.control.control import ControlGains, home_phi
 from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
-from mocobot_sim.scene.team_index import TeamIndex
+from mocobot_sim.scene.team_index import TeamIndex, ids_of
 from mocobot_sim.trial.sensed import SensedLog
 from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
 from mocobot_sim.trial.trial_log import TrialLog
@@ -39,12 +39,11 @@ class Rows:
         self.model, self.data, self.index = model, data, index
         robots = index.robots
         self.weld_limit_m = WELD_LIMIT_M + np.array(slack_m or (0.0,) * robots)
-        tip, platform = [], []
-        for i in range(robots):
-            for k in (1, 2, 3):
-                tip.append(model.site(f"omnid{i + 1}/rod{k}_tip").id)
-                platform.append(model.site(f"omnid{i + 1}/platform{k}").id)
-        self.sites = np.array([*index.grasp_site, *index.payload_site, *tip, *platform])
+        ends = (
+            ids_of(model.site, robots, [name.format(k) for k in (1, 2, 3)])
+            for name in ("rod{}_tip", "platform{}")
+        )
+        self.sites = np.concatenate([index.grasp_site, index.payload_site, *(end.ravel() for end in ends)])
         self.qpos = np.empty((samples, model.nq))
         self.spring_force = np.empty((samples, model.nv))
         self.site_xpos = np.empty((samples, len(self.sites), 3))

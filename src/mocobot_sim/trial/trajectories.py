@@ -81,12 +81,12 @@ def random_vias(
         paths.append((np.vstack([home, points, home]), transit, dwell))
     duration = 2.0 * SETTLE_S + max(transit.sum() + dwell[:-1].sum() for _, transit, dwell in paths)
     time = np.arange(round(duration * RATE_HZ) + 1) / RATE_HZ
-    return Trajectory("random", np.stack([_via_path(time, *path) for path in paths], axis=1))
+    return Trajectory("random", np.stack([_via_path(time, *path, SETTLE_S) for path in paths], axis=1))
 
 
-def _via_path(time: Array, points: Array, transit: Array, dwell: Array) -> Array:
+def _via_path(time: Array, points: Array, transit: Array, dwell: Array, start: float) -> Array:
+    """From point to point with minimum jerk, beginning at ``start`` [s]; shape (Q, 3)."""
     ref = np.tile(points[0], (len(time), 1))
-    start = SETTLE_S
     for k in range(len(transit)):
         on = time >= start
         ref[on] = points[k] + minimum_jerk((time[on] - start) / transit[k])[:, None] * (
@@ -162,11 +162,8 @@ def static_orientations(
     period = transit_s + hold_s
     duration = 2.0 * SETTLE_S + orientations * period + transit_s
     time = np.arange(round(duration * RATE_HZ) + 1) / RATE_HZ - SETTLE_S
-    rotation = np.tile(stations[0], (len(time), 1))
-    for k in range(orientations + 1):
-        on = time >= k * period
-        blend = minimum_jerk((time[on] - k * period) / transit_s)[:, None]
-        rotation[on] = stations[k] + blend * (stations[k + 1] - stations[k])
+    steps = np.ones(orientations + 1)
+    rotation = _via_path(time, stations, transit_s * steps, hold_s * steps, 0.0)
     return Trajectory("static", _turn_about(wrist_home_b, X_1i, X_1i.translation.mean(axis=0), rotation))
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from estimator.arm.delta import LEG_DIRECTIONS, leg_geometry
 from estimator.arm.design import OmnidDesign
@@ -49,10 +50,10 @@ def body_motion(phi: Array, theta: Array, design: OmnidDesign) -> BodyMotion:
     wrist, swing, tilt = rod_angles(phi, design)
     turns = {}
     for leg in LEGS:
-        turns[f"proximal{leg}"] = _about(1, -phi[..., leg - 1])
-        turns[f"rod{leg}"] = _about_y_then_z(swing[..., leg - 1], tilt[..., leg - 1])
-    for column, (name, axis) in enumerate(zip(GIMBAL, (2, 1, 0), strict=True)):
-        turns[name] = _about(axis, theta[..., column])
+        turns[f"proximal{leg}"] = _turned("Y", -phi[..., leg - 1])
+        turns[f"rod{leg}"] = _turned("YZ", swing[..., leg - 1], tilt[..., leg - 1])
+    for column, (name, axis) in enumerate(zip(GIMBAL, "ZYX", strict=True)):
+        turns[name] = _turned(axis, theta[..., column])
     return BodyMotion(wrist, turns)
 
 
@@ -83,14 +84,7 @@ def rod_angles(phi: Array, design: OmnidDesign) -> tuple[Array, Array, Array]:
     return legs.h, swing, tilt
 
 
-def _about(axis: int, angle: Array) -> Array:
-    """Quaternions of rotations about a coordinate axis, shape (..., 4)."""
-    q = np.zeros((*angle.shape, 4))
-    q[..., axis], q[..., 3] = np.sin(0.5 * angle), np.cos(0.5 * angle)
-    return q
-
-
-def _about_y_then_z(y: Array, z: Array) -> Array:
-    """Quaternions of Ry(y) Rz(z), shape (..., 4)."""
-    (sy, cy), (sz, cz) = ((np.sin(0.5 * a), np.cos(0.5 * a)) for a in (y, z))
-    return np.stack([sy * sz, sy * cz, cy * sz, cy * cz], axis=-1)
+def _turned(axes: str, *angles: Array) -> Array:
+    """Quaternions of turns about coordinate axes that turn along, one after the other; shape (..., 4)."""
+    rows = np.stack(angles, axis=-1)
+    return Rotation.from_euler(axes, rows.reshape(-1, len(axes))).as_quat().reshape(*rows.shape[:-1], 4)

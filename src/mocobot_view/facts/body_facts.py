@@ -7,7 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.errors import InputError
+from estimator.estimate.grasp_estimate import single_robot
 from estimator.estimate.result import PayloadEstimate
+from estimator.recording.model import Recording
 from mocobot_view.facts.placement import Grasps
 
 Array = NDArray[np.float64]
@@ -47,6 +50,26 @@ class BodyFacts:
         squares = 2.5 * (np.sum(self.principal_kgm2) - 2.0 * self.principal_kgm2) / self.mass_kg
         axes = np.sqrt(np.maximum(squares, 0.0))
         return np.maximum(axes, THINNEST * axes.max()) if axes.max() > 0 else None
+
+
+def held(facts: BodyFacts | None, robots: int) -> Grasps | None:
+    """The grasps that are known: one robot alone holds the payload at {1}, whatever else is."""
+    if facts is not None and facts.grasps is not None:
+        return facts.grasps
+    return Grasps(single_robot().R_1i, single_robot().p_1i) if robots == 1 else None
+
+
+def check_robots(estimate: PayloadEstimate, recording: Recording) -> None:
+    """Refuse an estimate of another team.
+
+    Raises:
+        InputError: it is of another number of robots than the recording.
+    """
+    robots = recording.metadata.robots
+    if estimate.robots != robots:
+        raise InputError(
+            f"the estimate is of {estimate.robots} robots; {recording.name} is of {robots} robots"
+        )
 
 
 def facts_of(estimate: PayloadEstimate) -> BodyFacts:

@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from discrepancy.result.read import NamedCause
 from discrepancy.team.causes import CAUSES
 from mocobot_view.bodies.robot import GIMBAL
+
+
+def by_place(causes: Iterable[NamedCause]) -> dict[tuple[int | None, str | None], list[NamedCause]]:
+    """Causes by robot (None for the payload) and its body as ``body_of`` has it."""
+    places: dict[tuple[int | None, str | None], list[NamedCause]] = {}
+    for cause in causes:
+        places.setdefault((cause.robot, body_of(cause)), []).append(cause)
+    return places
 
 
 def body_of(cause: NamedCause) -> str | None:

@@ -64,10 +64,7 @@ def read_estimate(path: Path) -> PayloadEstimate:
         _check(estimate)
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
-    except (
-        IndexError,
-        OverflowError,
-    ) as error:  # pairs of robots that are not there, numbers beyond all bounds
+    except (IndexError, OverflowError) as error:  # pairs of robots that are not there, boundless numbers
         raise InputError(f"{path}: not a complete estimate ({type(error).__name__}: {error})") from error
     return estimate
 
@@ -82,13 +79,10 @@ def _check(estimate: PayloadEstimate) -> None:
     if (grasps := estimate.grasps) is not None:
         N = estimate.robots
         facts += [("grasps.R_axis_angle_deg", grasps.R_1i, (N, 3, 3)), ("grasps.p_m", grasps.p_1i, (N, 3))]
-        facts += [("grasps.covariance", grasps.covariance, (6 * (N - 1),) * 2)]
         facts += [
-            (f"grasps.{kind}", getattr(grasps, field), (N, N))
-            for kind, field in (
-                ("angular_residual_radps", "angular_residual_rms"),
-                ("linear_residual_mps", "linear_residual_rms"),
-            )
+            ("grasps.covariance", grasps.covariance, (6 * (N - 1),) * 2),
+            ("grasps.angular_residual_radps", grasps.angular_residual_rms, (N, N)),
+            ("grasps.linear_residual_mps", grasps.linear_residual_rms, (N, N)),
         ]
     if (mass := estimate.mass) is not None:
         facts += [("mass.m_kg", mass.mass, ()), ("mass.m_se_kg", mass.se, ())]
@@ -97,8 +91,8 @@ def _check(estimate: PayloadEstimate) -> None:
             ("inertia.I_b_kgm2", inertia.inertia, (3, 3)),
             ("inertia.principal_kgm2", inertia.principal.moments, (3,)),
             ("inertia.principal_se_kgm2", inertia.principal.moments_se, (3,)),
+            ("inertia.R_1c_axis_angle_deg", inertia.principal.R_1c, (3, 3)),
         ]
-        facts += [("inertia.R_1c_axis_angle_deg", inertia.principal.R_1c, (3, 3))]
     for key, value, shape in facts:
         if value is not None and not _is(value, shape):
             size = " x ".join(map(str, shape)) + " finite numbers" if shape else "a finite number"

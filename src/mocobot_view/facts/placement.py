@@ -94,6 +94,19 @@ def in_a_row(robots: int, height_m: float) -> Bases:
     return Bases(np.tile(np.eye(3), (robots, 1, 1)), places)
 
 
+def placed(
+    R_bi: Array, p_bi: Array, grasps: Grasps | None, height_m: float, at: slice = slice(None)
+) -> tuple[Bases, PayloadMotion | None]:
+    """Bases, and the payload at the samples ``at``; a row of robots and None where the grasps are not known.
+
+    Arguments as for ``place_bases``.
+    """
+    if grasps is None:
+        return in_a_row(R_bi.shape[1], height_m), None
+    bases = place_bases(R_bi, p_bi, grasps, height_m)
+    return bases, payload_motion(R_bi[at], p_bi[at], grasps, bases)
+
+
 def payload_motion(R_bi: Array, p_bi: Array, grasps: Grasps, bases: Bases) -> PayloadMotion:
     """The payload where all robots together hold it: the mean over robots of what each says.
 
@@ -101,7 +114,7 @@ def payload_motion(R_bi: Array, p_bi: Array, grasps: Grasps, bases: Bases) -> Pa
     """
     R_Wi = bases.R_Wb @ R_bi
     p_Wi = np.einsum("nij,qnj->qni", bases.R_Wb, p_bi) + bases.p_Wb
-    R_W1 = _nearest_rotation(np.mean(R_Wi @ np.swapaxes(grasps.R_1i, -1, -2), axis=1))
+    R_W1 = so3.chordal_mean(np.swapaxes(R_Wi @ np.swapaxes(grasps.R_1i, -1, -2), 0, 1))
     p_W1 = np.mean(p_Wi - np.einsum("qij,nj->qni", R_W1, grasps.p_1i), axis=1)
     held = p_W1[:, None] + np.einsum("qij,nj->qni", R_W1, grasps.p_1i)
     # |R1 - R2|_F = 2 sqrt(2) sin(angle / 2): exact for small angles, where arccos is not.
@@ -109,10 +122,3 @@ def payload_motion(R_bi: Array, p_bi: Array, grasps: Grasps, bases: Bases) -> Pa
     return PayloadMotion(
         R_W1, p_W1, 2.0 * np.arcsin(np.clip(chord, 0.0, 1.0)), np.linalg.norm(p_Wi - held, axis=-1)
     )
-
-
-def _nearest_rotation(M: Array) -> Array:
-    """Rotations nearest (Frobenius) to matrices, shape (Q, 3, 3)."""
-    U, _, Vt = np.linalg.svd(M)
-    U[..., :, 2] *= np.linalg.det(U @ Vt)[..., None]
-    return U @ Vt

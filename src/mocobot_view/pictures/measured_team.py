@@ -12,8 +12,6 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arm.design import OmnidDesign
 from estimator.arm.gimbal import rotation
-from estimator.errors import InputError
-from estimator.estimate.grasp_estimate import single_robot
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from mocobot_sim.control.control import home_phi
@@ -25,8 +23,8 @@ from mocobot_view import colours
 from mocobot_view.bodies.payload_shape import drawn_payload
 from mocobot_view.bodies.poses import rod_angles
 from mocobot_view.bodies.robot import LEGS, TINTED, fit_design, robot_shapes
-from mocobot_view.facts.body_facts import BodyFacts, facts_of
-from mocobot_view.facts.placement import Bases, Grasps, in_a_row, payload_motion, place_bases
+from mocobot_view.facts.body_facts import BodyFacts, check_robots, facts_of, held
+from mocobot_view.facts.placement import Bases, Grasps, placed
 
 Array = NDArray[np.float64]
 
@@ -87,10 +85,7 @@ def measured_team(
             for these robots.
     """
     meta, notes = recording.metadata, []
-    if estimate.robots != meta.robots:
-        raise InputError(
-            f"the estimate is of {estimate.robots} robots; {recording.name} is of {meta.robots} robots"
-        )
+    check_robots(estimate, recording)
     since = recording.time - recording.time[0]
     now = len(since) // 2 if time_s is None else int(np.argmin(np.abs(since - time_s)))
     samples = np.append(np.linspace(0, len(since) - 1, min(len(since), SAMPLES)).astype(int), now)
@@ -98,18 +93,12 @@ def measured_team(
     wrist, swing, tilt = rod_angles(phi, meta.design)
     R_bi, height = rotation(theta), robot_shapes(meta.design).base_height_m
     facts = facts_of(estimate)
-    grasps = facts.grasps
-    if grasps is None and meta.robots == 1:
-        alone = single_robot()
-        grasps = Grasps(alone.R_1i, alone.p_1i)
+    grasps = held(facts, meta.robots)
+    bases, motion = placed(R_bi, wrist, grasps, height, slice(-1, None))
+    pose = None if motion is None else (motion.R_W1[0], motion.p_W1[0])
+    drawn = None if grasps is None else drawn_payload(payload, meta.payload, grasps, notes)
     if grasps is None:
-        bases, pose, drawn = in_a_row(meta.robots, height), None, None
         notes.append("The grasps are not known: the robots are drawn in a row, without a payload.")
-    else:
-        bases = place_bases(R_bi, wrist, grasps, height)
-        motion = payload_motion(R_bi[-1:], wrist[-1:], grasps, bases)
-        pose = motion.R_W1[0], motion.p_W1[0]
-        drawn = drawn_payload(payload, meta.payload, grasps, notes)
     model = _model(bases, drawn, meta.design, height)
     angles = (phi[-1], theta[-1], wrist[-1], swing[-1], tilt[-1])
     return MeasuredTeam(

@@ -23,7 +23,7 @@ from mocobot_view import colours
 from mocobot_view.bodies.payload_shape import BAR_M, BAR_RGBA
 from mocobot_view.colours import Colour
 from mocobot_view.facts.body_facts import BodyFacts
-from mocobot_view.facts.cause_body import body_of
+from mocobot_view.facts.cause_body import body_of, by_place
 from mocobot_view.pictures.camera import Camera, corners, framing, pixels
 from mocobot_view.pictures.marks import Marks
 from mocobot_view.pictures.measured_team import MeasuredTeam, measured_team
@@ -42,9 +42,16 @@ ABOVE = -34.0
 """Elevation [deg] where marks at the payload are to be seen."""
 LONG_M = 0.17
 """Length of a grasp frame's axes: they must stick out of the gimbal."""
-RED = (*(part / 255.0 for part in colours.FAULT), 1.0)
 NAME_AT = np.array([0.0, 0.0, 0.05])
 AROUND = np.linspace(0.0, 2.0 * np.pi, 73)
+
+
+def _rgba(colour: Colour) -> tuple[float, float, float, float]:
+    red, green, blue = (part / 255.0 for part in colour)
+    return red, green, blue, 1.0
+
+
+RED = _rgba(colours.FAULT)
 
 
 def team_shot(payload: str | Path, aspect: float = ASPECT) -> Shot:
@@ -61,13 +68,8 @@ def team_shot(payload: str | Path, aspect: float = ASPECT) -> Shot:
     model = scene.compile()
     data = mujoco.MjData(model)
     assemble_at_home(scene, model, data, TeamIndex.of(model))
-    return _shot(
-        model,
-        data.qpos.copy(),
-        Marks(),
-        f"{scene.robots} Omnids hold payload {payload}, as designed.",
-        aspect,
-    )
+    says = f"{scene.robots} Omnids hold payload {payload}, as designed."
+    return _shot(model, data.qpos.copy(), Marks(), says, aspect)
 
 
 def estimate_shot(
@@ -130,17 +132,15 @@ def diagnosis_shot(
     _causes(marks, team, causes)
     where = [f"{cause.name} ({_place(cause)})" for cause in causes]
     found = f" Red: {', '.join(where)}." if where else " No cause is named."
-    return _shot(
-        team.model, team.qpos, marks, _says(recording, team, None, marked=False) + found, aspect, ABOVE
-    )
+    says = _says(recording, team, None, marked=False) + found
+    return _shot(team.model, team.qpos, marks, says, aspect, ABOVE)
 
 
 def axis_shot(aspect: float = ASPECT) -> Shot:
     """The EMPS axis, its carriage at the middle of its way."""
     model = mujoco.MjModel.from_xml_path(str(models_dir() / "emps" / "scene.xml"))
-    return _shot(
-        model, model.key("hold").qpos.copy(), Marks(), "The EMPS axis: a carriage on a ball screw.", aspect
-    )
+    says = "The EMPS axis: a carriage on a ball screw."
+    return _shot(model, model.key("hold").qpos.copy(), Marks(), says, aspect)
 
 
 def _shot(
@@ -150,9 +150,8 @@ def _shot(
     model.vis.global_.fovy = FOVY
     points = np.concatenate([corners(model, qpos), marks.points()])
     data = posed(model, qpos)
-    feet = np.array(
-        [data.xpos[b] for b in range(model.nbody) if model.body(b).name.endswith("/chassis")]
-    ).reshape(-1, 3)
+    chassis = [b for b in range(model.nbody) if model.body(b).name.endswith("/chassis")]
+    feet = data.xpos[chassis].reshape(-1, 3)
 
     def apart(camera: Camera) -> float:
         """Least distance of two robots in the picture, widths counting double, because robots are tall."""
@@ -171,7 +170,8 @@ def _shot(
 
 def _says(recording: Recording, team: MeasuredTeam, truth: BodyFacts | None, *, marked: bool = True) -> str:
     """Words for what is to be seen."""
-    text = f"{_omnids(team.robots)} at {team.time_s:.1f} s of {Path(recording.name).name}, from the measured angles"
+    omnids = f"{team.robots} Omnid{'s' if team.robots != 1 else ''}"
+    text = f"{omnids} at {team.time_s:.1f} s of {Path(recording.name).name}, from the measured angles"
     if team.grasps is None:
         return f"{text}. {' '.join(team.notes)}"
     bars = "" if team.has_cad else "; bars stand for the payload, whose shape is not known"
@@ -185,10 +185,6 @@ def _says(recording: Recording, team: MeasuredTeam, truth: BodyFacts | None, *, 
     if truth is not None:
         parts.append("Green and thin: the truth.")
     return " ".join([*parts, *team.notes])
-
-
-def _omnids(robots: int) -> str:
-    return f"{robots} Omnid{'s' if robots != 1 else ''}"
 
 
 def _in_world(team: MeasuredTeam, point: Array) -> Array:
@@ -210,19 +206,16 @@ def _facts(marks: Marks, team: MeasuredTeam, facts: BodyFacts, colour: Colour, t
     """Grasp frames, centre of mass, principal axes and inertia ellipsoid."""
     if team.R_W1 is None:
         return
-    rgb = tuple(part / 255.0 for part in colour)
     longer = LONG_M * (1.0 if thick == 1.0 else 1.25)
     if facts.grasps is not None:
         for p, R in zip(facts.grasps.p_1i, facts.grasps.R_1i, strict=True):
             start = _in_world(team, p)
             for axis, tone in zip((team.R_W1 @ R).T, colours.AXES, strict=True):
-                marks.arrow(
-                    start, start + longer * axis, 0.009 * thick, (*(part / 255.0 for part in tone), 1.0)
-                )
+                marks.arrow(start, start + longer * axis, 0.009 * thick, _rgba(tone))
     if facts.p_1c is None:
         return
     centre = _in_world(team, facts.p_1c)
-    marks.ellipsoid(centre, 0.026 * thick, (*rgb, 1.0))
+    marks.ellipsoid(centre, 0.026 * thick, _rgba(colour))
     semi_axes = facts.semi_axes_m()
     if semi_axes is None or facts.R_1c is None:
         return
@@ -230,11 +223,8 @@ def _facts(marks: Marks, team: MeasuredTeam, facts: BodyFacts, colour: Colour, t
     # Its three principal ellipses: a filled one would throw its shadow on everything.
     for k in range(3):
         one, other = R[:, k - 1] * semi_axes[k - 1], R[:, k - 2] * semi_axes[k - 2]
-        marks.path(
-            centre + np.cos(AROUND)[:, None] * one + np.sin(AROUND)[:, None] * other,
-            0.004 * thick,
-            (*rgb, 1.0),
-        )
+        ellipse = centre + np.cos(AROUND)[:, None] * one + np.sin(AROUND)[:, None] * other
+        marks.path(ellipse, 0.004 * thick, _rgba(colour))
 
 
 def _names(marks: Marks, team: MeasuredTeam) -> None:
@@ -252,12 +242,8 @@ def _place(cause: NamedCause) -> str:
 
 def _causes(marks: Marks, team: MeasuredTeam, causes: Sequence[NamedCause]) -> None:
     """A red ball at the body of every cause, the body in red, and its name; several at one place share a mark."""
-    places: dict[str, list[NamedCause]] = {}
-    for cause in causes:
-        places.setdefault(_place(cause), []).append(cause)
     data = posed(team.model, team.qpos)
-    for here in places.values():
-        robot, body = here[0].robot, body_of(here[0])
+    for (robot, body), here in by_place(causes).items():
         if robot is None:
             if team.R_W1 is None:
                 continue

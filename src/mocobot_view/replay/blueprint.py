@@ -7,10 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
+from numpy.typing import NDArray
 
 from mocobot_view.replay.log_robots import trail_paths
 from mocobot_view.replay.log_time import TIMELINE
 from mocobot_view.replay.replay_trial import ReplayTrial
+
+Array = NDArray[np.float64]
 
 TRAIL_S = 3.0
 """Length of the visible wrist paths."""
@@ -71,13 +74,13 @@ def scene_view(trial: ReplayTrial) -> rrb.Spatial3DView:
         line_grid=rrb.LineGrid3D(
             visible=True, spacing=0.25, plane=rr.components.Plane3D.XY, color=(220, 225, 235, 70)
         ),
-        eye_controls=rrb.EyeControls3D(
-            position=target + 1.85 * reach * towards / np.linalg.norm(towards),
-            look_target=target,
-            eye_up=(0.0, 0.0, 1.0),
-        ),
+        eye_controls=_eye(target + 1.85 * reach * towards / np.linalg.norm(towards), target),
         overrides={path: rrb.VisibleTimeRanges([window]) for path in trail_paths(trial)},
     )
+
+
+def _eye(position: Array, target: Array) -> rrb.EyeControls3D:
+    return rrb.EyeControls3D(position=position, look_target=target, eye_up=(0.0, 0.0, 1.0))
 
 
 def _tabs(contents: list[rrb.Container | rrb.View], tab: str | None) -> rrb.Tabs:
@@ -105,14 +108,11 @@ def _series(trial: ReplayTrial, legend: bool) -> list[rrb.Container | rrb.View]:
         },
     }
     missing = _missing(trial)
-    shown = [
-        rrb.Vertical(
-            *(_plot(trial, key, title, legend) for key, title in plots.items() if key not in missing),
-            name=name,
-        )
-        for name, plots in tabs.items()
-        if set(plots) - missing
-    ]
+    shown = []
+    for name, plots in tabs.items():
+        views = [_plot(trial, key, title, legend) for key, title in plots.items() if key not in missing]
+        if views:
+            shown.append(rrb.Vertical(*views, name=name))
     return [*shown[:2], _paths(trial), *shown[2:]]
 
 
@@ -129,9 +129,7 @@ def _paths(trial: ReplayTrial) -> rrb.Grid:
             background=BACKGROUND,
             line_grid=False,
             spatial_information=rrb.SpatialInformation(target_frame=f"tf#/{path}", show_axes=True),
-            eye_controls=rrb.EyeControls3D(
-                position=home + PATH_EYE_M, look_target=home, eye_up=(0.0, 0.0, 1.0)
-            ),
+            eye_controls=_eye(home + PATH_EYE_M, home),
             time_ranges=[whole],
         )
         for i, path in enumerate(trail_paths(trial), start=1)
@@ -141,16 +139,13 @@ def _paths(trial: ReplayTrial) -> rrb.Grid:
 
 def _missing(trial: ReplayTrial) -> set[str]:
     """Series that this trial does not have."""
-    missing = set()
-    if trial.data is None:
-        missing |= {"omega", "velocity", "force", "moment"}
-    if trial.motion is None:
-        missing |= {"grasp_position_mm", "grasp_rotation_mrad"}
-    if trial.balance is None:
-        missing |= {"balance_force", "balance_moment"}
-    elif trial.balance.moment is None:
-        missing |= {"balance_moment"}
-    return missing
+    given = {
+        ("omega", "velocity", "force", "moment"): trial.data,
+        ("grasp_position_mm", "grasp_rotation_mrad"): trial.motion,
+        ("balance_force",): trial.balance,
+        ("balance_moment",): trial.balance and trial.balance.moment,
+    }
+    return {quantity for quantities, source in given.items() if source is None for quantity in quantities}
 
 
 def _plot(trial: ReplayTrial, quantity: str, title: str, legend: bool) -> rrb.TimeSeriesView:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import rerun as rr
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from mocobot_view import colours
@@ -13,6 +16,8 @@ from mocobot_view.replay.log_robots import log_label, log_shape
 from mocobot_view.replay.log_time import send_poses
 from mocobot_view.replay.replay_trial import ReplayTrial
 from mocobot_view.sizes import FRAME_M
+
+Array = NDArray[np.float64]
 
 
 def log_payload(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
@@ -37,48 +42,32 @@ def _log_facts(
     longer = FRAME_M * (1.0 if thick == 1.0 else 1.5)
     if facts.grasps is not None:
         for i, (p, R) in enumerate(zip(facts.grasps.p_1i, facts.grasps.R_1i, strict=True), start=1):
-            stream.log(
-                f"{path}/grasp{i}",
-                rr.Arrows3D(
-                    origins=np.tile(p, (3, 1)),
-                    vectors=longer * R.T,
-                    colors=colours.AXES,
-                    radii=0.006 * thick,
-                ),
-                static=True,
-            )
+            _log_axes(stream, f"{path}/grasp{i}", p, longer * R, colours.AXES, 0.006 * thick)
             log_label(stream, f"{path}/grasp{i}/name", p, f"{{{i}}}{suffix}", colour, show=not suffix)
     if facts.p_1c is None:
         return
-    stream.log(
-        f"{path}/com",
-        rr.Points3D([facts.p_1c], colors=[colour], radii=0.022 * thick),
-        static=True,
-    )
+    com = rr.Points3D([facts.p_1c], colors=[colour], radii=0.022 * thick)
+    stream.log(f"{path}/com", com, static=True)
     log_label(stream, f"{path}/com/name", facts.p_1c, f"CoM{suffix}", colour, show=not suffix)
     semi_axes = facts.semi_axes_m()
     if semi_axes is None or facts.R_1c is None:
         return
-    stream.log(
-        f"{path}/inertia",
-        rr.Ellipsoids3D(
-            half_sizes=[semi_axes],
-            centers=[facts.p_1c],
-            quaternions=[Rotation.from_matrix(facts.R_1c).as_quat()],
-            colors=[colour],
-            line_radii=0.002 * thick,
-            fill_mode=rr.components.FillMode.MajorWireframe,
-        ),
-        static=True,
+    inertia = rr.Ellipsoids3D(
+        half_sizes=[semi_axes],
+        centers=[facts.p_1c],
+        quaternions=[Rotation.from_matrix(facts.R_1c).as_quat()],
+        colors=[colour],
+        line_radii=0.002 * thick,
+        fill_mode=rr.components.FillMode.MajorWireframe,
     )
+    stream.log(f"{path}/inertia", inertia, static=True)
     if facts.axes_known:
-        stream.log(
-            f"{path}/axes",
-            rr.Arrows3D(
-                origins=np.tile(facts.p_1c, (3, 1)),
-                vectors=(facts.R_1c * semi_axes).T,
-                colors=[colour] * 3,
-                radii=0.005 * thick,
-            ),
-            static=True,
-        )
+        _log_axes(stream, f"{path}/axes", facts.p_1c, facts.R_1c * semi_axes, [colour] * 3, 0.005 * thick)
+
+
+def _log_axes(
+    stream: rr.RecordingStream, path: str, at: Array, axes: Array, tones: Sequence[Colour], radius_m: float
+) -> None:
+    """Three arrows from a point (3,), the columns of ``axes`` (3, 3), in {1} [m]."""
+    arrows = rr.Arrows3D(origins=np.tile(at, (3, 1)), vectors=axes.T, colors=tones, radii=radius_m)
+    stream.log(path, arrows, static=True)

@@ -7,12 +7,11 @@ import rerun as rr
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from discrepancy.result.read import NamedCause
 from mocobot_view import colours
 from mocobot_view.bodies.robot import PATHS, TINTED, fixed_frames, robot_shapes
 from mocobot_view.bodies.shapes import Shape
 from mocobot_view.colours import Colour
-from mocobot_view.facts.cause_body import body_of
+from mocobot_view.facts.cause_body import by_place
 from mocobot_view.replay.log_time import send, send_poses
 from mocobot_view.replay.replay_trial import ReplayTrial
 from mocobot_view.sizes import FORCE_M_PER_N, MARK_M
@@ -28,14 +27,9 @@ def log_robots(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
     shapes = robot_shapes(trial.recording.metadata.design)
     for i in range(trial.robots):
         robot = f"{trial.name}/omnid{i + 1}"
-        stream.log(
-            f"{robot}/base",
-            rr.Transform3D(
-                translation=trial.bases.p_Wb[i],
-                quaternion=Rotation.from_matrix(trial.bases.R_Wb[i]).as_quat(),
-            ),
-            static=True,
-        )
+        turn = Rotation.from_matrix(trial.bases.R_Wb[i]).as_quat()
+        standing = rr.Transform3D(translation=trial.bases.p_Wb[i], quaternion=turn)
+        stream.log(f"{robot}/base", standing, static=True)
         log_shape(stream, f"{robot}/base/shape", shapes.standing)
         foot = [0.0, 0.0, 0.02 - shapes.base_height_m]
         log_label(stream, f"{robot}/base/name", foot, f"omnid{i + 1}", colours.of_robot(i + 1))
@@ -54,12 +48,11 @@ def log_robots(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
 
 def log_causes(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
     """Mark every cause of the diagnosis where it sits; several at one place share a mark."""
-    places: dict[str, list[NamedCause]] = {}
-    for cause in trial.diagnosis.causes if trial.diagnosis else ():
-        places.setdefault(_place(cause), []).append(cause)
-    for place, causes in places.items():
+    named = trial.diagnosis.causes if trial.diagnosis else ()
+    for (robot, body), causes in by_place(named).items():
         position = np.zeros(3)
-        if place == "payload" and trial.facts is not None and trial.facts.p_1c is not None:
+        place = "payload" if robot is None else f"omnid{robot}/{PATHS[body] if body else 'base'}"
+        if robot is None and trial.facts is not None and trial.facts.p_1c is not None:
             position = trial.facts.p_1c
         path = f"{trial.name}/{place}/cause"
         label = ", ".join(f"! {cause.name}" for cause in causes)
@@ -80,28 +73,18 @@ def log_label(
 def log_shape(stream: rr.RecordingStream, path: str, shape: Shape) -> None:
     """Log a coloured mesh once, in the frame of the entity's parents."""
     mesh = shape.triangles
-    stream.log(
-        path,
-        rr.Mesh3D(
-            vertex_positions=mesh.vertices.astype(np.float32),
-            vertex_normals=mesh.normals.astype(np.float32),
-            triangle_indices=mesh.faces,
-            vertex_colors=shape.rgba,
-        ),
-        static=True,
+    drawn = rr.Mesh3D(
+        vertex_positions=mesh.vertices.astype(np.float32),
+        vertex_normals=mesh.normals.astype(np.float32),
+        triangle_indices=mesh.faces,
+        vertex_colors=shape.rgba,
     )
+    stream.log(path, drawn, static=True)
 
 
 def trail_paths(trial: ReplayTrial) -> list[str]:
     """Entities that hold wrist paths piece by piece, to be seen over a window of time."""
     return [f"{trial.name}/omnid{i + 1}/base/wrist" for i in range(trial.robots)]
-
-
-def _place(cause: NamedCause) -> str:
-    if cause.robot is None:
-        return "payload"
-    body = body_of(cause)
-    return f"omnid{cause.robot}/{'base' if body is None else PATHS[body]}"
 
 
 def _log_paths(stream: rr.RecordingStream, trial: ReplayTrial, i: int) -> None:
@@ -114,17 +97,11 @@ def _log_paths(stream: rr.RecordingStream, trial: ReplayTrial, i: int) -> None:
         looks.append((colours.COMMAND, 1.0))
     corners = np.stack([p[every] for p in paths], axis=1).astype(np.float32)
     pieces = np.stack([corners[:-1], corners[1:]], axis=2)  # (pieces, paths, 2, 3)
-    stream.log(
-        path,
-        rr.LineStrips3D.from_fields(
-            colors=[c for c, _ in looks], radii=rr.Radius.ui_points([r for _, r in looks])
-        ),
-        static=True,
-    )
-    strips = rr.LineStrips3D.columns(strips=pieces.reshape(-1, 2, 3)).partition(
-        np.full(len(pieces), len(paths))
-    )
-    send(stream, path, trial.time[every][1:], strips)
+    tones, radii = zip(*looks, strict=True)
+    look = rr.LineStrips3D.from_fields(colors=tones, radii=rr.Radius.ui_points(radii))
+    stream.log(path, look, static=True)
+    strips = rr.LineStrips3D.columns(strips=pieces.reshape(-1, 2, 3))
+    send(stream, path, trial.time[every][1:], strips.partition(np.full(len(pieces), len(paths))))
 
 
 def _log_force(stream: rr.RecordingStream, trial: ReplayTrial, i: int) -> None:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from mocobot_view import colours
 from mocobot_view.colours import Colour
-from mocobot_view.replay.log_time import send_scalars
+from mocobot_view.replay.log_time import send
 from mocobot_view.replay.replay_trial import ReplayTrial
 
 Array = NDArray[np.float64]
@@ -18,35 +18,32 @@ XYZ = ("x", "y", "z")
 
 def log_series(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
     """Log all series below ``series`` in the trial's root, one entity per quantity and robot."""
-    recording, motion = trial.recording, trial.motion
-    measured: dict[str, tuple[Array, tuple[str, ...]]] = {
-        "phi": (recording.phi, ("1", "2", "3")),
-        "theta": (recording.theta, ("z", "y", "x")),
-        "tau": (recording.tau, ("1", "2", "3")),
-    }
-    for quantity, (values, parts) in measured.items():
-        _per_robot(stream, trial, quantity, trial.time, values, parts)
+    recording, data, motion, balance = trial.recording, trial.data, trial.motion, trial.balance
     _log_wrists(stream, trial)
-    if trial.data is not None:
-        time = trial.data.time
-        for quantity, values in (
-            ("omega", trial.data.twist[..., :3]),
-            ("velocity", trial.data.twist[..., 3:]),
-            ("moment", trial.data.wrench[..., :3]),
-            ("force", trial.data.wrench[..., 3:]),
-        ):
-            _per_robot(stream, trial, quantity, time, values, XYZ)
-        if trial.balance is not None:
-            _vector(stream, f"{trial.name}/series/balance_force", time, trial.balance.force)
-            if trial.balance.moment is not None:
-                _vector(stream, f"{trial.name}/series/balance_moment", time, trial.balance.moment)
+    series: list[tuple[str, Array, Array, tuple[str, ...]]] = [
+        ("phi", trial.time, recording.phi, ("1", "2", "3")),
+        ("theta", trial.time, recording.theta, ("z", "y", "x")),
+        ("tau", trial.time, recording.tau, ("1", "2", "3")),
+    ]
+    if data is not None:
+        series += [
+            ("omega", data.time, data.twist[..., :3], XYZ),
+            ("velocity", data.time, data.twist[..., 3:], XYZ),
+            ("moment", data.time, data.wrench[..., :3], XYZ),
+            ("force", data.time, data.wrench[..., 3:], XYZ),
+        ]
     if motion is not None:
-        _per_robot(
-            stream, trial, "grasp_position_mm", trial.time, 1e3 * motion.gap_position_m[..., None], ("",)
-        )
-        _per_robot(
-            stream, trial, "grasp_rotation_mrad", trial.time, 1e3 * motion.gap_rotation_rad[..., None], ("",)
-        )
+        series += [
+            ("grasp_position_mm", trial.time, 1e3 * motion.gap_position_m[..., None], ("",)),
+            ("grasp_rotation_mrad", trial.time, 1e3 * motion.gap_rotation_rad[..., None], ("",)),
+        ]
+    for quantity, time, values, parts in series:
+        _per_robot(stream, trial, quantity, time, values, parts)
+    if data is not None and balance is not None:
+        for quantity, values in (("balance_force", balance.force), ("balance_moment", balance.moment)):
+            if values is not None:
+                path = f"{trial.name}/series/{quantity}"
+                _lines(stream, path, data.time, values, list(XYZ), list(colours.AXES))
 
 
 def _log_wrists(stream: rr.RecordingStream, trial: ReplayTrial) -> None:
@@ -77,10 +74,6 @@ def _per_robot(
     _lines(stream, f"{trial.name}/series/{quantity}", time, values.reshape(len(values), -1), names, shades)
 
 
-def _vector(stream: rr.RecordingStream, path: str, time: Array, values: Array) -> None:
-    _lines(stream, path, time, values, list(XYZ), list(colours.AXES))
-
-
 def _lines(
     stream: rr.RecordingStream,
     path: str,
@@ -90,5 +83,7 @@ def _lines(
     shades: list[Colour],
     width: float = 1.2,
 ) -> None:
+    """k lines of one entity at times [s], shape (Q, k)."""
     stream.log(path, rr.SeriesLines(names=names, colors=shades, widths=width), static=True)
-    send_scalars(stream, path, time, values)
+    counts = np.full(len(values), values.shape[1])
+    send(stream, path, time, rr.Scalars.columns(scalars=values.ravel()).partition(counts))

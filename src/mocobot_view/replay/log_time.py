@@ -23,12 +23,6 @@ def send(stream: rr.RecordingStream, path: str, time: Array, columns: Iterable[r
     stream.send_columns(path, [time_column(time)], columns)
 
 
-def send_scalars(stream: rr.RecordingStream, path: str, time: Array, values: Array) -> None:
-    """Log k scalars of one entity at times [s], shape (Q, k)."""
-    counts = np.full(len(values), values.shape[1])
-    send(stream, path, time, rr.Scalars.columns(scalars=values.ravel()).partition(counts))
-
-
 def send_poses(
     stream: rr.RecordingStream, path: str, time: Array, position: Array | None, quaternion: Array | None
 ) -> None:

@@ -13,24 +13,17 @@ from numpy.typing import NDArray
 from discrepancy.result.read import WrittenDiagnosis
 from estimator.arm.gimbal import rotation
 from estimator.errors import InputError
-from estimator.estimate.grasp_estimate import single_robot
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from estimator.signals.grasp_data import GraspData
+from estimator.statistics import rms
 from mocobot_view.bodies.payload_shape import bars, cad_shape, drawn_payload
 from mocobot_view.bodies.poses import BodyMotion, body_motion
 from mocobot_view.bodies.robot import robot_shapes
 from mocobot_view.bodies.shapes import Shape
-from mocobot_view.facts.body_facts import BodyFacts, facts_of
-from mocobot_view.facts.placement import (
-    Bases,
-    Grasps,
-    PayloadMotion,
-    in_a_row,
-    payload_motion,
-    place_bases,
-)
+from mocobot_view.facts.body_facts import BodyFacts, check_robots, facts_of, held
+from mocobot_view.facts.placement import Bases, Grasps, PayloadMotion, placed
 from mocobot_view.replay.signals import Balance, balance, filtered
 
 Array = NDArray[np.float64]
@@ -112,20 +105,15 @@ def replay_trial(
     R_bi, wrist = rotation(recording.theta), bodies.wrist
     height = robot_shapes(meta.design).base_height_m
     facts = None if estimate is None else facts_of(estimate)
-    grasps = None if facts is None else facts.grasps
-    if grasps is None and meta.robots == 1:
-        alone = single_robot()
-        grasps = Grasps(alone.R_1i, alone.p_1i)
-    if grasps is None:
-        bases, motion = in_a_row(meta.robots, height), None
+    grasps = held(facts, meta.robots)
+    bases, motion = placed(R_bi, wrist, grasps, height)
+    if motion is None:
         notes.append(
             "The grasps are not known, so neither is where the robots stand: they are drawn in a row, without a "
             "payload. Give an estimate from recordings with motion (--estimate)."
         )
     else:
-        bases = place_bases(R_bi, wrist, grasps, height)
-        motion = payload_motion(R_bi, wrist, grasps, bases)
-        gap, turn = (float(np.sqrt(np.mean(g**2))) for g in (motion.gap_position_m, motion.gap_rotation_rad))
+        gap, turn = rms(motion.gap_position_m), rms(motion.gap_rotation_rad)
         if gap > MISFIT_M or turn > MISFIT_RAD:
             notes.append(
                 f"The grasps do not fit this recording: flanges and grasps are {1e3 * gap:.0f} mm and "
@@ -168,11 +156,8 @@ def distinct_names(recordings: Sequence[Path]) -> list[str]:
 
 
 def _given(estimate: PayloadEstimate, recording: Recording, notes: list[str]) -> PayloadEstimate:
-    robots, label = recording.metadata.robots, recording.metadata.payload
-    if estimate.robots != robots:
-        raise InputError(
-            f"the estimate is of {estimate.robots} robots; {recording.name} is of {robots} robots"
-        )
+    label = recording.metadata.payload
+    check_robots(estimate, recording)
     if None not in (estimate.payload, label) and estimate.payload != label:
         notes.append(f"The estimate is of payload {estimate.payload!r}; this recording is of {label!r}.")
     return estimate

@@ -10,8 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.result.read import VERDICTS, WrittenDiagnosis
 from estimator.statistics import rms, rms_length
-from mocobot_view import colours
-from mocobot_view.colours import Colour
+from mocobot_view.facts.placement import Grasps
 from mocobot_view.replay.replay_trial import ReplayTrial
 from mocobot_view.sizes import FORCE_M_PER_N
 
@@ -37,61 +36,50 @@ def summary(trial: ReplayTrial) -> str:
 
 
 def _verdict(diagnosis: WrittenDiagnosis) -> str:
-    lines = [f"**Diagnosis: {VERDICTS[diagnosis.verdict]}.**"]
-    lines += [f"- **{_plain(cause.name)}**: {_plain(cause.sentence)}" for cause in diagnosis.causes]
-    if not diagnosis.causes:
-        lines.append("No cause is named.")
-    return lines[0] + "\n\n" + "\n".join(lines[1:])
+    causes = [f"- **{_plain(cause.name)}**: {_plain(cause.sentence)}" for cause in diagnosis.causes]
+    return f"**Diagnosis: {VERDICTS[diagnosis.verdict]}.**\n\n" + "\n".join(causes or ["No cause is named."])
 
 
 def _estimate(trial: ReplayTrial) -> str:
     estimate, truth = trial.estimate, trial.truth
     if estimate is None and truth is None:
         return ""
-    rows: list[tuple[str, str, str]] = []
-    known = "not determined"
-    facts = trial.facts
-    mass = estimate.mass if estimate else None
-    rows.append(
+    facts, known = trial.facts, "not determined"
+    mass, inertia, com_se = None, None, None
+    if estimate is not None:
+        mass, inertia, com_se = estimate.mass, estimate.inertia, estimate.p_1c_se_m
+    com = facts.p_1c if facts else None
+    rows = [
         (
             "mass [kg]",
             known if mass is None else f"{mass.mass:.4f} ± {mass.se:.4f}",
             "" if truth is None else f"{truth.mass_kg:.4f}",
-        )
-    )
-    com = facts.p_1c if facts else None
-    com_se = estimate.p_1c_se_m if estimate else None
-    rows.append(
+        ),
         (
             "centre of mass in {1} [mm]",
             known if com is None else _with_errors(1e3 * com, None if com_se is None else 1e3 * com_se, 2),
             "" if truth is None or truth.p_1c is None else _vector(1e3 * truth.p_1c, 2),
-        )
-    )
-    inertia = estimate.inertia if estimate else None
-    rows.append(
+        ),
         (
             "principal moments [kg m²]",
             known
             if inertia is None
             else _with_errors(inertia.principal.moments, inertia.principal.moments_se, 4),
             "" if truth is None or truth.principal_kgm2 is None else _vector(truth.principal_kgm2, 4),
+        ),
+    ]
+    grasps, true = (of.grasps if of else None for of in (facts, truth))
+    rows += [
+        (
+            f"grasp {i + 1} in {{1}} [mm]; [deg]",
+            known if grasps is None else _pose(grasps, i),
+            "" if true is None else _pose(true, i),
         )
-    )
-    for i in range(1, trial.robots):
-        grasps = facts.grasps if facts else None
-        true = truth.grasps if truth else None
-        rows.append(
-            (
-                f"grasp {i + 1} in {{1}} [mm]; [deg]",
-                known if grasps is None else _pose(grasps.p_1i[i], grasps.R_1i[i]),
-                "" if true is None else _pose(true.p_1i[i], true.R_1i[i]),
-            )
-        )
+        for i in range(1, trial.robots)
+    ]
     columns = 2 + (truth is not None)
-    head = ["", "estimate", "truth"][:columns]
-    table = ["| " + " | ".join(head) + " |", "|" + "---|" * columns]
-    table += ["| " + " | ".join(row[:columns]) + " |" for row in rows]
+    head, *lines = ["| " + " | ".join(row[:columns]) + " |" for row in [("", "estimate", "truth"), *rows]]
+    table = [head, "|" + "---|" * columns, *lines]
     title = "**Payload: estimate ± standard error" + (", and truth**" if truth else "**")
     flags = [f"- {_plain(flag)}" for flag in estimate.flags] if estimate else []
     return title + "\n\n" + "\n".join(table) + ("\n\n" + "\n".join(flags) if flags else "")
@@ -120,14 +108,14 @@ def _key(trial: ReplayTrial) -> str:
     if trial.facts is not None and trial.motion is not None:
         lines.append("- red, green, blue arrows: x, y, z of a grasp frame")
         lines.append(
-            f"- {_name(colours.ESTIMATE)}: estimated centre of mass, principal axes, and the solid ellipsoid of that "
+            "- magenta: estimated centre of mass, principal axes, and the solid ellipsoid of that "
             "mass and inertia"
         )
     if trial.truth is not None and trial.motion is not None:
-        lines.append(f"- {_name(colours.TRUTH)}, thin: the same in truth; true grasp frames are longer")
+        lines.append("- green, thin: the same in truth; true grasp frames are longer")
     if trial.diagnosis is not None and trial.diagnosis.causes:
-        lines.append(f"- {_name(colours.FAULT)} ball: a cause that the diagnosis names sits there")
-    commanded = f"; {_name(colours.COMMAND)}: the command" if trial.recording.ref is not None else ""
+        lines.append("- red ball: a cause that the diagnosis names sits there")
+    commanded = "; white: the command" if trial.recording.ref is not None else ""
     lines.append(f"- line at a wrist: its path, in the robot's colour{commanded}")
     lines.append(
         "- series: the robot's colour; dark, plain, light for its joints 1, 2, 3 or axes x, y, z (theta: z, y, x)"
@@ -135,17 +123,9 @@ def _key(trial: ReplayTrial) -> str:
     return "**Key**\n\n" + "\n".join(lines)
 
 
-def _name(colour: Colour) -> str:
-    return {
-        colours.ESTIMATE: "magenta",
-        colours.TRUTH: "green",
-        colours.COMMAND: "white",
-        colours.FAULT: "red",
-    }[colour]
-
-
-def _pose(p: Array, R: Array) -> str:
-    return f"{_vector(1e3 * p, 2)}; {_vector(Rotation.from_matrix(R).as_rotvec(degrees=True), 3)}"
+def _pose(grasps: Grasps, i: int) -> str:
+    turn = Rotation.from_matrix(grasps.R_1i[i]).as_rotvec(degrees=True)
+    return f"{_vector(1e3 * grasps.p_1i[i], 2)}; {_vector(turn, 3)}"
 
 
 def _with_errors(values: Array, errors: Array | None, digits: int) -> str:
