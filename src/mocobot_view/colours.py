@@ -1,7 +1,5 @@
 """One colour per meaning, the same in the scene, the series and the summary."""
 
-from __future__ import annotations
-
 import colorsys
 
 Colour = tuple[int, int, int]

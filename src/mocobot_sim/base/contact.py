@@ -1,7 +1,5 @@
 """How wheels stand on the floor: load, friction and slip of every one."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Design numbers of the mecanum base."""
 
-from __future__ import annotations
-
 import dataclasses
 from dataclasses import dataclass
 from functools import cache

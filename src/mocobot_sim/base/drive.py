@@ -10,8 +10,6 @@ Odometry integrates the twist that fits the wheels' angles best. It is all that 
 off, and the base with it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import mujoco

@@ -1,7 +1,5 @@
 """Arithmetic of the drives (see ``drive``), compiled with numba."""
 
-from __future__ import annotations
-
 import numpy as np
 from numba import njit
 

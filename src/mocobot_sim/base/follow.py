@@ -1,7 +1,5 @@
 """Bases that follow what their arms hold: each keeps itself under its own wrist."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

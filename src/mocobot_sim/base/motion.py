@@ -1,7 +1,5 @@
 """Planned planar motion of a frame, and of bases that stay where they are under it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

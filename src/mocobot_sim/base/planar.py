@@ -1,7 +1,5 @@
 """Planar poses (x [m], y [m], yaw [rad]) and planar body twists (w_z [rad/s], v_x, v_y [m/s])."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

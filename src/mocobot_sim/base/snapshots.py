@@ -1,7 +1,5 @@
 """States of a trial at chosen times, for pictures."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import mujoco

@@ -1,7 +1,5 @@
 """What can be off at the axis, by name: every effect changes numbers of the plant."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The axis with effects, to take away: MJCF for what it can express, a small file for the rest."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, fields
 from pathlib import Path

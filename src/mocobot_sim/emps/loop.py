@@ -1,7 +1,5 @@
 """The axis in MuJoCo under its digital loop, and what MJCF lacks: hold, delays, ripples, pulses, pushes."""
 
-from __future__ import annotations
-
 # mujoco's compiled modules come without types.
 # pyright: reportAttributeAccessIssue=false
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The axis as MJCF, with all of a plant that MJCF can express."""
 
-from __future__ import annotations
-
 # mujoco's compiled modules come without types.
 # pyright: reportAttributeAccessIssue=false
 import mujoco

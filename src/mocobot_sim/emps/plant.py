@@ -1,7 +1,5 @@
 """All numbers that the simulated axis and its loop have; effects change them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

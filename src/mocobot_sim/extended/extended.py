@@ -1,7 +1,5 @@
 """Extended models: a team with its effects as a folder that plain MuJoCo loads and a trial can run on."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, fields
@@ -55,7 +53,10 @@ def write_extended(scene: TeamScene, effects: Sequence[Effect], folder: Path, ex
         "grasps": poses_to_list(scene.X_1i),
         "mounts": poses_to_list(scene.mounts),
         "initial": scene.initial
-        and {key: np.asarray(part, dtype=float).tolist() for key, part in zip(INITIAL, scene.initial, strict=True)},
+        and {
+            key: np.asarray(part, dtype=float).tolist()
+            for key, part in zip(INITIAL, scene.initial, strict=True)
+        },
         "as_built": [{key: value.tolist() for key, value in asdict(unit).items()} for unit in scene.units],
         "sensors": {name: list(scene.sensors.of(name, scene.robots)) for name in SENSORS},
         "grasp_slack_m": list(scene.grasp_slack_m or (0.0,) * scene.robots),

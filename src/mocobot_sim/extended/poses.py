@@ -1,7 +1,5 @@
 """Poses as plain JSON values, and back."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 

@@ -1,7 +1,5 @@
 """The page that goes with an extended model."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Arms that carry a payload's weight and are otherwise as soft as their gains say: an actor of a trial."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

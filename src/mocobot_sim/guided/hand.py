@@ -1,7 +1,5 @@
 """A person's hands on the payload: a spring-damper that moves along a path, or a force that is given."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

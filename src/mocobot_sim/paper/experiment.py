@@ -4,8 +4,6 @@ Order as in the paper (section IV.C): random trials first; the grasps estimated 
 motion and the static orientations; then everything is estimated.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import product

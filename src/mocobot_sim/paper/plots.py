@@ -1,7 +1,5 @@
 """Pictures of Tables II-V: our errors beside the published ones, on logarithmic axes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

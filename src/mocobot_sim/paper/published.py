@@ -1,7 +1,5 @@
 """The paper's tables as data: ground truth of the four payloads (Table I) and published errors (II-V)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path

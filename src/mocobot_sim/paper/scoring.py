@@ -7,8 +7,6 @@ and standard deviation of the estimates over trials, so the two say bias and sca
 divide by n - 1; one trial has none (null).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a scene has to know of the effects in it: what they are, for the record, and which of them push."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Protocol, runtime_checkable
 
 import mujoco

@@ -1,7 +1,5 @@
 """How one real unit differs from its design: geometry, springs and sensor zeros."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

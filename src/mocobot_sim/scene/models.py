@@ -1,7 +1,5 @@
 """Where the hand-written models are: in the repository, or inside an installed wheel."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """One Omnid in MJCF: loaded, parked, off its design, put where it stands (PyMJCF)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

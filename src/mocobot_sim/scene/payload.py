@@ -1,7 +1,5 @@
 """A payload's MJCF: one rigid body, its frame at the first grasp, a site at every grasp."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

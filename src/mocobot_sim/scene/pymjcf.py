@@ -3,8 +3,6 @@
 dm_control loads a renderer when it is imported, and warns or fails without a display; composing needs none.
 """
 
-from __future__ import annotations
-
 import os
 
 import mujoco

@@ -1,7 +1,5 @@
 """What else acts in a trial, besides the robots' arms: bases that drive, a person's hand."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Protocol
 

@@ -1,7 +1,5 @@
 """Start a trial at rest: close every loop at home, then load the springs so that nothing moves."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray

@@ -1,7 +1,5 @@
 """Kinematic loops of a team, closed by Newton steps on MuJoCo's own constraint Jacobian."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray

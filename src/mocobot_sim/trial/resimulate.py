@@ -1,7 +1,5 @@
 """Resimulation: a recording's commands in closed loop once more, and what its sensors should then have read."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

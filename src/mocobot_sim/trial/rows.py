@@ -1,7 +1,5 @@
 """Rows of a trial as they are written, and the checks on them."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 from numpy.typing import NDArray

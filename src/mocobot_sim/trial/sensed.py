@@ -1,7 +1,5 @@
 """What joint sensors see during a trial, densely enough to be read at other instants."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

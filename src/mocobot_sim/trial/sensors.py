@@ -1,7 +1,5 @@
 """What the robots' joint sensors make of the truth: calibration, noise, quantisation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -1,7 +1,5 @@
 """From a payload's name to recordings: build the team, run a trial, read it through the sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

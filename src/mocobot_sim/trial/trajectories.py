@@ -4,8 +4,6 @@ Commands are sampled at the recording's rate; between them the controller follow
 a recording that carries its commands can be resimulated exactly.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Run one trial: physics and control at 1 kHz, logged at 100 Hz, checked for everything that can go wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import mujoco

@@ -1,7 +1,5 @@
 """The log of a trial."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the payload looks like: its CAD geometry where that is known, else bars from its centre to the grasps."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

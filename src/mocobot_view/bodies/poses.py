@@ -5,8 +5,6 @@ fixed in its parent (see ``robot.PATHS``), either turning about that frame's ori
 viewer that knows the tree needs no more than what varies.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

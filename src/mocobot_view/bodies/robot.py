@@ -1,7 +1,5 @@
 """One Omnid to look at: its bodies' shapes, taken from the MJCF and adapted to a recording's design."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 

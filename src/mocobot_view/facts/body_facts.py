@@ -1,7 +1,5 @@
 """What is said of a payload, by an estimate or by the truth, ready to be drawn."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Which body of a robot a cause sits at."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 from discrepancy.result.read import NamedCause

@@ -1,7 +1,5 @@
 """Files that say something of a payload: estimates, and the truth beside simulated recordings."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -4,8 +4,6 @@ The world W lies on the floor under robot 1, its axes those of {b1}. All bases a
 diagnosis looks for, not what a picture assumes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

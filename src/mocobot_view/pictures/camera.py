@@ -1,7 +1,5 @@
 """MuJoCo's free camera: from where to look so that everything is in the picture, and where points lie in it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import mujoco

@@ -1,7 +1,5 @@
 """Words written into a picture."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

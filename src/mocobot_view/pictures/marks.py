@@ -1,7 +1,5 @@
 """What is drawn into a picture beside the model: lines, arrows, ellipsoids and words, in the world."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise

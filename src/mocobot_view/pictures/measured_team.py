@@ -1,7 +1,5 @@
 """A team as a recording and an estimate have it at one instant: a MuJoCo model to look at, and its state."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -4,8 +4,6 @@ Rendering happens in a process of its own: MuJoCo chooses its renderer when it i
 installation may take the process with it. So whoever asks for pictures needs no OpenGL.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

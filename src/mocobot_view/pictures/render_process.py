@@ -3,8 +3,6 @@
 The folder holds ``task.npz`` and the models it names; the pictures go to ``result.npy``.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Mapping
 from contextlib import ExitStack

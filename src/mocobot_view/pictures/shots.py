@@ -1,7 +1,5 @@
 """What pictures of teams show: a payload as designed, an estimate, and where a diagnosis sees causes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations
 from pathlib import Path

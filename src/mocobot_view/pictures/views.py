@@ -3,8 +3,6 @@
 All return a picture, shape (height, width, 3), or one sentence that says why there is none.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

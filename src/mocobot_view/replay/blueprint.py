@@ -1,7 +1,5 @@
 """The layout of a replay: the scene left, series right, a text below."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

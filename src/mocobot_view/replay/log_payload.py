@@ -1,7 +1,5 @@
 """The payload of a replay in Rerun: where the grasps say it is, and what is known of its body."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

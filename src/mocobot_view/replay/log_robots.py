@@ -1,7 +1,5 @@
 """The robots of a replay in Rerun: shapes once, joint motion as columns, wrist paths, forces, marks of a diagnosis."""
 
-from __future__ import annotations
-
 import numpy as np
 import rerun as rr
 from numpy.typing import ArrayLike, NDArray

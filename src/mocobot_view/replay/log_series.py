@@ -1,7 +1,5 @@
 """Time series of a replay in Rerun."""
 
-from __future__ import annotations
-
 import numpy as np
 import rerun as rr
 from numpy.typing import NDArray

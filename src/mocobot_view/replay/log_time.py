@@ -1,7 +1,5 @@
 """Columns of samples for the Rerun stream: a whole signal at once, on one timeline."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

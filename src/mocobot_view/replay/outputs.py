@@ -1,7 +1,5 @@
 """Where a replay goes: a file, a browser, or the viewer."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import sys

@@ -1,7 +1,5 @@
 """One recording made ready to be shown: poses, signals, and what an estimate, the truth and a diagnosis say."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Time series of a replay: what was measured, what follows from it, and what a rigid payload leaves unexplained."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

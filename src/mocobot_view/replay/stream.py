@@ -1,7 +1,5 @@
 """A replay as one Rerun recording."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import rerun as rr

@@ -1,7 +1,5 @@
 """The text of a replay: verdict, estimate against truth, residuals, notes, and a key to the colours."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
