@@ -26,7 +26,8 @@ from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensed import SensedLog
 from mocobot_sim.trial.sensors import PRESETS, measure
 from mocobot_sim.trial.trajectories import random_vias
-from mocobot_sim.trial.trial import TrialLog, run_trial
+from mocobot_sim.trial.trial import run_trial
+from mocobot_sim.trial.trial_log import TrialLog
 from mocobot_sim.trial.truth import GroundTruth
 
 SKEWED = 1  # robot 2

@@ -18,7 +18,8 @@ from mocobot_sim.effects import apply_effects, make_effect
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.sensors import PRESETS, measure
 from mocobot_sim.trial.trajectories import random_vias, sphere_motion
-from mocobot_sim.trial.trial import TrialLog, run_trial
+from mocobot_sim.trial.trial import run_trial
+from mocobot_sim.trial.trial_log import TrialLog
 from mocobot_sim.trial.truth import GroundTruth, write_truth
 from payload_mjcf import TEAMS
 

@@ -19,7 +19,7 @@ from miswired import miswire
 from mocobot.cli import main
 from mocobot_logs.bag.write import write_bag
 from mocobot_sim.trial.sensors import PRESETS, measure
-from mocobot_sim.trial.trial import TrialLog
+from mocobot_sim.trial.trial_log import TrialLog
 from recorded_team import Sines, carry
 from recordings import small_recording
 

@@ -17,7 +17,8 @@ from mocobot_logs.log import Level
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import PRESETS, measure
 from mocobot_sim.trial.trajectories import random_vias
-from mocobot_sim.trial.trial import TrialLog, run_trial
+from mocobot_sim.trial.trial import run_trial
+from mocobot_sim.trial.trial_log import TrialLog
 from omnid_design import DESIGN
 
 ENCODER = 2 * np.pi / 2**16 / np.sqrt(12)

@@ -16,9 +16,11 @@ from estimator.recording.model import Recording
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import PAYLOAD_PREFIX
 from mocobot_sim.trial import trial as trial_module
+from mocobot_sim.trial.rows import Rows
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trajectories import random_vias
-from mocobot_sim.trial.trial import TrialLog, run_trial
+from mocobot_sim.trial.trial import run_trial
+from mocobot_sim.trial.trial_log import TrialLog
 
 BODIES = {
     **{f"proximal{k}": f"base/leg{k}/proximal" for k in (1, 2, 3)},
@@ -51,7 +53,7 @@ def placed_trial(scene: TeamScene, vias: int = 2) -> Placed:
     """Run a short trial and keep where MuJoCo's forward solution has every body."""
     xpos, xquat = [], []
 
-    class Keeping(trial_module._Buffers):
+    class Keeping(Rows):
         def after_step(self, sample: int) -> None:
             super().after_step(sample)
             xpos.append(self.data.xpos.copy())
@@ -60,7 +62,7 @@ def placed_trial(scene: TeamScene, vias: int = 2) -> Placed:
 
     names: dict[str, int] = {}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(trial_module, "_Buffers", Keeping)
+        patch.setattr(trial_module, "Rows", Keeping)
         log = run_trial(scene, random_vias(scene.wrist_home_b, np.random.default_rng(3), vias=vias))
     p, q = np.array(xpos), np.array(xquat)
     bodies = {

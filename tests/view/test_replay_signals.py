@@ -15,7 +15,7 @@ from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
 from estimator.signals.process import process_recording
 from mocobot_sim.trial.sensors import measure, sensor_preset
-from mocobot_sim.trial.trial import TrialLog
+from mocobot_sim.trial.trial_log import TrialLog
 from mocobot_sim.trial.truth import GroundTruth
 from mocobot_view.facts.body_facts import BodyFacts, facts_of
 from mocobot_view.facts.placement import Grasps

@@ -16,7 +16,7 @@ from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
 from mocobot_sim.trial.sensors import measure, sensor_preset
-from mocobot_sim.trial.trial import TrialLog
+from mocobot_sim.trial.trial_log import TrialLog
 from mocobot_view.bodies.payload_shape import BAR_M, cad_shape, held_elsewhere
 from mocobot_view.facts.cause_body import body_of
 from mocobot_view.facts.placement import Grasps

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Candidate
 
+LEAST_LOG10_P = -1e6
 MOST = 14
 BY_CHANCE = 28.0
 """Gain of chi-square that one parameter reaches by chance with a probability of about 1e-6 or 1e-7."""
@@ -37,10 +40,15 @@ def _strongest(explanation: Explanation, fit: Fit) -> list[dict[str, Any]]:
         | {
             "at": _when(problem.candidates[e.index]),
             "gain": float(e.gain),
-            "log10_p": max(float(e.log10_p), -1e6),
+            "log10_p": finite_log10_p(e.log10_p),
         }
         for e in strongest
     ]
+
+
+def finite_log10_p(value: float) -> float:
+    """A logarithm of a probability that JSON can hold."""
+    return max(float(np.nan_to_num(value, nan=0.0)), LEAST_LOG10_P)
 
 
 def place_of(candidate: Candidate) -> dict[str, Any]:

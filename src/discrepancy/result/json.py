@@ -53,13 +53,11 @@ from discrepancy.engine.diagnose import Diagnosis
 from discrepancy.engine.explanation import Explanation, Found
 from discrepancy.engine.gain import Gain, Response
 from discrepancy.least_squares.fit import Fit
-from discrepancy.result.evidence_list import evidence_list, place_of
+from discrepancy.result.evidence_list import evidence_list, finite_log10_p, place_of
 from discrepancy.result.read import FORMAT, VERSION
 from discrepancy.result.sensitivity import blind_spots, detection_limits
 from discrepancy.result.signature import signature
 from discrepancy.rig import Rig
-
-LEAST_LOG10_P = -1e6
 
 
 def diagnosis_to_dict(
@@ -119,11 +117,7 @@ def diagnosis_to_dict(
 
 def _strain(explanation: Explanation) -> tuple[float, float, float]:
     chi2, freedom, log10_p = explanation.fit.strain
-    return chi2, freedom, _log10_p(log10_p)
-
-
-def _log10_p(value: float) -> float:
-    return max(float(np.nan_to_num(value, nan=0.0)), LEAST_LOG10_P)
+    return chi2, freedom, finite_log10_p(log10_p)
 
 
 def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: Words) -> dict[str, Any]:
@@ -136,7 +130,7 @@ def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: W
             name: {"value": float(value), "se": _finite(se.get(name))} for name, value in values.items()
         },
         "explained": {"in_sample": found.in_sample, "held_out": found.held_out},
-        "log10_p": _log10_p(found.evidence.log10_p),
+        "log10_p": finite_log10_p(found.evidence.log10_p),
         "folds": [float(gain) for gain in found.folds],
         "shape": plain(dict(candidate.shape)),
         "separate": words.separate(candidate.cause),

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from discrepancy.causes.words import Words
 from discrepancy.result.plots_against import against_figure
 from discrepancy.result.plots_evidence import closed_loop_figure, evidence_figure
-from discrepancy.result.residual_statistics import running_rms
+from discrepancy.result.residual_statistics import multiples
 from discrepancy.result.traces import Group, Trace, groups
 
 Array = NDArray[np.float64]
@@ -115,9 +115,7 @@ def _multiples(axis: Axes, trace: Trace, group: Group, *, named: bool) -> None:
     series += [("with causes", trace.white_after, AFTER)] if named else []
     top = 1.0
     for label, white, colour in series:
-        square = np.mean(white[:, list(group.columns)] ** 2, axis=1)
-        moving = running_rms(square[: trace.moving], trace.rate_hz)
-        rms = np.concatenate([moving, np.sqrt(square[trace.moving :])])
+        rms = multiples(trace, white, group.columns)
         top = max(top, float(rms.max()))
         axis.plot(_broken(trace, trace.time), _broken(trace, rms), color=colour, linewidth=1.1, label=label)
         axis.plot(trace.time[trace.moving :], rms[trace.moving :], "o", color=colour, markersize=3)

@@ -26,6 +26,13 @@ def running_rms(square: Array, rate_hz: float) -> Array:
     return np.sqrt(np.maximum(uniform_filter1d(square, min(width, len(square)), mode="nearest"), 0.0))
 
 
+def multiples(trace: Trace, white: Array, columns: Sequence[int]) -> Array:
+    """Rms of some whitened channels over time in multiples of clean data, shape (n,): running, but for holds."""
+    square = np.mean(white[:, list(columns)] ** 2, axis=1)
+    moving = running_rms(square[: trace.moving], trace.rate_hz)
+    return np.concatenate([moving, np.sqrt(square[trace.moving :])])
+
+
 def binned(traces: Sequence[Trace], attribute: str, columns: list[int], quantity: str) -> tuple[Array, Array]:
     """Mean of a quantity and rms of some channels in bins of equal counts, shapes (b,)."""
     x = np.concatenate([trace.quantities[quantity] for trace in traces])

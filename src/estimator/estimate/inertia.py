@@ -58,6 +58,15 @@ class InertiaEstimate:
     residual_rms: float
     moment_rms: float
 
+    @classmethod
+    def of(
+        cls, parameters: Array, covariance: Array, residual_rms: float, moment_rms: float
+    ) -> InertiaEstimate:
+        """From the six parameters of (20), made positive (footnote 1); the rest as the attributes."""
+        inertia, projected = project_positive(inertia_matrix(parameters))
+        principal = principal_inertia(inertia, covariance)
+        return cls(inertia, covariance, principal, projected, residual_rms, moment_rms)
+
     def to_dict(self) -> dict[str, Any]:
         """Plain types; see ``estimator.estimate.result``."""
         return {
@@ -137,19 +146,13 @@ def estimate_inertia(
 
     covariance = window_covariance(*window_normals(X, residual, trial_windows(trials, window_s)))
     moment_scale, alpha_scale = rms(y), np.sqrt(np.mean(X[:, 0, 0] ** 2 + X[:, 1, 1] ** 2))
-    typical = moment_scale / alpha_scale
-    values, vectors = np.linalg.eigh(covariance)
-    uncertain = vectors[:, np.sqrt(np.maximum(values, 0.0)) > SE_LIMIT * typical]
-    if uncertain.size:
-        return None, refuse(report, uncertain.T, "its standard error is as large as a third of the inertia")
+    report = refuse_uncertain(report, covariance, moment_scale / alpha_scale)
+    if not report.determined:
+        return None, report
 
     if upstream is not None:
         covariance = covariance + _upstream_covariance(trials, grasps, p_1c, *upstream)
-    inertia, projected = project_positive(inertia_matrix(parameters))
-    estimate = InertiaEstimate(
-        inertia, covariance, principal_inertia(inertia, covariance), projected, noise, signal
-    )
-    return estimate, report
+    return InertiaEstimate.of(parameters, covariance, noise, signal), report
 
 
 def trial_windows(trials: Sequence[GraspData], window_s: float) -> list[Window]:
@@ -182,6 +185,13 @@ def refuse(report: StepReport, directions: Array, why: str) -> StepReport:
         for d in directions
     )
     return replace(report, weak=report.weak + weak)
+
+
+def refuse_uncertain(report: StepReport, covariance: Array, typical: float) -> StepReport:
+    """The report with the directions added whose standard error is too large for a typical inertia [kg m^2]."""
+    values, vectors = np.linalg.eigh(covariance)
+    uncertain = vectors[:, np.sqrt(np.maximum(values, 0.0)) > SE_LIMIT * typical]
+    return refuse(report, uncertain.T, "its standard error is as large as a third of the inertia")
 
 
 def _equations(trial: GraspData, grasps: GraspEstimate, p_1c: Array) -> tuple[Array, Array]:

@@ -23,20 +23,15 @@ from estimator.estimate.fusion import BodyMotion, acceleration_noise, fuse
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.identifiability import StepReport, cross_information, judge
 from estimator.estimate.inertia import (
-    SE_LIMIT,
     InertiaEstimate,
     every,
     inertia_regressor,
     refuse,
+    refuse_uncertain,
     rotational_excitation,
     trial_windows,
 )
-from estimator.estimate.principal import (
-    inertia_matrix,
-    inertia_parameters,
-    principal_inertia,
-    project_positive,
-)
+from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.statics import ComEstimate, MassEstimate, weak_com_reason
 from estimator.estimate.uncertainty import WINDOW_S, numerical_jacobian, window_covariance, window_normals
 from estimator.signals.grasp_data import GraspData
@@ -164,23 +159,11 @@ def estimate_joint(
             float(values[0]), values[1:4], covariance[:4, :4], own_covariance[:4, :4], J[1:4], moment_rms
         )
     if K == 10:
-        matrix, projected = project_positive(inertia_matrix(values[4:]))
-        of_inertia = covariance[4:, 4:]
         explained = rms(Y[:, 3:, 4:] @ theta[4:])
-        eigenvalues, vectors = np.linalg.eigh(of_inertia)
-        uncertain = vectors[:, np.sqrt(np.maximum(eigenvalues, 0.0)) > SE_LIMIT * np.trace(matrix) / 3]
-        if uncertain.size:
-            why = "its standard error is as large as a third of the inertia"
-            inertia_report = refuse(inertia_report, uncertain.T, why)
-        else:
-            inertia = InertiaEstimate(
-                matrix,
-                of_inertia,
-                principal_inertia(matrix, of_inertia),
-                projected,
-                moment_rms,
-                explained,
-            )
+        inertia = InertiaEstimate.of(values[4:], covariance[4:, 4:], moment_rms, explained)
+        typical = float(np.trace(inertia.inertia)) / 3
+        inertia_report = refuse_uncertain(inertia_report, inertia.covariance, typical)
+        inertia = inertia if inertia_report.determined else None
     return JointEstimate(mass, com, inertia, covariance), (com_report, inertia_report)
 
 

@@ -82,8 +82,7 @@ class LeRobotTable(ParquetTable):
         self._filter = pc.field(EPISODE) == episode
         with told_in_one_sentence(name):
             size = self._data.count_rows(filter=self._filter)
-        self._set_up(name, self._data.schema, size, *_extent(self._data))
-        self.metadata, self.sparse = None, True
+        self._set_up(name, self._data.schema.remove_metadata(), size, *_extent(self._data))
         self.aliases: Mapping[str, tuple[str, tuple[int, ...]]] = _aliases(info["features"], self.shapes)
 
     def blocks(

@@ -8,7 +8,7 @@ from itertools import zip_longest
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.result.residual_statistics import binned, running_rms, spectrum
+from discrepancy.result.residual_statistics import binned, multiples, spectrum
 from discrepancy.result.traces import Group, Trace, groups
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.charts import axis, chart, figure, line, log_axis
@@ -125,9 +125,7 @@ def _multiples(
     for group in grouped:
         lines, top = [], 1.0
         for key, white in zip(keys, (trace.white_before, trace.white_after), strict=True):
-            square = np.mean(white[:, list(group.columns)] ** 2, axis=1)
-            moving = running_rms(square[: trace.moving], trace.rate_hz)
-            shown = np.concatenate([moving, np.sqrt(square[trace.moving :])])
+            shown = multiples(trace, white, group.columns)
             top = max(top, float(shown.max(initial=0.0)))
             lines += _lines(trace, shown[:, None], [key], run)
         log = top > LOG_FROM

@@ -18,7 +18,7 @@ from mocobot_report.folder import Paper
 from mocobot_report.paper.charts import summary_chart, table_chart, trial_chart
 from mocobot_sim.paper.published import payload_truth
 from mocobot_sim.paper.tables import Cell, PaperTable, paper_tables, summary_table
-from mocobot_sim.trial.trial import ROD_LIMIT_M, WELD_LIMIT_M, WELD_LIMIT_RAD
+from mocobot_sim.trial.rows import ROD_LIMIT_M, WELD_LIMIT_M, WELD_LIMIT_RAD
 from mocobot_view.pictures.shots import team_shot
 
 SENSORS = {

@@ -14,7 +14,8 @@ from mocobot_sim.control.control import ControlGains
 from mocobot_sim.scene.scene import TIMESTEP_S, TeamScene
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
-from mocobot_sim.trial.trial import TrialLog, run_trial
+from mocobot_sim.trial.trial import run_trial
+from mocobot_sim.trial.trial_log import TrialLog
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,7 @@ from estimator.recording.model import Recording
 from mocobot_sim.scene.as_built import CalibrationSpread
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.trial.trajectories import RATE_HZ
-from mocobot_sim.trial.trial import TrialLog
+from mocobot_sim.trial.trial_log import TrialLog
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,8 @@ from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset, measure
 from mocobot_sim.trial.trajectories import Trajectory, random_vias, sphere_motion, static_orientations
-from mocobot_sim.trial.trial import TrialLog, run_trial
+from mocobot_sim.trial.trial import run_trial
+from mocobot_sim.trial.trial_log import TrialLog
 from mocobot_sim.trial.truth import GroundTruth
 
 TRIALS = ("random", "periodic", "static")

@@ -14,7 +14,9 @@ from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.as_built import CalibrationSpread
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene, build_team
+from mocobot_sim.trial import rows as rows_module
 from mocobot_sim.trial import trial as trial_module
+from mocobot_sim.trial.rows import Rows
 from mocobot_sim.trial.trajectories import Trajectory, random_vias, sphere_motion, static_orientations
 from mocobot_sim.trial.trial import between_commands, run_trial
 from payload_mjcf import TWO
@@ -86,13 +88,13 @@ def test_torque_is_the_springs_deflection_of_the_same_row(monkeypatch, tmp_path)
     units = CalibrationSpread(stiffness_ratio=0.05).draw(2, np.random.default_rng(1))
     scene = build_team(TWO.write(tmp_path), units)
     states = []
-    before_step = trial_module._Buffers.before_step
+    before_step = Rows.before_step
 
     def spy(self, sample):
         states.append(self.data.qpos.copy())
         before_step(self, sample)
 
-    monkeypatch.setattr(trial_module._Buffers, "before_step", spy)
+    monkeypatch.setattr(Rows, "before_step", spy)
     log = run_trial(scene, _short(scene))
     model = scene.compile()
     assert len(states) == len(log.time)
@@ -250,7 +252,7 @@ def test_an_open_rod_fails_the_trial():
 
 
 def test_a_turned_weld_fails_the_trial(monkeypatch):
-    monkeypatch.setattr(trial_module, "WELD_LIMIT_RAD", 1e-12)
+    monkeypatch.setattr(rows_module, "WELD_LIMIT_RAD", 1e-12)
     scene = build_team("a")
     with pytest.raises(TrialError, match=r"omnid[23]: weld angle 1 is .* rad at t = "):
         run_trial(scene, _short(scene))
@@ -302,7 +304,7 @@ def test_a_state_that_is_not_finite_fails_the_trial(team_a, monkeypatch):
     def before_step(self, sample):
         self.qpos[sample] = np.nan if sample == 120 else self.data.qpos
 
-    monkeypatch.setattr(trial_module._Buffers, "before_step", before_step)
+    monkeypatch.setattr(Rows, "before_step", before_step)
     with pytest.raises(TrialError, match=r"the state is not finite before t = 1\.49 s"):
         run_trial(team_a, _still(team_a))
 
@@ -346,13 +348,13 @@ def test_time_that_does_not_divide_is_refused(rate_hz, timestep_s, sentence):
 def test_simulated_time_is_the_logged_time(monkeypatch, rate_hz, timestep_s):
     scene = build_team("a", timestep_s=timestep_s)
     clock = []
-    before_step = trial_module._Buffers.before_step
+    before_step = Rows.before_step
 
     def spy(self, sample):
         clock.append(self.data.time)
         before_step(self, sample)
 
-    monkeypatch.setattr(trial_module._Buffers, "before_step", spy)
+    monkeypatch.setattr(Rows, "before_step", spy)
     log = run_trial(scene, _still(scene, 50), ControlGains(rate_hz=rate_hz))
     np.testing.assert_allclose(clock, log.time, rtol=0, atol=1e-9)
 
