@@ -8,13 +8,10 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from discrepancy.causes.numbers import Numbers, number
 from discrepancy.rig import Candidate, Parameter, Transient
+from estimator.arrays import Array
 
-Array = NDArray[np.float64]
 Shape = Mapping[str, float]
 
 

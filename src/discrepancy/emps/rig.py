@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.causes.excluded import excluded_from
@@ -35,11 +34,10 @@ from discrepancy.emps.undecidable import statements
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rig, Rows
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.emps.extended import write_extended
 from mocobot_sim.emps.plant import Plant
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

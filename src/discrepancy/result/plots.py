@@ -11,15 +11,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
-from numpy.typing import NDArray
 
 from discrepancy.causes.words import Words
 from discrepancy.result.plots_against import against_figure
 from discrepancy.result.plots_evidence import closed_loop_figure, evidence_figure
 from discrepancy.result.residual_statistics import multiples
 from discrepancy.result.traces import Group, Trace, groups
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 PLOTS = ("residual_*.png", "evidence.png", "closed_loop.png")
 BEFORE, AFTER, CLEAN_BAND = "#c8553d", "#2f6fd0", "#d9dde3"

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.engine.explanation import Explanation
@@ -40,12 +39,11 @@ from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.start import exact_residual, linearised_trials
 from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.undecidable import statements
+from estimator.arrays import Array
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.extended.extended import write_extended
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

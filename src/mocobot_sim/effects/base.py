@@ -9,12 +9,10 @@ from dataclasses import dataclass, fields
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.scene.scene import TeamScene
-
-Array = NDArray[np.float64]
 
 PLACE = ("robot", "joint")
 JOINTS = 3

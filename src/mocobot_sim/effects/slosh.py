@@ -7,8 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
+from estimator.arrays import Array
 from estimator.estimate.principal import inertia_parameters
-from mocobot_sim.effects.base import Array, Effect
+from mocobot_sim.effects.base import Effect
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 

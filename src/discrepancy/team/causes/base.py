@@ -8,15 +8,14 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.causes import base
 from discrepancy.causes.base import Shape
 from discrepancy.rig import Candidate
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
+from estimator.arrays import Array
 
-Array = NDArray[np.float64]
 At = Literal["driven joint", "gimbal joint", "robot", "grasp", "payload"]
 
 GIMBAL_AXES = {1: "z (first)", 2: "y (middle)", 3: "x (last)"}

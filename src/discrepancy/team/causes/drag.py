@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from discrepancy.team.causes.base import Array, Cause, stack
+from discrepancy.team.causes.base import Cause, stack
+from estimator.arrays import Array
 from estimator.estimate.fusion import fuse, fusion_matrix
 
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from discrepancy.team.causes.base import Array, Cause, Shape, stack
+from discrepancy.team.causes.base import Cause, Shape, stack
 from discrepancy.team.linear.trial_linear import TrialLinear
+from estimator.arrays import Array
 
 
 def during(trial: TrialLinear, shape: Shape) -> Array:

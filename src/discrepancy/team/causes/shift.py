@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def advanced(x: Array, rate_hz: float, lead_s: float) -> Array:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.causes.free_while import free_while
+from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
-
-Array = NDArray[np.float64]
 
 
 def sliding(x: Array, rate_hz: float, slow: float) -> tuple[Array, Array]:

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from discrepancy import rules
-from discrepancy.team.causes.base import Array, Cause, stack
+from discrepancy.team.causes.base import Cause, stack
+from estimator.arrays import Array
 from estimator.estimate.fusion import fuse
 
 

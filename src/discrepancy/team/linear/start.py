@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from discrepancy import rules
@@ -22,12 +21,11 @@ from estimator import so3
 from estimator.arm.delta import forward_kinematics
 from estimator.arm.design import OmnidDesign
 from estimator.arm.gimbal import rotation
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
-
-Array = NDArray[np.float64]
 
 
 def start_shared(estimate: PayloadEstimate) -> Shared:

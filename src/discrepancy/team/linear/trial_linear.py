@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.team.linear.jacobian import by_signals, needed_wrench
 from discrepancy.team.linear.reduction import Reduction
@@ -21,10 +20,9 @@ from discrepancy.team.linear.residual import (
 from discrepancy.team.linear.signals import Signals, with_rates
 from discrepancy.team.linear.slots import COUNT, PHI, TAU, THETA, with_its_rates
 from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
 from estimator.estimate.fusion import fusion_matrix
 from estimator.signals.grasp_data import GraspData
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
