@@ -64,6 +64,12 @@ class TrialLinear:
         """Number of residual channels, 6 N."""
         return 6 * self.robots
 
+    @property
+    def adjusted(self) -> Signals:
+        """The signals filtered, and with their torques at their adjusted values."""
+        phi, theta, tau = (self.s[..., kind] for kind in (PHI, THETA, TAU))
+        return Signals(self.signals.time, phi, theta, tau, self.signals.rate_hz)
+
     def of_signals(
         self, robot: int, phi: Array | None = None, theta: Array | None = None, tau: Array | None = None
     ) -> Array:
