@@ -22,7 +22,6 @@ class BaseTilt(Effect):
     The chassis body's ``quat``.
     """
 
-    cause = "base_tilt"
     ranges: ClassVar = {"roll_rad": (-0.2, 0.2), "pitch_rad": (-0.2, 0.2)}
     robot: int
     roll_rad: float

@@ -7,7 +7,6 @@ from estimator.arm.delta import inverse_kinematics
 class JointSpring(ReadingError):
     """The torque reading grows with the joint's own angle."""
 
-    name = "joint_spring"
     family = "joint_spring"
     parameters = ("stiffness_Nm_per_rad",)
     tolerances = (5e-3,)

@@ -6,7 +6,6 @@ from discrepancy.team.causes.shift import Late
 class ClockDelay(Late):
     """Everything a robot logs is that of ``delay_s`` ago."""
 
-    name = "clock_delay"
     family = "clock"
     tolerances = (1e-5,)
     readings = ("phi", "theta", "tau")

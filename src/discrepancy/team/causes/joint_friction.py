@@ -6,5 +6,4 @@ from discrepancy.team.causes.sliding import Friction
 class JointFriction(Friction):
     """The link gets less than the spring gives while it moves; below ``slow_rad_per_s`` it rests."""
 
-    name = "joint_friction"
     separate = "An arm-only run (payload released) shows friction of the joint alone."

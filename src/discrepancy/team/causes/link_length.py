@@ -14,7 +14,6 @@ class LinkLength(ReadingError):
     is weighed at the true angle.
     """
 
-    name = "link_length"
     family = "arm_geometry"
     adjusted = True
     parameters = ("proximal_m", "rod_m", "base_radius_m")

@@ -8,7 +8,6 @@ from discrepancy.team.causes.base import ReadingError
 class PhiZero(ReadingError):
     """phi reads too much by a constant."""
 
-    name = "phi_zero"
     family = "arm_geometry"
     parameters = ("zero_rad",)
     tolerances = (1e-4,)

@@ -8,7 +8,6 @@ from discrepancy.team.causes.base import ReadingError
 class SeaBias(ReadingError):
     """tau reads too much by a constant."""
 
-    name = "sea_bias"
     family = "sea_torque"
     parameters = ("bias_Nm",)
     tolerances = (3e-3,)

@@ -6,7 +6,6 @@ from discrepancy.team.causes.base import ReadingError, one_joint
 class SeaHardening(ReadingError):
     """Torque k d + k3 d^3 of deflection d, read as k d."""
 
-    name = "sea_hardening"
     family = "sea_torque"
     parameters = ("cubic_Nm_per_rad3",)
     tolerances = (3.0,)

@@ -9,7 +9,6 @@ class SeaHysteresis(Friction):
     Torque that changes more slowly than ``slow_Nm_per_s`` counts as at rest.
     """
 
-    name = "sea_hysteresis"
     parameters = ("friction_Nm",)
     tolerances = (2e-3,)
     clipped = ()

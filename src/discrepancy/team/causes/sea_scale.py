@@ -9,7 +9,6 @@ class SeaScale(ReadingError):
     A scale common to all springs cannot be told from the payload's mass; a single one can.
     """
 
-    name = "sea_scale"
     family = "sea_torque"
     parameters = ("scale",)
     tolerances = (1e-3,)

@@ -8,7 +8,6 @@ from discrepancy.team.causes.base import ReadingError
 class ThetaZero(ReadingError):
     """theta reads too much by a constant; joints 1, 2, 3 are z, y, x."""
 
-    name = "theta_zero"
     family = "gimbal_zero"
     parameters = ("zero_rad",)
     tolerances = (1e-4,)

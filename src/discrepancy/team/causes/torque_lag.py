@@ -7,7 +7,6 @@ from discrepancy.team.linear.signals import with_rates
 class TorqueLag(ReadingError):
     """All torques of a robot lag by a first-order filter, which the controller sees as well."""
 
-    name = "torque_lag"
     family = "dissipation"
     parameters = ("time_constant_s",)
     tolerances = (1e-4,)
