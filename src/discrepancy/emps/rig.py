@@ -214,7 +214,6 @@ class EmpsRig(Rig):
         )
 
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
-        """Standard deviation of the noise and of the motion, by channel."""
         here = self.blocks[trial]
         position, voltage = float(np.std(self.log.position[here])), float(np.std(self.log.voltage[here]))
         return {
@@ -239,7 +238,6 @@ class EmpsRig(Rig):
         return {"speed": np.abs(s.v[at]), "velocity": s.v[at], "position": s.x[at], "acceleration": s.a[at]}
 
     def row_rate_hz(self, trial: int) -> float:
-        """Rate of the rows [Hz]."""
         return self.log.rate_hz / self.reduction.step
 
     def directions(self, trial: int) -> dict[str, Array]:
