@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.rig import Transient
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def worst_intervals(

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.emps.causes import CAUSES
@@ -16,8 +15,8 @@ from discrepancy.emps.recording.signals import Signals
 from discrepancy.emps.reduction import Reduction
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate
+from estimator.arrays import Array
 
-Array = NDArray[np.float64]
 Tolerances = Mapping[str, Mapping[str, float]]
 
 

@@ -18,9 +18,8 @@ from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG
 from discrepancy.emps.recording.signals import Signals, smooth
 from discrepancy.emps.reduction import Reduction
 from discrepancy.least_squares.whitening import Whitening
+from estimator.arrays import Array
 from estimator.filtering import differentiate
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

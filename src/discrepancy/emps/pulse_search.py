@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 class Train(NamedTuple):

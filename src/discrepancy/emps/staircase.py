@@ -6,15 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Candidate
+from estimator.arrays import Array
 from estimator.statistics import rms
 
-Array = NDArray[np.float64]
 Active = Sequence[tuple[Candidate, Array]]
 
 

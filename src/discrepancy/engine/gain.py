@@ -7,14 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 @dataclass(frozen=True)

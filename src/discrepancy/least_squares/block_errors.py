@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.least_squares.fit import Fit
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def block_covariance(fit: Fit, rows_per_block: int) -> Array:

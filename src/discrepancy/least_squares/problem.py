@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from discrepancy.least_squares.gram import gram_of, orthonormal, project
 from discrepancy.rig import Candidate, Rows
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,12 +45,5 @@ def _judged(explanation: Explanation) -> Iterator[tuple[Candidate, dict[str, Any
             p.name: float(size) if size < rules.ABSURD_UNITS * p.unit else None
             for p, size in zip(candidate.parameters, np.asarray(sizes), strict=True)
         }
-        yield (
-            candidate,
-            {
-                "cause": candidate.cause,
-                "robot": candidate.robot,
-                "joint": candidate.joint,
-                "parameters": parameters,
-            },
-        )
+        place = zip(("cause", "robot", "joint"), candidate.key, strict=True)
+        yield candidate, {**dict(place), "parameters": parameters}

@@ -24,9 +24,8 @@ from numpy.typing import NDArray
 
 from discrepancy.result.traces import Trace
 from discrepancy.rig import Channel
+from estimator.arrays import Array
 from estimator.errors import InputError
-
-Array = NDArray[np.float64]
 
 NAME = "residuals.npz"
 FORMAT, VERSION = "mocobot-residuals", 1

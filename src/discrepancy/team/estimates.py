@@ -6,16 +6,15 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.fit import Fit
 from discrepancy.team.linear.residual import Shared
 from discrepancy.team.rig import TeamRig
+from estimator.arrays import Array
 from estimator.estimate.principal import inertia_matrix
 
-Array = NDArray[np.float64]
 Estimate = dict[str, Any]
 
 

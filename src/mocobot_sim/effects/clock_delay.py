@@ -16,7 +16,6 @@ class ClockDelay(Effect):
     An entry of the scene's ``sensors``; no MJCF edit.
     """
 
-    cause = "clock_delay"
     ranges: ClassVar = {"delay_s": (-1.0, 1.0)}
     robot: int
     delay_s: float

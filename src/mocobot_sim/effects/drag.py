@@ -19,7 +19,6 @@ class Drag(Effect):
     use for their control.
     """
 
-    cause = "drag"
     ranges: ClassVar = {"coefficient_Ns_per_m": (0.0, 1e3)}
     coefficient_Ns_per_m: float
 

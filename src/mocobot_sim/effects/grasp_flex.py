@@ -22,7 +22,6 @@ class GraspFlex(Effect):
     equalities (see ``mocobot_sim.scene.soft``), critically damped. The grasp cannot turn.
     """
 
-    cause = "grasp_flex"
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-3)}
     robot: int
     compliance_m_per_N: float

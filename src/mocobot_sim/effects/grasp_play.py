@@ -21,7 +21,6 @@ class GraspPlay(Effect):
     Three slides with stiff ``range`` limits, on the payload (robot 1) or on a pad between flange and weld (the others).
     """
 
-    cause = "grasp_play"
     ranges: ClassVar = {"play_m": (0.0, 5e-3)}
     robot: int
     play_m: float

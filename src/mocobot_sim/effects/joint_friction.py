@@ -20,7 +20,6 @@ class JointFriction(Effect):
     (see ``mocobot_sim.scene.soft``) as its damper. The sensor does not feel it.
     """
 
-    cause = "joint_friction"
     ranges: ClassVar = {"coulomb_Nm": (0.0, 20.0), "viscous_Nms_per_rad": (0.0, 100.0)}
     robot: int
     joint: int

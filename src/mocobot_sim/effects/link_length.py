@@ -18,7 +18,6 @@ from mocobot_sim.scene.scene import TeamScene
 class LinkLength(Effect):
     """One leg's proximal length, rod length and base radius, true minus design [m]: body and site positions."""
 
-    cause = "link_length"
     ranges: ClassVar = {name: (-0.05, 0.05) for name in ("proximal_m", "rod_m", "base_radius_m")}
     robot: int
     joint: int

@@ -13,7 +13,6 @@ from mocobot_sim.scene.scene import TeamScene
 class PhiZero(Effect):
     """One phi encoder, for log and controller, reads ``zero_rad`` more than the truth [rad]; no MJCF edit."""
 
-    cause = "phi_zero"
     robot: int
     joint: int
     zero_rad: float

@@ -13,7 +13,6 @@ from mocobot_sim.scene.scene import TeamScene
 class SeaBias(Effect):
     """One torque reading, for log and controller, is ``bias_Nm`` above the truth [N m]; no MJCF edit."""
 
-    cause = "sea_bias"
     robot: int
     joint: int
     bias_Nm: float

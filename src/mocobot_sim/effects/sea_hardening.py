@@ -17,7 +17,6 @@ class SeaHardening(Effect):
     The reading is the design stiffness times the deflection, as of any spring.
     """
 
-    cause = "sea_hardening"
     ranges: ClassVar = {"cubic_Nm_per_rad3": (-500.0, 1e6)}
     robot: int
     joint: int

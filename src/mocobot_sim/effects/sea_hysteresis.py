@@ -18,7 +18,6 @@ class SeaHysteresis(Effect):
     The link feels spring plus friction; the reading is the deflection's alone.
     """
 
-    cause = "sea_hysteresis"
     ranges: ClassVar = {"friction_Nm": (0.0, 20.0)}
     robot: int
     joint: int

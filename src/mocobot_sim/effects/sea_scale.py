@@ -17,7 +17,6 @@ class SeaScale(Effect):
     The reading is the design stiffness times the deflection, so it is low by 1 / (1 + scale).
     """
 
-    cause = "sea_scale"
     ranges: ClassVar = {"scale": (-0.9, 10.0)}
     robot: int
     joint: int

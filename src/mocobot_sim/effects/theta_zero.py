@@ -13,7 +13,6 @@ from mocobot_sim.scene.scene import TeamScene
 class ThetaZero(Effect):
     """One gimbal encoder (joints 1, 2, 3 are z, y, x) reads ``zero_rad`` more than the truth [rad]; no MJCF edit."""
 
-    cause = "theta_zero"
     robot: int
     joint: int
     zero_rad: float

@@ -16,7 +16,6 @@ class TorqueLag(Effect):
     An entry of the scene's ``sensors``; no MJCF edit.
     """
 
-    cause = "torque_lag"
     ranges: ClassVar = {"time_constant_s": (0.0, 10.0)}
     robot: int
     time_constant_s: float

@@ -16,7 +16,6 @@ class TorqueSkew(Effect):
     An entry of the scene's ``sensors``; no MJCF edit.
     """
 
-    cause = "torque_skew"
     ranges: ClassVar = {"delay_s": (-1.0, 1.0)}
     robot: int
     delay_s: float

@@ -7,13 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.causes import base
 from discrepancy.causes.base import Shape
 from discrepancy.emps.recording.signals import Signals, smooth
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

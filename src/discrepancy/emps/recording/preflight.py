@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.emps.recording.axis_log import LIMIT_V, AxisLog
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.filtering import differentiate, low_pass
-
-Array = NDArray[np.float64]
 
 
 def checked(log: AxisLog) -> AxisLog:

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from discrepancy import rules
+from estimator.arrays import Array
 from estimator.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 def on_grid(
