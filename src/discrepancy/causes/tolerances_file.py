@@ -1,7 +1,5 @@
 """Files of tolerances: how far a machine may be from its model without that being news."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path

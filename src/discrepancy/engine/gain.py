@@ -1,7 +1,5 @@
 """What a cause is worth: recorded commands resimulated, with and without it, on trials it was not fitted to."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The strongest candidates, with nothing named yet and with what is named in the model."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

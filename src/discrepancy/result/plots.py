@@ -1,7 +1,5 @@
 """Pictures of a diagnosis: residuals over time and against what they may depend on, evidence, closed loop."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from itertools import cycle

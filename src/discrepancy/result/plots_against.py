@@ -1,7 +1,5 @@
 """The residual against speed, position, load and frequency, in multiples of clean data."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from matplotlib.axes import Axes

@@ -1,7 +1,5 @@
 """Which causes the rows speak for, and how well the response to the commands is met without and with them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a diagnosis does to the payload's estimate: without and with the causes, and errors where truth is known."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """All causes by name, and effects as plain data."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from importlib import import_module

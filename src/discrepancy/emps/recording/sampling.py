@@ -1,7 +1,5 @@
 """One even grid of samples, from stamps that may miss some of it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
