@@ -83,9 +83,8 @@ def responses(
     for free in hypotheses:
         for t in trials:
             others = [k for k in trials if k != t] or [t]
-            used = [i for i in free if not problem.candidates[i].transient]
             # A push says nothing about other trials; its own trial has to tell it.
-            if len(used) < len(free):
+            if any(problem.candidates[i].transient for i in free):
                 others = list(trials)
             fit = Fit.of(problem, free, others, background=False)
             tasks.append((t, -fit.shared, -fit.local(t)[: rig.local_unknowns], fit.active))
