@@ -1,7 +1,5 @@
 """What the diagnosis needs to know of a rig: rows, unknowns, causes, and how to resimulate it."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

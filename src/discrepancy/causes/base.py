@@ -1,7 +1,5 @@
 """What the causes of every rig have in common: names, sizes, words."""
 
-from __future__ import annotations
-
 import inspect
 import re
 from abc import ABC

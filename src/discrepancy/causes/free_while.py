@@ -1,7 +1,5 @@
 """A quantity that may have any value for a while."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Intervals at which an event may have acted."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

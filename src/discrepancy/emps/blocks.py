@@ -1,7 +1,5 @@
 """Where a time series is cut into the trials that validate each other."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.signal import fftconvolve
 

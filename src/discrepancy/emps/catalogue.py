@@ -1,7 +1,5 @@
 """The catalogue as candidates, and what all of it together leaves."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

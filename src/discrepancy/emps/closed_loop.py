@@ -1,7 +1,5 @@
 """Resimulate a recording's reference, block by block from where each began."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

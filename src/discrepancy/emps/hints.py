@@ -1,7 +1,5 @@
 """Where to begin with a ripple's wavelength and a pulse train's timing: read off the data, judged later."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.signal import lombscargle
 

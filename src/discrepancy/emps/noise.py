@@ -6,8 +6,6 @@ is that of what the whole catalogue leaves, and the level that of the part of it
 rounding is in both at its full size, since it is in the columns, too, and a fit would hide it by shrinking gains.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

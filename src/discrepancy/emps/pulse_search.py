@@ -4,8 +4,6 @@ A box is fitted to the residual folded at every period (box least squares: Kovac
 algorithm in the search for periodic transits", A&A 391, 2002), then its edges are read off the samples.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What every cause is worth, one by one: error of the force, and of position and voltage in closed loop."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The numbers of a cause's shape that the data determine: their best values, their standard errors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What a search found: causes with their values, and the misfit without and with them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

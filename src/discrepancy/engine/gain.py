@@ -1,7 +1,5 @@
 """What a cause is worth: recorded commands resimulated, with and without it, on trials it was not fitted to."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -85,9 +83,8 @@ def responses(
     for free in hypotheses:
         for t in trials:
             others = [k for k in trials if k != t] or [t]
-            used = [i for i in free if not problem.candidates[i].transient]
             # A push says nothing about other trials; its own trial has to tell it.
-            if len(used) < len(free):
+            if any(problem.candidates[i].transient for i in free):
                 others = list(trials)
             fit = Fit.of(problem, free, others, background=False)
             tasks.append((t, -fit.shared, -fit.local(t)[: rig.local_unknowns], fit.active))

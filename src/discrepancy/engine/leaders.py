@@ -1,7 +1,5 @@
 """Candidates at their best: with the shape that fits, and with what they leave open."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Standard errors that hold when what is left is correlated in time: a sandwich over blocks of rows."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Gram matrices of rows, and rows without what a trial's own unknowns can explain."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from estimator.arrays import Array

@@ -1,7 +1,5 @@
 """Pictures of a diagnosis: residuals over time and against what they may depend on, evidence, closed loop."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from itertools import cycle
@@ -13,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from discrepancy.causes.words import Words
-from discrepancy.result.plots_against import AFTER, BEFORE, against_figure, scale_multiples
+from discrepancy.result.plots_against import AFTER, BEFORE, against_figure, scale_multiples, titled
 from discrepancy.result.plots_evidence import closed_loop_figure, evidence_figure
 from discrepancy.result.residual_statistics import multiples
 from discrepancy.result.traces import Group, Trace, groups
@@ -83,11 +81,9 @@ def _time_figure(trace: Trace, grouped: Sequence[Group], *, named: bool) -> Figu
     axes[0][-1].set_title("whitened rms, in multiples of clean data", loc="left", fontsize=10)
     found = [axis.get_legend_handles_labels() for axis in (axes[0][0], axes[0][-1])]
     handles, labels = found[0][0] + found[1][0], found[0][1] + found[1][1]
-    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels), frameon=False, fontsize=9)
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
-    figure.suptitle(f"Residual of {trace.name}", x=0.01, ha="left", fontsize=11)
-    return figure
+    return titled(figure, f"Residual of {trace.name}", handles, labels, len(labels))
 
 
 def _prefix(largest: float) -> tuple[str, float]:

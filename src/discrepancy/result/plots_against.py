@@ -1,8 +1,7 @@
 """The residual against speed, position, load and frequency, in multiples of clean data."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -33,8 +32,15 @@ def against_figure(traces: Sequence[Trace], grouped: Sequence[Group], words: Wor
     axes[-1][-1].set_xlabel("frequency [Hz]")
     handles, labels = axes[0][0].get_legend_handles_labels()
     labels[-1] = "with causes and tolerances" if named else "with tolerances"
-    figure.legend(handles, labels, loc="outside upper right", ncols=2, frameon=False, fontsize=9)
     title = "Residual (whitened rms) in multiples of clean data" + ("" if named else "; nothing is named")
+    return titled(figure, title, handles, labels)
+
+
+def titled(
+    figure: Figure, title: str, handles: Sequence[Any], labels: Sequence[str], columns: int = 2
+) -> Figure:
+    """The figure with its title and its legend."""
+    figure.legend(handles, labels, loc="outside upper right", ncols=columns, frameon=False, fontsize=9)
     figure.suptitle(title, x=0.01, ha="left", fontsize=11)
     return figure
 

@@ -1,7 +1,5 @@
 """Which causes the rows speak for, and how well the response to the commands is met without and with them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -10,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from discrepancy.result.evidence_list import label, relation
-from discrepancy.result.plots_against import AFTER, BEFORE, log_scale
+from discrepancy.result.plots_against import AFTER, BEFORE, log_scale, titled
 from discrepancy.result.text_gain import SMALL_UNITS
 
 NAMED, FAMILY, OTHER = "#2f6fd0", "#8fb3e8", "#b9bfc9"
@@ -90,8 +88,4 @@ def closed_loop_figure(values: Mapping[str, Any]) -> Figure | None:
         )
         axis.grid(axis="y", alpha=0.25)
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=2, frameon=False, fontsize=9)
-    figure.suptitle(
-        "Recorded commands, simulated again: error of the response", x=0.01, ha="left", fontsize=11
-    )
-    return figure
+    return titled(figure, "Recorded commands, simulated again: error of the response", handles, labels)

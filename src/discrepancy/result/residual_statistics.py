@@ -1,7 +1,5 @@
 """Statistics of whitened residuals over all trials: running rms, rms in bins, spectrum; white unit noise gives 1."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

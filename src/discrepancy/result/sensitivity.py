@@ -1,7 +1,5 @@
 """What these recordings could have shown: the smallest size of every cause that would have been noticed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 

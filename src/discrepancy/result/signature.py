@@ -1,7 +1,5 @@
 """Where the misfit sits: channels, trials, speed, frequency, and whose torques it points along."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Residuals as a plot wants them: over time, in physical units and in multiples of clean noise."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -9,8 +9,6 @@ white_before<k>, white_after<k>   whitened residuals, shape (n, C)
 quantity<k>_<j>        quantity j of trial k, shape (n,)
 """
 
-from __future__ import annotations
-
 import json
 import zipfile
 import zlib

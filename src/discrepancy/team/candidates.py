@@ -1,7 +1,5 @@
 """Every cause at every place, and in every shape."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 

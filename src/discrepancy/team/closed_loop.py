@@ -1,7 +1,5 @@
 """Resimulate recorded commands with the estimated payload and bases, with or without causes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """What a team's misfit may depend on, and in which channel it may sit: for pictures and the residual's signature."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from discrepancy.least_squares.whitening import Whitening

@@ -1,7 +1,5 @@
 """Errors of single sensors that last as long as a push, and would look like it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

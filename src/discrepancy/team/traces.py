@@ -1,7 +1,5 @@
 """A team's residuals for the plots: the whitening undone."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.signal import lfilter
 

@@ -1,7 +1,5 @@
 """What all effects have in common: checked numbers, a place, and how they are put into a scene."""
 
-from __future__ import annotations
-
 import math
 import re
 import sys

@@ -1,7 +1,5 @@
 """A base that gives way sideways."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """A base that creeps over the floor."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

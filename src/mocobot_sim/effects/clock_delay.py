@@ -1,7 +1,5 @@
 """A robot whose clock is off."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Something that resists the payload's motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

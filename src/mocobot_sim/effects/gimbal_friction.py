@@ -1,7 +1,5 @@
 """Friction of a gimbal joint."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar
 

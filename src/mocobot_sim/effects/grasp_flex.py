@@ -1,7 +1,5 @@
 """A grasp that flexes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """A loose grasp."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Friction of a driven joint."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar
 

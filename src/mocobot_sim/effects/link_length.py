@@ -1,7 +1,5 @@
 """Links and base radius of another length than designed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Encoder zero of a driven joint."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from mocobot_sim.effects.as_built import add_to_unit

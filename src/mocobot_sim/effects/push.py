@@ -1,7 +1,5 @@
 """Somebody pushes the payload."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Torque zero of a series-elastic actuator."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from mocobot_sim.effects.as_built import add_to_unit

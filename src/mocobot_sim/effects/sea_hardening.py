@@ -1,7 +1,5 @@
 """A spring that hardens."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """A spring with friction inside."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Spring of another stiffness than designed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

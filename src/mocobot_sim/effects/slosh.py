@@ -1,7 +1,5 @@
 """Liquid, or anything that swings, in the payload."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

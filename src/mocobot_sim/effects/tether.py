@@ -1,7 +1,5 @@
 """Something elastic that ties a grasp to the room."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

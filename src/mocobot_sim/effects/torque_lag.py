@@ -1,7 +1,5 @@
 """A torque sensor that follows late."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """The log of one robot's torques is late."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar
 

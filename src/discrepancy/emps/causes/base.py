@@ -1,7 +1,5 @@
 """What every cause of the axis' catalogue offers the diagnosis."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass

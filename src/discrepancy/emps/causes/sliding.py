@@ -1,7 +1,5 @@
 """Dry friction while it slides, and when it does not."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from discrepancy import rules

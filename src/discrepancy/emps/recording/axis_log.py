@@ -1,7 +1,5 @@
 """What is recorded of the axis."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

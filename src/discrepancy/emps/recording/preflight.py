@@ -1,7 +1,5 @@
 """Is a recording what it seems to be? Stuck sensors, coarse ones, a voltage of the wrong sign, saturation."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

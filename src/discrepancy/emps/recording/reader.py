@@ -1,7 +1,5 @@
 """Read the benchmark's MAT files; whatever they log of injected pulses is left unread."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Derivative of a trial's residual by every robot's signals."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """The unknowns before any cause: from the estimate, then Gauss-Newton on the whitened residual."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

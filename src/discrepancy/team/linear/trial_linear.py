@@ -1,7 +1,5 @@
 """One trial, linearised: its residual, how robots' signals and unknowns move it, and its whitening."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
