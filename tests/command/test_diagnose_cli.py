@@ -111,11 +111,11 @@ def test_nothing_is_left_when_interrupted(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def stop(*_: object) -> None:
+    def stop(*_: object, **__: object) -> None:
         assert [path.name for path in tmp_path.iterdir()] != []
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("mocobot.commands.diagnose.estimate_payload", stop)
+    monkeypatch.setattr("discrepancy.team.diagnosis.estimate_payload", stop)
     code, out, err = run(capsys, *biased_trials, "--out", tmp_path / "verdict")
     assert (code, out) == (130, "")
     assert err.endswith("mocobot: interrupted")

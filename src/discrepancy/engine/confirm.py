@@ -1,7 +1,5 @@
 """Named causes and their rivals in the closed loop: what responds best stays."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
@@ -108,14 +106,21 @@ def confirm(
     alternatives = []
     for found in explanation.found:
         place = winner.cause.index if winner and found.index == winner.index else found.index
-        listed = []
-        for rival, gap in found.rivals:
-            value = tried.get((place, rival.key))
-            apart = value is not None and value > best * (1.0 + rules.MARGIN_SHARE)
-            listed.append(Alternative(rival, gap, value, gap < rules.AMBIGUOUS_NATS and not apart))
-        alternatives.append(tuple(listed))
+        alternatives.append(
+            tuple(_alternative(c, gap, tried.get((place, c.key)), best) for c, gap in found.rivals)
+        )
     gain = Gain(before, after, len(rig.trials) > 1)
     return Confirmed(explanation, tuple(alternatives), gain, tuple(notes))
+
+
+def _alternative(rival: Candidate, gap: float, chi2_per_n: float | None, best: float) -> Alternative:
+    apart = chi2_per_n is not None and chi2_per_n > best * (1.0 + rules.MARGIN_SHARE)
+    return Alternative(rival, gap, chi2_per_n, gap < rules.AMBIGUOUS_NATS and not apart)
+
+
+def not_simulated(found: Found) -> tuple[Alternative, ...]:
+    """A cause's rivals by the rows alone."""
+    return tuple(_alternative(rival, gap, None, np.inf) for rival, gap in found.rivals)
 
 
 def _swaps(rig: Rig, explanation: Explanation) -> tuple[Problem, list[Swap]]:

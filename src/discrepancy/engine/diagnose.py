@@ -1,12 +1,10 @@
 """The whole diagnosis: search, closed-loop confirmation against rivals, verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from discrepancy import rules
-from discrepancy.engine.confirm import Alternative, confirm, labels
+from discrepancy.engine.confirm import Alternative, confirm, labels, not_simulated
 from discrepancy.engine.explanation import Explanation, Found
 from discrepancy.engine.gain import Gain, responses
 from discrepancy.engine.refit import only
@@ -67,7 +65,7 @@ def diagnose(
         explanation, note = _without_transient(rig, explanation)
         notes.append(note)
     why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"
-    alternatives = tuple(_unsimulated(found) for found in explanation.found)
+    alternatives = tuple(not_simulated(found) for found in explanation.found)
     gain: Gain | None = None
     if why_not is None and explanation.found:
         if say:
@@ -92,10 +90,6 @@ def diagnose(
     if len(rig.trials) == 1:
         notes.append("One trial only: nothing could be validated on data that was not used for the fit.")
     return Diagnosis(verdict, explanation, alternatives, gain, why_not, tuple(notes))
-
-
-def _unsimulated(found: Found) -> tuple[Alternative, ...]:
-    return tuple(Alternative(c, gap, None, gap < rules.AMBIGUOUS_NATS) for c, gap in found.rivals)
 
 
 def _without_transient(rig: Rig, explanation: Explanation) -> tuple[Explanation, str]:

@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 import pytest
-from mocobot_view.facts.diagnosis import read_diagnosis
 
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.result.json import diagnosis_to_dict
+from discrepancy.result.read import read_diagnosis
 from discrepancy.result.text import format_diagnosis
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.rig import TeamRig
@@ -22,6 +22,7 @@ from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trajectories import random_vias, sphere_motion
 from mocobot_sim.trial.trial import run_trial
+from mocobot_view.facts.cause_body import body_of
 
 STIFFNESS = 0.3
 
@@ -79,5 +80,5 @@ def test_two_files_are_all_that_an_effect_needs(registered, tmp_path):
     path = tmp_path / "diagnosis.json"
     path.write_text(json.dumps(values), encoding="utf-8")
     (mark,) = read_diagnosis(path).causes
-    assert (mark.name, mark.robot, mark.body) == ("joint_spring", 3, "proximal2")
+    assert (mark.name, mark.robot, body_of(mark)) == ("joint_spring", 3, "proximal2")
     assert mark.sentence == cause["sentence"]

@@ -164,3 +164,18 @@ def test_two_robots_share_by_the_lever(loops):
     vertical = loops[2].forces_on_payload()[:, 2]
     np.testing.assert_allclose(vertical, 9.81 * TWO.mass_kg * np.array([0.5, 0.5]), rtol=0, atol=0.5)
     assert set(TEAMS) == {1, 2, 5}
+
+
+def test_joints_that_nobody_announced_settle_too():
+    """A bell on a bent arm hangs under its pivot: nothing but its hinges tells that it is there."""
+    scene = build_team("b")
+    bell = scene.root.find("body", "omnid1/payload/payload").add("body", name="bell", pos=[0.1, 0.0, 0.05])
+    for axis in ([1.0, 0.0, 0.0], [0.0, 1.0, 0.0]):
+        bell.add("joint", name=f"bell{axis.index(1.0)}", type="hinge", axis=axis, damping=0.01)
+    bell.add("inertial", pos=[0.06, 0.0, -0.08], mass=0.2, diaginertia=[1e-5] * 3)
+    loop = ClosedLoop(scene)
+    assert len(loop.index.hanging_dof) == 2
+    assert not len(loop.index.yielding_dof)
+    body = loop.data.body("omnid1/payload/bell")
+    np.testing.assert_allclose(body.xipos[:2], body.xpos[:2], rtol=0, atol=1e-6)
+    assert body.xpos[2] - body.xipos[2] == pytest.approx(0.1, abs=1e-6)
