@@ -6,9 +6,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
 from estimator.clocks.offsets import ClockEstimate, estimate_clocks
 from mocobot_inspect.excerpt import SHORTEST_S, clean_stream, stretches
 from mocobot_inspect.readiness import Readiness, readiness
@@ -19,8 +19,6 @@ from mocobot_inspect.stream.survey import Survey, survey
 from mocobot_inspect.stream.timing import Timing
 from mocobot_inspect.wiring.check import Wiring, check_wiring
 from mocobot_logs.log import NS, Level, LogSource
-
-Array = NDArray[np.float64]
 
 SLOWEST_HZ, FASTEST_HZ = 10.0, 20_000.0
 """Rates within which samples are taken for those of a robot."""
