@@ -9,14 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import make_interp_spline
 
+from estimator.arrays import Array
 from estimator.clocks.offsets import ClockEstimate
 from mocobot_inspect.signals import RATE_HZ, TRIM_S
 from mocobot_logs.log import NS, Samples
-
-Array = NDArray[np.float64]
 
 MAX_GAP_S = 0.05
 SHORTEST_S = 2 * TRIM_S + 2.0

@@ -6,22 +6,19 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
 from estimator.clocks.offsets import ClockEstimate, estimate_clocks
 from mocobot_inspect.excerpt import SHORTEST_S, clean_stream, stretches
 from mocobot_inspect.readiness import Readiness, readiness
 from mocobot_inspect.segments import Segments, segments
-from mocobot_inspect.signals import RATE_HZ, Group, Signals, signals_of
+from mocobot_inspect.signals import KINDS, RATE_HZ, Group, Signals, signals_of
 from mocobot_inspect.stream.channels import Channel
 from mocobot_inspect.stream.survey import Survey, survey
 from mocobot_inspect.stream.timing import Timing
 from mocobot_inspect.wiring.check import Wiring, check_wiring
-from mocobot_inspect.wiring.mistakes import Mistake
 from mocobot_logs.log import NS, Level, LogSource
-
-Array = NDArray[np.float64]
 
 SLOWEST_HZ, FASTEST_HZ = 10.0, 20_000.0
 """Rates within which samples are taken for those of a robot."""
@@ -202,8 +199,6 @@ def _undone(part: Array, wiring: Wiring, level: Level) -> Array:
     signals = Signals(
         level, *(Group(part[None, ..., 3 * k : 3 * k + 3], nothing[:, 3 * k : 3 * k + 3]) for k in range(3))
     )
-    mistakes: list[Mistake] = [found.mistake for found in wiring.found]
-    for mistake in mistakes:
-        signals = mistake.undo(signals)
-    groups = signals.position, signals.theta, signals.effort
-    return np.concatenate([group.values[0] for group in groups], axis=2)
+    for found in wiring.found:
+        signals = found.mistake.undo(signals)
+    return np.concatenate([signals.group(kind).values[0] for kind in KINDS], axis=2)

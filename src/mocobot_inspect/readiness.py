@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimator.arm.design import OmnidDesign
 from estimator.arm.wrist_level import joints_of, wrist_fault
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.consistency import Trial
 from estimator.estimate.identifiability import FACTOR, StepReport
@@ -21,8 +21,6 @@ from estimator.signals.grasp_data import GraspData
 from estimator.signals.process import process_recording
 from mocobot_inspect.signals import CUTOFF_HZ, RATE_HZ, TRIM_S
 from mocobot_logs.log import Level
-
-Array = NDArray[np.float64]
 
 QUANTITIES = ("grasps", "mass", "centre of mass", "inertia")
 AXES = ("roll", "pitch", "yaw")

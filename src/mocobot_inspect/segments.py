@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
 from estimator.signals.holds import DURATION_S, STILL_RATE_RADPS, STILL_SPEED_MPS
 from mocobot_inspect.signals import CUTOFF_HZ, RATE_HZ, TRIM_S
 from mocobot_logs.log import Level
-
-Array = NDArray[np.float64]
 
 WINDOW_S = 0.5
 

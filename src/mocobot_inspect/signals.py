@@ -12,12 +12,11 @@ from functools import cache
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
 from mocobot_logs.log import Level
 
-Array = NDArray[np.float64]
 Kind = Literal["position", "theta", "effort"]
 KINDS: tuple[Kind, ...] = ("position", "theta", "effort")
 

@@ -14,9 +14,9 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.recording.metadata import RecordingMetadata
 
-Array = NDArray[np.float64]
 Stamps = NDArray[np.int64]
 
 Level = Literal["joint", "wrist"]

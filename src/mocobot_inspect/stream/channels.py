@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.quantisation import quantisation_step
 from mocobot_inspect.stream.frozen import Frozen, frozen
 from mocobot_inspect.stream.noise import noise_level
 from mocobot_logs.log import NS, Stamps
-
-Array = NDArray[np.float64]
 
 SENSORS = 9
 """Channels of a robot before its commands."""

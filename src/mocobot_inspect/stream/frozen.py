@@ -8,10 +8,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.quantisation import quantisation_step
 from mocobot_inspect.stream.noise import noise_level
-
-Array = NDArray[np.float64]
 
 STUCK_S = 0.5
 """Shortest time for which a channel must stand to be stuck."""

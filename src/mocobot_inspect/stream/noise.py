@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 _LAG_GAIN = 70.0  # variance of a fourth difference over that of white noise: 1 + 16 + 36 + 16 + 1
 _MAD = 0.6744897501960817  # median of |x| of a standard normal distribution

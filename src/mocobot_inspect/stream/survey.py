@@ -6,13 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from mocobot_inspect.stream.channels import Channel, ChannelTally, seconds
 from mocobot_inspect.stream.timing import Timing, TimingTally
 from mocobot_logs.log import CHANNELS, LogSource, Samples, joined
-
-Array = NDArray[np.float64]
 
 BLOCK_ROWS = 20_000
 """Rows looked at together."""

@@ -21,13 +21,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.statistics import rms
 from mocobot_inspect.wiring.motion import Fault, Grasp
 from mocobot_inspect.wiring.rigid_body import FARTHEST_M, Body, cross, rigid_body
-
-Array = NDArray[np.float64]
 
 TOLERANCES = {
     "rotation": 0.01,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimator.arm.delta import (
     LegGeometry,
@@ -19,11 +18,10 @@ from estimator.arm.design import OmnidDesign
 from estimator.arm.dynamics import arm_torque
 from estimator.arm.gimbal import angular_motion, rotation
 from estimator.arm.wrist_level import driven_motion
+from estimator.arrays import Array
 from estimator.recording.checks import TORQUE_FACTOR
 from estimator.statistics import rms
 from mocobot_inspect.signals import Signals, noise_gains
-
-Array = NDArray[np.float64]
 
 WRONG_SHARE = 0.01
 """A range that more than this share of the samples leaves is a fault of the wiring, not of some samples."""

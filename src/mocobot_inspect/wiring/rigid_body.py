@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.estimate.identifiability import FACTOR, cross_information
 from estimator.estimate.joint import newton_euler_regressor
 from estimator.so3 import chordal_mean
 from estimator.statistics import rms
 from mocobot_inspect.wiring.motion import Grasp
-
-Array = NDArray[np.float64]
 
 FARTHEST_M = 5.0
 """Grasps farther apart than this are a wrong unit of lengths or angles."""

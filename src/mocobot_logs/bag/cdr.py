@@ -15,13 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_logs.bag.messages import Messages, printable
 from mocobot_logs.bag.types import MessageType
 from mocobot_logs.bag.walk import CdrError, Walk
 from mocobot_logs.log import Stamps
-
-Array = NDArray[np.float64]
 
 _NEW_LAYOUTS = 4
 """So many new layouts of one size are looked for among all messages of a block; beyond them, one by one."""

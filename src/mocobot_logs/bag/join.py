@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -19,18 +19,6 @@ MATCHING = 0.9
 """Share of stamps that two topics have in common from which on they count as stamped together."""
 
 
-class Joiner(Protocol):
-    """Makes rows of the messages of one robot."""
-
-    def push(self, parts: Mapping[int, Part]) -> Samples | None:
-        """Take a block (topic from 0: its messages) and return the rows that are ready, if any."""
-        ...
-
-    def finish(self) -> Samples | None:
-        """The rows that are left, if any."""
-        ...
-
-
 class Single:
     """Rows of a robot with one topic: it has all its channels, in their order."""
 
@@ -42,6 +30,10 @@ class Single:
     def finish(self) -> Samples | None:
         """Nothing is left."""
         return None
+
+
+Joiner = Single | RowAligner
+"""Makes rows of the messages of one robot: ``push`` takes a block, topic from 0, and ``finish`` has what is left."""
 
 
 def agree(look: Look, topics: Sequence[str], clock: Clock) -> bool:

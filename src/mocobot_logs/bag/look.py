@@ -1,18 +1,22 @@
-"""A look at the first messages of a bag: joints' names and stamps, before anything is decided."""
+"""A look at the first messages of a bag: joints' names and stamps, and which built-in map suits them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal
 
 import numpy as np
 
+from estimator.errors import InputError
 from mocobot_logs.bag.cdr import CdrReader, Selector
-from mocobot_logs.bag.messages import Messages
+from mocobot_logs.bag.messages import Messages, Topic, listed_names
 from mocobot_logs.bag.storage.files import BagFiles
-from mocobot_logs.bag.types import JOINT_STATE, message_type
+from mocobot_logs.bag.types import JOINT_STATE, message_type, type_name
 from mocobot_logs.log import Stamps
+from mocobot_logs.map.files import builtin_map
+from mocobot_logs.map.log_map import LogMap
 
+_MAPS = ("mocobot-ros2", "omnid-ros2")
 STAMPS = 1000
 """So many stamps of a topic are looked at."""
 _ENOUGH_BLOCKS = 64
@@ -85,3 +89,33 @@ class Look:
         for topic, parts in found.items():
             self._stamps[topic, clock] = np.concatenate(parts)[:STAMPS]
         return {topic: self._stamps[topic, clock] for topic in topics}
+
+
+def choose_map(bag: str, topics: Mapping[str, Topic], look: Look) -> LogMap:
+    """The built-in map more of whose joints the first robot has.
+
+    Args:
+        bag: what messages call the bag.
+        topics: its topics.
+        look: its first messages.
+
+    Raises:
+        InputError: the bag is damaged, or the joints are neither map's.
+    """
+    maps = [builtin_map(name) for name in _MAPS]
+    topic = maps[0].channels(1)["theta_z"].topic or ""
+    if topic not in topics or type_name(topics[topic]) != JOINT_STATE:
+        return maps[-1]  # what is missing by it is said where it is used
+    there = look.joints(topic)
+    if not there:
+        raise InputError(f"{bag}: topic {topic} has no message with a joint, so nothing says what was logged")
+    wanted = [
+        list(dict.fromkeys(c.joint for c in m.channels(1).values() if c.joint is not None)) for m in maps
+    ]
+    found = [sum(joint in there for joint in joints) for joints in wanted]
+    if found[0] == found[1]:
+        known = " nor ".join(f"{', '.join(j)} ({m.name})" for j, m in zip(wanted, maps, strict=True))
+        raise InputError(
+            f"{bag}: the joints of topic {topic} are {listed_names(there)}, neither {known}; a map says which is which"
+        )
+    return maps[0] if found[0] > found[1] else maps[1]

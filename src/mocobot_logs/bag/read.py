@@ -19,9 +19,8 @@ from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
 from mocobot_logs.bag.align import Part
 from mocobot_logs.bag.cdr import CdrReader
-from mocobot_logs.bag.choose import choose_map
 from mocobot_logs.bag.join import Clock, agree, make_joiner
-from mocobot_logs.bag.look import Look
+from mocobot_logs.bag.look import Look, choose_map
 from mocobot_logs.bag.messages import Messages, listed_names
 from mocobot_logs.bag.plan import Plan, TopicPlan, make_plan
 from mocobot_logs.bag.storage.files import BagFiles, is_bag

@@ -7,14 +7,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_logs.log import CHANNELS, REF, Level
 from mocobot_logs.map.units import TIME_UNITS
-
-Array = NDArray[np.float64]
 
 GAP_OF_ROBOTS = 20
 """So far beyond the last robot found another one is looked for, which would mean that one is missing."""

@@ -27,12 +27,12 @@ class CountsFromElsewhere(Mistake):
     Attributes:
         words: the same in words.
         sign: of the logged positions.
-        offset: to be added to them then [rad or m].
+        offset: to be added to them then [rad or m], three numbers.
     """
 
     words: str
     sign: int
-    offset: tuple[float, float, float]
+    offset: tuple[float, ...]
 
     def undo(self, signals: Signals) -> Signals:
         turned = signals.position.arranged(self.robots, (0, 1, 2), (self.sign,) * 3)
