@@ -60,6 +60,29 @@ def whole_folder(path: Path) -> Iterator[Path]:
             shutil.rmtree(old, ignore_errors=True)
 
 
+def check_target(path: Path, suffix: str = "") -> None:
+    """Find out that a file cannot be written before the work is done whose result it would hold.
+
+    Args:
+        path: the file.
+        suffix: how its name must end, ``".html"`` for example; any name will do if empty.
+
+    Raises:
+        InputError: the target is a folder, its name ends otherwise, or its folder does not exist.
+    """
+    try:
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; name the file to write")
+        if suffix and path.suffix != suffix:
+            raise InputError(f"{path}: the file's name must end in {suffix}")
+        if not path.parent.is_dir():
+            raise InputError(f"{path.parent}: there is no such folder")
+    except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL
+        raise InputError(
+            f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})"
+        ) from error
+
+
 def write_text(path: Path, text: str) -> None:
     """Write UTF-8 text.
 

@@ -51,47 +51,30 @@ if TYPE_CHECKING:
     from mocobot_sim.trial.trial_log import TrialLog as TrialLog
     from mocobot_sim.trial.truth import GroundTruth as GroundTruth
 
-_HOMES = {
-    "Cause": "mocobot.api.diagnosis",
-    "Conversion": "mocobot.api.conversion",
-    "Diagnosis": "mocobot.api.diagnosis",
-    "EFFECTS": "mocobot_sim.effects.catalogue",
-    "Effect": "mocobot_sim.effects.base",
-    "Estimate": "mocobot.api.estimation",
-    "GroundTruth": "mocobot_sim.trial.truth",
-    "InputError": "estimator.errors",
-    "Inspection": "mocobot.api.inspection",
-    "PRESETS": "mocobot_sim.trial.sensors",
-    "Recording": "estimator.recording.model",
-    "SensorPreset": "mocobot_sim.trial.sensors",
-    "SimulatedRecording": "mocobot.api.simulation",
-    "TeamScene": "mocobot_sim.scene.scene",
-    "TrialError": "mocobot_sim.errors",
-    "TrialLog": "mocobot_sim.trial.trial_log",
-    "apply_effects": "mocobot_sim.effects.catalogue",
-    "bases": "mocobot",
-    "build_team": "mocobot_sim.scene.scene",
-    "convert": "mocobot.api.conversion",
-    "diagnose": "mocobot.api.diagnosis",
-    "emps": "mocobot",
-    "estimate": "mocobot.api.estimation",
-    "guiding": "mocobot",
-    "inspect": "mocobot.api.inspection",
-    "make_effect": "mocobot_sim.effects.catalogue",
-    "measure": "mocobot_sim.trial.sensors",
-    "pictures": "mocobot",
-    "read_estimate": "mocobot.api.estimation",
-    "read_recording": "estimator.recording.parquet",
-    "replay": "mocobot.api.replay",
-    "robots": "mocobot",
-    "run_trial": "mocobot_sim.trial.trial",
-    "simulate": "mocobot.api.simulation",
-    "trajectories": "mocobot",
-    "write_recording": "estimator.recording.parquet",
+_NAMES = {
+    "estimator.errors": "InputError",
+    "estimator.recording.model": "Recording",
+    "estimator.recording.parquet": "read_recording write_recording",
+    "mocobot": "bases emps guiding pictures robots trajectories",
+    "mocobot.api.conversion": "Conversion convert",
+    "mocobot.api.diagnosis": "Cause Diagnosis diagnose",
+    "mocobot.api.estimation": "Estimate estimate read_estimate",
+    "mocobot.api.inspection": "Inspection inspect",
+    "mocobot.api.replay": "replay",
+    "mocobot.api.simulation": "SimulatedRecording simulate",
+    "mocobot_sim.effects.base": "Effect",
+    "mocobot_sim.effects.catalogue": "EFFECTS apply_effects make_effect",
+    "mocobot_sim.errors": "TrialError",
+    "mocobot_sim.scene.scene": "TeamScene build_team",
+    "mocobot_sim.trial.sensors": "PRESETS SensorPreset measure",
+    "mocobot_sim.trial.trial": "run_trial",
+    "mocobot_sim.trial.trial_log": "TrialLog",
+    "mocobot_sim.trial.truth": "GroundTruth",
 }
-"""Where each public name is defined; modules of this package are themselves public."""
+"""Public names by the module that defines them; modules of this package are themselves public."""
+_HOMES = {name: home for home, names in _NAMES.items() for name in names.split()}
 
-__all__ = list(_HOMES)  # pyright: ignore[reportUnsupportedDunderAll]
+__all__ = sorted(_HOMES)  # pyright: ignore[reportUnsupportedDunderAll]
 
 
 def __getattr__(name: str) -> Any:

@@ -70,8 +70,6 @@ def _run(arguments: Sequence[str] | None) -> None:
 def _command(parsed: Any) -> Callable[[Any], None]:
     """What runs the options: imported only now, for the help needs neither MuJoCo nor the estimator."""
     name = next(name for name, kind in COMMANDS.items() if isinstance(parsed, kind))
-    if isinstance(parsed, options.Diagnose) and parsed.rig == "emps":
-        name = "diagnose_emps"
     try:
         return import_module(f"mocobot.commands.{name}").run
     except (AttributeError, ImportError, RuntimeError) as error:

@@ -15,7 +15,7 @@ from mocobot_report.estimate import part as estimate_part
 from mocobot_report.folder import Contents, Diagnosed, Estimated, Paper, complete, read_folder
 from mocobot_report.paper import part as paper_part
 from mocobot_report.provenance_part import provenance_part
-from mocobot_report.target import check_target, write_page
+from mocobot_report.target import check_page, write_page
 
 NAME = "report.html"
 Say = Callable[[str], object]
@@ -37,7 +37,7 @@ def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: Non
     """
     contents = read_folder(folder)
     out = folder / NAME if out is None else out
-    check_target(out)
+    check_page(out)
     write_page(out, make_page(contents, say))
     return out
 

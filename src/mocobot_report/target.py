@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from estimator.errors import InputError
-from estimator.files import whole_file
+from estimator.files import check_target, whole_file
 
 MARK = "mocobot report"
 """Generator that a page names; a file without it is no report."""
@@ -13,24 +13,19 @@ SUFFIX = ".html"
 HEAD_BYTES = 1000
 
 
-def check_target(out: Path) -> None:
+def check_page(out: Path) -> None:
     """Find out that a page cannot be written before it is made.
 
     Raises:
         InputError: the name does not end in .html, is that of a folder or of a file that is no report, or its folder
             does not exist.
     """
+    check_target(out, SUFFIX)
     try:
-        if out.is_dir():
-            raise InputError(f"{out}: is a folder; name the file to write")
-        if out.suffix != SUFFIX:
-            raise InputError(f"{out}: the file's name must end in {SUFFIX}")
-        if not out.parent.is_dir():
-            raise InputError(f"{out.parent}: there is no such folder")
         if out.exists() and not is_report(out):
             raise InputError(f"{out}: exists and is not a report of mocobot; name another file")
-    except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL
-        raise InputError(f"{out}: cannot be written ({getattr(error, 'strerror', None) or error})") from error
+    except OSError as error:
+        raise InputError(f"{out}: cannot be written ({error.strerror or error})") from error
 
 
 def is_report(path: Path) -> bool:

@@ -9,8 +9,8 @@ from pathlib import Path
 from discrepancy.result.read import read_diagnosis
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
+from estimator.files import check_target
 from mocobot.api.given import Given, recordings_of
-from mocobot.files.targets import check_target
 from mocobot_sim.trial.truth import GroundTruth
 from mocobot_view.facts.body_facts import BodyFacts
 from mocobot_view.facts.placement import Grasps
@@ -47,7 +47,7 @@ def replay(
             written.
     """
     target = Path(path)
-    check_replay_target(target)
+    check_target(target, SUFFIX)
     check_rerun()
     from mocobot_view.replay.outputs import check_enabled, save_replay
 
@@ -68,17 +68,6 @@ def facts_of_truth(truth: GroundTruth) -> BodyFacts:
     """The drawable part of a truth."""
     grasps = Grasps(truth.R_1i, truth.p_1i)
     return BodyFacts(grasps, truth.mass_kg, truth.p_1c, truth.R_1c, truth.principal_kgm2)
-
-
-def check_replay_target(path: Path) -> None:
-    """Find out that a replay cannot be written before it is made.
-
-    Raises:
-        InputError: the name does not end in .rrd, or there is no such folder.
-    """
-    if path.suffix != SUFFIX:
-        raise InputError(f"{path}: the file's name must end in {SUFFIX}")
-    check_target(path)
 
 
 def check_rerun() -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from estimator.arm.design import load_design
 from estimator.errors import InputError
-from mocobot.files.targets import check_target
+from estimator.files import check_target
 from mocobot.progress import bar
 from mocobot_logs.convert import Labels, convert, output_kind, write_converted
 from mocobot_logs.convert_report import format_conversion

@@ -3,22 +3,42 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
+from contextlib import nullcontext
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from discrepancy.result.diagnosed import Diagnosed
+from discrepancy.causes.tolerances_file import read_tolerances
+from discrepancy.emps import catalogue as emps_catalogue
+from discrepancy.emps import causes as emps_causes
+from discrepancy.emps.diagnosis import diagnose_emps
+from discrepancy.emps.recording.reader import read_emps
+from discrepancy.result.diagnosed import Diagnosed, is_diagnosis
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnosis import against_truth, diagnose_team
-from discrepancy.team.tolerances import read_tolerances
+from discrepancy.team.tolerances import default_tolerances
+from estimator.errors import InputError
+from estimator.files import whole_folder
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
-from mocobot.commands.diagnose_folder import Count, Say, check_options, diagnose_and_tell
-from mocobot.progress import bar
+from mocobot.files.provenance import file_facts, provenance
+from mocobot.files.targets import check_folder, check_recordings
+from mocobot.progress import bar, stages
 from mocobot_sim.trial.truth import truth_path
 
 if TYPE_CHECKING:
     from mocobot.options import Diagnose
+
+
+@dataclass(frozen=True)
+class _Rig:
+    """What can be diagnosed: names of its causes, its default tolerances, and what reads and diagnoses recordings."""
+
+    causes: Collection[str]
+    tolerances: Callable[[], Mapping[str, Mapping[str, float]]]
+    read: Callable[[Sequence[Path]], Any]
+    diagnose: Callable[..., Diagnosed]
 
 
 def run(options: Diagnose) -> None:
@@ -27,18 +47,50 @@ def run(options: Diagnose) -> None:
     Raises:
         InputError: recordings, tolerances or options that cannot be used, or an output that cannot be written.
     """
-    check_options(options, CAUSES)
-    tolerances = read_tolerances(options.tolerances)
+    rig = RIGS[options.rig]
+    inputs = [*options.rec, *([options.tolerances] if options.tolerances else [])]
+    _check(options, rig.causes, inputs)
+    tolerances = read_tolerances(options.tolerances, rig.tolerances())
+    with whole_folder(options.out) if options.out else nullcontext() as folder:
+        data = rig.read(options.rec)
+        made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
+        with stages() as (say, simulated):
+            found = rig.diagnose(
+                data, tolerances, options.exclude,
+                closed_loop=options.closed_loop, jobs=options.jobs, say=say, simulated=simulated,
+            )  # fmt: skip
+            if options.rig == "team" and (truth := _truth(options.rec)) is not None:
+                found = against_truth(found, truth)
+            if folder is not None:
+                say("write")
+                if found.estimates and "errors" in found.estimates:
+                    made_with["files"] += [file_facts(truth_path(path)) for path in options.rec]
+                found.write_into(folder, provenance=made_with)
+    print(found)  # after the folder is in place: whoever reads may close the pipe
+    if options.out:
+        print(f"\nWritten to {options.out}.")
 
-    def diagnosed(recordings: list[Recording], say: Say, simulated: Count) -> Diagnosed:
-        found = diagnose_team(
-            recordings, tolerances, options.exclude,
-            closed_loop=options.closed_loop, jobs=options.jobs, say=say, simulated=simulated,
-        )  # fmt: skip
-        truth = _truth(options.rec)
-        return found if truth is None else against_truth(found, truth)
 
-    diagnose_and_tell(options, lambda: _read(options.rec), diagnosed)
+def _check(options: Diagnose, causes: Collection[str], inputs: Sequence[Path]) -> None:
+    """Everything that can be refused before a recording is read."""
+    if not options.rec:
+        hint = "; name them before --exclude" if options.exclude else "; name at least one file"
+        raise InputError(f"no recording given{hint}")
+    if options.jobs < 1:
+        raise InputError(f"jobs is {options.jobs}; it must be at least 1")
+    check_recordings(options.rec)
+    for name in options.exclude:
+        if name not in causes:
+            raise InputError(f"cause {name!r} does not exist; the causes are {', '.join(causes)}")
+    if set(causes) <= set(options.exclude):
+        raise InputError("every cause is excluded; nothing is left to look for")
+    if options.out:
+        check_folder(options.out, inputs, is_diagnosis, "an earlier diagnosis")
+    if options.rig == "emps" and len(options.rec) > 1:
+        raise InputError(
+            f"{len(options.rec)} recordings are given; the emps rig takes one and cuts it into blocks that validate "
+            "each other"
+        )
 
 
 def _read(paths: Sequence[Path]) -> list[Recording]:
@@ -61,3 +113,14 @@ def _truth(paths: Sequence[Path]) -> dict[str, Any] | None:
         except (OSError, ValueError, KeyError, TypeError):
             return None
     return found[0] if all(values == found[0] for values in found) else None
+
+
+RIGS = {
+    "team": _Rig(CAUSES, default_tolerances, _read, diagnose_team),
+    "emps": _Rig(
+        emps_causes.CAUSES,
+        emps_catalogue.default_tolerances,
+        lambda paths: read_emps(paths[0]),
+        diagnose_emps,
+    ),
+}

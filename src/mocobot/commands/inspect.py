@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 from estimator.arm.design import load_design
 from estimator.errors import InputError
-from estimator.files import write_json
-from mocobot.files.targets import check_target
+from estimator.files import check_target, write_json
 from mocobot.progress import bar
 from mocobot_inspect.inspection import inspect_log
 from mocobot_inspect.json import inspection_dict

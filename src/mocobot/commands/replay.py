@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from discrepancy.result.read import read_diagnosis
 from estimator.errors import InputError
+from estimator.files import check_target
 from estimator.recording.parquet import read_recording
-from mocobot.api.replay import check_replay_target, check_rerun
+from mocobot.api.replay import SUFFIX, check_rerun
 from mocobot.files.targets import check_recordings
 from mocobot.progress import bar
 from mocobot_view.facts.fact_files import read_estimate, read_truth
@@ -71,7 +72,7 @@ def _check(options: Replay) -> None:
         raise InputError("--save and --web are both given; choose a file or a browser")
     check_recordings(options.rec)
     if options.save is not None:
-        check_replay_target(options.save)
+        check_target(options.save, SUFFIX)
 
 
 def _trials(options: Replay) -> list[ReplayTrial]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
+from estimator.files import check_target
 from mocobot.api.simulation import check_fits, simulate
-from mocobot.files.targets import check_target
 from mocobot.progress import bar
 
 if TYPE_CHECKING:
@@ -20,9 +20,7 @@ def run(options: Simulate) -> None:
         InputError: an option that cannot be met, or an output that cannot be written.
         TrialError: the physics of the trial cannot be trusted.
     """
-    if options.out.suffix != ".parquet":
-        raise InputError(f"{options.out}: the file's name must end in .parquet")
-    check_target(options.out)
+    check_target(options.out, ".parquet")
     check_fits("--vias", options.vias, "random", options.trajectory)
     check_fits("--duration", options.duration, "periodic", options.trajectory)
     if options.model is not None and options.payload is not None:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from estimator.errors import InputError
+from estimator.files import check_target
 
 
 def check_recordings(recordings: Sequence[Path], out: Path | None = None) -> None:
@@ -25,21 +26,6 @@ def check_recordings(recordings: Sequence[Path], out: Path | None = None) -> Non
         if os.path.realpath(out) in seen:
             raise InputError(f"{out}: is one of the recordings; write the estimate to another file")
         check_target(out)
-
-
-def check_target(path: Path) -> None:
-    """Find out that a file cannot be written before the work is done whose result it would hold.
-
-    Raises:
-        InputError: the target is a folder, or its folder does not exist.
-    """
-    try:
-        if path.is_dir():
-            raise InputError(f"{path}: is a folder; name the file to write")
-        if not path.parent.is_dir():
-            raise InputError(f"{path.parent}: there is no such folder")
-    except OSError as error:  # a name too long for the system
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
 def check_folder(path: Path, inputs: Sequence[Path], is_ours: Callable[[Path], bool], what: str) -> None:
