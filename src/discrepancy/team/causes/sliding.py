@@ -51,7 +51,9 @@ class Friction(Cause):
     def undo(
         self, signals: Signals, trial: TrialLinear, robot: int, joint: int, values: Array, shape: Shape
     ) -> Signals | None:
-        torque = sum(v * x for v, x in zip(values, self._sliding(signals, robot, joint, shape), strict=True))
+        torque = np.zeros(len(signals.time))
+        for value, state in zip(values, self._sliding(signals, robot, joint, shape), strict=True):
+            torque += value * state
         return signals.minus(tau=one_robot(one_joint(torque, joint), trial.robots, robot))
 
     def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> list[Array]:
