@@ -23,7 +23,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
@@ -31,80 +32,84 @@ import numpy as np
 from mocobot_inspect.findings import findings
 from mocobot_inspect.inspection import Inspection, differs
 from mocobot_inspect.readiness import Readiness
-from mocobot_inspect.stream.channels import Channel
 from mocobot_inspect.stream.timing import Timing
 from mocobot_inspect.text import ready_line
 from mocobot_inspect.wiring.check import Wiring
 from mocobot_inspect.wiring.misfit import Misfit
 
 FORMAT, VERSION = "mocobot-inspection", 1
+_STEP = ("step", "parameters", "unit", "rank", "condition", "singular_values", "noise", "weak")
 
 
 def inspection_dict(found: Inspection) -> dict[str, Any]:
     """Plain JSON values."""
-    return {
-        "format": FORMAT,
-        "version": VERSION,
-        "log": {
-            "name": found.name,
-            "level": found.level,
-            "robots": found.robots,
-            "channels": list(found.channel_names),
-            "assumed_design": found.assumed_design,
-        },
-        "streams": [_timing(t, found.survey.origin_ns) for t in found.survey.timing],
-        "channels": [{c.name: _channel(c) for c in of_robot} for of_robot in found.survey.channels],
-        "excerpt": {
-            "part_s": list(found.survey.excerpt_s) if found.survey.excerpt_s is not None else None,
-            "stretches": [{"start_s": a, "duration_s": b} for a, b in found.checked],
-            "unchecked": found.unchecked,
-        },
-        "segments": None
-        if found.segments is None
-        else {
-            "still_s": found.segments.still_s,
-            "moving_s": found.segments.moving_s,
-            "rests": [{"start_s": a, "duration_s": b} for a, b in found.segments.rests],
-        },
-        "clocks": _clocks(found),
-        "wiring": None if found.wiring is None else _wiring(found.wiring),
-        "excitation": {
-            "as_it_is": None if found.ready is None else _ready(found.ready),
-            "undone": None if found.ready_undone is None else _ready(found.ready_undone),
-        },
-        "findings": [{"topic": finding.topic, "sentence": finding.sentence} for finding in findings(found)],
-        "ready": ready_line(found),
-    }
+    seen, rested = found.survey, found.segments
+    return _plain(
+        {
+            "format": FORMAT,
+            "version": VERSION,
+            "log": {
+                "name": found.name,
+                "level": found.level,
+                "robots": found.robots,
+                "channels": found.channel_names,
+                "assumed_design": found.assumed_design,
+            },
+            "streams": [_timing(t, seen.origin_ns) for t in seen.timing],
+            "channels": [{c.name: _without(c, "name") for c in of_robot} for of_robot in seen.channels],
+            "excerpt": {
+                "part_s": seen.excerpt_s,
+                "stretches": _stretches(found.checked),
+                "unchecked": found.unchecked,
+            },
+            "segments": rested and (_without(rested, "rests") | {"rests": _stretches(rested.rests)}),
+            "clocks": _clocks(found),
+            "wiring": found.wiring and _wiring(found.wiring),
+            "excitation": {
+                "as_it_is": found.ready and _ready(found.ready),
+                "undone": found.ready_undone and _ready(found.ready_undone),
+            },
+            "findings": findings(found),
+            "ready": ready_line(found),
+        }
+    )
+
+
+def _plain(value: Any) -> Any:
+    """Objects for dataclasses, lists for tuples, None for what is not finite."""
+    if is_dataclass(value):
+        return _plain(_without(value))
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(entry) for entry in value]
+    if isinstance(value, float):
+        return float(value) if np.isfinite(value) else None
+    return value
+
+
+def _without(record: Any, *left_out: str) -> dict[str, Any]:
+    """Fields of a dataclass by name."""
+    return {f.name: getattr(record, f.name) for f in fields(record) if f.name not in left_out}
+
+
+def _stretches(told: tuple[tuple[float, float], ...]) -> list[dict[str, float]]:
+    return [{"start_s": start, "duration_s": duration} for start, duration in told]
 
 
 def _timing(t: Timing, origin_ns: int) -> dict[str, Any]:
-    values = asdict(t)
-    del values["first_ns"], values["last_ns"]
-    values["recorder_s"] = None if t.recorder_s is None else list(t.recorder_s)
     start = None if t.first_ns is None else (t.first_ns - origin_ns) * 1e-9
-    return {"start_s": start, "duration_s": t.duration_s} | values
-
-
-def _channel(c: Channel) -> dict[str, Any]:
-    values = asdict(c)
-    del values["name"]
-    values |= {"step": _number(c.step), "noise": _number(c.noise)}
-    return values | {"stuck": list(values["stuck"]), "clipped": list(values["clipped"])}
+    return {"start_s": start, "duration_s": t.duration_s} | _without(t, "first_ns", "last_ns")
 
 
 def _clocks(found: Inspection) -> list[dict[str, Any]] | None:
     clocks = found.clocks
     if clocks is None:
         return None
+    numbers = ("offset_s", "offset_se_s", "drift", "drift_se")
     return [
-        {
-            "offset_s": _number(clocks.offset_s[robot]),
-            "offset_se_s": _number(clocks.offset_se_s[robot]),
-            "drift": _number(clocks.drift[robot]),
-            "drift_se": _number(clocks.drift_se[robot]),
-            "differs": differs(clocks, robot),
-            "why_not": clocks.why_not[robot],
-        }
+        {name: getattr(clocks, name)[robot] for name in numbers}
+        | {"differs": differs(clocks, robot), "why_not": clocks.why_not[robot]}
         for robot in range(found.robots)
     ]
 
@@ -117,8 +122,8 @@ def _wiring(wiring: Wiring) -> dict[str, Any]:
             f.mistake.to_dict()
             | {
                 "alternatives": [m.to_dict() for m in f.alternatives],
-                "misfit_before": _number(f.before),
-                "misfit_after": _number(f.after),
+                "misfit_before": f.before,
+                "misfit_after": f.after,
             }
             for f in wiring.found
         ],
@@ -129,37 +134,21 @@ def _wiring(wiring: Wiring) -> dict[str, Any]:
 
 def _misfit(misfit: Misfit) -> dict[str, Any]:
     return {
-        "total": _number(misfit.total),
-        "relative": {name: _number(value) for name, value in misfit.relative.items()},
-        "scaled": {name: _number(value) for name, value in misfit.scaled.items()},
+        "total": misfit.total,
+        "relative": misfit.relative,
+        "scaled": misfit.scaled,
         "faults": [fault.reason for fault in misfit.faults],
         "determined": misfit.determined,
-        "mass_kg": _number(misfit.mass),
-        "span_m": _number(misfit.span),
+        "mass_kg": misfit.mass,
+        "span_m": misfit.span,
     }
 
 
 def _ready(ready: Readiness) -> dict[str, Any]:
     return {
         "holds": ready.holds,
-        "axes_radps": None if ready.axes is None else list(ready.axes),
-        "steps": [
-            {
-                "step": step.step,
-                "parameters": list(step.parameters),
-                "unit": step.unit,
-                "rank": step.rank,
-                "condition": _number(step.condition),
-                "singular_values": [_number(value) for value in step.singular_values],
-                "noise": _number(step.noise),
-                "weak": [asdict(weak) | {"vector": list(weak.vector)} for weak in step.weak],
-            }
-            for step in ready.steps
-        ],
-        "reasons": dict(ready.reasons),
-        "flags": list(ready.flags),
+        "axes_radps": ready.axes,
+        "steps": [{name: getattr(step, name) for name in _STEP} for step in ready.steps],
+        "reasons": ready.reasons,
+        "flags": ready.flags,
     }
-
-
-def _number(value: float | None) -> float | None:
-    return None if value is None or not np.isfinite(value) else float(value)

@@ -94,13 +94,11 @@ class Signals:
 
     def group(self, kind: Kind) -> Group:
         """One of the three groups."""
-        return {"position": self.position, "theta": self.theta, "effort": self.effort}[kind]
+        return getattr(self, kind)
 
     def having(self, kind: Kind, group: Group) -> Signals:
         """The same with another group in one place."""
-        if kind == "position":
-            return replace(self, position=group)
-        return replace(self, theta=group) if kind == "theta" else replace(self, effort=group)
+        return replace(self, **{kind: group})
 
 
 def signals_of(level: Level, stretches: Sequence[Array], noise: Array, instants: int = INSTANTS) -> Signals:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from estimator.errors import InputError
+from mocobot_logs.faults import readable
 
 FREE_BYTES = 256 << 20
 """Up to here any claim is read: it does no harm."""
@@ -42,11 +43,8 @@ def read_small(path: Path, most_bytes: int, where: str, kind: str) -> bytes:
     Raises:
         InputError: it is larger, or cannot be read.
     """
-    try:
-        with path.open("rb") as file:
-            content = file.read(most_bytes + 1)
-    except OSError as error:
-        raise InputError(f"{where}: cannot be read ({error.strerror or error})") from error
+    with readable(where), path.open("rb") as file:
+        content = file.read(most_bytes + 1)
     if len(content) > most_bytes:
         raise InputError(f"{where}: is larger than {most_bytes >> 20} MiB, which no {kind} is")
     return content

@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from estimator.errors import InputError
+
 LONGEST = 200
 
 
@@ -14,3 +19,33 @@ def detail_of(error: BaseException) -> str:
 def shown(text: str, longest: int = 60) -> str:
     """Text of a file as a terminal may show it."""
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text[:longest])[:longest]
+
+
+@contextmanager
+def readable(where: str) -> Iterator[None]:
+    """What the operating system refuses inside the block, as one sentence.
+
+    Raises:
+        InputError: a file cannot be read.
+    """
+    try:
+        yield
+    except OSError as error:
+        raise InputError(f"{where}: cannot be read ({error.strerror or error})") from error
+
+
+@contextmanager
+def told_in_one_sentence(where: str, kind: str) -> Iterator[None]:
+    """Whatever a library raises inside the block on a file of some kind, as one sentence.
+
+    Raises:
+        InputError: a file is not of that kind, or damaged, or cannot be read.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except PermissionError as error:
+        raise InputError(f"{where}: cannot be read (permission denied)") from error
+    except Exception as error:  # on damaged bytes libraries raise many types, not all of them their own
+        raise InputError(f"{where}: not a readable {kind}, or a damaged one ({detail_of(error)})") from error

@@ -7,7 +7,7 @@ running backwards) is still in it, for ``inspect`` to see and for the resampler 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
@@ -110,11 +110,12 @@ def collect(source: LogSource, advance: Callable[[int], object] = lambda _: None
     parts: list[list[Samples]] = [[] for _ in range(source.robots)]
     for robot, samples in source.chunks(advance):
         parts[robot].append(samples)
-    streams = tuple(_join(p, len(source.channels)) for p in parts)
+    streams = tuple(joined(p, len(source.channels)) for p in parts)
     return Log(source.name, source.level, source.channels, source.metadata, streams)
 
 
-def _join(parts: list[Samples], channels: int) -> Samples:
+def joined(parts: Sequence[Samples], channels: int) -> Samples:
+    """Samples of one robot in one piece; ``log_ns`` only where every part has it."""
     if not parts:
         return Samples(np.empty(0, np.int64), np.empty((0, channels)))
     logs = [part.log_ns for part in parts if part.log_ns is not None]

@@ -1,20 +1,16 @@
 """What the causes of every rig have in common: names, sizes, words."""
 
-from __future__ import annotations
-
 import inspect
+import re
 from abc import ABC
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from discrepancy.causes.numbers import Numbers, number
 from discrepancy.rig import Candidate, Parameter, Transient
+from estimator.arrays import Array
 
-Array = NDArray[np.float64]
 Shape = Mapping[str, float]
 
 
@@ -22,7 +18,7 @@ class Cause(ABC):
     """One physical cause, as the diagnosis and the report know it.
 
     Attributes:
-        name: as in the verdict.
+        name: as in the verdict: that of the class, in lower case with underscores.
         family: causes of one family look alike.
         parameters: names of the columns' parameters, units as suffix.
         tolerances: of the parameters, standard deviations that are no news; none where the cause is an event.
@@ -42,6 +38,9 @@ class Cause(ABC):
     transient: ClassVar[bool] = False
     where: ClassVar[str] = "payload"
     separate: ClassVar[str] = ""
+
+    def __init_subclass__(cls) -> None:
+        cls.name = re.sub(r"\B(?=[A-Z])", "_", cls.__name__).lower()
 
     def candidate(
         self, given: Mapping[str, float], shape: Shape, robot: int | None = None, joint: int | None = None

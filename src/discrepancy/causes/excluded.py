@@ -1,7 +1,5 @@
 """Causes that are left out of a catalogue on request."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 
 from estimator.errors import InputError

@@ -1,13 +1,11 @@
 """A quantity that may have any value for a while."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def free_while(

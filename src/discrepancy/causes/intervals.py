@@ -1,16 +1,12 @@
 """Intervals at which an event may have acted."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.rig import Transient
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def worst_intervals(

@@ -1,7 +1,5 @@
 """Numbers as sentences show them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

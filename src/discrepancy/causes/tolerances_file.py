@@ -1,12 +1,10 @@
 """Files of tolerances: how far a machine may be from its model without that being news."""
 
-from __future__ import annotations
-
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 
 from estimator.errors import InputError
+from estimator.strict import is_number, read_toml
 
 
 def read_tolerances(
@@ -24,11 +22,7 @@ def read_tolerances(
     tolerances = {cause: dict(values) for cause, values in defaults.items()}
     if path is None:
         return tolerances
-    try:
-        given = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: not a readable file of tolerances ({error})") from error
-    for cause, values in given.items():
+    for cause, values in read_toml(path, "file of tolerances").items():
         if cause not in tolerances or not isinstance(values, Mapping):
             raise InputError(f"{path}: unknown table {cause!r}; the causes are {', '.join(tolerances)}")
         for name, value in values.items():
@@ -36,8 +30,7 @@ def read_tolerances(
                 raise InputError(
                     f"{path}: {cause} has no {name!r}; its parameters are {', '.join(tolerances[cause])}"
                 )
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not number or not 0 <= value < 1e6:
+            if not is_number(value) or not 0 <= value < 1e6:
                 raise InputError(f"{path}: {cause}.{name} is {value!r}; it must be a number of at least 0")
             tolerances[cause][name] = float(value)
         zeros = [name for name, value in tolerances[cause].items() if value == 0]

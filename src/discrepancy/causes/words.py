@@ -1,7 +1,5 @@
 """What a rig says about its causes in words; the JSON and the report take it from here."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar
 

@@ -1,15 +1,11 @@
 """Where a time series is cut into the trials that validate each other."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import fftconvolve
 
 from discrepancy import rules
 from discrepancy.emps.recording.signals import Signals
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def period_of(reference: Array, rate_hz: float) -> int | None:

@@ -1,12 +1,9 @@
 """The catalogue as candidates, and what all of it together leaves."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.emps.causes import CAUSES
@@ -16,8 +13,8 @@ from discrepancy.emps.recording.signals import Signals
 from discrepancy.emps.reduction import Reduction
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate
+from estimator.arrays import Array
 
-Array = NDArray[np.float64]
 Tolerances = Mapping[str, Mapping[str, float]]
 
 

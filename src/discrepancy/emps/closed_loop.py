@@ -1,7 +1,5 @@
 """Resimulate a recording's reference, block by block from where each began."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
@@ -11,11 +9,10 @@ from discrepancy import rules
 from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG, LIMIT_V, AxisLog
 from discrepancy.emps.recording.signals import Signals
 from discrepancy.rig import Candidate
+from estimator.arrays import Array
 from mocobot_sim.emps.effects import AxisEffect, apply_effects
 from mocobot_sim.emps.loop import Start, run
 from mocobot_sim.emps.plant import Plant
-
-Array = NDArray[np.float64]
 
 
 def nominal_plant(log: AxisLog) -> Plant:

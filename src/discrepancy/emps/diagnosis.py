@@ -1,7 +1,5 @@
 """Diagnose one recording of the axis."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,9 +1,6 @@
 """Where to begin with a ripple's wavelength and a pulse train's timing: read off the data, judged later."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lombscargle
 
 from discrepancy import rules
@@ -12,8 +9,7 @@ from discrepancy.emps.causes.sliding import direction
 from discrepancy.emps.pulse_search import pulse_train, rectangle
 from discrepancy.emps.recording.signals import Signals, smooth
 from discrepancy.emps.reduction import Reduction
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def hints_of(signals: Signals, reduction: Reduction) -> Hints:

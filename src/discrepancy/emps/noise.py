@@ -6,8 +6,6 @@ is that of what the whole catalogue leaves, and the level that of the part of it
 rounding is in both at its full size, since it is in the columns, too, and a fit would hide it by shrinking gains.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,9 +16,8 @@ from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG
 from discrepancy.emps.recording.signals import Signals, smooth
 from discrepancy.emps.reduction import Reduction
 from discrepancy.least_squares.whitening import Whitening
+from estimator.arrays import Array
 from estimator.filtering import differentiate
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,16 +4,13 @@ A box is fitted to the residual folded at every period (box least squares: Kovac
 algorithm in the search for periodic transits", A&A 391, 2002), then its edges are read off the samples.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 class Train(NamedTuple):

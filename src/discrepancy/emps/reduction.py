@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from scipy.signal import oaconvolve
 
 from discrepancy import rules
+from estimator.arrays import Array
 from estimator.filtering import low_pass
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.causes.excluded import excluded_from
@@ -35,11 +34,10 @@ from discrepancy.emps.undecidable import statements
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rig, Rows
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.emps.extended import write_extended
 from mocobot_sim.emps.plant import Plant
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -216,7 +214,6 @@ class EmpsRig(Rig):
         )
 
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
-        """Standard deviation of the noise and of the motion, by channel."""
         here = self.blocks[trial]
         position, voltage = float(np.std(self.log.position[here])), float(np.std(self.log.voltage[here]))
         return {
@@ -241,7 +238,6 @@ class EmpsRig(Rig):
         return {"speed": np.abs(s.v[at]), "velocity": s.v[at], "position": s.x[at], "acceleration": s.a[at]}
 
     def row_rate_hz(self, trial: int) -> float:
-        """Rate of the rows [Hz]."""
         return self.log.rate_hz / self.reduction.step
 
     def directions(self, trial: int) -> dict[str, Array]:

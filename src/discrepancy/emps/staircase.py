@@ -1,20 +1,17 @@
 """What every cause is worth, one by one: error of the force, and of position and voltage in closed loop."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Candidate
+from estimator.arrays import Array
 from estimator.statistics import rms
 
-Array = NDArray[np.float64]
 Active = Sequence[tuple[Candidate, Array]]
 
 

@@ -1,7 +1,5 @@
 """The axis' residuals for the plots."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from discrepancy.emps.rig import EmpsRig

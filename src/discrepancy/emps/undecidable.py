@@ -1,7 +1,5 @@
 """What recordings of position and voltage alone cannot decide about the axis, whatever their length."""
 
-from __future__ import annotations
-
 from typing import Any
 
 UNDECIDABLE = (

@@ -1,7 +1,5 @@
 """The axis' causes in words."""
 
-from __future__ import annotations
-
 from discrepancy.causes.words import Words
 from discrepancy.emps.causes import CAUSES
 

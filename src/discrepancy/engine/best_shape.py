@@ -1,17 +1,13 @@
 """The numbers of a cause's shape that the data determine: their best values, their standard errors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Candidate, Rig
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def covariance_with_shape(rig: Rig, fit: Fit, index: int) -> Array:

@@ -1,7 +1,5 @@
 """Standard errors of what was found that hold when what is left is correlated in time."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

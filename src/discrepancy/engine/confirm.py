@@ -1,7 +1,5 @@
 """Named causes and their rivals in the closed loop: what responds best stays."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 

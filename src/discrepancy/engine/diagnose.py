@@ -1,7 +1,5 @@
 """The whole diagnosis: search, closed-loop confirmation against rivals, verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

@@ -1,20 +1,16 @@
 """What a cause is worth: recorded commands resimulated, with and without it, on trials it was not fitted to."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -87,9 +83,8 @@ def responses(
     for free in hypotheses:
         for t in trials:
             others = [k for k in trials if k != t] or [t]
-            used = [i for i in free if not problem.candidates[i].transient]
             # A push says nothing about other trials; its own trial has to tell it.
-            if len(used) < len(free):
+            if any(problem.candidates[i].transient for i in free):
                 others = list(trials)
             fit = Fit.of(problem, free, others, background=False)
             tasks.append((t, -fit.shared, -fit.local(t)[: rig.local_unknowns], fit.active))

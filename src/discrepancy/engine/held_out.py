@@ -1,7 +1,5 @@
 """Does a cause help where it was not fitted? Trials left out, blocks of a transient left out."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Is it a transient, or one sensor that was wrong for as long?"""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,12 +1,9 @@
 """Candidates at their best: with the shape that fits, and with what they leave open."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.engine.best_shape import nearest_shape
@@ -14,8 +11,7 @@ from discrepancy.least_squares.evidence import Evidence
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,5 @@
 """Fit chosen causes again: exact residuals, other causes in their places, causes that tell nothing any more."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import TypeVar

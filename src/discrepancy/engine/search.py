@@ -1,7 +1,5 @@
 """Look for causes: scan, sharpen the best, confirm on held-out trials, look again in what is left."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 
 from discrepancy import rules

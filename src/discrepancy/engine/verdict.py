@@ -1,7 +1,5 @@
 """From what a search found to one word."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from discrepancy import rules

@@ -1,7 +1,5 @@
 """Does a candidate take away enough to be worth naming?"""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

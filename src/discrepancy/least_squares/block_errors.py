@@ -1,15 +1,11 @@
 """Standard errors that hold when what is left is correlated in time: a sandwich over blocks of rows."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.least_squares.fit import Fit
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def block_covariance(fit: Fit, rows_per_block: int) -> Array:

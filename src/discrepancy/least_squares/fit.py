@@ -14,8 +14,7 @@ from discrepancy.least_squares.evidence import Evidence, visible
 from discrepancy.least_squares.gram import flat_inverse, gram_of, project
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,11 +1,8 @@
 """Gram matrices of rows, and rows without what a trial's own unknowns can explain."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def gram_of(a: Array, b: Array) -> Array:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.least_squares.gram import gram_of, orthonormal, project
 from discrepancy.rig import Candidate, Rows
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +105,7 @@ class Problem:
             raw[t][..., at], rows[t][..., at] = new, project(new, self.explicable[t])
             edge = gram_of(rows[t], rows[t][..., at])
             grams[t][:, at], grams[t][at] = edge, edge.T
-        return Problem(
-            candidates, tuple(raw), tuple(rows), self.local, self.explicable, grams, self.shared, self.spans,
-            self.tolerant,
-        )  # fmt: skip
+        return replace(self, candidates=candidates, raw=tuple(raw), rows=tuple(rows), grams=grams)
 
     def with_unknowns(self, unknowns: Sequence[Array]) -> Problem:
         """The problem with further unknowns of every trial, shape (n, C, k) each."""
@@ -120,27 +116,14 @@ class Problem:
 
     def extended(self, candidate: Candidate, columns: Sequence[Array]) -> Problem:
         """The problem with one candidate more."""
-        raw, rows, grams = [], [], []
-        for t, new in enumerate(columns):
-            scaled = new * candidate.units
-            own = project(scaled, self.explicable[t])
-            raw.append(np.concatenate([self.raw[t][..., :-1], scaled, self.raw[t][..., -1:]], axis=2))
-            rows.append(np.concatenate([self.rows[t][..., :-1], own, self.rows[t][..., -1:]], axis=2))
-            edge, corner = gram_of(self.rows[t], own), gram_of(own, own)
-            old = self.grams[t]
-            grams.append(
-                np.block(
-                    [
-                        [old[:-1, :-1], edge[:-1], old[:-1, -1:]],
-                        [edge[:-1].T, corner, edge[-1:].T],
-                        [old[-1:, :-1], edge[-1:], old[-1:, -1:]],
-                    ]
-                )
-            )
-        start = self.spans[-1].stop if self.spans else self.shared
-        span = slice(start, start + len(candidate.parameters))
-        tolerant = np.append(self.tolerant, [p.tolerance > 0 for p in candidate.parameters]).astype(bool)
-        return Problem(
-            (*self.candidates, candidate), tuple(raw), tuple(rows), self.local, self.explicable, np.array(grams),
-            self.shared, (*self.spans, span), tolerant,
-        )  # fmt: skip
+        start, count = self.shared + len(self.tolerant), len(candidate.parameters)
+        place = [start] * count  # before the residual
+        wider = replace(
+            self,
+            raw=tuple(np.insert(x, place, 0.0, axis=2) for x in self.raw),
+            rows=tuple(np.insert(x, place, 0.0, axis=2) for x in self.rows),
+            grams=np.insert(np.insert(self.grams, place, 0.0, axis=1), place, 0.0, axis=2),
+            spans=(*self.spans, slice(start, start + count)),
+            tolerant=np.append(self.tolerant, [p.tolerance > 0 for p in candidate.parameters]).astype(bool),
+        )
+        return wider._with(start, [c * candidate.units for c in columns], (*self.candidates, candidate))

@@ -1,7 +1,5 @@
 """A finished diagnosis with all that is told, drawn and written of it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The strongest candidates, with nothing named yet and with what is named in the model."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -33,17 +31,14 @@ def evidence_list(explanation: Explanation) -> dict[str, Any]:
 
 
 def _strongest(explanation: Explanation, fit: Fit) -> list[dict[str, Any]]:
-    problem = explanation.problem
-    strongest = sorted(fit.evidence(fit.inflation), key=lambda e: -e.gain)[:MOST]
-    return [
-        place_of(problem.candidates[e.index])
-        | {
-            "at": _when(problem.candidates[e.index]),
-            "gain": float(e.gain),
-            "log10_p": finite_log10_p(e.log10_p),
-        }
-        for e in strongest
-    ]
+    out = []
+    for e in sorted(fit.evidence(fit.inflation), key=lambda e: -e.gain)[:MOST]:
+        candidate = explanation.problem.candidates[e.index]
+        at = candidate.transient
+        when = [at.trial + 1, float(at.start_s)] if at else None
+        told = {"at": when, "gain": float(e.gain), "log10_p": finite_log10_p(e.log10_p)}
+        out.append(place_of(candidate) | told)
+    return out
 
 
 def finite_log10_p(value: float) -> float:
@@ -60,12 +55,6 @@ def place_of(candidate: Candidate) -> dict[str, Any]:
         "joint": candidate.joint,
         "place": candidate.place,
     }
-
-
-def _when(candidate: Candidate) -> list[float] | None:
-    """Trial (from 1) and start [s] of an event."""
-    at = candidate.transient
-    return [at.trial + 1, float(at.start_s)] if at else None
 
 
 def label(entry: Mapping[str, Any]) -> str:

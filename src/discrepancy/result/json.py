@@ -40,8 +40,6 @@ notes               sentences
 (``mocobot.files.provenance``).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,28 +1,24 @@
 """Pictures of a diagnosis: residuals over time and against what they may depend on, evidence, closed loop."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
-from numpy.typing import NDArray
 
 from discrepancy.causes.words import Words
-from discrepancy.result.plots_against import against_figure
+from discrepancy.result.plots_against import AFTER, BEFORE, against_figure, scale_multiples, titled
 from discrepancy.result.plots_evidence import closed_loop_figure, evidence_figure
 from discrepancy.result.residual_statistics import multiples
 from discrepancy.result.traces import Group, Trace, groups
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 PLOTS = ("residual_*.png", "evidence.png", "closed_loop.png")
-BEFORE, AFTER, CLEAN_BAND = "#c8553d", "#2f6fd0", "#d9dde3"
+CLEAN_BAND = "#d9dde3"
 COMPONENTS = ("#7a5195", "#d99a2b", "#2a9d8f")
 
 
@@ -85,11 +81,9 @@ def _time_figure(trace: Trace, grouped: Sequence[Group], *, named: bool) -> Figu
     axes[0][-1].set_title("whitened rms, in multiples of clean data", loc="left", fontsize=10)
     found = [axis.get_legend_handles_labels() for axis in (axes[0][0], axes[0][-1])]
     handles, labels = found[0][0] + found[1][0], found[0][1] + found[1][1]
-    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels), frameon=False, fontsize=9)
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
-    figure.suptitle(f"Residual of {trace.name}", x=0.01, ha="left", fontsize=11)
-    return figure
+    return titled(figure, f"Residual of {trace.name}", handles, labels, len(labels))
 
 
 def _prefix(largest: float) -> tuple[str, float]:
@@ -103,7 +97,7 @@ def _components(axis: Axes, trace: Trace, group: Group, values: Array, scale: fl
     if trace.moving:
         band = _broken(trace, sigma)
         axis.fill_between(time, -band, band, color=CLEAN_BAND, linewidth=0)
-    for k, name, colour in zip(group.columns, group.components, _colours(len(group.columns)), strict=True):
+    for k, name, colour in zip(group.columns, group.components, cycle(COMPONENTS), strict=False):
         axis.plot(time, _broken(trace, values[:, k]), color=colour, linewidth=0.8, label=name)
         axis.plot(trace.time[trace.moving :], values[trace.moving :, k], "o", color=colour, markersize=3)
     axis.axhline(0.0, color="black", linewidth=0.4)
@@ -119,14 +113,7 @@ def _multiples(axis: Axes, trace: Trace, group: Group, *, named: bool) -> None:
         top = max(top, float(rms.max()))
         axis.plot(_broken(trace, trace.time), _broken(trace, rms), color=colour, linewidth=1.1, label=label)
         axis.plot(trace.time[trace.moving :], rms[trace.moving :], "o", color=colour, markersize=3)
-    axis.axhline(1.0, color="black", linewidth=0.8, linestyle="--")
-    if top > 8.0:
-        axis.set_yscale("log")
-        axis.set_ylim(0.3, 1.5 * top)
-        axis.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
-    else:
-        axis.set_ylim(0.0, max(2.0, 1.15 * top))
-    axis.grid(alpha=0.25)
+    scale_multiples(axis, top, 1.5)
 
 
 def _broken(trace: Trace, values: Array) -> Array:
@@ -134,10 +121,6 @@ def _broken(trace: Trace, values: Array) -> Array:
     moving = values[: trace.moving]
     after = np.flatnonzero(np.diff(trace.time[: trace.moving]) > 1.5 / trace.rate_hz) + 1
     return np.insert(moving.astype(float), after, np.nan)
-
-
-def _colours(count: int) -> list[str]:
-    return [COMPONENTS[k % len(COMPONENTS)] for k in range(count)]
 
 
 def _save(figure: Figure, path: Path) -> Path:

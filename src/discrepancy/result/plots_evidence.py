@@ -1,17 +1,14 @@
 """Which causes the rows speak for, and how well the response to the commands is met without and with them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
 
 from discrepancy.result.evidence_list import label, relation
-from discrepancy.result.plots_against import AFTER, BEFORE
+from discrepancy.result.plots_against import AFTER, BEFORE, log_scale, titled
 from discrepancy.result.text_gain import SMALL_UNITS
 
 NAMED, FAMILY, OTHER = "#2f6fd0", "#8fb3e8", "#b9bfc9"
@@ -83,9 +80,7 @@ def closed_loop_figure(values: Mapping[str, Any]) -> Figure | None:
         axis.axhline(floor, color="black", linewidth=0.8, linestyle="--", label="noise and integration error")
         low, high = min(low, floor), max(high, floor)
         if high > 12.0 * low:
-            axis.set_yscale("log")
-            axis.set_ylim(10 ** np.floor(np.log10(0.9 * low)), 10 ** np.ceil(np.log10(1.1 * high)))
-            axis.yaxis.set_major_formatter(FuncFormatter(lambda y, _: f"{y:g}"))
+            log_scale(axis, 10 ** np.floor(np.log10(0.9 * low)), 10 ** np.ceil(np.log10(1.1 * high)))
         axis.set_xticks(at, [f"{k + 1}" for k in at])
         axis.set_xlabel("trial")
         axis.set_title(
@@ -93,8 +88,4 @@ def closed_loop_figure(values: Mapping[str, Any]) -> Figure | None:
         )
         axis.grid(axis="y", alpha=0.25)
     handles, labels = axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=2, frameon=False, fontsize=9)
-    figure.suptitle(
-        "Recorded commands, simulated again: error of the response", x=0.01, ha="left", fontsize=11
-    )
-    return figure
+    return titled(figure, "Recorded commands, simulated again: error of the response", handles, labels)

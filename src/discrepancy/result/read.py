@@ -1,7 +1,5 @@
 """A diagnosis read back from its file (format: ``discrepancy.result.json``)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,17 +1,13 @@
 """Statistics of whitened residuals over all trials: running rms, rms in bins, spectrum; white unit noise gives 1."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 from scipy.signal import welch
 
 from discrepancy.result.traces import Trace
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 RUNNING_S = 1.0
 BINS = 12

@@ -1,7 +1,5 @@
 """What these recordings could have shown: the smallest size of every cause that would have been noticed."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -45,12 +43,5 @@ def _judged(explanation: Explanation) -> Iterator[tuple[Candidate, dict[str, Any
             p.name: float(size) if size < rules.ABSURD_UNITS * p.unit else None
             for p, size in zip(candidate.parameters, np.asarray(sizes), strict=True)
         }
-        yield (
-            candidate,
-            {
-                "cause": candidate.cause,
-                "robot": candidate.robot,
-                "joint": candidate.joint,
-                "parameters": parameters,
-            },
-        )
+        place = zip(("cause", "robot", "joint"), candidate.key, strict=True)
+        yield candidate, {**dict(place), "parameters": parameters}

@@ -1,16 +1,12 @@
 """Where the misfit sits: channels, trials, speed, frequency, and whose torques it points along."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Rig
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def signature(rig: Rig, fit: Fit) -> dict[str, Any]:

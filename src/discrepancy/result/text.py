@@ -1,7 +1,5 @@
 """The text report of a diagnosis: verdict first, then what supports it, what it is worth and what stays open."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """The part of the report that says what the causes are worth: response to the commands, and payload estimates."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

@@ -1,16 +1,10 @@
 """Residuals as a plot wants them: over time, in physical units and in multiples of clean noise."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
 from discrepancy.rig import Channel
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

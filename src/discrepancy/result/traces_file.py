@@ -9,8 +9,6 @@ white_before<k>, white_after<k>   whitened residuals, shape (n, C)
 quantity<k>_<j>        quantity j of trial k, shape (n,)
 """
 
-from __future__ import annotations
-
 import json
 import zipfile
 import zlib
@@ -24,9 +22,8 @@ from numpy.typing import NDArray
 
 from discrepancy.result.traces import Trace
 from discrepancy.rig import Channel
+from estimator.arrays import Array
 from estimator.errors import InputError
-
-Array = NDArray[np.float64]
 
 NAME = "residuals.npz"
 FORMAT, VERSION = "mocobot-residuals", 1

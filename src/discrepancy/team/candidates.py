@@ -1,20 +1,17 @@
 """Every cause at every place, and in every shape."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.causes.intervals import intervals_near, worst_intervals
 from discrepancy.rig import Candidate, Transient
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.reduction import Reduction
+from estimator.arrays import Array
 
-Array = NDArray[np.float64]
 Tolerances = Mapping[str, float]
 
 

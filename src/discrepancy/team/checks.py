@@ -1,7 +1,5 @@
 """What recordings of a team must be before they are held against a model of it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from discrepancy import rules

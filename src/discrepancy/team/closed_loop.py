@@ -1,12 +1,9 @@
 """Resimulate recorded commands with the estimated payload and bases, with or without causes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from discrepancy import rules
@@ -16,6 +13,7 @@ from discrepancy.team.causes.base import Context
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.residual import Bases, Shared
 from discrepancy.team.linear.signals import Signals
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.principal import inertia_matrix
 from estimator.recording.model import Recording
@@ -26,8 +24,6 @@ from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.payload_mjcf import payload_mjcf
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.resimulate import predicted, resimulate
-
-Array = NDArray[np.float64]
 
 
 def team_of(

@@ -1,15 +1,11 @@
 """What a team's misfit may depend on, and in which channel it may sit: for pictures and the residual's signature."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.team.linear.slots import PHI, TAU, THETA
 from discrepancy.team.linear.trial_linear import TrialLinear
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def quantities_of(linear: TrialLinear) -> dict[str, Array]:

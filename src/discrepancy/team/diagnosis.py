@@ -1,7 +1,5 @@
 """Diagnose recordings of one payload that a team carries."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,21 +1,18 @@
 """What a diagnosis does to the payload's estimate: without and with the causes, and errors where truth is known."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.fit import Fit
 from discrepancy.team.linear.residual import Shared
 from discrepancy.team.rig import TeamRig
+from estimator.arrays import Array
 from estimator.estimate.principal import inertia_matrix
 
-Array = NDArray[np.float64]
 Estimate = dict[str, Any]
 
 
@@ -58,28 +55,27 @@ def errors(estimate: Mapping[str, Any], truth: Mapping[str, Any]) -> dict[str, f
     Raises:
         ValueError, KeyError, TypeError: the truth lacks something, or is of another number of robots.
     """
-    moments, true_moments = (_array(x["principal_inertia_kgm2"], (3,)) for x in (estimate, truth))
+    moments, true_moments = (_three(x, "principal_inertia_kgm2") for x in (estimate, truth))
     turns, places = [0.0], [0.0]
     for mine, true in zip(estimate["grasps"], truth["grasps"], strict=True):
-        R, R_true = (
-            Rotation.from_rotvec(_array(x["R_1i_rotvec_deg"], (3,)), degrees=True) for x in (mine, true)
-        )
+        R, R_true = (Rotation.from_rotvec(_three(x, "R_1i_rotvec_deg"), degrees=True) for x in (mine, true))
         turns.append(float(np.rad2deg((R_true.inv() * R).magnitude())))
-        places.append(
-            1e3 * float(np.linalg.norm(_array(mine["p_1i_m"], (3,)) - _array(true["p_1i_m"], (3,))))
-        )
+        places.append(_apart_mm(mine, true, "p_1i_m"))
     return {
         "mass_percent": 100 * abs(estimate["mass_kg"] / float(truth["mass_kg"]) - 1.0),
-        "com_mm": 1e3
-        * float(np.linalg.norm(_array(estimate["p_1c_m"], (3,)) - _array(truth["p_1c_m"], (3,)))),
+        "com_mm": _apart_mm(estimate, truth, "p_1c_m"),
         "principal_inertia_percent": 100 * float(np.max(np.abs(moments / true_moments - 1.0))),
         "grasp_rotation_deg": max(turns),
         "grasp_position_mm": max(places),
     }
 
 
-def _array(values: Any, shape: tuple[int, ...]) -> Array:
-    array = np.asarray(values, dtype=float)
-    if array.shape != shape or not np.all(np.isfinite(array)):
-        raise ValueError(f"shape {array.shape}, not {shape}, or not finite")
+def _apart_mm(a: Mapping[str, Any], b: Mapping[str, Any], key: str) -> float:
+    return 1e3 * float(np.linalg.norm(_three(a, key) - _three(b, key)))
+
+
+def _three(values: Mapping[str, Any], key: str) -> Array:
+    array = np.asarray(values[key], dtype=float)
+    if array.shape != (3,) or not np.all(np.isfinite(array)):
+        raise ValueError(f"{key} has shape {array.shape}, not (3,), or is not finite")
     return array

@@ -1,19 +1,15 @@
 """Errors of single sensors that last as long as a push, and would look like it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate
 from discrepancy.team.causes.base import one_joint
 from discrepancy.team.causes.push import during
 from discrepancy.team.linear.trial_linear import TrialLinear
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def wrong_torques(

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.engine.explanation import Explanation
@@ -40,12 +39,11 @@ from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.start import exact_residual, linearised_trials
 from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.undecidable import statements
+from estimator.arrays import Array
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.extended.extended import write_extended
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +89,6 @@ class TeamRig(Rig):
 
     @property
     def trials(self) -> Sequence[str]:
-        """Names of the trials."""
         return [recording.name for recording in self.recordings]
 
     @property
@@ -101,12 +98,10 @@ class TeamRig(Rig):
 
     @property
     def local_unknowns(self) -> int:
-        """Number of unknowns that every trial has of its own."""
         return self.linear[0].by_bases.shape[2]
 
     @property
     def channels(self) -> Sequence[Channel]:
-        """Names of the residual's channels, in order."""
         out = []
         for i in range(2, self.robots + 1):
             out += [Channel(f"grasp {i} rotation {a}", "kinematic", i, "rad") for a in "xyz"]
@@ -119,7 +114,6 @@ class TeamRig(Rig):
         return every_candidate(self.robots, self.tolerances, self.excluded)
 
     def columns(self, candidate: Candidate) -> list[Array]:
-        """Whitened columns of one candidate, one array (n, C, k) per trial."""
         return [self._columns(t, candidate) for t in range(len(self.linear))]
 
     def _columns(self, trial: int, candidate: Candidate) -> Array:
@@ -133,7 +127,6 @@ class TeamRig(Rig):
     def effect_parameters(
         self, candidate: Candidate, values: Array, covariance: Array
     ) -> tuple[dict[str, float], dict[str, float]]:
-        """Parameters of the simulator's effect, and their standard errors."""
         return CAUSES[candidate.cause].report(values, covariance, self._context(candidate))
 
     def _context(self, candidate: Candidate) -> Context:
@@ -151,7 +144,6 @@ class TeamRig(Rig):
         return CAUSES[candidate.cause].possible(values, se, candidate.shape)
 
     def can_resimulate(self) -> str | None:
-        """Why the recordings cannot be resimulated, or None."""
         return next(filter(None, map(why_not, self.recordings)), None)
 
     def simulation(
@@ -181,7 +173,6 @@ class TeamRig(Rig):
         return scale_of_response(self.noise, self.linear[trial].signals)
 
     def unknowns(self, candidate: Candidate) -> list[Array]:
-        """What a cause leaves open in every trial, whitened columns, shape (n, C, k) each."""
         out = []
         robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
         for linear, white in zip(self.linear, self.whitening, strict=True):
@@ -191,7 +182,6 @@ class TeamRig(Rig):
         return out
 
     def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
-        """Whitened rows of every trial."""
         return [
             Rows(
                 self.recordings[t].name,
@@ -207,7 +197,6 @@ class TeamRig(Rig):
     def residual(
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
     ) -> list[Array]:
-        """Exact whitened residual of every trial with unknowns moved and causes taken out."""
         out = []
         for t, (linear, x) in enumerate(zip(self.linear, local, strict=True)):
             signals, modelled = linear.signals, np.zeros_like(linear.residual)
@@ -248,7 +237,6 @@ class TeamRig(Rig):
         return wrong_torques(self.linear, self.whitening, candidate)
 
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
-        """The candidate with each number of its shape that the data determine changed both ways, and by how much."""
         return shape_steps(candidate)
 
     def quantities(self, trial: int) -> dict[str, Array]:
@@ -256,7 +244,6 @@ class TeamRig(Rig):
         return quantities_of(self.linear[trial])
 
     def row_rate_hz(self, trial: int) -> float:
-        """Rate of a trial's moving rows [Hz]."""
         return self.linear[trial].signals.rate_hz / self.linear[trial].reduction.step
 
     def directions(self, trial: int) -> dict[str, Array]:

@@ -1,7 +1,5 @@
 """How far a well-kept Omnid may be from its model without that being news: standard deviations per parameter."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from discrepancy.causes import tolerances_file

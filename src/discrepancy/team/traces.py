@@ -1,9 +1,6 @@
 """A team's residuals for the plots: the whitening undone."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from discrepancy.engine.explanation import Explanation
@@ -11,8 +8,7 @@ from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.result.traces import Trace
 from discrepancy.team.rig import TeamRig
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def traces(rig: TeamRig, explanation: Explanation) -> list[Trace]:

@@ -1,7 +1,5 @@
 """What recordings of a parked team that holds one rigid payload cannot decide, whatever the data."""
 
-from __future__ import annotations
-
 from typing import Any
 
 UNDECIDABLE = (

@@ -1,7 +1,5 @@
 """A team's causes in the words of a lab."""
 
-from __future__ import annotations
-
 from discrepancy.causes.words import Words
 from discrepancy.team.causes import CAUSES
 

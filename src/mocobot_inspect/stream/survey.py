@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from mocobot_inspect.stream.channels import Channel, ChannelTally, seconds
 from mocobot_inspect.stream.timing import Timing, TimingTally
-from mocobot_logs.log import CHANNELS, LogSource, Samples, Stamps
+from mocobot_logs.log import CHANNELS, LogSource, Samples, joined
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ def survey(source: LogSource, advance: Callable[[int], object] = lambda _: None)
             parts[robot].append(Samples(samples.stamp_ns[inside], samples.values[inside]))
     origin = min(robot.first_ns for robot in robots if robot.first_ns is not None)
     bounds = float(seconds(np.array(start_ns), origin)), float(seconds(np.array(stop_ns), origin))
-    return Survey(timing, channels, tuple(_joined(p, len(source.channels)) for p in parts), bounds)
+    return Survey(timing, channels, tuple(joined(p, len(source.channels)) for p in parts), bounds)
 
 
 class _Robot:
@@ -111,10 +111,10 @@ class _Robot:
         return self._timing.finish()
 
     def excerpt(self) -> Samples:
-        return _joined(self.kept, len(self._names))
+        return joined(self.kept, len(self._names))
 
     def _look(self) -> None:
-        block = _joined(self._waiting, len(self._names))
+        block = joined(self._waiting, len(self._names))
         self._waiting, self._waiting_rows = [], 0
         if not len(block.stamp_ns) or self.first_ns is None:
             return
@@ -150,10 +150,3 @@ def _liveliest(robots: list[_Robot], most_rows: int) -> tuple[int, int]:
     best = max(starts, key=lambda start: sum(total.get(k, 0.0) for k in range(start, start + width)))
     nanoseconds = 1_000_000_000
     return origin + round(best * _BIN_S) * nanoseconds, origin + round((best + width) * _BIN_S) * nanoseconds
-
-
-def _joined(parts: list[Samples], channels: int) -> Samples:
-    if not parts:
-        return Samples(np.empty(0, np.int64), np.empty((0, channels)))
-    stamps: Stamps = np.concatenate([part.stamp_ns for part in parts])
-    return Samples(stamps, np.concatenate([part.values for part in parts]))

@@ -16,9 +16,6 @@ from mocobot_logs.bag.types import MessageType, message_type
 from mocobot_logs.log import CHANNELS, REF
 from mocobot_logs.map.log_map import ChannelMap, LogMap
 
-GAP_OF_ROBOTS = 20
-"""So far beyond the last robot found another one is looked for, which would mean that one is missing."""
-
 Names = Callable[[str], tuple[str, ...]]
 
 
@@ -95,7 +92,7 @@ def make_plan(
     robots = _count_robots(bag, topics, log_map, names)
     maps = [log_map.channels(robot) for robot in range(1, robots + 1)]
     channels = CHANNELS[log_map.level]
-    if _has_commands(log_map, maps, lambda topic: topic in topics and spoken(topic)):
+    if log_map.has_commands(robots, lambda c: (c.topic or "") in topics and spoken(c.topic or "")):
         channels += REF
     selected: dict[str, dict[Selector, str]] = {}
     for robot, channel_maps in enumerate(maps, 1):
@@ -147,9 +144,6 @@ def _check(kind: MessageType, selectors: tuple[Selector, ...], log_map: LogMap) 
 
 
 def _count_robots(bag: str, topics: Mapping[str, Topic], log_map: LogMap, names: Names) -> int:
-    if log_map.robots is not None:
-        return log_map.robots
-
     def joints_of(topic: str) -> tuple[str, ...]:
         return names(topic) if topic in topics else ()
 
@@ -165,30 +159,13 @@ def _count_robots(bag: str, topics: Mapping[str, Topic], log_map: LogMap, names:
                 return True
         return False
 
-    if log_map.one_robot_only("topic"):
-        if log_map.channels(1) != log_map.channels(2):
-            raise InputError(
-                f"map {log_map.name}: missing key 'robots'; robots that have neither topics nor joints of their own "
-                "cannot be counted"
-            )
-        return 1
-    count = 0
-    while is_there(count + 1):
-        count += 1
-    for later in range(count + 2, count + 2 + GAP_OF_ROBOTS):
-        if count and is_there(later):
-            raise InputError(
-                f"{bag}: there are topics of robots {count} and {later}, but none of robot {count + 1}; robots are "
-                "counted from 1 without a gap, or set by the key robots in a map"
-            )
-    return max(count, 1)  # without any robot, the first one's topics are what is missing
-
-
-def _has_commands(log_map: LogMap, maps: list[dict[str, ChannelMap]], spoken: Callable[[str], bool]) -> bool:
-    if REF[0] not in log_map.common:
-        return False
-    optional = all(log_map.common[name].optional for name in REF)
-    return not optional or any(spoken(channels[name].topic or "") for channels in maps for name in REF)
+    shared = log_map.robots is None and log_map.one_robot_only("topic")
+    if shared and log_map.channels(1) != log_map.channels(2):
+        raise InputError(
+            f"map {log_map.name}: missing key 'robots'; robots that have neither topics nor joints of their own "
+            "cannot be counted"
+        )
+    return log_map.count_robots(bag, is_there, "topic")
 
 
 def _missing(topic: str, meaning: str, topics: Mapping[str, Topic], log_map: LogMap) -> str:

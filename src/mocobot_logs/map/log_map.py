@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -16,6 +16,8 @@ from mocobot_logs.map.units import TIME_UNITS
 
 Array = NDArray[np.float64]
 
+GAP_OF_ROBOTS = 20
+"""So far beyond the last robot found another one is looked for, which would mean that one is missing."""
 PLACEHOLDERS = ("robot", "robot0", "channel")
 """Number of the robot from 1, number of the robot from 0, name of the channel."""
 
@@ -144,6 +146,41 @@ class LogMap:
                         "(it may also stand in [defaults])"
                     )
 
+    def count_robots(
+        self, where: str, is_there: Callable[[int], bool], key: Literal["topic", "column"]
+    ) -> int:
+        """Robots by the map, or those that a log has.
+
+        Args:
+            where: what messages call the log.
+            is_there: whether it has anything of a robot, counted from 1.
+            key: what locates channels in it.
+
+        Raises:
+            InputError: one robot is missing between others.
+        """
+        if self.robots is not None:
+            return self.robots
+        if self.one_robot_only(key):
+            return 1
+        count = 0
+        while is_there(count + 1):
+            count += 1
+        for later in range(count + 2, count + 2 + GAP_OF_ROBOTS):
+            if count and is_there(later):
+                raise InputError(
+                    f"{where}: there are {key}s of robots {count} and {later}, but none of robot {count + 1}; "
+                    "robots are counted from 1 without a gap, or set by the key robots in a map"
+                )
+        return max(count, 1)  # without any robot, what the first one lacks is what is missing
+
+    def has_commands(self, robots: int, is_there: Callable[[ChannelMap], bool]) -> bool:
+        """Whether commands are read: mapped, and in the log of any robot unless they must be there."""
+        if REF[0] not in self.common:
+            return False
+        every = [self.channels(robot)[name] for robot in range(1, robots + 1) for name in REF]
+        return not all(self.common[name].optional for name in REF) or any(map(is_there, every))
+
     def one_robot_only(self, key: Literal["topic", "column"]) -> bool:
         """Whether every robot would be read from the same place, so that a log can hold just one."""
         return not self.own and not any(
@@ -159,15 +196,5 @@ def fill(text: str, robot: int, channel: str = "") -> str:
 
 
 def _filled(channel: ChannelMap, robot: int, name: str) -> ChannelMap:
-    def part(text: str | None) -> str | None:
-        return None if text is None else fill(text, robot, name)
-
-    return ChannelMap(
-        part(channel.topic),
-        part(channel.joint),
-        part(channel.field),
-        part(channel.column),
-        channel.scale,
-        channel.offset,
-        channel.optional,
-    )
+    texts = {key: getattr(channel, key) for key in ("topic", "joint", "field", "column")}
+    return replace(channel, **{key: text and fill(text, robot, name) for key, text in texts.items()})

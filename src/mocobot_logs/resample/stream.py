@@ -6,7 +6,7 @@ import numpy as np
 
 from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES
-from mocobot_logs.log import NS, Array, Samples, Stamps
+from mocobot_logs.log import NS, Array, Samples, Stamps, joined
 from mocobot_logs.resample.fill import Merger
 from mocobot_logs.resample.filter import Decimator, fineness
 from mocobot_logs.resample.grid import Grid, Interpolator
@@ -41,6 +41,7 @@ class RobotStream:
         """``robot`` counts from 1; without ``may_fit`` no stamps count as lying on a grid."""
         self.screen = Screen(name, robot, channels)
         self._where, self._robot = f"{name}: robot {robot}", robot
+        self._channels = channels
         self._rate_hz, self._max_gap_s, self._may_fit = rate_hz, max_gap_s, may_fit
         self._waiting: list[Samples] = []
         self._rows_waiting = 0
@@ -101,7 +102,10 @@ class RobotStream:
         return screen.first_ns + round(pipe.lead / self._rate_hz / NS), values, report
 
     def _flush(self) -> None:
-        for samples in _joined(self._waiting):
+        waiting = self._waiting
+        if len({part.log_ns is None for part in waiting}) == 1:  # else single parts tell the recorder's time
+            waiting = [joined(waiting, len(self._channels))]
+        for samples in waiting:
             rows = self.screen.keep(samples)
             if self._pipe is not None:
                 self._pipe.push(*rows)
@@ -196,17 +200,3 @@ class _Pipe:
 
     def _feed(self, time_ns: Stamps, values: Array) -> None:
         self._out += [self._decimator.push(block) for block in self._interpolator.push(time_ns, values)]
-
-
-def _joined(chunks: list[Samples]) -> list[Samples]:
-    """The same rows in one piece, where all of them have the recorder's time or none has."""
-    if len(chunks) < 2 or len({part.log_ns is None for part in chunks}) > 1:
-        return chunks
-    logs = [part.log_ns for part in chunks if part.log_ns is not None]
-    return [
-        Samples(
-            np.concatenate([part.stamp_ns for part in chunks]),
-            np.concatenate([part.values for part in chunks]),
-            np.concatenate(logs) if logs else None,
-        )
-    ]

@@ -13,11 +13,10 @@ import pyarrow.compute as pc
 import pyarrow.csv as pcsv
 
 from estimator.errors import InputError
-from estimator.recording.metadata import RecordingMetadata
-from mocobot_logs.faults import detail_of
+from mocobot_logs.faults import detail_of, readable
 from mocobot_logs.map.log_map import CsvMap
 from mocobot_logs.table.stamps import from_text
-from mocobot_logs.table.table import Block
+from mocobot_logs.table.table import Block, Table, Wanted
 
 BLOCK_BYTES = 4 << 20
 MAX_LINE_BYTES = 1 << 20
@@ -30,16 +29,11 @@ _NUMBER = re.compile(
 """As pyarrow reads them."""
 
 
-class CsvTable:
+class CsvTable(Table):
     """A CSV file as a ``Table``: UTF-8, a header line, any of ``DELIMITERS``; blank lines are skipped.
 
     A leading ``#`` before the header, as numpy writes it, is dropped.
     """
-
-    metadata: RecordingMetadata | None = None
-    aliases: Mapping[str, tuple[str, tuple[int, ...]]] = {}
-    time_column = "time"
-    sparse = True
 
     def __init__(self, path: Path, options: CsvMap, name: str) -> None:
         """Read the header.
@@ -61,18 +55,13 @@ class CsvTable:
         self.size = path.stat().st_size
         self.shapes: Mapping[str, tuple[int, ...]] = dict.fromkeys(self._names, ())
 
-    def blocks(
-        self,
-        columns: tuple[str, ...],
-        clocks: tuple[str, ...],
-        unit_ns: int,
-        advance: Callable[[int], object],
-    ) -> Iterator[Block]:
+    def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
         """Rows in the order of the file, see ``Table.blocks``.
 
         Raises:
             InputError: a row has too few or too many cells, or a cell is not a number.
         """
+        columns, clocks = wanted.columns, wanted.clocks
         index = {name: self._index(name) for name in (*columns, *clocks)}
         types = {f"{index[name]}": pa.float64() for name in columns}
         types |= {f"{index[name]}": pa.string() for name in clocks}
@@ -94,7 +83,7 @@ class CsvTable:
                 {
                     name: from_text(
                         self._point(batch.column(f"{index[name]}")),
-                        unit_ns,
+                        wanted.unit_ns,
                         f"{self.name}: column {name!r}",
                         row,
                     )
@@ -171,7 +160,7 @@ def _first_lines(path: Path, name: str) -> tuple[str, str, int]:
     """The header line, the first row (empty if there is none), and the number of lines up to and with the header."""
     header, before = "", 0
     try:
-        with path.open("rb") as file:
+        with readable(name), path.open("rb") as file:
             for count, line in enumerate(iter(lambda: file.readline(MAX_LINE_BYTES + 1), b""), 1):
                 if len(line) > MAX_LINE_BYTES:
                     raise InputError(
@@ -187,8 +176,6 @@ def _first_lines(path: Path, name: str) -> tuple[str, str, int]:
                 header, before = text.removeprefix("#").lstrip(), count
     except UnicodeDecodeError as error:
         raise InputError(f"{name}: is not text in UTF-8 ({error.reason})") from error
-    except OSError as error:
-        raise InputError(f"{name}: cannot be read ({error.strerror or error})") from error
     if not header:
         raise InputError(f"{name}: has no header; the first line must name the columns")
     return header, "", before

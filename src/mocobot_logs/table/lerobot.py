@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,10 +21,10 @@ import pyarrow.dataset as ds
 
 from estimator.errors import InputError
 from mocobot_logs.claims import check_claim, read_small
-from mocobot_logs.faults import detail_of
-from mocobot_logs.table.parquet import ParquetTable, told_in_one_sentence
+from mocobot_logs.faults import detail_of, told_in_one_sentence
+from mocobot_logs.table.parquet import KIND, ParquetTable
 from mocobot_logs.table.stamps import LARGEST_NS
-from mocobot_logs.table.table import Block
+from mocobot_logs.table.table import Block, Wanted
 
 INFO = Path("meta") / "info.json"
 MAX_INFO_BYTES = 16 << 20
@@ -80,25 +81,19 @@ class LeRobotTable(ParquetTable):
             if column not in self._data.schema.names:
                 raise InputError(f"{name}: its Parquet files have no column {column!r}")
         self._filter = pc.field(EPISODE) == episode
-        with told_in_one_sentence(name):
+        with told_in_one_sentence(name, KIND):
             size = self._data.count_rows(filter=self._filter)
         self._set_up(name, self._data.schema.remove_metadata(), size, *_extent(self._data))
         self.aliases: Mapping[str, tuple[str, tuple[int, ...]]] = _aliases(info["features"], self.shapes)
 
-    def blocks(
-        self,
-        columns: tuple[str, ...],
-        clocks: tuple[str, ...],
-        unit_ns: int,
-        advance: Callable[[int], object],
-    ) -> Iterator[Block]:
+    def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
         """Rows of the episode, see ``Table.blocks``; rounded timestamps are replaced by ``frame_index / fps``.
 
         Raises:
             InputError: a file is damaged, or holds what is not a number.
         """
-        for block in super().blocks((*columns, FRAME), clocks, unit_ns, advance):
-            if TIMESTAMP in clocks:
+        for block in super().blocks(replace(wanted, columns=(*wanted.columns, FRAME)), advance):
+            if TIMESTAMP in wanted.clocks:
                 stamp, given = block.clocks[TIMESTAMP]
                 exact = self._exact(stamp, block.columns[FRAME].reshape(-1))
                 block = Block(block.columns, {**block.clocks, TIMESTAMP: (exact, given)})
@@ -200,7 +195,7 @@ def _dataset(paths: list[Path], name: str) -> ds.Dataset:
     Raises:
         InputError: a file cannot be read, their columns differ, or they claim more than measured samples can take.
     """
-    with told_in_one_sentence(name):
+    with told_in_one_sentence(name, KIND):
         data = ds.dataset(
             [str(path) for path in paths], format=ds.ParquetFileFormat(default_fragment_scan_options=_SCAN)
         )
@@ -218,7 +213,7 @@ def _extent(data: ds.Dataset) -> tuple[int, int]:
 
 def _read(data: ds.Dataset, name: str, **what: Any) -> Iterator[pa.RecordBatch]:
     """Batches in the order of the files, as few as possible in memory; row groups of other episodes are left out."""
-    with told_in_one_sentence(name):
+    with told_in_one_sentence(name, KIND):
         yield from data.to_batches(**what, use_threads=False, batch_readahead=0, fragment_readahead=0)
 
 

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
 from mocobot_logs.claims import check_claim
-from mocobot_logs.faults import detail_of
+from mocobot_logs.faults import told_in_one_sentence
 from mocobot_logs.table.stamps import from_numbers
-from mocobot_logs.table.table import Block, rows_at_a_time
+from mocobot_logs.table.table import Block, Table, Wanted, rows_at_a_time
 
 METADATA_NAME = "mocobot"
 """Array of one text: the JSON metadata of a recording (docs/recording.md)."""
@@ -56,12 +56,8 @@ class Array:
         return self.shape[1:]
 
 
-class NpzTable:
+class NpzTable(Table):
     """An NPZ archive as a ``Table``: every array of at least one dimension is a column, its first axis counts rows."""
-
-    aliases: Mapping[str, tuple[str, tuple[int, ...]]] = {}
-    time_column = "time"
-    sparse = True
 
     def __init__(self, path: Path, name: str) -> None:
         """Read the directory of the archive and the header of every array.
@@ -78,19 +74,13 @@ class NpzTable:
         }
         self.size = max((array.shape[0] for array in self._arrays.values() if array.shape), default=0)
 
-    def blocks(
-        self,
-        columns: tuple[str, ...],
-        clocks: tuple[str, ...],
-        unit_ns: int,
-        advance: Callable[[int], object],
-    ) -> Iterator[Block]:
+    def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
         """Rows in step, see ``Table.blocks``.
 
         Raises:
             InputError: the archive is damaged, or an array does not hold numbers or has another number of rows.
         """
-        names = list(dict.fromkeys([*clocks, *columns]))
+        names = list(dict.fromkeys([*wanted.clocks, *wanted.columns]))
         rows = self._rows(names)
         at_a_time = rows_at_a_time(sum(prod(self._arrays[name].row_shape) for name in names))
         with self._opened() as archive, ExitStack() as stack:
@@ -99,12 +89,12 @@ class NpzTable:
                 count = min(at_a_time, rows - row)
                 read = {name: reader(count) for name, reader in readers.items()}
                 yield Block(
-                    {name: read[name] for name in columns},
+                    {name: read[name] for name in wanted.columns},
                     {
                         name: from_numbers(
-                            read[name].reshape(count), unit_ns, f"{self.name}: array {name!r}", row
+                            read[name].reshape(count), wanted.unit_ns, f"{self.name}: array {name!r}", row
                         )
-                        for name in clocks
+                        for name in wanted.clocks
                     },
                 )
                 advance(count)
@@ -180,17 +170,8 @@ class NpzTable:
 
     @contextmanager
     def _opened(self) -> Iterator[zipfile.ZipFile]:
-        try:
-            with zipfile.ZipFile(self._path) as archive:
-                yield archive
-        except InputError:
-            raise
-        except PermissionError as error:
-            raise InputError(f"{self.name}: cannot be read (permission denied)") from error
-        except Exception as error:  # on damaged bytes zipfile and zlib raise many types
-            raise InputError(
-                f"{self.name}: not a readable NPZ archive, or a damaged one ({detail_of(error)})"
-            ) from error
+        with told_in_one_sentence(self.name, "NPZ archive"), zipfile.ZipFile(self._path) as archive:
+            yield archive
 
 
 def _header(member: zipfile.ZipInfo, file: IO[bytes], where: str) -> Array:

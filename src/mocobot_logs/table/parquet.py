@@ -15,22 +15,20 @@ from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.parquet import METADATA_KEY
 from mocobot_logs.claims import check_claim
-from mocobot_logs.faults import detail_of
+from mocobot_logs.faults import told_in_one_sentence
 from mocobot_logs.log import Stamps
 from mocobot_logs.table.stamps import from_numbers
-from mocobot_logs.table.table import Block, rows_at_a_time
+from mocobot_logs.table.table import Block, Table, Wanted, rows_at_a_time
 
+KIND = "Parquet file"
 Clock = tuple[Stamps, NDArray[np.bool_]]
 
 
-class ParquetTable:
+class ParquetTable(Table):
     """A Parquet file as a ``Table``.
 
     Columns may hold numbers or lists of always as many numbers; time may also be a timestamp, whose unit is its own.
     """
-
-    aliases: Mapping[str, tuple[str, tuple[int, ...]]] = {}
-    time_column = "time"
 
     def __init__(self, path: Path, name: str) -> None:
         """Look at the file's footer.
@@ -66,26 +64,20 @@ class ParquetTable:
         self.sparse = self.metadata is None
         self.shapes: Mapping[str, tuple[int, ...]] = self._row_shapes()
 
-    def blocks(
-        self,
-        columns: tuple[str, ...],
-        clocks: tuple[str, ...],
-        unit_ns: int,
-        advance: Callable[[int], object],
-    ) -> Iterator[Block]:
+    def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
         """Rows in the order of the file, see ``Table.blocks``.
 
         Raises:
             InputError: the file is damaged, or holds what is not a number.
         """
-        names = list(dict.fromkeys([*columns, *clocks]))
+        names = list(dict.fromkeys([*wanted.columns, *wanted.clocks]))
         for name in names:
-            self._check_type(name, time=name in clocks)
+            self._check_type(name, time=name in wanted.clocks)
         cells = sum(int(np.prod(self.shapes[name], dtype=np.int64)) for name in names)
         check_claim(8 * cells * self._rows, self._stored_bytes, f"{self.name}: the table")
         row = 0
         for batch in self._batches(names, rows_at_a_time(cells)):
-            yield self._block(batch, columns, clocks, unit_ns, row)
+            yield self._block(batch, wanted, row)
             row += batch.num_rows
             advance(batch.num_rows)
         pa.default_memory_pool().release_unused()
@@ -94,17 +86,15 @@ class ParquetTable:
         with opened(self._path, self.name) as file:
             yield from file.iter_batches(rows, columns=names, use_threads=False)
 
-    def _block(
-        self, batch: pa.RecordBatch, columns: tuple[str, ...], clocks: tuple[str, ...], unit_ns: int, row: int
-    ) -> Block:
+    def _block(self, batch: pa.RecordBatch, wanted: Wanted, row: int) -> Block:
         def where(name: str) -> str:
             return f"{self.name}: column {name!r}"
 
         return Block(
-            {name: numbers(batch.column(name), self.shapes[name], where(name)) for name in columns},
+            {name: numbers(batch.column(name), self.shapes[name], where(name)) for name in wanted.columns},
             {
-                name: _clock(batch.column(name), self.shapes[name], unit_ns, where(name), row)
-                for name in clocks
+                name: _clock(batch.column(name), self.shapes[name], wanted.unit_ns, where(name), row)
+                for name in wanted.clocks
             },
         )
 
@@ -133,29 +123,10 @@ def opened(path: Path, name: str) -> Iterator[pq.ParquetFile]:
     """
     # Not pre-buffered: that would hold a whole row group, which may be a whole log.
     with (
-        told_in_one_sentence(name),
+        told_in_one_sentence(name, KIND),
         pq.ParquetFile(path, page_checksum_verification=True, pre_buffer=False, buffer_size=1 << 20) as file,
     ):
         yield file
-
-
-@contextmanager
-def told_in_one_sentence(name: str) -> Iterator[None]:
-    """Whatever pyarrow raises inside the block, as one sentence.
-
-    Raises:
-        InputError: a file is not Parquet, or damaged, or cannot be read.
-    """
-    try:
-        yield
-    except InputError:
-        raise
-    except PermissionError as error:
-        raise InputError(f"{name}: cannot be read (permission denied)") from error
-    except Exception as error:  # on damaged bytes pyarrow raises many types, not all of them its own
-        raise InputError(
-            f"{name}: not a readable Parquet file, or a damaged one ({detail_of(error)})"
-        ) from error
 
 
 def numbers(column: pa.Array, shape: tuple[int, ...], where: str) -> NDArray:

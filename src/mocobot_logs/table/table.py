@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import difflib
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,6 @@ from mocobot_logs.map.log_map import ChannelMap, LogMap
 
 SHOWN_COLUMNS = 12
 """So many columns are listed in a message."""
-GAP_OF_ROBOTS = 20
-"""So far beyond the last robot found another one is looked for, which would mean that one is missing."""
 CELLS = 1 << 20
 """About so many numbers are in memory at a time."""
 
@@ -38,14 +36,29 @@ class Block:
     clocks: Mapping[str, tuple[Stamps, NDArray[np.bool_]]]
 
 
-class Table(Protocol):
+@dataclass(frozen=True)
+class Wanted:
+    """What is to be read of a table.
+
+    Attributes:
+        columns: names to read as numbers.
+        clocks: names to read as time.
+        unit_ns: nanoseconds in one unit of time.
+    """
+
+    columns: tuple[str, ...]
+    clocks: tuple[str, ...]
+    unit_ns: int
+
+
+class Table(ABC):
     """A table that can be read in blocks of rows, any number of times.
 
     Attributes:
         name: the path as the user gave it.
         size: all that there is to read, in units of ``advance``.
-        metadata: what the file says about itself where mocobot wrote it, else None.
         shapes: every column that may be mapped, and the shape of one row of it: () for a number.
+        metadata: what the file says about itself where mocobot wrote it, else None.
         aliases: other names of single numbers in a row: the column and the index there.
         time_column: where time is unless a map says so.
         sparse: whether a row without any value of a robot is no sample of it.
@@ -53,31 +66,23 @@ class Table(Protocol):
 
     name: str
     size: int
-    metadata: RecordingMetadata | None
     shapes: Mapping[str, tuple[int, ...]]
-    aliases: Mapping[str, tuple[str, tuple[int, ...]]]
-    time_column: str
-    sparse: bool
+    metadata: RecordingMetadata | None = None
+    aliases: Mapping[str, tuple[str, tuple[int, ...]]] = {}
+    time_column = "time"
+    sparse = True
 
-    def blocks(
-        self,
-        columns: tuple[str, ...],
-        clocks: tuple[str, ...],
-        unit_ns: int,
-        advance: Callable[[int], object],
-    ) -> Iterator[Block]:
+    @abstractmethod
+    def blocks(self, wanted: Wanted, advance: Callable[[int], object]) -> Iterator[Block]:
         """Rows in the order of the file.
 
         Args:
-            columns: names to read as numbers.
-            clocks: names to read as time.
-            unit_ns: nanoseconds in one unit of time.
+            wanted: which columns.
             advance: takes the progress made since the last call.
 
         Raises:
             InputError: the file is damaged or holds what is not a number.
         """
-        ...
 
 
 @dataclass(frozen=True)
@@ -101,8 +106,9 @@ class TableSource:
         self._table, self._map = table, log_map
         self.name, self.size, self.metadata = table.name, table.size, table.metadata
         self.level: Level = log_map.level
-        self.robots = self._count_robots()
-        self.channels: tuple[str, ...] = CHANNELS[self.level] + (REF if self._has_commands() else ())
+        self.robots = log_map.count_robots(self.name, self._has_robot, "column")
+        has_commands = log_map.has_commands(self.robots, lambda channel: self._find(channel) is not None)
+        self.channels: tuple[str, ...] = CHANNELS[self.level] + (REF if has_commands else ())
         self._places = [self._places_of(robot) for robot in range(1, self.robots + 1)]
         self._clocks = [self._clock_of(robot) for robot in range(1, self.robots + 1)]
         self._check_shared()
@@ -117,7 +123,7 @@ class TableSource:
         columns = tuple(dict.fromkeys(place.column for places in self._places for place in places))
         clocks = tuple(dict.fromkeys(self._clocks))
         row = 0
-        for block in self._table.blocks(columns, clocks, self._map.time.unit_ns, advance):
+        for block in self._table.blocks(Wanted(columns, clocks, self._map.time.unit_ns), advance):
             for robot, (places, channels) in enumerate(zip(self._places, maps, strict=True)):
                 stamps, given = block.clocks[self._clocks[robot]]
                 values = np.empty((len(stamps), len(self.channels)))
@@ -136,32 +142,9 @@ class TableSource:
                 yield robot, Samples(stamps, values)
             row += len(next(iter(block.clocks.values()))[0])
 
-    def _count_robots(self) -> int:
-        if self._map.robots is not None:
-            return self._map.robots
-        if self._map.one_robot_only("column"):
-            return 1
-        count = 0
-        while self._has_robot(count + 1):
-            count += 1
-        for later in range(count + 2, count + 2 + GAP_OF_ROBOTS):
-            if count and self._has_robot(later):
-                raise InputError(
-                    f"{self.name}: there are columns of robots {count} and {later}, but none of robot {count + 1}; "
-                    "robots are counted from 1 without a gap, or set by the key robots in a map"
-                )
-        return max(count, 1)  # without any robot, the first one's columns are what is missing
-
     def _has_robot(self, robot: int) -> bool:
         channels = self._map.channels(robot)
         return any(self._find(channels[name]) is not None for name in CHANNELS[self.level])
-
-    def _has_commands(self) -> bool:
-        if REF[0] not in self._map.common:
-            return False
-        optional = all(self._map.common[name].optional for name in REF)
-        every = [self._map.channels(robot)[name] for robot in range(1, self.robots + 1) for name in REF]
-        return not optional or any(self._find(channel) is not None for channel in every)
 
     def _places_of(self, robot: int) -> list[Place]:
         channels, places = self._map.channels(robot), []

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from estimator.errors import InputError
 from mocobot_sim.base.design import WHEELS
-
-Index = NDArray[np.intp]
+from mocobot_sim.scene.team_index import Index, ids_of, robots_with
 
 
 @dataclass(frozen=True)
@@ -45,29 +44,24 @@ class BaseIndex:
         Raises:
             InputError: a robot is parked, or there is none.
         """
-        robots = 0
-        while mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, f"omnid{robots + 1}/chassis") >= 0:
-            robots += 1
-        names = [[f"omnid{i + 1}/wheel_{wheel}" for wheel in WHEELS] for i in range(robots)]
-        drives = [[f"omnid{i + 1}/drive_{wheel}" for wheel in WHEELS] for i in range(robots)]
-        for i, row in enumerate(drives):
-            if any(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name) < 0 for name in row):
-                raise InputError(f"omnid{i + 1} is parked; a base that is to drive must be released")
+        robots = robots_with(model, mujoco.mjtObj.mjOBJ_BODY, "chassis")
         if not robots:
             raise InputError("the model has no Omnid; a base that is to drive must be there")
-        joints = np.array([[model.joint(name).id for name in row] for row in names])
+        drives = [f"drive_{wheel}" for wheel in WHEELS]
+        driven = min(robots_with(model, mujoco.mjtObj.mjOBJ_ACTUATOR, drive) for drive in drives)
+        if driven < robots:
+            raise InputError(f"omnid{driven + 1} is parked; a base that is to drive must be released")
+        names = [f"wheel_{wheel}" for wheel in WHEELS]
+        joints = ids_of(model.joint, robots, names)
         geom_wheel = np.full(model.ngeom, -1, dtype=np.intp)
-        for number, name in enumerate(name for row in names for name in row):
-            hub = model.body(name).id
+        for number, hub in enumerate(ids_of(model.body, robots, names).ravel()):
             geom_wheel[model.body_parentid[model.geom_bodyid] == hub] = number
         return cls(
             wheel_qpos=model.jnt_qposadr[joints].astype(np.intp),
             wheel_dof=model.jnt_dofadr[joints].astype(np.intp),
-            drive=np.array([[model.actuator(name).id for name in row] for row in drives], dtype=np.intp),
-            chassis=np.array([model.body(f"omnid{i + 1}/chassis").id for i in range(robots)], dtype=np.intp),
-            free_qpos=np.array(
-                [model.jnt_qposadr[model.joint(f"omnid{i + 1}/").id] for i in range(robots)], dtype=np.intp
-            ),
+            drive=ids_of(model.actuator, robots, drives),
+            chassis=ids_of(model.body, robots, ("chassis",)).ravel(),
+            free_qpos=model.jnt_qposadr[ids_of(model.joint, robots, ("",)).ravel()].astype(np.intp),
             geom_wheel=geom_wheel,
         )
 

@@ -13,7 +13,6 @@ controller never knows the payload.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import Any
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 
 from estimator.arm.design import OmnidDesign
 from estimator.errors import InputError
+from estimator.strict import is_number
 from mocobot_sim.control.kernel import update_team
 from mocobot_sim.control.kernel import wrist as wrist
 from mocobot_sim.scene.as_built import AsBuilt, units_of
@@ -31,9 +31,6 @@ from mocobot_sim.scene.sensor_effects import SensorEffects
 from mocobot_sim.scene.team_index import TeamIndex
 
 Array = NDArray[np.float64]
-
-# Also refuses inf, NaN and whole numbers too large for a float.
-_LARGEST = sys.float_info.max
 
 
 @dataclass(frozen=True)
@@ -76,7 +73,7 @@ class ControlGains:
         gains = {}
         for entry in fields(cls):
             value = values.get(entry.name)
-            if isinstance(value, bool) or not isinstance(value, int | float) or not 0 < value <= _LARGEST:
+            if not is_number(value) or not value > 0:
                 raise InputError(f"control.{entry.name} is {value!r}; it must be a number greater than 0")
             gains[entry.name] = float(value)
         return cls(**gains)

@@ -1,7 +1,5 @@
 """Change one robot's as-built unit, and the simulated robot with it."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,20 +1,17 @@
 """What all effects have in common: checked numbers, a place, and how they are put into a scene."""
 
-from __future__ import annotations
-
 import math
+import re
 import sys
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.scene.scene import TeamScene
-
-Array = NDArray[np.float64]
 
 PLACE = ("robot", "joint")
 JOINTS = 3
@@ -25,7 +22,7 @@ class Effect(ABC):
     """One cause at one place; the fields besides ``robot`` and ``joint`` are its parameters.
 
     Attributes:
-        cause: name of the cause, as in the catalogue.
+        cause: name of the cause: that of the class, in lower case with underscores.
         ranges: allowed range (low, high) of the parameters that may not be any finite number, both ends included.
         repeats: whether one place takes several.
     """
@@ -33,6 +30,9 @@ class Effect(ABC):
     cause: ClassVar[str]
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
     repeats: ClassVar[bool] = False
+
+    def __init_subclass__(cls) -> None:
+        cls.cause = re.sub(r"\B(?=[A-Z])", "_", cls.__name__).lower()
 
     def __post_init__(self) -> None:
         """Check every number.

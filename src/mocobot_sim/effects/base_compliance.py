@@ -1,7 +1,5 @@
 """A base that gives way sideways."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -18,7 +16,6 @@ class BaseCompliance(Effect):
     Two slides under the chassis, held by soft ``joint`` equalities (see ``mocobot_sim.scene.soft``), critically damped.
     """
 
-    cause = "base_compliance"
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-2)}
     robot: int
     compliance_m_per_N: float

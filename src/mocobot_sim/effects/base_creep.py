@@ -1,7 +1,5 @@
 """A base that creeps over the floor."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -25,7 +23,6 @@ class BaseCreep(Effect):
     ``springref`` is so far away that its force is constant: damping times the velocity.
     """
 
-    cause = "base_creep"
     ranges: ClassVar = {"x_mps": (-1e-3, 1e-3), "y_mps": (-1e-3, 1e-3)}
     robot: int
     x_mps: float

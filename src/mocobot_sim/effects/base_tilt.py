@@ -1,14 +1,13 @@
 """A base that does not stand level."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mocobot_sim.effects.base import Array, Effect
+from estimator.arrays import Array
+from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.slides import level_slides
 from mocobot_sim.scene.models import base_height_m
 from mocobot_sim.scene.scene import TeamScene
@@ -21,7 +20,6 @@ class BaseTilt(Effect):
     The chassis body's ``quat``.
     """
 
-    cause = "base_tilt"
     ranges: ClassVar = {"roll_rad": (-0.2, 0.2), "pitch_rad": (-0.2, 0.2)}
     robot: int
     roll_rad: float

@@ -1,13 +1,12 @@
 """All causes by name, and effects as plain data."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from importlib import import_module
 from typing import Any
 
 from estimator.errors import InputError
+from estimator.strict import Fields
 from mocobot_sim.effects.base import PLACE, Effect
 from mocobot_sim.scene.applied import Applied
 from mocobot_sim.scene.scene import TeamScene
@@ -90,9 +89,12 @@ def _has_default(entry: Any) -> bool:
 
 def effect_to_dict(effect: Applied) -> dict[str, Any]:
     """Plain JSON values: ``cause``, ``robot`` and ``joint`` where there are, ``parameters``."""
-    place = {name: getattr(effect, name) for name in effect.place_names()}
     parameters = {name: getattr(effect, name) for name in effect.parameter_names()}
-    return {"cause": effect.cause, **place, "parameters": parameters}
+    return {"cause": effect.cause, **_place(effect), "parameters": parameters}
+
+
+def _place(effect: Applied) -> dict[str, int]:
+    return {name: getattr(effect, name) for name in effect.place_names()}
 
 
 def effect_from_dict(values: Mapping[str, Any]) -> Effect:
@@ -101,15 +103,7 @@ def effect_from_dict(values: Mapping[str, Any]) -> Effect:
     Raises:
         InputError: a key is unknown or missing, or its value is not allowed.
     """
-    if not isinstance(values, Mapping):
-        raise InputError(f"effect is {values!r:.60}; it must be an object")
-    keys = ("cause", *PLACE, "parameters")
-    for key in values:
-        if key not in keys:
-            raise InputError(f"effect: unknown key {key!r}; the keys are {', '.join(keys)}")
-    for key in ("cause", "parameters"):
-        if key not in values:
-            raise InputError(f"effect: missing key {key!r}; the keys are {', '.join(keys)}")
+    Fields(values, ("cause", "parameters"), "effect", PLACE)
     if not isinstance(values["cause"], str) or not isinstance(values["parameters"], Mapping):
         raise InputError("effect: cause must be text and parameters an object")
     return make_effect(values["cause"], values["parameters"], values.get("robot"), values.get("joint"))
@@ -121,13 +115,11 @@ def apply_effects(scene: TeamScene, effects: Sequence[Effect]) -> TeamScene:
     Raises:
         InputError: a place does not exist, or has the same cause twice (pushes may repeat).
     """
-    places = [
-        (effect.cause, *(getattr(effect, name) for name in effect.place_names())) for effect in scene.effects
-    ]
+    places = [(effect.cause, _place(effect)) for effect in scene.effects]
     for effect in effects:
-        place = (effect.cause, *(getattr(effect, name) for name in effect.place_names()))
+        place = effect.cause, _place(effect)
         if place in places and not effect.repeats:
-            where = " ".join(f"{name} {at}" for name, at in zip(effect.place_names(), place[1:], strict=True))
+            where = " ".join(f"{name} {at}" for name, at in place[1].items())
             raise InputError(
                 f"{effect.cause} is given twice{where and f' for {where}'}; each place takes it once"
             )

@@ -1,7 +1,5 @@
 """A robot whose clock is off."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -16,7 +14,6 @@ class ClockDelay(Effect):
     An entry of the scene's ``sensors``; no MJCF edit.
     """
 
-    cause = "clock_delay"
     ranges: ClassVar = {"delay_s": (-1.0, 1.0)}
     robot: int
     delay_s: float

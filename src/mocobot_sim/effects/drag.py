@@ -1,7 +1,5 @@
 """Something that resists the payload's motion."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -19,7 +17,6 @@ class Drag(Effect):
     use for their control.
     """
 
-    cause = "drag"
     ranges: ClassVar = {"coefficient_Ns_per_m": (0.0, 1e3)}
     coefficient_Ns_per_m: float
 

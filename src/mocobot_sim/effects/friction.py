@@ -4,8 +4,6 @@ Under its limit, a friction row lets its coordinate creep at -R f / B (see ``sof
 that stops a coordinate within a millisecond, a coordinate of inertia I creeps at 1e-7 f / I [1/s].
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 STICK: dict[str, Any] = {

@@ -1,7 +1,5 @@
 """Friction of a gimbal joint."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -25,7 +23,6 @@ class GimbalFriction(Effect):
     ``mocobot_sim.scene.soft``) as its damper: damping of the joint itself would pull the welds open.
     """
 
-    cause = "gimbal_friction"
     ranges: ClassVar = {"coulomb_Nm": (0.0, 5.0), "viscous_Nms_per_rad": (0.0, 10.0)}
     robot: int
     joint: int

@@ -1,7 +1,5 @@
 """A grasp that flexes."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -22,7 +20,6 @@ class GraspFlex(Effect):
     equalities (see ``mocobot_sim.scene.soft``), critically damped. The grasp cannot turn.
     """
 
-    cause = "grasp_flex"
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-3)}
     robot: int
     compliance_m_per_N: float

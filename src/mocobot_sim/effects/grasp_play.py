@@ -1,7 +1,5 @@
 """A loose grasp."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -21,7 +19,6 @@ class GraspPlay(Effect):
     Three slides with stiff ``range`` limits, on the payload (robot 1) or on a pad between flange and weld (the others).
     """
 
-    cause = "grasp_play"
     ranges: ClassVar = {"play_m": (0.0, 5e-3)}
     robot: int
     play_m: float

@@ -1,7 +1,5 @@
 """Friction of a driven joint."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -20,7 +18,6 @@ class JointFriction(Effect):
     (see ``mocobot_sim.scene.soft``) as its damper. The sensor does not feel it.
     """
 
-    cause = "joint_friction"
     ranges: ClassVar = {"coulomb_Nm": (0.0, 20.0), "viscous_Nms_per_rad": (0.0, 100.0)}
     robot: int
     joint: int

@@ -1,7 +1,5 @@
 """Links and base radius of another length than designed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -18,7 +16,6 @@ from mocobot_sim.scene.scene import TeamScene
 class LinkLength(Effect):
     """One leg's proximal length, rod length and base radius, true minus design [m]: body and site positions."""
 
-    cause = "link_length"
     ranges: ClassVar = {name: (-0.05, 0.05) for name in ("proximal_m", "rod_m", "base_radius_m")}
     robot: int
     joint: int

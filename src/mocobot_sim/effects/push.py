@@ -1,7 +1,5 @@
 """Somebody pushes the payload."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -20,7 +18,6 @@ class Push(Effect):
     any tilt [N], the point where it acts is fixed to the payload and given in {1} [m].
     """
 
-    cause = "push"
     repeats = True
     ranges: ClassVar = {"start_s": (0.0, 1e9), "duration_s": (0.0, 1e9)}
     trial: int

@@ -1,7 +1,5 @@
 """Torque zero of a series-elastic actuator."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from mocobot_sim.effects.as_built import add_to_unit
@@ -13,7 +11,6 @@ from mocobot_sim.scene.scene import TeamScene
 class SeaBias(Effect):
     """One torque reading, for log and controller, is ``bias_Nm`` above the truth [N m]; no MJCF edit."""
 
-    cause = "sea_bias"
     robot: int
     joint: int
     bias_Nm: float

@@ -1,7 +1,5 @@
 """A spring that hardens."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -17,7 +15,6 @@ class SeaHardening(Effect):
     The reading is the design stiffness times the deflection, as of any spring.
     """
 
-    cause = "sea_hardening"
     ranges: ClassVar = {"cubic_Nm_per_rad3": (-500.0, 1e6)}
     robot: int
     joint: int

@@ -1,7 +1,5 @@
 """A spring with friction inside."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -18,7 +16,6 @@ class SeaHysteresis(Effect):
     The link feels spring plus friction; the reading is the deflection's alone.
     """
 
-    cause = "sea_hysteresis"
     ranges: ClassVar = {"friction_Nm": (0.0, 20.0)}
     robot: int
     joint: int

@@ -1,7 +1,5 @@
 """Spring of another stiffness than designed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -17,7 +15,6 @@ class SeaScale(Effect):
     The reading is the design stiffness times the deflection, so it is low by 1 / (1 + scale).
     """
 
-    cause = "sea_scale"
     ranges: ClassVar = {"scale": (-0.9, 10.0)}
     robot: int
     joint: int

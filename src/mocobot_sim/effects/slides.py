@@ -1,7 +1,5 @@
 """Three slides, and where they go: between a flange and its grasp, or under a base."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,14 +1,13 @@
 """Liquid, or anything that swings, in the payload."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
+from estimator.arrays import Array
 from estimator.estimate.principal import inertia_parameters
-from mocobot_sim.effects.base import Array, Effect
+from mocobot_sim.effects.base import Effect
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 
@@ -21,7 +20,6 @@ class Slosh(Effect):
     small swings.
     """
 
-    cause = "slosh"
     ranges: ClassVar = {"mass_kg": (0.0, 100.0), "length_m": (0.005, 10.0), "damping_ratio": (0.0, 10.0)}
     mass_kg: float
     length_m: float

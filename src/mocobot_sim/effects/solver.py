@@ -1,7 +1,5 @@
 """A stricter stopping rule for MuJoCo's constraint solver."""
 
-from __future__ import annotations
-
 from mocobot_sim.scene.scene import TeamScene
 
 DEFAULT = 1e-8

@@ -1,7 +1,5 @@
 """Something elastic that ties a grasp to the room."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -17,7 +15,6 @@ class Tether(Effect):
     world. The anchor is given in the robot's {b} as its floor mount has it, without any tilt [m].
     """
 
-    cause = "tether"
     ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4)}
     robot: int
     stiffness_N_per_m: float

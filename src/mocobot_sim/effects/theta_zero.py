@@ -1,7 +1,5 @@
 """Encoder zero of a gimbal joint."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from mocobot_sim.effects.as_built import add_to_unit
@@ -13,7 +11,6 @@ from mocobot_sim.scene.scene import TeamScene
 class ThetaZero(Effect):
     """One gimbal encoder (joints 1, 2, 3 are z, y, x) reads ``zero_rad`` more than the truth [rad]; no MJCF edit."""
 
-    cause = "theta_zero"
     robot: int
     joint: int
     zero_rad: float

@@ -1,7 +1,5 @@
 """A torque sensor that follows late."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -16,7 +14,6 @@ class TorqueLag(Effect):
     An entry of the scene's ``sensors``; no MJCF edit.
     """
 
-    cause = "torque_lag"
     ranges: ClassVar = {"time_constant_s": (0.0, 10.0)}
     robot: int
     time_constant_s: float

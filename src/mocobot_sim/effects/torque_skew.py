@@ -1,7 +1,5 @@
 """The log of one robot's torques is late."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -16,7 +14,6 @@ class TorqueSkew(Effect):
     An entry of the scene's ``sensors``; no MJCF edit.
     """
 
-    cause = "torque_skew"
     ranges: ClassVar = {"delay_s": (-1.0, 1.0)}
     robot: int
     delay_s: float

@@ -74,19 +74,6 @@ class CalibrationSpread:
 
     def draw(self, robots: int, rng: np.random.Generator) -> tuple[AsBuilt, ...]:
         """Draw one team; robot i's unit does not depend on how many robots follow it."""
-        units = []
-        for _ in range(robots):
-            z = rng.standard_normal((8, 3))
-            units.append(
-                AsBuilt(
-                    base_radius_m=self.geometry_m * z[0],
-                    proximal_length_m=self.geometry_m * z[1],
-                    rod_length_m=self.geometry_m * z[2],
-                    platform_radius_m=self.geometry_m * z[3],
-                    stiffness_ratio=self.stiffness_ratio * z[4],
-                    phi_zero_rad=self.encoder_zero_rad * z[5],
-                    theta_zero_rad=self.encoder_zero_rad * z[6],
-                    tau_zero_Nm=self.tau_zero_Nm * z[7],
-                )
-            )
-        return tuple(units)
+        zeros = (self.encoder_zero_rad, self.encoder_zero_rad, self.tau_zero_Nm)
+        spreads = np.array([*[self.geometry_m] * 4, self.stiffness_ratio, *zeros])  # as the fields of AsBuilt
+        return tuple(AsBuilt(*(spreads[:, None] * rng.standard_normal((8, 3)))) for _ in range(robots))

@@ -6,6 +6,8 @@ from functools import cache
 from pathlib import Path
 
 import mujoco
+import numpy as np
+from numpy.typing import NDArray
 
 from estimator.arm.design import OmnidDesign, load_design
 from estimator.errors import InputError
@@ -51,6 +53,13 @@ def omnid_design() -> OmnidDesign:
 def base_height_m() -> float:
     """Height of {b} over the floor mount of an Omnid, whose axes it shares [m]."""
     model = mujoco.MjModel.from_xml_path(str(models_dir() / "omnid" / "omnid.xml"))
+    return float(posed(model).body("base").xpos[2])
+
+
+def posed(model: mujoco.MjModel, qpos: NDArray[np.float64] | None = None) -> mujoco.MjData:
+    """Data with the poses of everything at ``qpos``, shape (nq,); None for ``qpos0``."""
     data = mujoco.MjData(model)
+    if qpos is not None:
+        data.qpos[:] = qpos
     mujoco.mj_kinematics(model, data)
-    return float(data.body("base").xpos[2])
+    return data

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.errors import InputError
-from mocobot_sim.scene.models import payload_path
+from mocobot_sim.scene.models import payload_path, posed
 from mocobot_sim.scene.pymjcf import compiled, mjcf
 
 OWN_COMPILER_SETTINGS = ("angle", "autolimits", "eulerseq", "assetdir", "meshdir", "texturedir")
@@ -71,8 +71,7 @@ def grasp_frames(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
         raise InputError(
             f"{where}: MuJoCo cannot compile the payload ({' '.join(str(error).split())})"
         ) from error
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    data = posed(model)
     numbers = sorted(int(n[1]) for i in range(model.nsite) if (n := GRASP.fullmatch(model.site(i).name)))
     if not numbers or numbers != list(range(1, len(numbers) + 1)):
         missing = next(n for n in range(1, len(numbers) + 2) if n not in numbers)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -11,7 +13,13 @@ from numpy.typing import NDArray
 Index = NDArray[np.intp]
 
 GIMBAL_AXES = ("z", "y", "x")
-SLIDES = ("platform_x", "platform_y", "platform_z")
+JOINTS = {
+    "motor": ("motor1", "motor2", "motor3"),
+    "spring": ("spring1", "spring2", "spring3"),
+    "gimbal": tuple(f"gimbal_{axis}" for axis in GIMBAL_AXES),
+    "slide": ("platform_x", "platform_y", "platform_z"),
+    "knee": tuple(f"knee{k}_{motion}" for k in (1, 2, 3) for motion in ("swing", "tilt")),
+}
 PAYLOAD_PREFIX = "omnid1/payload/"
 
 
@@ -60,51 +68,46 @@ class TeamIndex:
         Raises:
             KeyError: the model is not a team scene (the message names what is missing).
         """
-        robots = 0
-        while mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, f"omnid{robots + 1}/grasp") >= 0:
-            robots += 1
-        prefixes = [f"omnid{i + 1}/" for i in range(robots)]
-
-        def joints(names: list[str]) -> list[int]:
-            return [model.joint(name).id for name in names]
-
-        motor = np.array([joints([f"{p}motor{k}" for k in (1, 2, 3)]) for p in prefixes], dtype=np.intp)
-        spring = np.array([joints([f"{p}spring{k}" for k in (1, 2, 3)]) for p in prefixes], dtype=np.intp)
-        gimbal = np.array(
-            [joints([f"{p}gimbal_{axis}" for axis in GIMBAL_AXES]) for p in prefixes], dtype=np.intp
-        )
-        slide = np.array([joints([f"{p}{name}" for name in SLIDES]) for p in prefixes], dtype=np.intp)
-        knee = np.array(
-            [
-                joints([f"{p}knee{k}_{motion}" for k in (1, 2, 3) for motion in ("swing", "tilt")])
-                for p in prefixes
-            ],
-            dtype=np.intp,
-        )
+        robots = robots_with(model, mujoco.mjtObj.mjOBJ_SITE, "grasp")
+        joints = {kind: ids_of(model.joint, robots, names) for kind, names in JOINTS.items()}
         base = _base_joints(model)
-        own = np.concatenate([joints.ravel() for joints in (motor, spring, gimbal, slide, knee, base)])
+        own = np.concatenate([*(ids.ravel() for ids in joints.values()), base])
+        qpos = {
+            f"{kind}_qpos": model.jnt_qposadr[joints[kind]].astype(np.intp)
+            for kind in JOINTS
+            if kind != "knee"
+        }
+        dof = {f"{kind}_dof": model.jnt_dofadr[joints[kind]].astype(np.intp) for kind in JOINTS}
+        grasps = [model.site(f"{PAYLOAD_PREFIX}grasp{i + 1}").id for i in range(robots)]
         return cls(
-            motor_qpos=model.jnt_qposadr[motor].astype(np.intp),
-            spring_qpos=model.jnt_qposadr[spring].astype(np.intp),
-            gimbal_qpos=model.jnt_qposadr[gimbal].astype(np.intp),
-            slide_qpos=model.jnt_qposadr[slide].astype(np.intp),
-            motor_dof=model.jnt_dofadr[motor].astype(np.intp),
-            spring_dof=model.jnt_dofadr[spring].astype(np.intp),
-            gimbal_dof=model.jnt_dofadr[gimbal].astype(np.intp),
-            slide_dof=model.jnt_dofadr[slide].astype(np.intp),
-            knee_dof=model.jnt_dofadr[knee].astype(np.intp),
-            actuator=np.array(
-                [[model.actuator(f"{p}motor{k}").id for k in (1, 2, 3)] for p in prefixes], dtype=np.intp
-            ),
-            grasp_site=np.array([model.site(f"{p}grasp").id for p in prefixes], dtype=np.intp),
-            payload_site=np.array(
-                [model.site(f"{PAYLOAD_PREFIX}grasp{i + 1}").id for i in range(robots)], dtype=np.intp
-            ),
+            **qpos,
+            **dof,
+            actuator=ids_of(model.actuator, robots, JOINTS["motor"]),
+            grasp_site=ids_of(model.site, robots, ("grasp",)).ravel(),
+            payload_site=np.array(grasps, dtype=np.intp),
             payload_body=model.body(f"{PAYLOAD_PREFIX}payload").id,
             yielding_dof=_added(model, own, mujoco.mjtJoint.mjJNT_SLIDE),
             hanging_dof=_added(model, own, mujoco.mjtJoint.mjJNT_HINGE),
             base_dof=np.flatnonzero(np.isin(model.dof_jntid, base)).astype(np.intp),
         )
+
+
+def robots_with(model: mujoco.MjModel, kind: mujoco.mjtObj, name: str) -> int:
+    """How many robots, counted from 1 on, have something of a name."""
+    robots = 0
+    while mujoco.mj_name2id(model, kind, f"omnid{robots + 1}/{name}") >= 0:
+        robots += 1
+    return robots
+
+
+def ids_of(look_up: Callable[[str], Any], robots: int, names: Sequence[str]) -> Index:
+    """Ids of every robot's things of these names, shape (N, names).
+
+    Raises:
+        KeyError: there is none of such a name.
+    """
+    ids = [[look_up(f"omnid{i + 1}/{name}").id for name in names] for i in range(robots)]
+    return np.array(ids, dtype=np.intp)
 
 
 def _added(model: mujoco.MjModel, own: Index, kind: mujoco.mjtJoint) -> Index:

@@ -6,7 +6,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-import mujoco
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -15,6 +14,7 @@ from estimator.files import write_json
 from mocobot_sim.effects import effect_to_dict
 from mocobot_sim.scene.applied import Applied
 from mocobot_sim.scene.as_built import AsBuilt
+from mocobot_sim.scene.models import posed
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import TeamIndex
 
@@ -49,8 +49,7 @@ class GroundTruth:
     def of(cls, scene: TeamScene) -> GroundTruth:
         """Read the truth from the compiled scene."""
         model = scene.compile()
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
+        data = posed(model)
         index = TeamIndex.of(model)
         body = index.payload_body
         R_W = data.site_xmat[index.payload_site].reshape(-1, 3, 3)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from estimator.arm.delta import LEG_DIRECTIONS
 from estimator.arm.design import OmnidDesign
-from mocobot_sim.scene.models import base_height_m, models_dir, omnid_design
+from mocobot_sim.scene.models import base_height_m, models_dir, omnid_design, posed
 from mocobot_view.bodies.shapes import Shape, body_shape
 
 Array = NDArray[np.float64]
@@ -52,8 +52,7 @@ def robot_shapes(design: OmnidDesign) -> RobotShapes:
     """The Omnid with a design's lengths."""
     model = mujoco.MjModel.from_xml_path(str(models_dir() / "omnid" / "omnid.xml"))
     fit_design(model, design)
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    data = posed(model)
     base = model.body("base").id
     moving = {name: model.body(name).id for name in PATHS}
     standing = [b for b in range(1, model.nbody) if b not in moving.values()]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mocobot_sim.scene.models import posed
 from mocobot_view.bodies.primitives import Triangles, box, capsule, cylinder, ellipsoid, join
 
 Array = NDArray[np.float64]
@@ -16,6 +18,13 @@ VISIBLE_GROUPS = (0, 1, 2)
 """Geom groups that MuJoCo's own viewer shows; the others are by custom for collisions."""
 _PLAIN = np.array([0.5, 0.5, 0.5, 1.0], dtype=np.float32)
 """Colour of a geom that sets none: then its material's counts."""
+_PRIMITIVES: dict[mujoco.mjtGeom, Callable[[Array], Triangles]] = {
+    mujoco.mjtGeom.mjGEOM_BOX: box,
+    mujoco.mjtGeom.mjGEOM_SPHERE: lambda size: ellipsoid(np.full(3, size[0])),
+    mujoco.mjtGeom.mjGEOM_ELLIPSOID: ellipsoid,
+    mujoco.mjtGeom.mjGEOM_CAPSULE: lambda size: capsule(size[0], size[1]),
+    mujoco.mjtGeom.mjGEOM_CYLINDER: lambda size: cylinder(size[0], size[1]),
+}
 
 
 @dataclass(frozen=True)
@@ -54,8 +63,7 @@ def body_shape(
         frame: position [m], (3,), and rotation, (3, 3), of the frame to express it in, at ``qpos0``; None for the
             frame of the first body.
     """
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    data = posed(model)
     origin, R = frame or (data.xpos[bodies[0]].copy(), data.xmat[bodies[0]].reshape(3, 3).copy())
     meshes, colours = [], []
     for g in range(model.ngeom):
@@ -72,21 +80,10 @@ def body_shape(
 
 
 def _triangles(model: mujoco.MjModel, g: int) -> Triangles | None:
-    size = model.geom_size[g]
     kind = mujoco.mjtGeom(int(model.geom_type[g]))
-    if kind == mujoco.mjtGeom.mjGEOM_BOX:
-        return box(size)
-    if kind == mujoco.mjtGeom.mjGEOM_SPHERE:
-        return ellipsoid(np.full(3, size[0]))
-    if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID:
-        return ellipsoid(size)
-    if kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        return capsule(size[0], size[1])
-    if kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-        return cylinder(size[0], size[1])
     if kind == mujoco.mjtGeom.mjGEOM_MESH:
         return _mesh(model, int(model.geom_dataid[g]))
-    return None
+    return _PRIMITIVES[kind](model.geom_size[g]) if kind in _PRIMITIVES else None
 
 
 def _mesh(model: mujoco.MjModel, m: int) -> Triangles:

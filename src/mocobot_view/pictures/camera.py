@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import root_scalar
 
+from mocobot_sim.scene.models import posed
 from mocobot_view.bodies.shapes import VISIBLE_GROUPS
 
 Array = NDArray[np.float64]
@@ -45,9 +46,7 @@ class Camera:
 
 def corners(model: mujoco.MjModel, qpos: Array) -> Array:
     """Corners of the boxes around all that is visible of a model and moves or stands on the floor [m], shape (K, 3)."""
-    data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, qpos)
     seen = np.isin(model.geom_group, VISIBLE_GROUPS) & (model.geom_rbound > 0)  # planes have no bound
     boxes = model.geom_aabb[seen]
     local = boxes[:, None, :3] + CORNERS * boxes[:, None, 3:]

@@ -15,7 +15,7 @@ from discrepancy.result.read import NamedCause
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
-from mocobot_sim.scene.models import models_dir
+from mocobot_sim.scene.models import models_dir, posed
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.scene.team_index import TeamIndex
 from mocobot_sim.trial.assemble import assemble_at_home
@@ -149,9 +149,7 @@ def _shot(
     """Look from where the robots hide each other least, with the light behind the camera's shoulder."""
     model.vis.global_.fovy = FOVY
     points = np.concatenate([corners(model, qpos), marks.points()])
-    data = mujoco.MjData(model)
-    data.qpos[:] = qpos
-    mujoco.mj_kinematics(model, data)
+    data = posed(model, qpos)
     feet = np.array(
         [data.xpos[b] for b in range(model.nbody) if model.body(b).name.endswith("/chassis")]
     ).reshape(-1, 3)
@@ -241,9 +239,7 @@ def _facts(marks: Marks, team: MeasuredTeam, facts: BodyFacts, colour: Colour, t
 
 def _names(marks: Marks, team: MeasuredTeam) -> None:
     """Every robot's name at its foot, in its colour."""
-    data = mujoco.MjData(team.model)
-    data.qpos[:] = team.qpos
-    mujoco.mj_kinematics(team.model, data)
+    data = posed(team.model, team.qpos)
     for i in range(1, team.robots + 1):
         marks.label(f"omnid{i}", data.body(f"omnid{i}/chassis").xpos + NAME_AT, colours.of_robot(i))
 
@@ -259,9 +255,7 @@ def _causes(marks: Marks, team: MeasuredTeam, causes: Sequence[NamedCause]) -> N
     places: dict[str, list[NamedCause]] = {}
     for cause in causes:
         places.setdefault(_place(cause), []).append(cause)
-    data = mujoco.MjData(team.model)
-    data.qpos[:] = team.qpos
-    mujoco.mj_kinematics(team.model, data)
+    data = posed(team.model, team.qpos)
     for here in places.values():
         robot, body = here[0].robot, body_of(here[0])
         if robot is None:

@@ -13,7 +13,6 @@ from mocobot_sim.scene.scene import TeamScene
 class JointSpring(Effect):
     """Torque -k (phi - home) on a driven link, past its series-elastic spring: a tendon with ``stiffness``."""
 
-    cause = "joint_spring"
     ranges: ClassVar = {"stiffness_Nm_per_rad": (0.0, 10.0)}
     robot: int
     joint: int

@@ -2,16 +2,20 @@
 
 import numpy as np
 
+from discrepancy.causes.numbers import Numbers
 from discrepancy.emps.causes.base import Cause, filtered, force
 from discrepancy.emps.causes.sliding import SLOW, direction
 
-LARGER_SMALLER = ("larger", "smaller"), ("smaller", "larger")
+
+def each_way(n: Numbers, name: str, unit: str) -> str:
+    """How much larger or smaller friction is in either direction."""
+    forwards, backwards = n.either(name, "larger", "smaller"), n.either(name, "smaller", "larger")
+    return f"{n(name, unit)} {forwards} forwards and as much {backwards} backwards"
 
 
 class AsymmetricCoulomb(Cause):
     """Dry friction is larger forwards and smaller backwards, by ``asymmetry_N`` each; while it slides, a constant."""
 
-    name = "asymmetric_coulomb"
     family = "constant_force"
     parameters = ("asymmetry_N",)
     scales = (1.0,)
@@ -21,10 +25,7 @@ class AsymmetricCoulomb(Cause):
     )
 
     def sentence(self, n):
-        forwards, backwards = (n.either("asymmetry_N", *words) for words in LARGER_SMALLER)
-        return (
-            f"dry friction is {n('asymmetry_N', 'N')} {forwards} forwards and as much {backwards} backwards"
-        )
+        return f"dry friction is {each_way(n, 'asymmetry_N', 'N')}"
 
     def columns(self, signals, shape):
         return force(filtered(signals, np.abs(direction(signals, shape["slow_mps"]))))

@@ -11,7 +11,6 @@ from estimator.filtering import differentiate, low_pass
 class Backlash(Cause):
     """The carriage, half of the mass and all of the friction, follows the motor with a play of ``play_m`` in all."""
 
-    name = "backlash"
     family = "backlash"
     parameters = ("play_m",)
     scales = (1e-5,)

@@ -1,19 +1,15 @@
 """What every cause of the axis' catalogue offers the diagnosis."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.causes import base
 from discrepancy.causes.base import Shape
 from discrepancy.emps.recording.signals import Signals, smooth
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

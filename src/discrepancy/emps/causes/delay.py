@@ -8,7 +8,6 @@ from estimator.filtering import differentiate
 class Delay(Cause):
     """The force follows the voltage late, beyond the half period that its hold takes anyway."""
 
-    name = "delay"
     family = "delay"
     where = "drive"
     parameters = ("delay_s",)

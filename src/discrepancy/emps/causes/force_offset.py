@@ -8,7 +8,6 @@ from discrepancy.emps.causes.base import Cause, force
 class ForceOffset(Cause):
     """A constant force resists the motion forwards and helps it backwards."""
 
-    name = "force_offset"
     family = "constant_force"
     parameters = ("resisting_N",)
     scales = (1.0,)

@@ -7,7 +7,6 @@ from discrepancy.emps.causes.base import Cause, voltage
 class PositionGain(Cause):
     """The position loop is stronger than its nominal gain says."""
 
-    name = "position_gain"
     family = "position_gain"
     where = "loop"
     parameters = ("excess_per_s",)

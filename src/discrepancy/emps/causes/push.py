@@ -6,7 +6,6 @@ from discrepancy.emps.causes.base import Cause, force
 class Push(Cause):
     """A constant outside force on the carriage during an interval of one block."""
 
-    name = "push"
     family = "push"
     parameters = ("force_N",)
     transient = True

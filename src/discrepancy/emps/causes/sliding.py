@@ -1,15 +1,11 @@
 """Dry friction while it slides, and when it does not."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.causes.free_while import free_while
 from discrepancy.emps.recording.signals import Signals
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 SLOW = tuple({"slow_mps": s} for s in rules.SLOWER_MPS)
 """Speeds below which the direction of friction fades; the first is the catalogue's."""

@@ -1,9 +1,38 @@
 """A train of rectangular pulses as the shape of a cause: ``start_s``, ``period_s``, ``width_s``."""
 
-from __future__ import annotations
+from typing import ClassVar, Literal
 
-from discrepancy.causes.base import Shape
 from discrepancy.causes.numbers import Numbers
+from discrepancy.emps.causes.base import Cause, filtered, force, voltage
+from discrepancy.emps.pulse_search import rectangle
+
+
+class Pulses(Cause):
+    """Rectangular pulses that something adds.
+
+    Attributes:
+        adds_to: the channel.
+    """
+
+    family = "injection"
+    separate = "The law's inputs and its output, logged separately."
+    adds_to: ClassVar[Literal["force", "voltage"]]
+
+    def columns(self, signals, shape):
+        on = filtered(signals, rectangle(signals.log.time, **shape))
+        return force(on) if self.adds_to == "force" else voltage(on)
+
+    def visible(self, signals, hints, values):
+        # Of all rectangles that were tried, the best always fits something.
+        return abs(values[0]) > getattr(hints, f"{self.adds_to}_spread")
+
+    def shapes(self, hints):
+        return [dict(getattr(hints, f"{self.adds_to}_train"))]
+
+    def finer(self, shape):
+        """Trains whose pulses begin or end a sample earlier or later."""
+        moves = [(name, off) for name in ("start_s", "width_s") for off in (-1e-3, 1e-3)]
+        return [dict(shape) | {name: shape[name] + off} for name, off in moves]
 
 
 def train(n: Numbers) -> str:
@@ -11,10 +40,3 @@ def train(n: Numbers) -> str:
     start, period, width = (n.values[name] for name in ("start_s", "period_s", "width_s"))
     begin = f"from {start:.4g} s on" if start >= 0 else "since before the recording began"
     return f"rectangular pulses {begin}, every {period:.5g} s for {width:.4g} s"
-
-
-def sharper(shape: Shape) -> list[Shape]:
-    """Trains whose pulses begin or end a sample earlier or later."""
-    return [
-        dict(shape) | {name: shape[name] + off} for name in ("start_s", "width_s") for off in (-1e-3, 1e-3)
-    ]

@@ -7,7 +7,6 @@ from discrepancy.emps.causes.base import Cause, voltage
 class VelocityGain(Cause):
     """The velocity loop is stronger than its nominal gain says."""
 
-    name = "velocity_gain"
     family = "velocity_gain"
     where = "loop"
     parameters = ("excess_Vs_per_m",)

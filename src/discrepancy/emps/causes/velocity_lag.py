@@ -7,7 +7,6 @@ from discrepancy.emps.recording.signals import at_delay
 class VelocityLag(Cause):
     """The loop uses a velocity that is ``lag_s`` old."""
 
-    name = "velocity_lag"
     family = "velocity_lag"
     where = "loop"
     parameters = ("lag_s",)

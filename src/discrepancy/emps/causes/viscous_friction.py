@@ -6,7 +6,6 @@ from discrepancy.emps.causes.base import Cause, force
 class ViscousFriction(Cause):
     """A force against the motion in proportion to the speed."""
 
-    name = "viscous_friction"
     family = "viscous_friction"
     parameters = ("viscous_Ns_per_m",)
     scales = (10.0,)

@@ -1,15 +1,12 @@
 """What is recorded of the axis."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.quantisation import quantisation_step
-
-Array = NDArray[np.float64]
 
 LIMIT_V = 10.0
 """The drive saturates there (Janot, Gautier, Brunot)."""

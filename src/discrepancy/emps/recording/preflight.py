@@ -1,7 +1,5 @@
 """Is a recording what it seems to be? Stuck sensors, coarse ones, a voltage of the wrong sign, saturation."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +7,9 @@ from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.emps.recording.axis_log import LIMIT_V, AxisLog
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.filtering import differentiate, low_pass
-
-Array = NDArray[np.float64]
 
 
 def checked(log: AxisLog) -> AxisLog:

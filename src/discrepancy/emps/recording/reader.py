@@ -1,19 +1,15 @@
 """Read the benchmark's MAT files; whatever they log of injected pulses is left unread."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 
 from discrepancy.emps.recording.axis_log import AxisLog
 from discrepancy.emps.recording.sampling import on_grid
+from estimator.arrays import Array
 from estimator.errors import InputError
-
-Array = NDArray[np.float64]
 
 SERIES = {
     "t": "time [s]",

@@ -1,7 +1,5 @@
 """One even grid of samples, from stamps that may miss some of it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np
@@ -9,9 +7,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from discrepancy import rules
+from estimator.arrays import Array
 from estimator.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 def on_grid(
@@ -66,12 +63,8 @@ def on_grid(
             f"{name}: {longest:.3g} s are missing from t = {time[k]:.6g} s on; gaps of up to {rules.LONGEST_GAP_S:g} s "
             "can be filled, so cut the recording there"
         )
-    filled = {}
-    for key, values in series.items():
-        if key == "vir":
-            filled[key] = np.interp(grid, grid[at], values)
-        else:
-            filled[key] = CubicSpline(grid[at], values)(grid)
+    filled = {key: CubicSpline(grid[at], values)(grid) for key, values in series.items() if key != "vir"}
+    filled |= {"vir": np.interp(grid, grid[at], series["vir"])}
     note = (
         f"{missing} of {len(grid)} samples are missing (longest gap {1e3 * longest:.3g} ms) and were interpolated; "
         "what is faster than the gaps is lost, the voltage's peaks first."

@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from discrepancy import rules
 from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG, AxisLog
+from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

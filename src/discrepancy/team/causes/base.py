@@ -1,22 +1,20 @@
 """What every cause of the team's catalogue offers the diagnosis."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.causes import base
 from discrepancy.causes.base import Shape
 from discrepancy.rig import Candidate
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
+from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
 
-Array = NDArray[np.float64]
 At = Literal["driven joint", "gimbal joint", "robot", "grasp", "payload"]
 
 GIMBAL_AXES = {1: "z (first)", 2: "y (middle)", 3: "x (last)"}
@@ -133,6 +131,35 @@ class Cause(base.Cause):
         further = dict(zip(self.determined, step[k:], strict=False))
         shape = {name: x + further.get(name, 0.0) for name, x in context.shape.items()}
         return self.physical(values + step[:k], replace(context, shape=shape))
+
+
+class ReadingError(Cause):
+    """An error of one robot's readings, linear in the parameters: taken out of the signals, not added to the model.
+
+    Attributes:
+        adjusted: whether its columns are made of filtered and adjusted signals in place of those recorded.
+    """
+
+    adjusted: ClassVar[bool] = False
+
+    @abstractmethod
+    def errors(
+        self, signals: Signals, robot: int, joint: int, shape: Shape, design: OmnidDesign
+    ) -> Sequence[Mapping[str, Array]]:
+        """Per parameter what one unit adds to ``phi``, ``theta``, ``tau`` of the robot, shape (Q, 3) or (3,)."""
+
+    def columns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Array:
+        signals = trial.adjusted if self.adjusted else trial.signals
+        errors = self.errors(signals, robot, joint, shape, trial.design)
+        return stack([trial.of_signals(robot, **error) for error in errors])
+
+    def undo(
+        self, signals: Signals, trial: TrialLinear, robot: int, joint: int, values: Array, shape: Shape
+    ) -> Signals:
+        for value, error in zip(values, self.errors(signals, robot, joint, shape, trial.design), strict=True):
+            scaled = {name: np.broadcast_to(value * x, (len(signals.time), 3)) for name, x in error.items()}
+            signals = signals.minus(**{n: one_robot(x, trial.robots, robot) for n, x in scaled.items()})
+        return signals
 
 
 def one_joint(values: Array, joint: int) -> Array:

@@ -10,7 +10,6 @@ from estimator.arm.delta import leg_geometry, wrist_motion
 class BaseCompliance(Cause):
     """The base moves by compliance times the horizontal force, which is the reaction to arm and payload."""
 
-    name = "base_compliance"
     family = "compliance"
     parameters = ("compliance_m_per_N",)
     tolerances = (1e-7,)

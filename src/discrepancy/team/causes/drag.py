@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from discrepancy.team.causes.base import Array, Cause, stack
+from discrepancy.team.causes.base import Cause, stack
+from estimator.arrays import Array
 from estimator.estimate.fusion import fuse, fusion_matrix
 
 
 class Drag(Cause):
     """Force -c v on the payload at its centre of mass."""
 
-    name = "drag"
     family = "dissipation"
     parameters = ("coefficient_Ns_per_m",)
     tolerances = (0.05,)

@@ -8,7 +8,6 @@ from discrepancy.team.causes.base import Cause, stack
 class GraspFlex(Cause):
     """The payload's grasp site lags behind the flange by compliance times the force on the payload."""
 
-    name = "grasp_flex"
     family = "compliance"
     parameters = ("compliance_m_per_N",)
     tolerances = (1e-7,)

@@ -13,7 +13,6 @@ class GraspPlay(Cause):
     Below ``force_N`` it has not settled there, and is anywhere between the ends.
     """
 
-    name = "grasp_play"
     family = "compliance"
     parameters = ("play_m",)
     tolerances = (3e-6,)

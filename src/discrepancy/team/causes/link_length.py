@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from discrepancy.team.causes.base import Cause, one_joint, one_robot, stack
-from discrepancy.team.linear.slots import PHI, TAU
+from discrepancy.team.causes.base import ReadingError, one_joint
 from estimator.arm.delta import LEG_DIRECTIONS, leg_geometry
 
 
-class LinkLength(Cause):
+class LinkLength(ReadingError):
     """True length minus design.
 
     At the same wrist the leg's joint then stands at another angle: a length is an error of phi that depends on the
@@ -15,8 +14,8 @@ class LinkLength(Cause):
     is weighed at the true angle.
     """
 
-    name = "link_length"
     family = "arm_geometry"
+    adjusted = True
     parameters = ("proximal_m", "rod_m", "base_radius_m")
     tolerances = (2e-5, 2e-5, 2e-5)
     separate = "Poses spread over the whole workspace separate a wrong length from an encoder's zero."
@@ -32,22 +31,9 @@ class LinkLength(Cause):
         ]
         return "the leg deviates from its design: " + (", ".join(words) or "by nothing that shows")
 
-    def columns(self, trial, robot, joint, shape):
-        phi, tau = trial.s[:, robot, PHI], trial.s[:, robot, TAU]
-        angle, torque = _errors(phi, tau, joint, trial.design)
-        return stack(
-            [
-                trial.of_signals(robot, phi=one_joint(a, joint), tau=t)
-                for a, t in zip(angle, torque, strict=True)
-            ]
-        )
-
-    def undo(self, signals, trial, robot, joint, values, shape):
-        angle, torque = _errors(signals.phi[:, robot], signals.tau[:, robot], joint, trial.design)
-        return signals.minus(
-            phi=one_robot(one_joint(np.einsum("k,kq->q", values, angle), joint), trial.robots, robot),
-            tau=one_robot(np.einsum("k,kqj->qj", values, torque), trial.robots, robot),
-        )
+    def errors(self, signals, robot, joint, shape, design):
+        angle, torque = _errors(signals.phi[:, robot], signals.tau[:, robot], joint, design)
+        return [{"phi": one_joint(a, joint), "tau": t} for a, t in zip(angle, torque, strict=True)]
 
 
 def _errors(phi, tau, joint, design):

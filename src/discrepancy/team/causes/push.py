@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from discrepancy.team.causes.base import Array, Cause, Shape, stack
+from discrepancy.team.causes.base import Cause, Shape, stack
 from discrepancy.team.linear.trial_linear import TrialLinear
+from estimator.arrays import Array
 
 
 def during(trial: TrialLinear, shape: Shape) -> Array:
@@ -15,7 +16,6 @@ def during(trial: TrialLinear, shape: Shape) -> Array:
 class Push(Cause):
     """Force (axes of {b1}) at a payload point, as force and moment at the origin of {1}."""
 
-    name = "push"
     family = "push"
     parameters = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nm", "moment_y_Nm", "moment_z_Nm")
     tolerances = (

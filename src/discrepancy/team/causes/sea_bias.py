@@ -2,13 +2,12 @@
 
 import numpy as np
 
-from discrepancy.team.causes.base import Cause, one_robot, stack
+from discrepancy.team.causes.base import ReadingError
 
 
-class SeaBias(Cause):
+class SeaBias(ReadingError):
     """tau reads too much by a constant."""
 
-    name = "sea_bias"
     family = "sea_torque"
     parameters = ("bias_Nm",)
     tolerances = (3e-3,)
@@ -19,9 +18,5 @@ class SeaBias(Cause):
             f"the torque sensor reads {n('bias_Nm', 'N m')} {n.either('bias_Nm', 'too much', 'too little')}"
         )
 
-    def columns(self, trial, robot, joint, shape):
-        return stack([trial.of_signals(robot, tau=np.eye(3)[joint])])
-
-    def undo(self, signals, trial, robot, joint, values, shape):
-        error = np.tile(values[0] * np.eye(3)[joint], (len(signals.time), 1))
-        return signals.minus(tau=one_robot(error, trial.robots, robot))
+    def errors(self, signals, robot, joint, shape, design):
+        return [{"tau": np.eye(3)[joint]}]

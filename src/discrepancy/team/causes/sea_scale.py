@@ -1,28 +1,23 @@
 """Stiffness of a spring: scale of a torque reading."""
 
-from discrepancy.team.causes.base import Cause, one_joint, one_robot, stack
-from discrepancy.team.linear.slots import TAU
+from discrepancy.team.causes.base import ReadingError, one_joint
 
 
-class SeaScale(Cause):
+class SeaScale(ReadingError):
     """The spring is stiffer than believed by a factor 1 + scale, so the reading is low by it.
 
     A scale common to all springs cannot be told from the payload's mass; a single one can.
     """
 
-    name = "sea_scale"
     family = "sea_torque"
     parameters = ("scale",)
     tolerances = (1e-3,)
+    adjusted = True
     separate = "Loads of both signs on the joint (a known added weight) separate bias, scale and hardening."
 
     def sentence(self, n):
         stiffer, small = n.either("scale", "stiffer", "softer"), n.either("scale", "too small", "too large")
         return f"the spring is {n('scale', '%', 1e2)} {stiffer} than assumed, so the torque is read {small}"
 
-    def columns(self, trial, robot, joint, shape):
-        return stack([trial.of_signals(robot, tau=one_joint(-trial.s[:, robot, TAU][:, joint], joint))])
-
-    def undo(self, signals, trial, robot, joint, values, shape):
-        error = one_joint(-values[0] * signals.tau[:, robot, joint], joint)
-        return signals.minus(tau=one_robot(error, trial.robots, robot))
+    def errors(self, signals, robot, joint, shape, design):
+        return [{"tau": one_joint(-signals.tau[:, robot, joint], joint)}]

@@ -1,15 +1,32 @@
-"""Signals at other instants."""
-
-from __future__ import annotations
+"""Readings of other instants than they say."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-Array = NDArray[np.float64]
+from discrepancy.team.causes.base import ReadingError, one_robot
+from discrepancy.team.linear.signals import with_rates
 
 
-def advanced(x: Array, rate_hz: float, lead_s: float) -> Array:
-    """x(t + lead) of uniform samples, shape (Q, ...); held at the ends."""
-    time = np.arange(len(x)) / rate_hz
-    return CubicSpline(time, x)(np.clip(time + lead_s, 0.0, time[-1]))
+class Late(ReadingError):
+    """A robot's readings are those of ``delay_s`` ago.
+
+    Attributes:
+        readings: which of them.
+    """
+
+    parameters = ("delay_s",)
+    at = "robot"
+    readings = ("tau",)
+
+    def errors(self, signals, robot, joint, shape, design):
+        rates = {x: with_rates(getattr(signals, x)[:, robot], signals.rate_hz)[1] for x in self.readings}
+        return [{x: -rate for x, rate in rates.items()}]
+
+    def undo(self, signals, trial, robot, joint, values, shape):
+        time = np.arange(len(signals.time)) / signals.rate_hz
+        at = np.clip(time + values[0], 0.0, time[-1])  # held at the ends
+        late = {}
+        for name in self.readings:
+            x = getattr(signals, name)[:, robot]
+            late[name] = one_robot(x - CubicSpline(time, x)(at), trial.robots, robot)
+        return signals.minus(**late)

@@ -6,7 +6,8 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from discrepancy import rules
-from discrepancy.team.causes.base import Array, Cause, stack
+from discrepancy.team.causes.base import Cause, stack
+from estimator.arrays import Array
 from estimator.estimate.fusion import fuse
 
 
@@ -17,7 +18,6 @@ class Slosh(Cause):
     -mass x'' at the point. Its weight and rigid part are in the payload's own parameters.
     """
 
-    name = "slosh"
     family = "slosh"
     parameters = ("mass_kg", "moment_x_kgm", "moment_y_kgm", "moment_z_kgm")
     scales = (0.01, 0.005, 0.005, 0.005)

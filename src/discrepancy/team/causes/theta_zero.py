@@ -2,13 +2,12 @@
 
 import numpy as np
 
-from discrepancy.team.causes.base import Cause, one_robot, stack
+from discrepancy.team.causes.base import ReadingError
 
 
-class ThetaZero(Cause):
+class ThetaZero(ReadingError):
     """theta reads too much by a constant; joints 1, 2, 3 are z, y, x."""
 
-    name = "theta_zero"
     family = "gimbal_zero"
     parameters = ("zero_rad",)
     tolerances = (1e-4,)
@@ -22,9 +21,5 @@ class ThetaZero(Cause):
         much = n.either("zero_rad", "too much", "too little")
         return f"the encoder of the gimbal joint reads {n('zero_rad', 'mrad', 1e3)} {much}"
 
-    def columns(self, trial, robot, joint, shape):
-        return stack([trial.of_signals(robot, theta=np.eye(3)[joint])])
-
-    def undo(self, signals, trial, robot, joint, values, shape):
-        error = np.tile(values[0] * np.eye(3)[joint], (len(signals.time), 1))
-        return signals.minus(theta=one_robot(error, trial.robots, robot))
+    def errors(self, signals, robot, joint, shape, design):
+        return [{"theta": np.eye(3)[joint]}]

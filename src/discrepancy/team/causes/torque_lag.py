@@ -1,13 +1,12 @@
 """A first-order lag inside the torque sensors."""
 
-from discrepancy.team.causes.base import Cause, one_robot, stack
+from discrepancy.team.causes.base import ReadingError
 from discrepancy.team.linear.signals import with_rates
 
 
-class TorqueLag(Cause):
+class TorqueLag(ReadingError):
     """All torques of a robot lag by a first-order filter, which the controller sees as well."""
 
-    name = "torque_lag"
     family = "dissipation"
     parameters = ("time_constant_s",)
     tolerances = (1e-4,)
@@ -18,11 +17,6 @@ class TorqueLag(Cause):
     def sentence(self, n):
         return f"the torque sensor follows with a time constant of {n('time_constant_s', 'ms', 1e3, signed=True)}"
 
-    def columns(self, trial, robot, joint, shape):
-        rate = with_rates(trial.signals.tau[:, robot], trial.signals.rate_hz)[1]
-        return stack([trial.of_signals(robot, tau=-rate)])
-
-    def undo(self, signals, trial, robot, joint, values, shape):
+    def errors(self, signals, robot, joint, shape, design):
         # truth = reading + T d(reading)/dt
-        rate = with_rates(signals.tau[:, robot], signals.rate_hz)[1]
-        return signals.minus(tau=one_robot(-values[0] * rate, trial.robots, robot))
+        return [{"tau": -with_rates(signals.tau[:, robot], signals.rate_hz)[1]}]

@@ -12,13 +12,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.team.linear.residual import balance
 from discrepancy.team.linear.slots import TAU
 from discrepancy.team.linear.trial_linear import TrialLinear
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,5 @@
 """Derivative of a trial's residual by every robot's signals."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,11 +7,10 @@ from discrepancy import rules
 from discrepancy.team.linear.residual import Bases, Shared, robot_data
 from discrepancy.team.linear.slots import COUNT, STEPS
 from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
 from estimator.estimate.fusion import fuse, fusion_matrix
 from estimator.estimate.principal import inertia_matrix
 from estimator.signals.grasp_data import GraspData
-
-Array = NDArray[np.float64]
 
 
 def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, design: OmnidDesign) -> Array:

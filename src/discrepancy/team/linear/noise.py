@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import butter, sosfiltfilt
 
 from discrepancy import rules
 from discrepancy.team.linear.signals import Signals
+from estimator.arrays import Array
 from estimator.filtering import low_pass
 from estimator.quantisation import quantisation_step
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,8 @@ from scipy.sparse import csr_array
 
 from discrepancy import rules
 from discrepancy.team.linear.signals import Signals
+from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,19 +13,17 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.delta import forward_kinematics, leg_geometry, wrist_motion
 from estimator.arm.design import OmnidDesign
 from estimator.arm.dynamics import wrench_on_payload
 from estimator.arm.gimbal import angular_motion, rotation
+from estimator.arrays import Array
 from estimator.estimate.fusion import fuse
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.joint import newton_euler_regressor
 from estimator.signals.grasp_data import GraspData
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy import rules
+from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass, trim_slice
 from estimator.recording.model import Recording
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

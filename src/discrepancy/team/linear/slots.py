@@ -1,7 +1,5 @@
 """The 21 numbers that describe one robot at an instant: three of each kind, one a joint."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

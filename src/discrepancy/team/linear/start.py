@@ -1,13 +1,10 @@
 """The unknowns before any cause: from the estimate, then Gauss-Newton on the whitened residual."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from discrepancy import rules
@@ -16,18 +13,17 @@ from discrepancy.team.linear.adjust import TorqueNoise, with_adjusted_torques
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.residual import Bases, Shared, balance, grasp_data, pose_residual
-from discrepancy.team.linear.signals import Signals, with_rates
-from discrepancy.team.linear.trial_linear import TrialLinear, linearise
+from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.trial_linear import TrialLinear, filtered, linearise
 from estimator import so3
 from estimator.arm.delta import forward_kinematics
 from estimator.arm.design import OmnidDesign
 from estimator.arm.gimbal import rotation
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
-
-Array = NDArray[np.float64]
 
 
 def start_shared(estimate: PayloadEstimate) -> Shared:
@@ -37,18 +33,10 @@ def start_shared(estimate: PayloadEstimate) -> Shared:
         InputError: grasps, mass or centre of mass are missing.
     """
     grasps, mass, c = estimate.grasps, estimate.mass, estimate.p_1c
-    missing = [
-        name
-        for name, value in (
-            ("grasps", estimate.grasps),
-            ("mass", estimate.mass),
-            ("centre of mass", estimate.p_1c),
-        )
-        if value is None
-    ]
-    if missing or grasps is None or mass is None or c is None:
+    if grasps is None or mass is None or c is None:
+        missing = "grasps" if grasps is None else "mass" if mass is None else "centre of mass"
         raise InputError(
-            f"these recordings do not determine the {missing[0]}, so there is nothing to hold the data against; "
+            f"these recordings do not determine the {missing}, so there is nothing to hold the data against; "
             "add a recording with motion in all axes"
         )
     inertia = estimate.inertia.inertia if estimate.inertia else np.zeros((3, 3))
@@ -123,11 +111,7 @@ def linearised(
 def exact_residual(
     signals: Signals, shared: Shared, bases: Bases, design: OmnidDesign, reduction: Reduction
 ) -> Array:
-    rate = signals.rate_hz
-    Q, N = signals.phi.shape[:2]
-    parts = with_rates(signals.phi, rate), with_rates(signals.theta, rate), with_rates(signals.tau, rate)[:1]
-    s = np.concatenate(parts).transpose(1, 2, 0, 3).reshape(Q, N, -1)
-    force = balance(grasp_data(s, design, rate), shared)[0]
+    force = balance(grasp_data(filtered(signals), design, signals.rate_hz), shared)[0]
     pose = pose_residual(signals.phi, signals.theta, shared, bases, design)
     return reduction(np.concatenate([pose, force], axis=1))
 

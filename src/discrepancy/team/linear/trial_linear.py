@@ -1,12 +1,10 @@
 """One trial, linearised: its residual, how robots' signals and unknowns move it, and its whitening."""
 
-from __future__ import annotations
-
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.team.linear.jacobian import by_signals, needed_wrench
 from discrepancy.team.linear.reduction import Reduction
@@ -21,10 +19,9 @@ from discrepancy.team.linear.residual import (
 from discrepancy.team.linear.signals import Signals, with_rates
 from discrepancy.team.linear.slots import COUNT, PHI, TAU, THETA, with_its_rates
 from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
 from estimator.estimate.fusion import fusion_matrix
 from estimator.signals.grasp_data import GraspData
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +62,12 @@ class TrialLinear:
     def channels(self) -> int:
         """Number of residual channels, 6 N."""
         return 6 * self.robots
+
+    @property
+    def adjusted(self) -> Signals:
+        """The signals filtered, and with their torques at their adjusted values."""
+        phi, theta, tau = (self.s[..., kind] for kind in (PHI, THETA, TAU))
+        return Signals(self.signals.time, phi, theta, tau, self.signals.rate_hz)
 
     def of_signals(
         self, robot: int, phi: Array | None = None, theta: Array | None = None, tau: Array | None = None
@@ -157,37 +160,42 @@ def linearise(
     signals: Signals, shared: Shared, bases: Bases, design: OmnidDesign, reduction: Reduction, *, full: bool
 ) -> TrialLinear:
     """Linearise one trial; without ``full`` the robots' signals are left out (J is empty)."""
-    rate = signals.rate_hz
-    Q, N = signals.phi.shape[:2]
-    phi, theta = with_rates(signals.phi, rate), with_rates(signals.theta, rate)
-    tau = with_rates(signals.tau, rate)[:1]
-    s = np.concatenate([phi, theta, tau]).transpose(1, 2, 0, 3).reshape(Q, N, COUNT)
-    data = grasp_data(s, design, rate)
+    s = filtered(signals)
+    Q, N = s.shape[:2]
+    data = grasp_data(s, design, signals.rate_hz)
     force, Y = balance(data, shared)
     pose = pose_residual(signals.phi, signals.theta, shared, bases, design)
     residual = reduction(np.concatenate([pose, force], axis=1))
 
+    def both(x: Array) -> Array:
+        moved = shared.moved(x)
+        pose = pose_error(data.R_bi, data.p_bi, moved, bases)
+        return np.concatenate([pose, balance(data, moved)[0]], axis=1)
+
     C, split = 6 * N, 6 * (N - 1)
     by_shared = np.zeros((Q, C, split + 10))
-    by_bases = np.zeros((Q, split, 4 * (N - 1)))
     by_shared[:, split:, split:] = -Y
     for k in range(split):
-        at = np.zeros(split + 10)
-        ends = []
-        for at[k] in (1e-5, -1e-5):
-            moved = shared.moved(at)
-            pose = pose_error(data.R_bi, data.p_bi, moved, bases)
-            ends.append(np.concatenate([pose, balance(data, moved)[0]], axis=1))
-        by_shared[:, :, k] = (ends[0] - ends[1]) / 2e-5
+        by_shared[:, :, k] = _slope(both, k, split + 10)
+    by_bases = np.zeros((Q, C, 4 * (N - 1)))
     for k in range(4 * (N - 1)):
-        at = np.zeros(4 * (N - 1))
-        ends = []
-        for at[k] in (1e-5, -1e-5):
-            ends.append(pose_error(data.R_bi, data.p_bi, shared, bases.moved(at)))
-        by_bases[:, :, k] = (ends[0] - ends[1]) / 2e-5
+        by_bases[:, :split, k] = _slope(
+            lambda x: pose_error(data.R_bi, data.p_bi, shared, bases.moved(x)), k, 4 * (N - 1)
+        )
     J = by_signals(s, data, shared, bases, design) if full else np.zeros((N, 0, C, COUNT))
-    padded = np.zeros((len(reduction.sample), C, by_bases.shape[2]))
-    padded[:, :split] = reduction(by_bases)
-    return TrialLinear(
-        signals, s, data, shared, bases, design, reduction, residual, J, reduction(by_shared), padded
-    )
+    columns = reduction(by_shared), reduction(by_bases)
+    return TrialLinear(signals, s, data, shared, bases, design, reduction, residual, J, *columns)
+
+
+def _slope(of: Callable[[Array], Array], k: int, count: int) -> Array:
+    """Central difference of a function of ``count`` unknowns by the k-th, at nought."""
+    step = 1e-5 * np.eye(count)[k]
+    return (of(step) - of(-step)) / 2e-5
+
+
+def filtered(signals: Signals) -> Array:
+    """Signals as ``slots`` has them, shape (Q, N, 21)."""
+    rate, (Q, N) = signals.rate_hz, signals.phi.shape[:2]
+    angles = with_rates(signals.phi, rate), with_rates(signals.theta, rate)
+    parts = np.concatenate([*angles, with_rates(signals.tau, rate)[:1]])
+    return parts.transpose(1, 2, 0, 3).reshape(Q, N, COUNT)

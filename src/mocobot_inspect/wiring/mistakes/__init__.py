@@ -1,4 +1,4 @@
-"""Mistakes in the wiring of a log that are looked for, one suspicion per file."""
+"""Mistakes in the wiring of a log that are looked for."""
 
 from __future__ import annotations
 
@@ -6,27 +6,18 @@ from collections.abc import Iterator
 
 from estimator.arm.design import OmnidDesign
 from mocobot_inspect.signals import Signals
-from mocobot_inspect.wiring.mistakes import (
-    exchanged_groups,
-    gimbal_axes,
-    joint_order,
-    joint_sign,
-    swapped_robots,
-    torque_sign,
-    wrist_axes,
-    wrong_unit,
-    wrong_zero,
-)
+from mocobot_inspect.wiring.mistakes import exchanged_groups, swapped_robots, wrong_unit, wrong_zero
 from mocobot_inspect.wiring.mistakes.base import Mistake
+from mocobot_inspect.wiring.mistakes.rearranged import REARRANGED
 
 SUSPICIONS = (
     wrong_unit,
-    torque_sign,
-    gimbal_axes,
+    REARRANGED["torque_sign"],
+    REARRANGED["gimbal_axes"],
     swapped_robots,
-    joint_order,
-    joint_sign,
-    wrist_axes,
+    REARRANGED["joint_order"],
+    REARRANGED["joint_sign"],
+    REARRANGED["wrist_axes"],
     exchanged_groups,
     wrong_zero,
 )

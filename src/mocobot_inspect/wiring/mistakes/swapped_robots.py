@@ -9,11 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Any, ClassVar
+from typing import Any
 
 from estimator.arm.design import OmnidDesign
-from mocobot_inspect.signals import KINDS, Kind, Signals
-from mocobot_inspect.wiring.mistakes.base import NAMES, Mistake, channel_names, listed
+from mocobot_inspect.signals import KINDS, Signals
+from mocobot_inspect.wiring.mistakes.base import NAMES, Mistake, listed
 
 MOST_AT_ONCE = 3
 
@@ -23,45 +23,29 @@ class SwappedRobots(Mistake):
     """One group of several robots in the wrong order.
 
     Attributes:
-        group: which group.
         order: true robot i is logged as robot ``order[i]``.
     """
 
-    group: Kind
     order: tuple[int, ...]
 
-    kind: ClassVar[str] = "swapped_robots"
-
     def undo(self, signals: Signals) -> Signals:
-        """See ``Mistake.undo``."""
-        return signals.having(self.group, signals.group(self.group).renumbered(self.order))
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """See ``Mistake.channels``."""
-        return channel_names(self.level, self.group)
+        (group,) = self.groups
+        return signals.having(group, signals.group(group).renumbered(self.order))
 
     def what(self) -> str:
-        """See ``Mistake.what``."""
-        name = NAMES[self.level][self.group]
         if len(self.robots) == 2:
-            others = " and ".join(NAMES[self.level][kind] for kind in KINDS if kind != self.group)
-            return (
-                f"their {name} columns are exchanged (or those of {others}: the same but for their numbers)"
-            )
+            others = " and ".join(NAMES[self.level][kind] for kind in KINDS if kind not in self.groups)
+            return f"their {self.named} columns are exchanged (or those of {others}: the same but for their numbers)"
         parts = [f"robot {self.order[i] + 1} has those of robot {i + 1}" for i in self.robots]
-        return f"their {name} columns are mixed up: {listed(parts)}"
+        return f"their {self.named} columns are mixed up: {listed(parts)}"
 
     def subject(self) -> str:
-        """See ``Mistake.subject``."""
-        return f"{NAMES[self.level][self.group]} of robots exchanged"
+        return f"{self.named} of robots exchanged"
 
     def who(self) -> str:
-        """See ``Mistake.who``."""
         return f"robots {listed([str(robot + 1) for robot in self.robots])}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
         return super().to_dict() | {"order": [robot + 1 for robot in self.order]}
 
 
@@ -80,4 +64,4 @@ def suspects(signals: Signals, design: OmnidDesign) -> Iterator[SwappedRobots]:
             orders.append((three, tuple(order)))
     for robots, order in orders:
         for group in KINDS:
-            yield SwappedRobots(signals.level, robots, N, group, order)
+            yield SwappedRobots("swapped_robots", signals.level, robots, N, (group,), order)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
 from estimator.arm.design import OmnidDesign
 from mocobot_inspect.signals import Kind, Signals
-from mocobot_inspect.wiring.mistakes.base import NAMES, Mistake, channel_names, teams
+from mocobot_inspect.wiring.mistakes.base import Mistake, teams
 
 DEGREE = float(np.pi / 180)
 ANGLES = (
@@ -33,36 +33,24 @@ class WrongUnit(Mistake):
     """A group that has to be scaled.
 
     Attributes:
-        group: which group.
         words: the unit in words.
         factor: from the logged number to SI.
     """
 
-    group: Kind
     words: str
     factor: float
 
-    kind: ClassVar[str] = "wrong_unit"
-
     def undo(self, signals: Signals) -> Signals:
-        """See ``Mistake.undo``."""
-        return signals.having(self.group, signals.group(self.group).scaled(self.robots, self.factor))
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """See ``Mistake.channels``."""
-        return channel_names(self.level, self.group)
+        (group,) = self.groups
+        return signals.having(group, signals.group(group).scaled(self.robots, self.factor))
 
     def what(self) -> str:
-        """See ``Mistake.what``."""
-        return f"{NAMES[self.level][self.group]} is {self.words}"
+        return f"{self.named} is {self.words}"
 
     def subject(self) -> str:
-        """See ``Mistake.subject``."""
-        return f"unit of {NAMES[self.level][self.group]}"
+        return f"unit of {self.named}"
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain JSON values."""
         return super().to_dict() | {"factor": self.factor}
 
 
@@ -77,7 +65,7 @@ def suspects(signals: Signals, design: OmnidDesign) -> Iterator[WrongUnit]:
     for robots in teams(signals.robots):
         for group, choices in units.items():
             for words, factor in (*choices, *_counts(signals, group)):
-                yield WrongUnit(signals.level, robots, signals.robots, group, words, factor)
+                yield WrongUnit("wrong_unit", signals.level, robots, signals.robots, (group,), words, factor)
 
 
 def _counts(signals: Signals, group: Kind) -> Iterator[tuple[str, float]]:

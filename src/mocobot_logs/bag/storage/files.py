@@ -23,7 +23,7 @@ from mocobot_logs.bag.storage.mcap import MAGIC, McapBag
 from mocobot_logs.bag.storage.sqlite import HEAD, SqliteBag
 from mocobot_logs.bag.storage.unpack import UnpackError, unpack_file, unpack_message
 from mocobot_logs.claims import read_small
-from mocobot_logs.faults import detail_of
+from mocobot_logs.faults import detail_of, readable
 
 VERSIONS = range(1, 10)
 """Of ``metadata.yaml`` that are read; all that rosbag2 has written so far."""
@@ -156,15 +156,13 @@ def _unpacked(messages: Messages, where: str) -> Messages:
 
 
 def _head(path: Path) -> bytes:
-    try:
+    with readable(str(path)):
         if not path.exists():
             raise InputError(f"{path}: there is no such file, though the bag's {METADATA} names it")
         if not path.is_file():
             raise InputError(f"{path}: is not a regular file")
         with path.open("rb") as file:
             return file.read(16)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
 
 
 def _has_suffix(path: Path) -> bool:
@@ -174,7 +172,7 @@ def _has_suffix(path: Path) -> bool:
 def _read_metadata(folder: Path) -> tuple[list[str], bool]:
     """Names of the files, and whether every message is compressed by itself."""
     path = folder / METADATA
-    try:
+    with readable(str(path)):
         if not path.is_file():
             found = sorted(entry.name for entry in folder.iterdir() if _has_suffix(entry))
             if not found:
@@ -183,8 +181,6 @@ def _read_metadata(folder: Path) -> tuple[list[str], bool]:
                 f"{folder}: has no {METADATA}; `ros2 bag reindex` writes it, or name a single file such as "
                 f"{folder / found[0]}"
             )
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
     content = read_small(path, _METADATA_BYTES, str(path), "bag's metadata")
     values = _load(content, path).get(_KEY)
     if not isinstance(values, dict):

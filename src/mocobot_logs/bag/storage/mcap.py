@@ -25,6 +25,7 @@ from mcap.records import Channel, Schema, Statistics
 from estimator.errors import InputError
 from mocobot_logs.bag.messages import BLOCK_BYTES, Messages, Topic, check_sizes, merged
 from mocobot_logs.bag.storage.unpack import CHUNK_BYTES, UnpackError, unpack
+from mocobot_logs.faults import readable
 
 MAGIC = b"\x89MCAP0\r\n"
 DEFINITION_BYTES = 256 << 10
@@ -230,19 +231,15 @@ class McapBag:
         return InputError(f"{self.name}: damaged at byte {offset}, {what}")
 
     def _open(self) -> BinaryIO:
-        try:
+        with readable(self.name):
             return self._path.open("rb")
-        except OSError as error:
-            raise InputError(f"{self.name}: cannot be read ({error.strerror or error})") from error
 
     def _read(self, file: BinaryIO, length: int, at: int | None = None) -> bytes:
         """So many bytes from where the file is, or from ``at``; the caller knows that the file has them."""
-        try:
+        with readable(self.name):
             if at is not None:
                 file.seek(at)
             content = file.read(length)
-        except OSError as error:
-            raise InputError(f"{self.name}: cannot be read ({error.strerror or error})") from error
         if len(content) < length:
             raise InputError(f"{self.name}: became shorter while it was read")
         return content

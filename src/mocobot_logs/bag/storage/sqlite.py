@@ -17,7 +17,7 @@ import numpy as np
 
 from estimator.errors import InputError
 from mocobot_logs.bag.messages import BLOCK_BYTES, MESSAGE_BYTES, Messages, Topic, joined, merged
-from mocobot_logs.faults import detail_of
+from mocobot_logs.faults import detail_of, readable
 
 HEAD = b"SQLite format 3\0"
 _OPERATIONS = 1_000_000
@@ -120,7 +120,7 @@ class SqliteBag:
             return connection.execute(query, ids).fetchone() is not None
 
     def _check_file(self) -> None:
-        try:
+        with readable(self.name):
             with self.path.open("rb") as file:
                 head = file.read(100)
             self.size = self.path.stat().st_size
@@ -131,8 +131,6 @@ class SqliteBag:
                         f"{self.name}: its recording was not closed, {side.name} holds a part of it; "
                         f"`sqlite3 {self.path.name} 'PRAGMA wal_checkpoint(TRUNCATE)'` puts it in place"
                     )
-        except OSError as error:
-            raise InputError(f"{self.name}: cannot be read ({error.strerror or error})") from error
         if not head.startswith(HEAD):
             raise InputError(f"{self.name}: not an SQLite file, it begins with other bytes")
         page = int.from_bytes(head[16:18], "big")
