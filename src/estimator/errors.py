@@ -3,7 +3,3 @@
 
 class InputError(ValueError):
     """Bad input from the user: one sentence that names the file, the field, the value and what is allowed."""
-
-
-class UndeterminedError(ValueError):
-    """The data cannot determine what was asked; the sentence says which direction is missing."""

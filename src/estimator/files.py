@@ -1,8 +1,7 @@
 """Files and folders that appear whole or not at all: written beside their place, then renamed into it."""
 
-from __future__ import annotations
-
 import contextlib
+import hashlib
 import json
 import os
 import shutil
@@ -25,7 +24,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     real = Path(os.path.realpath(path))
     temporary = real.parent / f".{uuid.uuid4().hex}.tmp"
     try:
-        with _as_input_error(path):
+        with system_errors(path):
             yield temporary
             temporary.replace(real)
     finally:
@@ -44,10 +43,10 @@ def whole_folder(path: Path) -> Iterator[Path]:
     mark = uuid.uuid4().hex
     temporary, old = real.parent / f".{mark}.tmp", real.parent / f".{mark}.old"
     try:
-        with _as_input_error(path):
+        with system_errors(path):
             temporary.mkdir()
         yield temporary
-        with _as_input_error(path):
+        with system_errors(path):
             if real.exists():
                 real.rename(old)
             temporary.rename(real)
@@ -70,17 +69,25 @@ def check_target(path: Path, suffix: str = "") -> None:
     Raises:
         InputError: the target is a folder, its name ends otherwise, or its folder does not exist.
     """
-    try:
+    with system_errors(path):  # a name too long for the system
         if path.is_dir():
             raise InputError(f"{path}: is a folder; name the file to write")
         if suffix and path.suffix != suffix:
             raise InputError(f"{path}: the file's name must end in {suffix}")
         if not path.parent.is_dir():
             raise InputError(f"{path.parent}: there is no such folder")
-    except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL
-        raise InputError(
-            f"{path}: cannot be written ({getattr(error, 'strerror', None) or error})"
-        ) from error
+
+
+def file_facts(path: Path) -> dict[str, Any]:
+    """Name, path as given, size and SHA-256 of a file, which is read piece by piece.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    with system_errors(path, "read"), path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256").hexdigest()
+        size = os.fstat(file.fileno()).st_size
+    return {"name": path.name, "path": str(path), "bytes": size, "sha256": digest}
 
 
 def write_text(path: Path, text: str) -> None:
@@ -103,8 +110,13 @@ def write_json(path: Path, values: Mapping[str, Any]) -> None:
 
 
 @contextmanager
-def _as_input_error(path: Path) -> Iterator[None]:
+def system_errors(path: Path, done: str = "written") -> Iterator[None]:
+    """A block in which what the operating system refuses becomes one sentence: that ``path`` cannot be ``done``.
+
+    Raises:
+        InputError: it refuses something.
+    """
     try:
         yield
     except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
+        raise InputError(f"{path}: cannot be {done} ({error.strerror or error})") from error

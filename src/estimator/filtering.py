@@ -1,7 +1,5 @@
 """Zero-phase low-pass filter, high-order differences and trimming of uniformly sampled signals."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

@@ -1,7 +1,5 @@
 """Values with their standard errors as text: as many digits as the error has meaning."""
 
-from __future__ import annotations
-
 import math
 
 

@@ -1,7 +1,5 @@
 """The step of a quantised channel, from its samples alone."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """The few SO(3) operations that scipy's ``Rotation`` lacks, or is slow at."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation

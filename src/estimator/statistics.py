@@ -1,7 +1,5 @@
 """Root mean squares."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

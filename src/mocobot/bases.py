@@ -1,7 +1,5 @@
 """Bases that drive: planned motions in the plane, mecanum kinematics, one robot alone, and what a drive logs."""
 
-from __future__ import annotations
-
 from mocobot_sim.base.design import WHEELS, BaseDesign, base_design
 from mocobot_sim.base.drive import BaseDrive, DriveLog
 from mocobot_sim.base.follow import FollowingDrive

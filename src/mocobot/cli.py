@@ -1,7 +1,5 @@
 """The ``mocobot`` command: a thin edge over the estimator and the simulator."""
 
-from __future__ import annotations
-
 import io
 import os
 import sys

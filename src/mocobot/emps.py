@@ -1,7 +1,5 @@
 """The EMPS benchmark's axis: diagnose its recordings, and measure what every cause is worth (docs/emps.md)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
 

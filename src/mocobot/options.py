@@ -1,7 +1,5 @@
 """Options of every command, as the command line shows them: data only, so that the help needs nothing else."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal

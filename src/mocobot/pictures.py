@@ -1,7 +1,5 @@
 """Pictures without a screen: teams at rest, teams as estimated, and models in any state."""
 
-from __future__ import annotations
-
 from mocobot_view.pictures.camera import Camera
 from mocobot_view.pictures.marks import Marks
 from mocobot_view.pictures.render import make_folder, render

@@ -1,7 +1,5 @@
 """The robots: design numbers, kinematics of the arm, deviations from the design, control gains."""
 
-from __future__ import annotations
-
 from estimator.arm.delta import forward_kinematics, inverse_kinematics
 from estimator.arm.design import OmnidDesign
 from mocobot_sim.control.control import ControlGains

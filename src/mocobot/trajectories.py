@@ -1,7 +1,5 @@
 """Commanded motions of the wrists, sampled at ``RATE_HZ``."""
 
-from __future__ import annotations
-
 from mocobot_sim.trial.trajectories import (
     RATE_HZ,
     Trajectory,

@@ -1,7 +1,5 @@
 """The page around its content: head, themes, navigation, script, in one file that needs nothing else."""
 
-from __future__ import annotations
-
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 

@@ -1,7 +1,5 @@
 """What a folder holds that a report can be made of."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,6 +17,7 @@ from estimator.errors import InputError
 from estimator.estimate.result import FORMAT as ESTIMATE
 from estimator.estimate.result import VERSION as ESTIMATE_VERSION
 from estimator.estimate.result import PayloadEstimate
+from estimator.files import system_errors
 from estimator.strict import Fields, is_number, read_json
 from mocobot_sim.paper.tables import paper_tables, summary_table
 from mocobot_view.facts.fact_files import read_estimate
@@ -97,14 +96,12 @@ def read_folder(folder: Path) -> Contents:
     Raises:
         InputError: there is no such folder, it holds no result, or one of them cannot be read.
     """
-    try:
+    with system_errors(folder, "read"):
         if not folder.exists():
             raise InputError(f"{folder}: there is no such folder; it must hold {SOUGHT}")
         if not folder.is_dir():
             raise InputError(f"{folder}: is a file; name the folder that holds it")
         jsons = sorted(path for path in folder.glob("*.json") if path.is_file())
-    except OSError as error:
-        raise InputError(f"{folder}: cannot be read ({error.strerror or error})") from error
     paper = diagnosis = None
     estimates, files = [], []
     for path in jsons:
@@ -132,13 +129,11 @@ def read_folder(folder: Path) -> Contents:
 def _paper(folder: Path) -> Paper:
     path = folder / "paper.json"
     scores = read_json(path, "the scores of the paper's experiment")
-    try:
+    with complete(path, "not the scores of the paper's experiment"):
         tables = [*paper_tables(scores), summary_table(scores)]
         cells = [cell for table in tables for row in table.rows for cell in row.cells]
         if not cells or not all(_number(x) for cell in cells for x in (cell.value, cell.spread)):
             raise ValueError("it must hold errors, numbers of at least 0 or null")
-    except (KeyError, TypeError, ValueError, AttributeError, StopIteration) as error:
-        raise InputError(f"{path}: not the scores of the paper's experiment ({_words(error)})") from error
     found = {
         (payload, preset): read_estimate(file)
         for preset, by_payload in scores.items()
@@ -181,10 +176,8 @@ def _diagnosis(path: Path, values: Json, other: Diagnosed | None) -> Diagnosed:
     if other is not None:
         raise InputError(f"{path}: is a second diagnosis in one folder; a report takes one")
     parse_diagnosis(values, path)
-    try:
+    with complete(path, "not a complete diagnosis"):
         format_diagnosis(values)  # touches most keys that a report has to show
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
-        raise InputError(f"{path}: not a complete diagnosis ({_words(error)})") from error
     file = path.parent / RESIDUALS
     traces, channels = load_traces(file) if file.is_file() else ([], [])
     if traces and [trace.name for trace in traces] != list(values["recordings"]):
@@ -193,7 +186,7 @@ def _diagnosis(path: Path, values: Json, other: Diagnosed | None) -> Diagnosed:
 
 
 @contextmanager
-def complete(path: Path) -> Iterator[None]:
+def complete(path: Path, otherwise: str = "not complete") -> Iterator[None]:
     """A block that reads a file's values; where one is missing or of another kind, the file is what is wrong.
 
     Raises:
@@ -201,15 +194,20 @@ def complete(path: Path) -> Iterator[None]:
     """
     try:
         yield
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
-        raise InputError(f"{path}: not complete ({_words(error)})") from error
+    except (
+        KeyError,
+        TypeError,
+        ValueError,
+        AttributeError,
+        IndexError,
+        OverflowError,
+        StopIteration,
+    ) as error:
+        text = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) and error.args else str(error)
+        words = " ".join(text.split())[:120] or type(error).__name__
+        raise InputError(f"{path}: {otherwise} ({words})") from error
 
 
 def _number(value: Any) -> bool:
     """Whether a score is null or a finite number of at least 0."""
     return value is None or (is_number(value) and value >= 0)
-
-
-def _words(error: Exception) -> str:
-    text = f"{error.args[0]!r} is missing" if isinstance(error, KeyError) and error.args else str(error)
-    return " ".join(text.split())[:120] or type(error).__name__

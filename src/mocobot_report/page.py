@@ -1,12 +1,11 @@
 """The report of a result folder: the answer, a part for every result, provenance."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
+from estimator.files import whole_file
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import el, to_bytes
 from mocobot_report.diagnosis import part as diagnosis_part
@@ -15,7 +14,7 @@ from mocobot_report.estimate import part as estimate_part
 from mocobot_report.folder import Contents, Diagnosed, Estimated, Paper, complete, read_folder
 from mocobot_report.paper import part as paper_part
 from mocobot_report.provenance_part import provenance_part
-from mocobot_report.target import check_page, write_page
+from mocobot_report.target import check_page
 
 NAME = "report.html"
 Say = Callable[[str], object]
@@ -38,7 +37,8 @@ def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: Non
     contents = read_folder(folder)
     out = folder / NAME if out is None else out
     check_page(out)
-    write_page(out, make_page(contents, say))
+    with whole_file(out) as temporary:
+        temporary.write_bytes(make_page(contents, say))
     return out
 
 
@@ -53,13 +53,15 @@ def make_page(contents: Contents, say: Say = lambda _: None) -> bytes:
         InputError: a file has gone, or changed its meaning, since the folder was read.
     """
     book, parts, answers = Book(say), [], []
-    for result in _results(contents):
+    results = _results(contents)
+    for result in results:
         with complete(result.path):
             answers.append(
                 (f"{result.part.title(result.found)}{result.of}", result.part.answer(result.found))
             )
             parts.append((result.identity, result.name, result.part.sections(book, result.found)))
-    parts.append(("provenance", "Provenance", provenance_part(book, contents)))
+    made = [(result.made, result.found.provenance) for result in results]
+    parts.append(("provenance", "Provenance", provenance_part(book, contents, made)))
     if len(answers) == 1:
         title, top = answers[0]
     else:
@@ -81,13 +83,14 @@ def make_page(contents: Contents, say: Say = lambda _: None) -> bytes:
 
 @dataclass(frozen=True)
 class _Result:
-    """One result: its file, what was read, and the module that has title, answer and sections of it."""
+    """One result: its file, what was read, the module that makes nodes of it, its id, and how headings call it."""
 
     path: Path
     found: Paper | Estimated | Diagnosed
     part: ModuleType
     identity: str
     name: str
+    made: str
     of: str = ""
 
 
@@ -95,13 +98,15 @@ def _results(contents: Contents) -> list[_Result]:
     out = []
     if (paper := contents.paper) is not None:
         path = contents.folder / "paper.json"
-        out.append(_Result(path, paper, paper_part, "paper", "The experiment in detail"))
+        out.append(_Result(path, paper, paper_part, "paper", "The experiment in detail", "the experiment"))
     for k, one in enumerate(contents.estimates, start=1):
         several = len(contents.estimates) > 1
         name = f"Estimate {one.path.name}" if several else "The estimate in detail"
         of = f": {one.path.name}" if several else ""
-        out.append(_Result(one.path, one, estimate_part, f"estimate-{k}", name, of))
+        out.append(_Result(one.path, one, estimate_part, f"estimate-{k}", name, one.path.name, of))
     if (diagnosis := contents.diagnosis) is not None:
         path = diagnosis.folder / "diagnosis.json"
-        out.append(_Result(path, diagnosis, diagnosis_part, "diagnosis", "The diagnosis in detail"))
+        out.append(
+            _Result(path, diagnosis, diagnosis_part, "diagnosis", "The diagnosis in detail", "the diagnosis")
+        )
     return out

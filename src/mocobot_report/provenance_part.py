@@ -1,12 +1,9 @@
 """Where the numbers come from: versions, options, files and their hashes."""
 
-from __future__ import annotations
-
-import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from estimator.errors import InputError
+from estimator.files import file_facts
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Node, el
 from mocobot_report.blocks.numbers import size
@@ -16,15 +13,9 @@ from mocobot_report.blocks.tables import Entry, Num, table
 from mocobot_report.folder import Contents
 
 
-def provenance_part(book: Book, contents: Contents) -> list[Node]:
-    """One section per result, and the files that this page was made from."""
-    found: list[tuple[str, Any]] = []
-    if contents.paper is not None:
-        found.append(("the experiment", contents.paper.provenance))
-    found += [(e.path.name, e.provenance) for e in contents.estimates]
-    if contents.diagnosis is not None:
-        found.append(("the diagnosis", contents.diagnosis.provenance))
-    out = [section(book, f"How {name} was made", *_one(made)) for name, made in found]
+def provenance_part(book: Book, contents: Contents, results: Iterable[tuple[str, Any]]) -> list[Node]:
+    """One section per result, by its name and provenance, and the files that this page was made from."""
+    out = [section(book, f"How {name} was made", *_one(made)) for name, made in results]
     return [*out, section(book, "What this page was made from", _read(contents))]
 
 
@@ -71,12 +62,7 @@ def _files(caption: str, listed: list[Mapping[str, Any]]) -> Node:
 
 
 def _read(contents: Contents) -> Node:
-    listed = []
-    for path in contents.files:
-        try:
-            data = path.read_bytes()
-        except OSError as error:
-            raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
-        name, digest = path.relative_to(contents.folder).as_posix(), hashlib.sha256(data).hexdigest()
-        listed.append({"path": name, "bytes": len(data), "sha256": digest})
+    listed = [
+        file_facts(path) | {"path": path.relative_to(contents.folder).as_posix()} for path in contents.files
+    ]
     return _files("Read from the folder", listed)

@@ -1,9 +1,6 @@
 """Recordings that a result was made from, if they are still where its provenance says and have not changed."""
 
-from __future__ import annotations
-
 import hashlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -48,16 +45,17 @@ def sources(provenance: dict[str, Any] | None, folder: Path) -> list[Source]:
     """
     files = provenance.get("files") if isinstance(provenance, dict) else None
     listed = files if isinstance(files, list) else []
-    return [_found(entry, folder) for entry in listed if _is_recording(entry)]
-
-
-def _is_recording(entry: Any) -> bool:
-    return isinstance(entry, dict) and str(entry.get("path", "")).endswith(SUFFIX)
+    return [
+        _found(entry, folder)
+        for entry in listed
+        if isinstance(entry, dict) and str(entry.get("path", "")).endswith(SUFFIX)
+    ]
 
 
 def _found(entry: dict[str, Any], folder: Path) -> Source:
     name, changed = str(entry.get("name", "")), False
-    for path in _places(str(entry["path"]), name, folder):
+    given = entry["path"]
+    for path in (Path(given), folder / given, folder / name, folder.parent / name):
         try:
             with path.open("rb") as file:
                 same = hashlib.file_digest(file, "sha256").hexdigest() == entry.get("sha256")
@@ -69,7 +67,3 @@ def _found(entry: dict[str, Any], folder: Path) -> Source:
     if changed:
         return Source(name, None, f"{name} is no longer the file that the result was made from")
     return Source(name, None, f"{name} is no longer where it was ({entry['path']})")
-
-
-def _places(path: str, name: str, folder: Path) -> Iterator[Path]:
-    yield from (Path(path), folder / path, folder / name, folder.parent / name)

@@ -1,11 +1,9 @@
-"""Where a report goes: nothing is overwritten but an earlier report, and a page appears whole or not at all."""
-
-from __future__ import annotations
+"""Where a report goes: nothing is overwritten but an earlier report."""
 
 from pathlib import Path
 
 from estimator.errors import InputError
-from estimator.files import check_target, whole_file
+from estimator.files import check_target, system_errors
 
 MARK = "mocobot report"
 """Generator that a page names; a file without it is no report."""
@@ -21,11 +19,9 @@ def check_page(out: Path) -> None:
             does not exist.
     """
     check_target(out, SUFFIX)
-    try:
+    with system_errors(out):
         if out.exists() and not is_report(out):
             raise InputError(f"{out}: exists and is not a report of mocobot; name another file")
-    except OSError as error:
-        raise InputError(f"{out}: cannot be written ({error.strerror or error})") from error
 
 
 def is_report(path: Path) -> bool:
@@ -33,13 +29,3 @@ def is_report(path: Path) -> bool:
     with path.open("rb") as file:
         head = file.read(HEAD_BYTES)
     return not head or f'<meta name="generator" content="{MARK}">'.encode() in head
-
-
-def write_page(out: Path, content: bytes) -> None:
-    """Write through a temporary file beside the target.
-
-    Raises:
-        InputError: the target cannot be written.
-    """
-    with whole_file(out) as temporary:
-        temporary.write_bytes(content)

@@ -6,8 +6,6 @@ every platform joint onto the wrist (the platform only translates) turns the rod
 Everything here follows from that constraint; docs/method-arm.md has the derivation.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

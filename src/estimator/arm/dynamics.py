@@ -5,8 +5,6 @@ motion and taken away from the second. Derivation: docs/method-arm.md. The paper
 f_i = (dh/dphi)^-T tau_i for a massless arm; the motor's rotor lies before the spring and never appears.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -17,7 +15,13 @@ from estimator.arm.gimbal import angular_motion, rate_matrix, rotation
 Array = NDArray[np.float64]
 
 
-def arm_torque(phi: ArrayLike, phi_dot: ArrayLike, phi_ddot: ArrayLike, design: OmnidDesign) -> Array:
+def arm_torque(
+    phi: ArrayLike,
+    phi_dot: ArrayLike,
+    phi_ddot: ArrayLike,
+    design: OmnidDesign,
+    legs: LegGeometry | None = None,
+) -> Array:
     """Spring torques that move the unloaded arm [N m], positive raising the link, shape (..., 3).
 
     Covers the driven links, the rods as uniform slender bodies and everything that translates with the
@@ -28,11 +32,28 @@ def arm_torque(phi: ArrayLike, phi_dot: ArrayLike, phi_ddot: ArrayLike, design: 
         phi_dot: rates [rad/s], shape (..., 3).
         phi_ddot: accelerations [rad/s^2], shape (..., 3).
         design: the robot's numbers.
+        legs: geometry at ``phi``, if it is known.
 
     Raises:
         InputError: no wrist position exists at some configuration.
     """
-    return _arm_torque(leg_geometry(phi, design), phi, phi_dot, phi_ddot, design)
+    phi, phi_dot, phi_ddot = (np.asarray(a, dtype=float) for a in (phi, phi_dot, phi_ddot))
+    legs = leg_geometry(phi, design) if legs is None else legs
+    g = np.array([0.0, 0.0, design.gravity_mps2])
+    _, h_ddot = wrist_motion(legs, phi_dot, phi_ddot)
+    knee_ddot = legs.knee_d1 * phi_ddot[..., None] + legs.knee_d2 * (phi_dot**2)[..., None]
+    # Consistent mass of a slender rod: T = m/6 (va.va + va.vb + vb.vb), half of the weight at each end.
+    wrist_ddot = h_ddot[..., None, :]
+    at_knee = design.rod_mass_kg * ((2.0 * knee_ddot + wrist_ddot) / 6.0 + g / 2.0)
+    at_wrist = design.rod_mass_kg * ((knee_ddot + 2.0 * wrist_ddot) / 6.0 + g / 2.0)
+    wrist_force = at_wrist.sum(axis=-2) + design.wrist_mass_kg * (h_ddot + g)
+    link_weight = design.proximal_mass_kg * design.gravity_mps2 * design.proximal_com_m * np.cos(phi)
+    return (
+        design.proximal_inertia_kgm2 * phi_ddot
+        + link_weight
+        + np.sum(legs.knee_d1 * at_knee, axis=-1)
+        + np.einsum("...ij,...i->...j", jacobian_of(legs), wrist_force)
+    )
 
 
 def gimbal_torque(
@@ -75,32 +96,11 @@ def wrench_on_payload(
     """
     legs = leg_geometry(phi[0], design)
     jacobian_T = np.swapaxes(jacobian_of(legs), -1, -2)
-    f_b = np.linalg.solve(jacobian_T, (np.asarray(tau) - _arm_torque(legs, *phi, design))[..., None])[..., 0]
+    f_b = np.linalg.solve(jacobian_T, (np.asarray(tau) - arm_torque(*phi, design, legs))[..., None])[..., 0]
     f_i = np.einsum("...ji,...j->...i", rotation(theta[0]), f_b)
     axes_T = np.swapaxes(rate_matrix(theta[0]), -1, -2)
     m_i = -np.linalg.solve(axes_T, gimbal_torque(*theta, design)[..., None])[..., 0]
     return np.concatenate([m_i, f_i], axis=-1, dtype=np.float64)
-
-
-def _arm_torque(
-    legs: LegGeometry, phi: ArrayLike, phi_dot: ArrayLike, phi_ddot: ArrayLike, design: OmnidDesign
-) -> Array:
-    phi, phi_dot, phi_ddot = (np.asarray(a, dtype=float) for a in (phi, phi_dot, phi_ddot))
-    g = np.array([0.0, 0.0, design.gravity_mps2])
-    _, h_ddot = wrist_motion(legs, phi_dot, phi_ddot)
-    knee_ddot = legs.knee_d1 * phi_ddot[..., None] + legs.knee_d2 * (phi_dot**2)[..., None]
-    # Consistent mass of a slender rod: T = m/6 (va.va + va.vb + vb.vb), half of the weight at each end.
-    wrist_ddot = h_ddot[..., None, :]
-    at_knee = design.rod_mass_kg * ((2.0 * knee_ddot + wrist_ddot) / 6.0 + g / 2.0)
-    at_wrist = design.rod_mass_kg * ((knee_ddot + 2.0 * wrist_ddot) / 6.0 + g / 2.0)
-    wrist_force = at_wrist.sum(axis=-2) + design.wrist_mass_kg * (h_ddot + g)
-    link_weight = design.proximal_mass_kg * design.gravity_mps2 * design.proximal_com_m * np.cos(phi)
-    return (
-        design.proximal_inertia_kgm2 * phi_ddot
-        + link_weight
-        + np.sum(legs.knee_d1 * at_knee, axis=-1)
-        + np.einsum("...ij,...i->...j", jacobian_of(legs), wrist_force)
-    )
 
 
 def _rotor_torque(theta: Array, theta_dot: Array, theta_ddot: Array, inertia: Triple) -> Array:

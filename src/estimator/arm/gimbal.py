@@ -4,8 +4,6 @@ Angles come in column order (theta_z, theta_y, theta_x) throughout;
 R_bi = Rz(theta_z) Ry(theta_y) Rx(theta_x).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

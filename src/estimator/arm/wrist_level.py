@@ -5,8 +5,6 @@ force = (dh/dphi)^-T tau (paper, section IV.B, for a massless arm). Weight and i
 makes it the torques in other words and the conversion exact both ways.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -38,19 +36,16 @@ def wrist_of(phi: ArrayLike, tau: ArrayLike, design: OmnidDesign) -> tuple[Array
             above the driven axes, or the arm is singular.
     """
     phi, tau = np.asarray(phi, dtype=float), np.asarray(tau, dtype=float)
-    apart = ~is_reachable(phi, design)
-    if np.any(apart):
-        raise InputError(f"no wrist position reaches all three rods at phi = ({_at(phi, apart)}) rad")
-    legs = leg_geometry(phi, design)
-    folded = np.any(legs.leverage <= 0.0, axis=-1)
-    if np.any(folded):
-        raise InputError(f"a leg is folded past its stretched position at phi = ({_at(phi, folded)}) rad")
-    below = legs.h[..., 2] <= 0.0
-    if np.any(below):
-        raise InputError(f"the wrist lies below the driven axes at phi = ({_at(phi, below)}) rad")
-    singular = _is_singular(legs)
-    if np.any(singular):
-        raise InputError(f"the arm is singular at phi = ({_at(phi, singular)}) rad")
+    legs = leg_geometry(phi, design)  # refuses what no wrist position reaches
+    faults = {
+        "a leg is folded past its stretched position": np.any(legs.leverage <= 0.0, axis=-1),
+        "the wrist lies below the driven axes": legs.h[..., 2] <= 0.0,
+        "the arm is singular": _is_singular(legs),
+    }
+    for fault, bad in faults.items():
+        if np.any(bad):
+            where = phi[np.unravel_index(np.argmax(bad), bad.shape)]
+            raise InputError(f"{fault} at phi = ({_numbers(where)}) rad")
     # rod_k . h_dot = leverage_k phi_dot_k: leg k pushes along its rod with tau_k / leverage_k.
     force = np.sum(legs.rod * (tau / legs.leverage)[..., None], axis=-2)
     return legs.h, force
@@ -132,10 +127,6 @@ def _first(bad: NDArray[np.bool_]) -> tuple[int, ...] | None:
     if not np.any(bad):
         return None
     return tuple(int(k) for k in np.unravel_index(np.argmax(bad), bad.shape))
-
-
-def _at(values: Array, bad: NDArray[np.bool_]) -> str:
-    return _numbers(values[np.unravel_index(np.argmax(bad), bad.shape)])
 
 
 def _numbers(vector: Array) -> str:

@@ -9,8 +9,6 @@ takes away it takes from both. q_i between its samples is a quintic spline; far 
 the band-limited signal.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -10,8 +10,6 @@ A positive offset means that a clock is ahead: **stamp = true time + offset + dr
 time being that of robot 1. A log that says t of a sample taken at t - delay has an offset of +delay.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -29,6 +27,8 @@ from estimator.statistics import rms
 Array = NDArray[np.float64]
 
 MAX_OFFSET_S = 30.0
+NUMBERS = ("offset_s", "drift", "covariance", "mismatch", "repeats_s")
+"""What is told of each clock in numbers."""
 MATCH = 1.0 / 3.0
 """Residual over motion (rms) from which two robots do not turn alike, whatever their clocks."""
 _SHORTEST_S = 4.0  # of overlapping motion
@@ -115,11 +115,7 @@ def estimate_clocks(
             results.append(_pair(first, Rates(theta[i], starts[i], rate_hz), i + 1, middle_s, max_offset_s))
     return ClockEstimate(
         middle_s,
-        np.array([r.offset_s for r in results]),
-        np.array([r.drift for r in results]),
-        np.array([r.covariance for r in results]),
-        np.array([r.mismatch for r in results]),
-        np.array([r.repeats_s for r in results]),
+        *(np.array([getattr(r, name) for r in results]) for name in NUMBERS),
         tuple(r.report for r in results if r.report is not None),
         tuple(r.why_not for r in results),
     )

@@ -1,7 +1,5 @@
 """By how much one robot's clock may be off: where the courses of |omega| of two robots look alike."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate

@@ -5,10 +5,8 @@ the robots; and a payload is known by its wrenches alone, so a wrong torque sign
 share looks like another payload unless internal forces or the inertia give it away.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -206,13 +204,4 @@ def _exchanged(grasps: GraspEstimate, i: int, j: int) -> GraspEstimate:
     order = np.arange(grasps.robots)
     order[[i, j]] = order[[j, i]]
     R, p = grasps.R_1i[order], grasps.p_1i[order]
-    moved = GraspEstimate(
-        R[0].T @ R,
-        (p - p[0]) @ R[0],
-        grasps.covariance,
-        grasps.angular_residual_rms,
-        grasps.linear_residual_rms,
-        grasps.angular_motion_rms,
-        grasps.linear_motion_rms,
-    )
-    return moved
+    return replace(grasps, R_1i=R[0].T @ R, p_1i=(p - p[0]) @ R[0])

@@ -1,7 +1,5 @@
 """One motion of the payload from all robots' twists, given the grasp frames."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,6 +91,14 @@ def fused_up(R_bi: Array, grasps: GraspEstimate) -> Array:
 def robot_up(R_bi: Array, grasps: GraspEstimate) -> Array:
     """The same by each robot alone: R_1i R_bi^T z, shape (Q, N, 3)."""
     return np.einsum("iab,qib->qia", grasps.R_1i, R_bi[..., 2, :])
+
+
+def tilt_scatter(R_bi: Array, grasps: GraspEstimate) -> float:
+    """Sum of squares of what the robots' tilts disagree by [rad^2], each robot's constant offset taken out."""
+    up = robot_up(R_bi, grasps)
+    apart = up - up.mean(axis=1, keepdims=True)
+    apart -= apart.mean(axis=0)
+    return float(np.sum(apart**2))
 
 
 def acceleration_noise(data: GraspData, grasps: GraspEstimate) -> float:

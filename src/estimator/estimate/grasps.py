@@ -14,8 +14,6 @@ All residuals are linear in the stacked twists V = [V_1; ...; V_N] of a sample, 
 depend on the samples only through V V^T: one triangular 6N x 6N factor per window of samples replaces them.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 from typing import Any
@@ -121,33 +119,19 @@ def _excitation(V_1: Array, V_j: Array, R: Array, p: Array, robot: int, samples:
     e_w = V_1[:, :3] - V_j[:, :3] @ R.T
     e_v = V_1[:, 3:] - V_j[:, 3:] @ R.T + np.cross(V_j[:, :3] @ R.T, p)
     noise_w, noise_v = (float(np.sqrt(np.sum(e**2) / (3 * samples))) for e in (e_w, e_v))
-    common: Any = {"frame": "{1}", "floor": RATE_FLOOR_RADPS}
-    why = "the payload does not turn enough about any axis across it"
+    # Scaled by 1 m: the velocity that a position error of 1 m would cause, against the residual's.
+    # With an open rotation that residual means nothing, and the rates' own noise stands in for it.
+    common: Any = {
+        "frame": "{1}", "floor": RATE_FLOOR_RADPS,
+        "reason": "the payload does not turn enough about any axis across it",
+    }  # fmt: skip
+    about, along = ("about x", "about y", "about z"), ("x", "y", "z")
     rotation = judge(
-        f"rotation R_1{robot}",
-        ("about x", "about y", "about z"),
-        information,
-        noise_w,
-        unit="rad/s",
-        words="about",
-        reason=why,
-        **common,
+        f"rotation R_1{robot}", about, information, noise_w, unit="rad/s", words="about", **common
     )
-    return [
-        rotation,
-        # Scaled by 1 m: the velocity that a position error of 1 m would cause, against the residual's.
-        # With an open rotation that residual means nothing, and the rates' own noise stands in for it.
-        judge(
-            f"position p_1{robot}",
-            ("x", "y", "z"),
-            information,
-            noise_v if rotation.determined else noise_w,
-            unit="m/s per m",
-            words="along",
-            reason=why,
-            **common,
-        ),
-    ]
+    noise = noise_v if rotation.determined else noise_w
+    name = f"position p_1{robot}"
+    return [rotation, judge(name, along, information, noise, unit="m/s per m", words="along", **common)]
 
 
 def _weights(V: Array, R: Array, p: Array) -> Array:

@@ -213,8 +213,7 @@ def _upstream_covariance(
     com_by_grasp: Array,
 ) -> Array:
     """Covariance of the inertia due to errors of the CoM and of the grasps, which also move the CoM."""
-    stride = max(1, sum(trial.samples for trial in trials) // _JACOBIAN_SAMPLES)
-    thin = [every(trial, stride) for trial in trials]
+    thin = thinned(trials)
     K = len(grasps.covariance)
 
     def parameters(x: Array) -> Array:
@@ -226,8 +225,11 @@ def _upstream_covariance(
     return J[:, :K] @ grasps.covariance @ J[:, :K].T + J[:, K:] @ com_covariance @ J[:, K:].T
 
 
-def every(trial: GraspData, stride: int) -> GraspData:
-    """Every ``stride``-th sample of a trial."""
+def thinned(trials: Sequence[GraspData]) -> list[GraspData]:
+    """Every so-and-so-many-th sample of the trials, about a thousand in all."""
+    stride = max(1, sum(trial.samples for trial in trials) // _JACOBIAN_SAMPLES)
     names = ("time", "R_bi", "p_bi", "twist", "twist_dot", "wrench")
-    thin = {name: getattr(trial, name)[::stride] for name in names}
-    return replace(trial, rate_hz=trial.rate_hz / stride, **thin)
+    return [
+        replace(t, rate_hz=t.rate_hz / stride, **{name: getattr(t, name)[::stride] for name in names})
+        for t in trials
+    ]

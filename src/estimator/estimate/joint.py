@@ -8,8 +8,6 @@ With a the acceleration of the origin of {1}, G = a + g up, c = p_1c and J the i
 linear in (m, m c, J). Needs no static hold, and the mass and centre of mass profit from the motion too.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -18,28 +16,25 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag, null_space
 
 from estimator import so3
-from estimator.errors import InputError
-from estimator.estimate.fusion import BodyMotion, acceleration_noise, fuse
+from estimator.estimate.fusion import BodyMotion, acceleration_noise, fuse, tilt_scatter
 from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.identifiability import StepReport, cross_information, judge
+from estimator.estimate.identifiability import StepReport, cross_information
 from estimator.estimate.inertia import (
     InertiaEstimate,
-    every,
     inertia_regressor,
     refuse,
     refuse_uncertain,
     rotational_excitation,
+    thinned,
     trial_windows,
 )
 from estimator.estimate.principal import inertia_parameters
-from estimator.estimate.statics import ComEstimate, MassEstimate, weak_com_reason
+from estimator.estimate.statics import ComEstimate, MassEstimate, check_lifted, judge_com
 from estimator.estimate.uncertainty import WINDOW_S, numerical_jacobian, window_covariance, window_normals
 from estimator.signals.grasp_data import GraspData
 from estimator.statistics import rms
 
 Array = NDArray[np.float64]
-
-_JACOBIAN_SAMPLES = 1000
 
 
 @dataclass(frozen=True)
@@ -102,26 +97,13 @@ def estimate_joint(
     turning = _excited(inertia_report)
     basis = _blocks(np.eye(4), turning)
     theta, weights = _weighted_solve(_spanned(Y, basis), w)
-    if theta[0] <= 0:
-        raise InputError(
-            f"the estimated mass is {theta[0]:.3g} kg: the robots do not lift anything; "
-            "check the sign of the torques"
-        )
+    check_lifted(theta[0])
     residual = w - _spanned(Y, basis) @ theta
     force_rms, moment_rms = (rms(part) for part in (residual[:, :3], residual[:, 3:]))
-    com_report = judge(
-        "centre of mass p_1c",
-        ("x", "y", "z"),
-        cross_information(Y[:, :3, 0]) / gravity**2,
-        max(moment_rms / (theta[0] * gravity), _tilt_noise(trials, grasps)),
-        unit="rad",
-        words="along",
-        frame="{1}",
-        floor=1e-9,
-        reason=weak_com_reason(
-            "the payload hardly tilts about any axis across it", moment_rms, theta[0] * gravity
-        ),
-    )
+    com_report = judge_com(
+        cross_information(Y[:, :3, 0]) / gravity**2, moment_rms, theta[0] * gravity, _tilt_noise(trials, grasps),
+        "the payload hardly tilts about any axis across it",
+    )  # fmt: skip
     if not com_report.determined:
         basis = _blocks(np.eye(1), _excited(com_report), turning)
         theta, weights = _weighted_solve(_spanned(Y, basis), w)
@@ -144,8 +126,7 @@ def estimate_joint(
         equations = _equations([fuse(trial, grasps.moved(x)) for trial in thin], thin)
         return _centred(_solve(_spanned(equations[0], basis), equations[1], weights), K)
 
-    stride = max(1, used // _JACOBIAN_SAMPLES)
-    thin = [every(trial, stride) for trial in trials]
+    thin = thinned(trials)
     J_own = numerical_jacobian(lambda x: _centred(x, K), theta)
     J = numerical_jacobian(moved, np.zeros(len(grasps.covariance)))
     own_covariance = J_own @ covariance @ J_own.T
@@ -235,11 +216,6 @@ def _tilt_noise(trials: Sequence[GraspData], grasps: GraspEstimate) -> float:
     """Rms disagreement of the robots' tilts around each robot's constant offset [rad]."""
     if grasps.robots == 1:
         return 0.0
-    total, count = 0.0, 0
-    for trial in trials:
-        up = np.einsum("iab,qib->qia", grasps.R_1i, trial.R_bi[..., 2, :])
-        apart = up - up.mean(axis=1, keepdims=True)
-        apart -= apart.mean(axis=0)
-        total += float(np.sum(apart**2))
-        count += 2 * (grasps.robots - 1) * trial.samples
+    total = sum(tilt_scatter(trial.R_bi, grasps) for trial in trials)
+    count = 2 * (grasps.robots - 1) * sum(trial.samples for trial in trials)
     return float(np.sqrt(total / count))

@@ -1,7 +1,5 @@
 """Are recordings of one payload? Without labels, what each of them alone says of the mass has to tell."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

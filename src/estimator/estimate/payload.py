@@ -1,7 +1,5 @@
 """The pipeline: from recordings of one payload to its estimate."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Literal

@@ -10,8 +10,6 @@ added to every hold: a random-effects model, scaled once for forces and once for
 equal, independent errors in every robot's force, so moments take it through the grasps' levers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -22,7 +20,7 @@ from scipy.optimize import brentq
 
 from estimator import so3
 from estimator.errors import InputError
-from estimator.estimate.fusion import fused_up, robot_up, total_wrench
+from estimator.estimate.fusion import fused_up, tilt_scatter, total_wrench
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.identifiability import StepReport, cross_information, judge
 from estimator.estimate.uncertainty import numerical_jacobian
@@ -80,11 +78,7 @@ def estimate_mass(holds: Sequence[Hold], gravity_mps2: float) -> MassEstimate:
     """
     vertical = np.array([vertical_force(hold.R_bi, hold.wrench[None])[0] for hold in holds])  # (H,)
     mass = float(vertical.mean() / gravity_mps2)
-    if mass <= 0:
-        raise InputError(
-            f"the estimated mass is {mass:.3g} kg: the robots do not lift anything; "
-            "check the sign of the torques"
-        )
+    check_lifted(mass)
     within = [_mean_covariance(vertical_force(hold.R_bi, hold.batches)[:, None]) for hold in holds]
     residual = vertical - vertical.mean()
     between = _between(residual @ residual, len(holds) - 1, float(np.mean(within)))
@@ -106,19 +100,10 @@ def estimate_com(
     within_rms = float(np.sqrt(np.mean([np.trace(S[1:, 1:]) / 3 for S in within])))
     noise = max(float(np.sqrt(rss / dof)) if dof else 0.0, within_rms)
     weight = mass.mass * gravity_mps2
-    tilt_noise = _tilt_noise(holds, grasps)
-    report = judge(
-        "centre of mass p_1c",
-        ("x", "y", "z"),
-        cross_information(up),
-        # As angles: what a moment residual looks like at 1 m from the CoM, and how well the tilt is known.
-        max(noise / weight, tilt_noise),
-        unit="rad",
-        words="along",
-        frame="{1}",
-        floor=1e-9,
-        reason=weak_com_reason("the holds hardly differ in tilt about any axis across it", noise, weight),
-    )
+    report = judge_com(
+        cross_information(up), noise, weight, _tilt_noise(holds, grasps),
+        "the holds hardly differ in tilt about any axis across it",
+    )  # fmt: skip
     if not report.determined:
         return None, report
 
@@ -172,14 +157,41 @@ def estimate_from_holds(
     return mass, *estimate_com(holds, mass, grasps, gravity_mps2)
 
 
-def weak_com_reason(tilt: str, moment_rms: float, weight: float) -> str:
-    """Why the centre of mass is open: too little ``tilt`` [sentence], or moments [N m] that make no sense."""
-    if moment_rms < CONTRADICTION_M * weight:
-        return tilt
-    return (
-        f"{CONTRADICTION} ({moment_rms:.2g} N m rms are left over); "
-        "check the signs and columns of the torques"
-    )
+def check_lifted(mass: float) -> None:
+    """Refuse an estimated mass [kg] that nobody can lift.
+
+    Raises:
+        InputError: it is zero or negative.
+    """
+    if mass <= 0:
+        raise InputError(
+            f"the estimated mass is {mass:.3g} kg: the robots do not lift anything; "
+            "check the sign of the torques"
+        )
+
+
+def judge_com(
+    information: Array, moment_rms: float, weight: float, tilt_noise: float, reason: str
+) -> StepReport:
+    """Judge the centre of mass by angles: what a moment residual looks like at 1 m from it, and the tilt's noise.
+
+    Args:
+        information: of the directions against gravity, as ``cross_information`` gives it, shape (3, 3).
+        moment_rms: moments left over [N m].
+        weight: of the payload [N].
+        tilt_noise: how well the tilt is known [rad].
+        reason: why a direction is open, unless the moments make no sense.
+    """
+    if moment_rms >= CONTRADICTION_M * weight:
+        reason = (
+            f"{CONTRADICTION} ({moment_rms:.2g} N m rms are left over); "
+            "check the signs and columns of the torques"
+        )
+    noise = max(moment_rms / weight, tilt_noise)
+    return judge(
+        "centre of mass p_1c", ("x", "y", "z"), information, noise,
+        unit="rad", words="along", frame="{1}", floor=1e-9, reason=reason,
+    )  # fmt: skip
 
 
 def vertical_force(R_bi: Array, wrench: Array) -> Array:
@@ -251,8 +263,5 @@ def _tilt_noise(holds: Sequence[Hold], grasps: GraspEstimate) -> float:
     """How much the robots' tilts disagree from hold to hold [rad]; a constant offset is no noise."""
     if grasps.robots == 1 or len(holds) < 2:
         return 0.0
-    up = robot_up(np.array([hold.R_bi for hold in holds]), grasps)  # (H, N, 3)
-    apart = up - up.mean(axis=1, keepdims=True)
-    apart -= apart.mean(axis=0)
     dof = (len(holds) - 1) * (grasps.robots - 1) * 2  # a direction has two components
-    return float(np.sqrt(np.sum(apart**2) / dof))
+    return float(np.sqrt(tilt_scatter(np.array([hold.R_bi for hold in holds]), grasps) / dof))

@@ -1,12 +1,12 @@
 """The text report of an estimate: every value with its standard error, then doubts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
 
+from estimator.estimate.inertia import PARAMETERS
+from estimator.estimate.principal import ORDER
 from estimator.estimate.result import PayloadEstimate
 from estimator.numbers import measured
 
@@ -23,10 +23,7 @@ def format_estimate(estimate: PayloadEstimate) -> str:
     mass = estimate.mass
     lines.append(_line("m", mass.mass, mass.se, "kg") if mass else _none("m"))
     if estimate.p_1c is not None and estimate.p_1c_se_m is not None:
-        lines += [
-            _line(f"p_1c {a}", v, s, "m")
-            for a, v, s in zip("xyz", estimate.p_1c, estimate.p_1c_se_m, strict=True)
-        ]
+        lines += _vector("p_1c", estimate.p_1c, estimate.p_1c_se_m, "m")
         lines.append(
             _line("|p_1c|", float(np.linalg.norm(estimate.p_1c)), estimate.p_1c_distance_se_m or 0.0, "m")
         )
@@ -65,13 +62,8 @@ def _grasps(estimate: PayloadEstimate) -> list[str]:
             continue
         pair = estimate.grasps.pair(i, j)
         angles, angles_se = np.rad2deg(pair.axis_angle_rad), np.rad2deg(pair.axis_angle_se_rad)
-        lines += [
-            _line(f"R_{i}{j} {a}", v, s, "deg", percent=False)
-            for a, v, s in zip("xyz", angles, angles_se, strict=True)
-        ]
-        lines += [
-            _line(f"p_{i}{j} {a}", v, s, "m") for a, v, s in zip("xyz", pair.p_ij, pair.p_se_m, strict=True)
-        ]
+        lines += _vector(f"R_{i}{j}", angles, angles_se, "deg", percent=False)
+        lines += _vector(f"p_{i}{j}", pair.p_ij, pair.p_se_m, "m")
         lines.append(_line(f"|p_{i}{j}|", float(np.linalg.norm(pair.p_ij)), pair.distance_se_m, "m"))
     return lines
 
@@ -81,8 +73,7 @@ def _inertia(estimate: PayloadEstimate) -> list[str]:
     if inertia is None:
         return [*lines, _none("I")]
     se = np.sqrt(np.diag(inertia.covariance))
-    order = ((0, 0, "Ixx"), (0, 1, "Ixy"), (0, 2, "Ixz"), (1, 1, "Iyy"), (1, 2, "Iyz"), (2, 2, "Izz"))
-    for k, (a, b, name) in enumerate(order):
+    for k, (name, (a, b)) in enumerate(zip(PARAMETERS, ORDER, strict=True)):
         lines.append(_line(f"{name} in {{b}}", inertia.inertia[a, b], se[k], "kg m^2", percent=a == b))
     principal = inertia.principal
     for k, (value, error) in enumerate(zip(principal.moments, principal.moments_se, strict=True)):
@@ -90,10 +81,14 @@ def _inertia(estimate: PayloadEstimate) -> list[str]:
     if principal.axis_angle_rad is None or principal.axis_angle_se_rad is None:
         return [*lines, _none("R_1c")]
     angles, errors = np.rad2deg(principal.axis_angle_rad), np.rad2deg(principal.axis_angle_se_rad)
-    lines += [
-        _line(f"R_1c {a}", v, s, "deg", percent=False) for a, v, s in zip("xyz", angles, errors, strict=True)
-    ]
-    return lines
+    return [*lines, *_vector("R_1c", angles, errors, "deg", percent=False)]
+
+
+def _vector(
+    name: str, values: np.ndarray, errors: np.ndarray, unit: str, *, percent: bool = True
+) -> list[str]:
+    each = zip("xyz", values, errors, strict=True)
+    return [_line(f"{name} {axis}", value, se, unit, percent=percent) for axis, value, se in each]
 
 
 def _line(name: str, value: float, se: float, unit: str, *, percent: bool = True) -> str:

@@ -8,8 +8,6 @@ windows are smooth (Hann, overlapping by three quarters) because differentiated 
 sharp edges of plain blocks let its strong high frequencies leak in, which claimed 1.6 times too much here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Is a recording plausible? Checked before anything is computed from it; one sentence per fault."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -55,12 +55,7 @@ class RecordingMetadata:
         values: dict[str, Any] = {
             "format": FORMAT,
             "version": 1 if self.level == "joint" else 2,
-            "robots": self.robots,
-            "rate_hz": self.rate_hz,
-            "trial": self.trial,
-            "source": self.source,
-            "payload": self.payload,
-            "seed": self.seed,
+            **{key: getattr(self, key) for key in _REQUIRED[2:]},
             "design": self.design.to_dict(),
         }
         if self.level != "joint":
@@ -90,17 +85,9 @@ class RecordingMetadata:
         _check_format(values, where)
         required = _REQUIRED + (("level",) if values.get("version") == 2 else ())
         _check_values(Fields(values, required, where, _OPTIONAL))
-        return cls(
-            robots=values["robots"],
-            rate_hz=float(values["rate_hz"]),
-            trial=values["trial"],
-            source=values["source"],
-            payload=values["payload"],
-            seed=values["seed"],
-            design=OmnidDesign.from_dict(values["design"], where=f"{where}: design"),
-            control=values.get("control"),
-            level=values.get("level", "joint"),
-        )
+        kept = {key: value for key, value in values.items() if key not in ("format", "version")}
+        design = OmnidDesign.from_dict(values["design"], where=f"{where}: design")
+        return cls(**kept | {"rate_hz": float(values["rate_hz"]), "design": design})
 
 
 def _check_format(values: dict[str, Any], where: str) -> None:

@@ -1,7 +1,5 @@
 """Recordings: joint angles and spring torques of one trial; their columns are those of docs/recording.md."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

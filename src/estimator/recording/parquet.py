@@ -1,7 +1,5 @@
 """The Parquet file of a recording (docs/recording.md)."""
 
-from __future__ import annotations
-
 import contextlib
 import difflib
 from collections.abc import Iterator

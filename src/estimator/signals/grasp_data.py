@@ -1,7 +1,5 @@
 """The paper's data points D_iq: pose, twist, twist derivative and wrench of every grasp at every sample."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -16,8 +16,6 @@ Without noise sigma is 0 and the first rule is the paper's criterion. With noise
 into the motion before and after it, so means are taken without half a second at either end.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

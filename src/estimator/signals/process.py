@@ -1,7 +1,5 @@
 """From a recording's joint angles and spring torques to the data points D_iq (paper, section IV.B)."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

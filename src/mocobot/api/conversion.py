@@ -1,7 +1,5 @@
 """Bring a measured log onto one grid and one clock."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Find out what the simulation of a team gets wrong."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Estimate a payload."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Recordings as a caller may give them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from pathlib import Path

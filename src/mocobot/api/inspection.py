@@ -1,7 +1,5 @@
 """Look at a log before anyone trusts a number of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

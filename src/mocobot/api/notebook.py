@@ -1,7 +1,5 @@
 """Results as small HTML tables for notebooks: no script, no network; every text is escaped."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 from xml.etree import ElementTree

@@ -1,7 +1,5 @@
 """Results of the layers below as what a Python user gets: the same data, with presentation."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from typing import Any, TypeVar
 

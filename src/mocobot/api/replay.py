@@ -1,7 +1,5 @@
 """Watch recordings: the scene moving from the measured angles, estimate against truth, all signals (Rerun)."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterable
 from pathlib import Path

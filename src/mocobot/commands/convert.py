@@ -1,23 +1,18 @@
 """``mocobot convert``: read a log of any format, bring it onto one grid, write it as any format, say what was done."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from estimator.arm.design import load_design
 from estimator.errors import InputError
 from estimator.files import check_target
+from mocobot.options import Convert
 from mocobot.progress import bar
 from mocobot_logs.convert import Labels, convert, output_kind, write_converted
 from mocobot_logs.convert_report import format_conversion
 from mocobot_logs.map.files import MAPS, read_map
 from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design
-
-if TYPE_CHECKING:
-    from mocobot.options import Convert
 
 SLOWEST_HZ, FASTEST_HZ = 20.0, 2000.0
 """Bounds of the recording's rate: the estimator's filter passes 5 Hz."""

@@ -1,13 +1,11 @@
 """``mocobot diagnose``: read recordings, find out what the simulation gets wrong, report and write it."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from discrepancy.causes.tolerances_file import read_tolerances
 from discrepancy.emps import catalogue as emps_catalogue
@@ -24,11 +22,9 @@ from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
 from mocobot.files.provenance import file_facts, provenance
 from mocobot.files.targets import check_folder, check_recordings
+from mocobot.options import Diagnose
 from mocobot.progress import bar, stages
 from mocobot_sim.trial.truth import truth_path
-
-if TYPE_CHECKING:
-    from mocobot.options import Diagnose
 
 
 @dataclass(frozen=True)

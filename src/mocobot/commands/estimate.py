@@ -1,10 +1,7 @@
 """``mocobot estimate``: read recordings, estimate what they hold, write and print it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import asdict
-from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
 from estimator.files import write_json
@@ -13,10 +10,8 @@ from estimator.recording.parquet import read_recording
 from mocobot.api.estimation import estimate
 from mocobot.files.provenance import provenance
 from mocobot.files.targets import check_recordings
+from mocobot.options import Estimate
 from mocobot.progress import stages
-
-if TYPE_CHECKING:
-    from mocobot.options import Estimate
 
 
 def run(options: Estimate) -> None:

@@ -1,13 +1,11 @@
 """``mocobot inspect``: a look at a log before anyone trusts a number from it."""
 
-from __future__ import annotations
-
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from estimator.arm.design import load_design
 from estimator.errors import InputError
 from estimator.files import check_target, write_json
+from mocobot.options import Inspect
 from mocobot.progress import bar
 from mocobot_inspect.inspection import inspect_log
 from mocobot_inspect.json import inspection_dict
@@ -15,9 +13,6 @@ from mocobot_inspect.text import format_inspection
 from mocobot_logs.map.files import read_map
 from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design
-
-if TYPE_CHECKING:
-    from mocobot.options import Inspect
 
 
 def run(options: Inspect) -> None:

@@ -1,16 +1,15 @@
 """``mocobot paper``: run the experiment, print the tables, write the results."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import asdict
-from typing import TYPE_CHECKING
+from pathlib import Path
 
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.recording.parquet import write_recording
 from mocobot.files.provenance import NAME, folder_provenance, provenance
 from mocobot.files.targets import make_folder
+from mocobot.options import Paper
 from mocobot.progress import bar
 from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
 from mocobot_sim.paper.plots import save_plots
@@ -19,11 +18,6 @@ from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import sensor_preset
 from mocobot_sim.trial.simulate import draw_units
 from mocobot_sim.trial.truth import GroundTruth, truth_path, write_truth
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from mocobot.options import Paper
 
 
 def run(options: Paper) -> None:

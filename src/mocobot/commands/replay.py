@@ -1,10 +1,7 @@
 """``mocobot replay``: recordings as moving scenes and time series, in the Rerun viewer, a browser or a file."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from discrepancy.result.read import read_diagnosis
 from estimator.errors import InputError
@@ -12,12 +9,10 @@ from estimator.files import check_target
 from estimator.recording.parquet import read_recording
 from mocobot.api.replay import SUFFIX, check_rerun
 from mocobot.files.targets import check_recordings
+from mocobot.options import Replay
 from mocobot.progress import bar
 from mocobot_view.facts.fact_files import read_estimate, read_truth
 from mocobot_view.replay.replay_trial import ReplayTrial, distinct_names, replay_trial
-
-if TYPE_CHECKING:
-    from mocobot.options import Replay
 
 
 def run(options: Replay) -> None:

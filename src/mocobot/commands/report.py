@@ -1,14 +1,8 @@
 """``mocobot report``: one HTML page of a result folder."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
+from mocobot.options import Report
 from mocobot.progress import stages
 from mocobot_report.page import write_report
-
-if TYPE_CHECKING:
-    from mocobot.options import Report
 
 
 def run(options: Report) -> None:

@@ -1,16 +1,10 @@
 """``mocobot simulate``: simulate one trial, write its recording and the truth beside it."""
 
-from __future__ import annotations
-
-from typing import TYPE_CHECKING
-
 from estimator.errors import InputError
 from estimator.files import check_target
 from mocobot.api.simulation import check_fits, simulate
+from mocobot.options import Simulate
 from mocobot.progress import bar
-
-if TYPE_CHECKING:
-    from mocobot.options import Simulate
 
 
 def run(options: Simulate) -> None:

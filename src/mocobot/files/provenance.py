@@ -12,9 +12,6 @@ files                     list of {name, path, bytes, sha256}: inputs, the path 
 Nothing in it depends on when, where or by whom the command was run, so the same inputs give the same bytes.
 """
 
-from __future__ import annotations
-
-import hashlib
 import os
 import platform
 import subprocess
@@ -23,7 +20,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from estimator.errors import InputError
+from estimator.files import file_facts
 
 PACKAGES = ("dm-control", "joblib", "mujoco", "numba", "numpy", "pyarrow", "scipy")
 """Libraries that a result's numbers pass through."""
@@ -79,21 +76,6 @@ def folder_provenance(made_with: Mapping[str, Any], folder: Path, written: Itera
         **made_with,
         "written": sorted(listed, key=lambda f: f["path"]),
     }
-
-
-def file_facts(path: Path) -> dict[str, Any]:
-    """Name, path as given, size and SHA-256 of a file, which is read piece by piece.
-
-    Raises:
-        InputError: it cannot be read.
-    """
-    try:
-        with path.open("rb") as file:
-            digest = hashlib.file_digest(file, "sha256").hexdigest()
-            size = os.fstat(file.fileno()).st_size
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from error
-    return {"name": path.name, "path": str(path), "bytes": size, "sha256": digest}
 
 
 def _version(package: str) -> str | None:

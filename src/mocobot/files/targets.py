@@ -1,13 +1,11 @@
 """What a user names to be read and written, checked before any work is done."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from estimator.errors import InputError
-from estimator.files import check_target
+from estimator.files import check_target, system_errors
 
 
 def check_recordings(recordings: Sequence[Path], out: Path | None = None) -> None:
@@ -42,7 +40,7 @@ def check_folder(path: Path, inputs: Sequence[Path], is_ours: Callable[[Path], b
             parent does not exist.
     """
     real = Path(os.path.realpath(path))
-    try:
+    with system_errors(path):
         if not real.parent.is_dir():
             raise InputError(f"{path.parent}: there is no such folder")
         if real.exists() and not real.is_dir():
@@ -54,8 +52,6 @@ def check_folder(path: Path, inputs: Sequence[Path], is_ours: Callable[[Path], b
                 raise InputError(f"{path}: holds {entry}, which would be lost; name another folder")
         if real.exists() and any(real.iterdir()) and not is_ours(real):
             raise InputError(f"{path}: exists and is not {what}; name a new folder")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written ({error.strerror or error})") from error
 
 
 def make_folder(path: Path) -> Path:
@@ -64,8 +60,6 @@ def make_folder(path: Path) -> Path:
     Raises:
         InputError: it cannot be created.
     """
-    try:
+    with system_errors(path, "created"):
         path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"{path}: cannot be created ({error.strerror or error})") from error
     return path

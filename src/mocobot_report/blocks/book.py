@@ -1,7 +1,5 @@
 """What the parts of a page share: running ids, the pictures they want, and how far the work is."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 

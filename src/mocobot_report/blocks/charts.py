@@ -1,7 +1,5 @@
 """Interactive plots: plotly figures without colours of their own, which the page's theme gives them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from typing import Any

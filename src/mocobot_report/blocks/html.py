@@ -1,7 +1,5 @@
 """HTML as a tree of nodes: the serialiser escapes every text and attribute, so nothing in a file becomes markup."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterable, Mapping

@@ -1,7 +1,5 @@
 """Legends: what the marks of a plot mean, as buttons that show and hide where they can."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Numbers as people read them: as many digits as the standard error has meaning, units that fit their size."""
 
-from __future__ import annotations
-
 import math
 
 from estimator.numbers import decimals

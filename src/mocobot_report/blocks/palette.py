@@ -1,8 +1,6 @@
 """Colours of the page, light and dark. Series follow Okabe and Ito's colour-blind safe set, each made darker or lighter
 until it stands out from its background."""
 
-from __future__ import annotations
-
 _THEMES = {
     "page": ("#f6f7f9", "#0f141a"),
     "card": ("#ffffff", "#171d25"),
@@ -41,27 +39,6 @@ _THEMES = {
 LIGHT = {name: light for name, (light, _) in _THEMES.items()}
 DARK = {name: dark for name, (_, dark) in _THEMES.items()}
 
-TEXTS = (
-    ("text", "page"), ("text", "card"), ("text", "sunk"), ("soft", "page"), ("soft", "card"), ("soft", "sunk"),
-    ("link", "page"), ("link", "card"), ("good", "good-card"), ("warn", "warn-card"), ("bad", "bad-card"),
-    ("text", "good-card"), ("text", "warn-card"), ("text", "bad-card"), ("good", "card"), ("bad", "card"),
-)  # fmt: skip
-"""Text and background that meet on the page; WCAG AA asks for a contrast of 4.5."""
-MARKS = ("paper", "ideal", "nominal", "uncalibrated", "before", "after", "truth", "c1", "c2", "c3", "r1", "r2", "r3",
-         "r4", "r5", "r6", "focus")  # fmt: skip
-"""Colours of lines and points on a card; WCAG AA asks for 3."""
 PRESETS = {"paper": "diamond", "ideal": "triangle-down", "nominal": "circle", "uncalibrated": "square"}
 """Marker of each column of the paper's tables; its colour has the same name."""
 OTHER_COLOURS, OTHER_MARKERS = ("c1", "c2"), ("triangle-up", "circle-open", "x")
-
-
-def contrast(one: str, other: str) -> float:
-    """Contrast ratio of two colours ``#rrggbb`` as WCAG 2.2 defines it."""
-    light, dark = sorted((_luminance(one), _luminance(other)), reverse=True)
-    return (light + 0.05) / (dark + 0.05)
-
-
-def _luminance(colour: str) -> float:
-    parts = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
-    red, green, blue = (p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
-    return 0.2126 * red + 0.7152 * green + 0.0722 * blue

@@ -1,7 +1,5 @@
 """Numbers of an estimated payload as entries of tables, with standard errors; a dash for what is not known."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from estimator.estimate.result import PayloadEstimate

@@ -1,7 +1,5 @@
 """Pictures of teams as data in the page; where nothing can be rendered, the sentence that says why."""
 
-from __future__ import annotations
-
 import base64
 import io
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Sentences and what frames them: paragraphs, verdicts, tiles, lists."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 

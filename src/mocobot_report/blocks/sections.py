@@ -1,7 +1,5 @@
 """Sections, and panels of which one is shown at a time."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from mocobot_report.blocks.book import Book

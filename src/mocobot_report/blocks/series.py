@@ -1,7 +1,5 @@
 """Time series as stacked plots with one time axis, thinned so that no spike is lost."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Tables: captions, heads with units, numbers with their errors."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

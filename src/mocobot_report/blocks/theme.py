@@ -1,7 +1,5 @@
 """Themes of the plots: plotly templates, light and dark. A trace names its colour of the palette in ``meta``."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import plotly.graph_objects as go

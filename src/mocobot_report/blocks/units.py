@@ -1,7 +1,5 @@
 """Names of parameters and quantities, and the units that they carry as suffixes."""
 
-from __future__ import annotations
-
 import re
 
 from mocobot_report.blocks.numbers import spelled

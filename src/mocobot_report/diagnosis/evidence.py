@@ -1,7 +1,5 @@
 """Where the misfit sits: by channel, by trial and along the directions of single sources; and the evidence."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What the causes are worth: response to the recorded commands, and estimates of the payload, before and after."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a diagnosis' plots compare."""
 
-from __future__ import annotations
-
 from mocobot_report.blocks.legend import Key
 
 CLEAN = Key("", "clean data", "text", "dash")

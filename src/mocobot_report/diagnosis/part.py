@@ -1,7 +1,5 @@
 """The part of the page on a diagnosis: verdict, causes, gain, and what the residual says."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """The residual over time, against what it may depend on, and by channel, without and with the named causes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import zip_longest
 

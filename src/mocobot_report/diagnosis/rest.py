@@ -1,7 +1,5 @@
 """What a diagnosis leaves open: limits of detection, what cannot be decided, the extended model, notes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

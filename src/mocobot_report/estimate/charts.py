@@ -1,7 +1,5 @@
 """Plots of one estimate: every recording's own values beside the pooled ones, and the excitation of every step."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """The part of the page on one estimate: payload and grasps with standard errors, and what the data say of them."""
 
-from __future__ import annotations
-
 import contextlib
 from functools import partial
 from itertools import combinations

@@ -1,7 +1,5 @@
 """What the recordings leave of one rigid payload: gaps at the grasps, balance of forces and moments, their spectra."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """An estimate against the truth beside a simulated recording."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from estimator.estimate.result import PayloadEstimate

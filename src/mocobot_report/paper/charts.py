@@ -1,7 +1,5 @@
 """Plots of the paper's tables: our errors beside the published ones."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import cycle, groupby
 

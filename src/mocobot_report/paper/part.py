@@ -1,7 +1,5 @@
 """The part of the page on the paper's experiment: the answer, Tables II-V beside ours, trials, payloads."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np
