@@ -4,12 +4,11 @@ import math
 from functools import cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.signal import butter, sosfiltfilt
 
+from estimator.arrays import Array
 from estimator.errors import InputError
-
-Array = NDArray[np.float64]
 
 BUTTERWORTH_ORDER = 3
 MIN_SAMPLES = 16  # what the filter's padding and the widest difference need

@@ -1,9 +1,8 @@
 """The step of a quantised channel, from its samples alone."""
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 _LARGEST_RATIO = 1000.0  # of a difference to the step: rounding spoils larger ones
 _OFF = 0.05  # of a step

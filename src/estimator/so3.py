@@ -1,10 +1,9 @@
 """The few SO(3) operations that scipy's ``Rotation`` lacks, or is slow at."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def skew(a: Array) -> Array:

@@ -4,8 +4,6 @@ Unlike resampling for an estimate (``mocobot_logs.resample``) nothing is refused
 time are left out, gaps split the log, and what is too short is not looked at.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is wrong with a log, one sentence each with its evidence."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Literal

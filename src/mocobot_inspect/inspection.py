@@ -1,7 +1,5 @@
 """The preflight: everything that can be said about a log before anyone trusts a number from it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

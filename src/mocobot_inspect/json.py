@@ -21,8 +21,6 @@
     ready         the last line of the text
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any

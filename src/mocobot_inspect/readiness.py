@@ -1,7 +1,5 @@
 """What an estimate would make of the log: excitation of every step, and what it is ready for."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Where the payload rests and where it moves."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

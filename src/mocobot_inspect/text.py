@@ -1,7 +1,5 @@
 """An inspection as text."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from mocobot_inspect.findings import evidence, findings

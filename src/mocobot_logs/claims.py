@@ -1,7 +1,5 @@
 """How much a file may hold, or claim to hold, before it is taken for a bomb."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from estimator.errors import InputError

@@ -1,7 +1,5 @@
 """From a log to a recording, and from a recording to a file of any kind that is written."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace

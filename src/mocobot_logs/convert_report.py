@@ -1,7 +1,5 @@
 """What happened to a log on its way to a recording, as text."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """What a library says of damaged bytes, fit for one sentence on a terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 

@@ -5,8 +5,6 @@ What they hand out is in SI units and in mocobot's channels already; what is wro
 running backwards) is still in it, for ``inspect`` to see and for the resampler to refuse.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol

@@ -6,8 +6,6 @@ others are read between their samples by a quintic spline: of a sine of 5 Hz sam
 1e-7, of 1 Hz less than 1e-11.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Any log by its path: what it is shows in its first bytes, or in what its folder holds."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
 from estimator.errors import InputError
-
-Array = NDArray[np.float64]
 
 # Exact values: cos(2 pi / 3) in floating point is off by 2e-16, which would break the legs' symmetry.
 _HALF_SQRT_3 = np.sqrt(3.0) / 2.0

@@ -6,13 +6,12 @@ f_i = (dh/dphi)^-T tau_i for a massless arm; the motor's rotor lies before the s
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimator.arm.delta import LegGeometry, jacobian_of, leg_geometry, wrist_motion
 from estimator.arm.design import OmnidDesign, Triple
 from estimator.arm.gimbal import angular_motion, rate_matrix, rotation
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def arm_torque(

@@ -5,9 +5,9 @@ R_bi = Rz(theta_z) Ry(theta_y) Rx(theta_x).
 """
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def rotation(theta: ArrayLike) -> Array:

@@ -10,9 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from estimator.arm.delta import LegGeometry, inverse_kinematics, is_in_reach, is_reachable, leg_geometry
 from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
 from estimator.errors import InputError
-
-Array = NDArray[np.float64]
 
 MAX_CONDITION = 1e4
 """Of dh/dphi: beyond it the arm counts as singular. Within the Omnid's joint limits it stays below 20; at the bound,

@@ -13,18 +13,16 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.signal import butter, sosfiltfilt
 from scipy.spatial.transform import Rotation
 
 from estimator import so3
 from estimator.arm.gimbal import rate_matrix
+from estimator.arrays import Array
 from estimator.estimate.grasps import pair_rotation
 from estimator.filtering import differentiate
 from estimator.statistics import rms
-
-Array = NDArray[np.float64]
 
 CUTOFF_HZ = 0.7
 """Of the first-order low-pass, run forward and backward. White noise of encoders grows in proportion to frequency in

@@ -15,16 +15,15 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from estimator.arrays import Array
 from estimator.clocks.fit import TRIM_S, ClockFit, Rates, fit_clock
 from estimator.clocks.search import likely_lags
 from estimator.estimate.identifiability import StepReport, judge
 from estimator.estimate.uncertainty import WINDOW_S, window_covariance, window_normals, windows
 from estimator.recording.model import Recording
 from estimator.statistics import rms
-
-Array = NDArray[np.float64]
 
 MAX_OFFSET_S = 30.0
 NUMBERS = ("offset_s", "drift", "covariance", "mismatch", "repeats_s")

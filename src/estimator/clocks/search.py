@@ -1,10 +1,9 @@
 """By how much one robot's clock may be off: where the courses of |omega| of two robots look alike."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import correlate
 
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 CANDIDATES = 6
 _AS_HIGH = 0.02

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.fusion import fuse
 from estimator.estimate.grasp_estimate import GraspEstimate
@@ -22,8 +22,6 @@ from estimator.estimate.principal import inertia_parameters
 from estimator.signals.grasp_data import GraspData
 from estimator.signals.holds import STILL_RATE_RADPS, STILL_SPEED_MPS
 from estimator.statistics import rms_length
-
-Array = NDArray[np.float64]
 
 NOT_RIGID_ERROR = 0.5
 NOT_RIGID_FLAG = 0.1

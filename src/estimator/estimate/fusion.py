@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimator import so3
+from estimator.arrays import Array
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.signals.grasp_data import GraspData
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,11 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator import so3
+from estimator.arrays import Array
 from estimator.estimate.uncertainty import norm_se, standard_errors
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

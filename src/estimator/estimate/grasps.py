@@ -19,18 +19,16 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from estimator import so3
+from estimator.arrays import Array
 from estimator.estimate.grasp_estimate import GraspEstimate, single_robot
 from estimator.estimate.identifiability import StepReport, cross_information, judge
 from estimator.estimate.uncertainty import WINDOW_S, window_covariance, windows
 from estimator.signals.grasp_data import GraspData
 from estimator.statistics import rms
-
-Array = NDArray[np.float64]
 
 RATE_FLOOR_RADPS = 1e-10
 """Angular velocity that cannot be told from rounding error of differenced angles [rad/s]."""

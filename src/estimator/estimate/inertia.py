@@ -11,9 +11,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimator import so3
+from estimator.arrays import Array
 from estimator.estimate.fusion import acceleration_noise, fuse
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.identifiability import StepReport, WeakDirection, combination, judge
@@ -29,8 +29,6 @@ from estimator.estimate.uncertainty import (
 )
 from estimator.signals.grasp_data import GraspData
 from estimator.statistics import rms
-
-Array = NDArray[np.float64]
 
 PARAMETERS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 SE_LIMIT = 1 / 3

@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag, null_space
 
 from estimator import so3
+from estimator.arrays import Array
 from estimator.estimate.fusion import BodyMotion, acceleration_noise, fuse, tilt_scatter
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.identifiability import StepReport, cross_information
@@ -33,8 +33,6 @@ from estimator.estimate.statics import ComEstimate, MassEstimate, check_lifted, 
 from estimator.estimate.uncertainty import WINDOW_S, numerical_jacobian, window_covariance, window_normals
 from estimator.signals.grasp_data import GraspData
 from estimator.statistics import rms
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator import so3
+from estimator.arrays import Array
 from estimator.estimate.uncertainty import standard_errors
-
-Array = NDArray[np.float64]
 
 ORDER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 """Entries (row, column) of the six inertia parameters of equation (20): xx, xy, xz, yy, yz, zz."""

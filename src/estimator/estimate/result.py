@@ -40,8 +40,8 @@ from dataclasses import dataclass
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.identifiability import StepReport, WeakDirection
@@ -49,7 +49,6 @@ from estimator.estimate.inertia import InertiaEstimate
 from estimator.estimate.statics import MassEstimate
 from estimator.estimate.uncertainty import norm_se, standard_errors
 
-Array = NDArray[np.float64]
 Given = TypeVar("Given")
 
 FORMAT, VERSION = "mocobot-estimate", 1

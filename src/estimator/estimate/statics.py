@@ -14,11 +14,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag, eigh, null_space
 from scipy.optimize import brentq
 
 from estimator import so3
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.fusion import fused_up, tilt_scatter, total_wrench
 from estimator.estimate.grasp_estimate import GraspEstimate
@@ -26,8 +26,6 @@ from estimator.estimate.identifiability import StepReport, cross_information, ju
 from estimator.estimate.uncertainty import numerical_jacobian
 from estimator.signals.holds import Hold
 from estimator.statistics import rms
-
-Array = NDArray[np.float64]
 
 CONTRADICTION = "the wrenches contradict each other"
 CONTRADICTION_M = 0.02

@@ -12,9 +12,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 WINDOW_S = 4.0
 """Length of a window [s]: resolves 0.25 Hz, long against the correlation time of 5 Hz noise (0.1 s)."""

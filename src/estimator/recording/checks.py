@@ -6,11 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.arm.delta import is_reachable, leg_geometry
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES, trim_slice
 from estimator.recording.model import Recording
-
-Array = NDArray[np.float64]
 
 SPACING_TOLERANCE = 0.5  # of one sample period: a time stamp may jitter by so much
 TORQUE_FACTOR = 2.0  # of torque_limit_Nm: no spring reads beyond, so it is another unit or a spike

@@ -3,13 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimator.arm.wrist_level import wrist_of
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.recording.metadata import Level, RecordingMetadata
-
-Array = NDArray[np.float64]
 
 # Column suffixes in array order: one (Q, N, 3) array per field.
 _THETA, _REF = ("theta_z", "theta_y", "theta_x"), ("ref_x", "ref_y", "ref_z")

@@ -8,16 +8,14 @@ from pathlib import Path
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
-from numpy.typing import NDArray
 
 from estimator.arm.wrist_level import joints_of, wrist_fault
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.files import whole_file
 from estimator.recording.checks import check_finite, check_recording
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import CHANNELS, Recording
-
-Array = NDArray[np.float64]
 
 METADATA_KEY = b"mocobot"
 

@@ -23,9 +23,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, minimum_filter1d, uniform_filter1d
 
 from estimator import so3
+from estimator.arrays import Array
 from estimator.signals.grasp_data import GraspData
-
-Array = NDArray[np.float64]
 
 TOLERANCE_N = 0.01
 DURATION_S = 6.0

@@ -1,19 +1,17 @@
 """From a recording's joint angles and spring torques to the data points D_iq (paper, section IV.B)."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from estimator.arm.delta import leg_geometry, wrist_motion
 from estimator.arm.design import OmnidDesign
 from estimator.arm.dynamics import wrench_on_payload
 from estimator.arm.gimbal import angular_motion, rotation
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.filtering import differentiate, low_pass, trim_slice
 from estimator.recording.checks import check_duration, check_recording
 from estimator.recording.model import Recording
 from estimator.signals.grasp_data import GraspData
-
-Array = NDArray[np.float64]
 
 BLOCK = 16_384
 """Samples of one robot that are converted at a time; the result does not depend on it."""

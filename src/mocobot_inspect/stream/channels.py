@@ -1,7 +1,5 @@
 """Every channel of a robot over the whole log: range, faults, resolution, noise."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Stretches in which a channel is stuck, or clipped at an extreme, while the robot's other channels move."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """Noise level of a channel, from its samples alone."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from estimator.arrays import Array

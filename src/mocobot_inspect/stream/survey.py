@@ -1,7 +1,5 @@
 """One pass over a log of any length: counts of everything, and an excerpt for what needs many samples at once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """A robot's stamps: rate, jitter, gaps, duplicates, time that runs backwards."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

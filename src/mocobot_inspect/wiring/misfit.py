@@ -15,8 +15,6 @@ Every disagreement is put in units of what a healthy robot may show: its toleran
 channels. The misfit is the mean of their squares: about 1 for poorly calibrated robots, hundreds for swapped channels.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Motion and force of one robot's grasp from its channels, however wrong these may be."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

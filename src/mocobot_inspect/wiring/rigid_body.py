@@ -1,7 +1,5 @@
 """One rigid motion that fits what all robots say of their grasps best, and what they disagree by."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -6,8 +6,6 @@ messages with the same lengths, and the same joint names, are read at those plac
 gets a layout of its own.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """How the topics of one robot become its rows."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Literal
 

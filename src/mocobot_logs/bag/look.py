@@ -1,7 +1,5 @@
 """A look at the first messages of a bag: joints' names and stamps, and which built-in map suits them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Literal
 

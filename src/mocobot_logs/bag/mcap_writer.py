@@ -1,7 +1,5 @@
 """MCAP files for the bag writer of ``rosbags``: chunks compressed (zstd) and with checksums."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import cast
 

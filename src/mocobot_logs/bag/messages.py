@@ -1,7 +1,5 @@
 """What a bag's storage hands over: its topics, and serialised messages by the block."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol

@@ -1,7 +1,5 @@
 """From a map to a bag's topics: which number of which message is which channel of which robot."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

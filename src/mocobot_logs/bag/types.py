@@ -1,7 +1,5 @@
 """Message types of a bag: from their definitions to typed fields, and dotted paths through them."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import cache

@@ -3,8 +3,6 @@
 Encapsulation as in OMG DDSI-RTPS 2.5, section 10; alignment as in plain CDR (XCDR1), which is what ROS 2 writes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from rosbags.interfaces import Nodetype

@@ -11,8 +11,6 @@ Topics per robot i, from 1:
 times are the recording's times. The maps ``mocobot-ros2`` and ``omnid-ros2`` read such bags.
 """
 
-from __future__ import annotations
-
 import sqlite3
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace

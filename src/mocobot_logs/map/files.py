@@ -1,7 +1,5 @@
 """Maps by file or by name: where a log has each channel, and in which unit, sign and zero (docs/measured-data.md)."""
 
-from __future__ import annotations
-
 import tomllib
 from functools import cache
 from importlib import resources

@@ -1,7 +1,5 @@
 """What a map says: where a log has each channel of each robot, and in which unit, sign and zero."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """From the TOML of a map to a ``LogMap``: every key known, every value allowed, nothing missing."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import Any, Literal, get_args

@@ -1,7 +1,5 @@
 """Units of a measured log: what each kind of channel may be logged in, and its size in SI."""
 
-from __future__ import annotations
-
 import math
 
 from estimator.errors import InputError

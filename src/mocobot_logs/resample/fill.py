@@ -1,7 +1,5 @@
 """Missing samples of a stream, and samples that crowd."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray

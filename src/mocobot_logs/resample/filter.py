@@ -14,8 +14,6 @@ Then, for k > 1, a linear-phase FIR filter, its delay taken out, and every k-th 
 weaker than -108 dB from 0.5 r on, so that nothing above half the output rate folds to anywhere.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

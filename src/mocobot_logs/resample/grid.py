@@ -1,7 +1,5 @@
 """From a robot's rows to evenly spaced samples, block by block, whatever pieces the rows come in."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -11,8 +11,6 @@ Missing samples are filled in first (``fill``). The anti-alias rule and its numb
 ``filter``. What the low-pass needs, a tenth of a second, is lost at either end.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

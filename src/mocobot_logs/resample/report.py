@@ -1,7 +1,5 @@
 """What resampling found in a robot's stream, and what it did to it."""
 
-from __future__ import annotations
-
 from dataclasses import asdict, dataclass
 from typing import Any, Literal
 

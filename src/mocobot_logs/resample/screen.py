@@ -1,7 +1,5 @@
 """A robot's rows in order: each a finite sample at a later time than the one before."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

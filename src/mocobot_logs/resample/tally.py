@@ -1,7 +1,5 @@
 """Gaps and jitter of a robot's stamps."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from estimator.errors import InputError

@@ -1,7 +1,5 @@
 """Text tables: one header line, then one row per sample, cells of numbers."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import re

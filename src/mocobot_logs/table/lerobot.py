@@ -5,8 +5,6 @@ Features are columns of lists; ``meta/info.json`` names their numbers. Several e
 ``lerobot/datasets/dataset_writer.py``, is where that is laid down.)
 """
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable, Iterator, Mapping

@@ -1,7 +1,5 @@
 """NPZ archives of numpy arrays: headers checked before anything is allocated, then read in step; never a pickle."""
 
-from __future__ import annotations
-
 import io
 import zipfile
 from collections.abc import Callable, Iterator, Mapping

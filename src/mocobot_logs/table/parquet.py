@@ -1,7 +1,5 @@
 """Parquet tables, mocobot's own recordings among them: read as they are, so that broken ones can be looked at."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Time of a table in whole nanoseconds: exact for whole numbers and decimal text, rounded for floats."""
 
-from __future__ import annotations
-
 from bisect import bisect_left
 
 import numpy as np

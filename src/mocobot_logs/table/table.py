@@ -1,7 +1,5 @@
 """Tables as logs: columns of any table, by a map, become the robots' channels."""
 
-from __future__ import annotations
-
 import difflib
 import re
 from abc import ABC, abstractmethod

@@ -1,7 +1,5 @@
 """Recordings as CSV and NPZ: for other programs, and read back by ``open_log`` without a map."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

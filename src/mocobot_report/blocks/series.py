@@ -6,14 +6,12 @@ from itertools import pairwise
 
 import numpy as np
 import plotly.graph_objects as go
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.charts import Axis, axis, chart, figure, line, literal, log_axis
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.legend import Key
-
-Array = NDArray[np.float64]
 
 MOST = 1600
 """Points that a line keeps at most, about two per pixel of a wide plot."""

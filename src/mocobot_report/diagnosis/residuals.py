@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from itertools import zip_longest
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.result.residual_statistics import binned, multiples, spectrum
 from discrepancy.result.traces import Group, Trace, groups
+from estimator.arrays import Array
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.charts import axis, chart, figure, line, log_axis
 from mocobot_report.blocks.html import Node, el
@@ -21,7 +21,6 @@ from mocobot_report.blocks.units import QUANTITIES
 from mocobot_report.diagnosis.keys import CLEAN, misfits
 from mocobot_report.folder import Diagnosed
 
-Array = NDArray[np.float64]
 BAND = Key("", "±2 standard deviations of clean data", "band", "band")
 LOG_FROM = 8.0
 """Multiples of clean noise above which an axis is logarithmic."""

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import welch
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.statistics import rms_length
@@ -19,8 +19,6 @@ from mocobot_report.blocks.series import Line, Panel, stacked_chart, thinned
 from mocobot_report.blocks.tables import Entry, table, value
 from mocobot_report.sources import Source
 from mocobot_view.replay.replay_trial import ReplayTrial, replay_trial
-
-Array = NDArray[np.float64]
 
 AXES = (Key("x", "x", "c1"), Key("y", "y", "c2"), Key("z", "z", "c3"))
 SEGMENT_S = 10.0

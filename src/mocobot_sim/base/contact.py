@@ -2,12 +2,10 @@
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from mocobot_sim.base.design import HAND, BaseDesign
 from mocobot_sim.base.index import BaseIndex
-
-Array = NDArray[np.float64]
 
 
 class WheelContacts:

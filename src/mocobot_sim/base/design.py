@@ -6,13 +6,11 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.strict import Fields, is_number, read_toml
 from mocobot_sim.scene.models import models_dir
-
-Array = NDArray[np.float64]
 
 # Order of the wheels everywhere; x forward, y left.
 WHEELS = ("front_left", "front_right", "rear_left", "rear_right")

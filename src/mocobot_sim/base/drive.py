@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.base.contact import WheelContacts
 from mocobot_sim.base.design import BaseDesign, base_design
@@ -24,8 +24,6 @@ from mocobot_sim.base.index import BaseIndex
 from mocobot_sim.base.mecanum import MecanumKinematics
 from mocobot_sim.base.motion import PlanarMotion
 from mocobot_sim.trial.actors import Stage
-
-Array = NDArray[np.float64]
 
 POSITION_GAIN_PER_S = 2.0
 

@@ -21,11 +21,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from estimator.arrays import Array
 from mocobot_sim.base.design import HAND, BaseDesign
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

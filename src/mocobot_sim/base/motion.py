@@ -4,13 +4,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.base.planar import compose, relative, seen_from
 from mocobot_sim.trial.trajectories import LONGEST_S, minimum_jerk
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

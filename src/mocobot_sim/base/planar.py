@@ -1,9 +1,9 @@
 """Planar poses (x [m], y [m], yaw [rad]) and planar body twists (w_z [rad/s], v_x, v_y [m/s])."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 
 def compose(pose: ArrayLike, of: ArrayLike) -> Array:

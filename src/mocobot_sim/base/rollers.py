@@ -11,13 +11,12 @@ so twelve of them make a wheel that is round within 0.09 mm.
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.base.design import HAND, WHEELS, BaseDesign
 from mocobot_sim.scene.pymjcf import mjcf
-
-Array = NDArray[np.float64]
 
 BASE_JOINTS = ("base_x", "base_y", "base_yaw")
 HUB_HALF_WIDTH_M = 0.018

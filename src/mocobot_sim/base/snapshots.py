@@ -3,12 +3,9 @@
 from collections.abc import Sequence
 
 import mujoco
-import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from mocobot_sim.trial.actors import Stage
-
-Array = NDArray[np.float64]
 
 
 class Snapshots:

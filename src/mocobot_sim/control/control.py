@@ -19,9 +19,9 @@ from typing import Any
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.strict import is_number
 from mocobot_sim.control.kernel import update_team
@@ -29,8 +29,6 @@ from mocobot_sim.control.kernel import wrist as wrist
 from mocobot_sim.scene.as_built import AsBuilt, units_of
 from mocobot_sim.scene.sensor_effects import SensorEffects
 from mocobot_sim.scene.team_index import TeamIndex
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

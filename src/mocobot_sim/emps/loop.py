@@ -6,12 +6,10 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from mocobot_sim.emps.mjcf import DRIVE, JOINT, LOAD_JOINT, axis_spec
 from mocobot_sim.emps.plant import Plant
-
-Array = NDArray[np.float64]
 
 TIMESTEP_S = 5e-4
 """Largest step of the integration, within which the voltage is held."""

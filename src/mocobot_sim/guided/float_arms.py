@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.control.control import ControlGains
 from mocobot_sim.guided.weight import Payload, up_in_payload, weight_shares
@@ -12,8 +12,6 @@ from mocobot_sim.scene.as_built import AsBuilt, units_of
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.trial.actors import Stage
 from mocobot_sim.trial.trajectories import minimum_jerk
-
-Array = NDArray[np.float64]
 
 # No stiffness. The SEA torque loop lags behind the changing lever arms, which takes about 1.4 N s/m of damping away
 # per arm (measured with payload (a)); a little more than that brings a payload that nobody holds to rest.

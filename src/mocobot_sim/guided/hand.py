@@ -5,14 +5,13 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.trial.actors import Stage
 from mocobot_sim.trial.trajectories import minimum_jerk
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from estimator.arm import gimbal
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from mocobot_sim.trial.truth import GroundTruth
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.strict import Fields, read_toml
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

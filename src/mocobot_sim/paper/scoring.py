@@ -11,14 +11,12 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from estimator.arrays import Array
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 from mocobot_sim.paper.published import PayloadTruth
-
-Array = NDArray[np.float64]
 
 MOMENTS = ("Ixx", "Iyy", "Izz")
 

@@ -4,11 +4,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
-
-Array = NDArray[np.float64]
 
 
 def _zeros() -> Array:

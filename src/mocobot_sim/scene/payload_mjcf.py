@@ -1,13 +1,11 @@
 """The MJCF of a payload that is known by its numbers only, such as an estimated one."""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.scene.pymjcf import mjcf
-
-Array = NDArray[np.float64]
 
 
 def payload_mjcf(mass_kg: float, p_1c: Array, inertia_1: Array, X_1i: RigidTransform) -> mjcf.RootElement:

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.base.design import base_design
 from mocobot_sim.base.rollers import release, rough_floor
@@ -22,8 +22,6 @@ from mocobot_sim.scene.payload import grasp_frames, load_payload
 from mocobot_sim.scene.pymjcf import mjcf
 from mocobot_sim.scene.sensor_effects import SensorEffects
 from mocobot_sim.scene.soft import SoftRow, tune
-
-Array = NDArray[np.float64]
 
 TIMESTEP_S = 0.001
 STIFF = {"solref": [0.004, 1.0], "solimp": [0.9999, 0.9999, 0.001, 0.5, 2.0]}

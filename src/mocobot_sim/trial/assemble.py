@@ -4,6 +4,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.control.control import home_phi
 from mocobot_sim.scene.models import omnid_design
@@ -11,8 +12,6 @@ from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.soft import row_compliance
 from mocobot_sim.scene.team_index import TeamIndex
 from mocobot_sim.trial.loops import close, hang, loop_jacobian, open_by, static_load, turn_free_directions
-
-Array = NDArray[np.float64]
 
 # How far closing the loops may move a wrist or turn a gimbal from where the scene has them.
 LARGEST_SHIFT_M = 0.06

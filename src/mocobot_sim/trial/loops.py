@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from mocobot_sim.scene.team_index import TeamIndex
 
-Array = NDArray[np.float64]
 Index = NDArray[np.intp]
 
 

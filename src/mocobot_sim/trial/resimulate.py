@@ -4,8 +4,8 @@ import json
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.recording.model import Recording
 from mocobot_sim.control.control import ControlGains
@@ -14,8 +14,6 @@ from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
 from mocobot_sim.trial.trial import run_trial
 from mocobot_sim.trial.trial_log import TrialLog
-
-Array = NDArray[np.float64]
 
 
 def resimulate(

@@ -2,9 +2,9 @@
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
 from mocobot_sim.control.control import ControlGains, home_phi
 from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.models import omnid_design
@@ -13,8 +13,6 @@ from mocobot_sim.scene.team_index import TeamIndex, ids_of
 from mocobot_sim.trial.sensed import SensedLog
 from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
 from mocobot_sim.trial.trial_log import TrialLog
-
-Array = NDArray[np.float64]
 
 ROD_LIMIT_M = 0.02e-3
 WELD_LIMIT_M = 0.01e-3

@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import Recording
@@ -12,8 +12,6 @@ from mocobot_sim.scene.as_built import CalibrationSpread
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.trial.trajectories import RATE_HZ
 from mocobot_sim.trial.trial_log import TrialLog
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

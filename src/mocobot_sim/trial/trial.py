@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.control.control import ControlGains, TeamController
 from mocobot_sim.scene.models import omnid_design
@@ -18,8 +18,6 @@ from mocobot_sim.trial.rows import Rows
 from mocobot_sim.trial.sensed import SensedLog
 from mocobot_sim.trial.trajectories import RATE_HZ, Trajectory
 from mocobot_sim.trial.trial_log import TrialLog
-
-Array = NDArray[np.float64]
 
 
 def run_trial(

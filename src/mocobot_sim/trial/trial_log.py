@@ -2,16 +2,13 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from estimator.arrays import Array
 from mocobot_sim.control.control import ControlGains
 from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.sensor_effects import SensorEffects
 from mocobot_sim.trial.sensed import SensedLog
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from estimator.arrays import Array
 from estimator.files import write_json
 from mocobot_sim.effects import effect_to_dict
 from mocobot_sim.scene.applied import Applied
@@ -17,8 +17,6 @@ from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.models import posed
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import TeamIndex
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

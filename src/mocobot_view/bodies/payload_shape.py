@@ -3,7 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.errors import InputError
@@ -14,8 +13,6 @@ from mocobot_view.bodies.primitives import capsule, join
 from mocobot_view.bodies.shapes import Shape, body_shape
 from mocobot_view.facts.body_facts import BodyFacts
 from mocobot_view.facts.placement import Grasps
-
-Array = NDArray[np.float64]
 
 BAR_M, BAR_RGBA = 0.012, (0.55, 0.60, 0.70, 1.0)
 FAR_M, FAR_RAD = 0.1, np.deg2rad(15.0)

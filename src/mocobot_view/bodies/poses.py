@@ -8,14 +8,12 @@ viewer that knows the tree needs no more than what varies.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.delta import LEG_DIRECTIONS, leg_geometry
 from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
 from mocobot_view.bodies.robot import GIMBAL, LEGS
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

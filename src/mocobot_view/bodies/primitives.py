@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 AROUND = 24
 """Facets around an axis; a rod of 6 mm then deviates from round by 0.05 mm."""

@@ -5,14 +5,12 @@ from functools import cache
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from estimator.arm.delta import LEG_DIRECTIONS
 from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
 from mocobot_sim.scene.models import base_height_m, models_dir, omnid_design, posed
 from mocobot_view.bodies.shapes import Shape, body_shape
-
-Array = NDArray[np.float64]
 
 LEGS = (1, 2, 3)
 GIMBAL = ("yoke", "ring", "flange")

@@ -9,10 +9,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from mocobot_sim.scene.models import posed
 from mocobot_view.bodies.primitives import Triangles, box, capsule, cylinder, ellipsoid, join
-
-Array = NDArray[np.float64]
 
 VISIBLE_GROUPS = (0, 1, 2)
 """Geom groups that MuJoCo's own viewer shows; the others are by custom for collisions."""

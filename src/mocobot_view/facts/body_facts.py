@@ -3,15 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import single_robot
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from mocobot_view.facts.placement import Grasps
-
-Array = NDArray[np.float64]
 
 THINNEST = 0.02
 """Least semi-axis of a drawn inertia ellipsoid over the largest, for inertias that no body has."""

@@ -4,7 +4,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator.errors import InputError
@@ -13,8 +12,6 @@ from estimator.strict import Fields, read_json
 from mocobot_sim.trial.truth import truth_path
 from mocobot_view.facts.body_facts import BodyFacts
 from mocobot_view.facts.placement import Grasps
-
-Array = NDArray[np.float64]
 
 TRUTH = ("grasps", "mass_kg", "p_1c_m", "R_1c_rotvec_deg", "principal_inertia_kgm2")
 """Keys of the truth that are drawn."""

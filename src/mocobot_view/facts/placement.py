@@ -7,12 +7,10 @@ diagnosis looks for, not what a picture assumes.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator import so3
-
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 SPACING_M = 1.2
 """Distance of robots in a row, where nothing tells how they stand."""

@@ -4,13 +4,12 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import root_scalar
 
+from estimator.arrays import Array
 from mocobot_sim.scene.models import posed
 from mocobot_view.bodies.shapes import VISIBLE_GROUPS
-
-Array = NDArray[np.float64]
 
 MARGIN = 0.04
 """Share of the picture that stays free at each side."""

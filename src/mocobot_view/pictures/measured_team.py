@@ -5,11 +5,11 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.design import OmnidDesign
 from estimator.arm.gimbal import rotation
+from estimator.arrays import Array
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from mocobot_sim.control.control import home_phi
@@ -23,8 +23,6 @@ from mocobot_view.bodies.poses import rod_angles
 from mocobot_view.bodies.robot import LEGS, TINTED, fit_design, robot_shapes
 from mocobot_view.facts.body_facts import BodyFacts, check_robots, facts_of, held
 from mocobot_view.facts.placement import Bases, Grasps, placed
-
-Array = NDArray[np.float64]
 
 SAMPLES = 2000
 """Samples, spread over a recording, from which bases are placed."""

@@ -16,12 +16,12 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_view.pictures.camera import Camera, pixels
 from mocobot_view.pictures.labels import with_labels
 from mocobot_view.pictures.marks import Marks
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
 RENDERERS = ("egl", "osmesa")

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from discrepancy.result.read import NamedCause
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
@@ -27,8 +27,6 @@ from mocobot_view.pictures.marks import Marks
 from mocobot_view.pictures.measured_team import MeasuredTeam, measured_team
 from mocobot_view.pictures.render import Shot
 from mocobot_view.sizes import MARK_M
-
-Array = NDArray[np.float64]
 
 ASPECT = 1.6
 """Width over height of a picture that shots are framed for, if nothing else is said."""

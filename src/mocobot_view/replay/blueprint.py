@@ -5,13 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from mocobot_view.replay.log_robots import trail_paths
 from mocobot_view.replay.log_time import TIMELINE
 from mocobot_view.replay.replay_trial import ReplayTrial
-
-Array = NDArray[np.float64]
 
 TRAIL_S = 3.0
 """Length of the visible wrist paths."""

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from estimator.arrays import Array
 from mocobot_view import colours
 from mocobot_view.colours import Colour
 from mocobot_view.facts.body_facts import BodyFacts
@@ -14,8 +14,6 @@ from mocobot_view.replay.log_robots import log_label, log_shape
 from mocobot_view.replay.log_time import send_poses
 from mocobot_view.replay.replay_trial import ReplayTrial
 from mocobot_view.sizes import FRAME_M
-
-Array = NDArray[np.float64]
 
 
 def log_payload(stream: rr.RecordingStream, trial: ReplayTrial) -> None:

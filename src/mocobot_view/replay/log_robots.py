@@ -2,7 +2,7 @@
 
 import numpy as np
 import rerun as rr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from mocobot_view import colours
@@ -13,8 +13,6 @@ from mocobot_view.facts.cause_body import by_place
 from mocobot_view.replay.log_time import send, send_poses
 from mocobot_view.replay.replay_trial import ReplayTrial
 from mocobot_view.sizes import FORCE_M_PER_N, MARK_M
-
-Array = NDArray[np.float64]
 
 TRAIL_HZ = 25.0
 """Pieces of a wrist path per second; it is drawn only, the samples are among the series."""

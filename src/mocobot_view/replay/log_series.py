@@ -2,14 +2,12 @@
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from mocobot_view import colours
 from mocobot_view.colours import Colour
 from mocobot_view.replay.log_time import send
 from mocobot_view.replay.replay_trial import ReplayTrial
-
-Array = NDArray[np.float64]
 
 XYZ = ("x", "y", "z")
 

@@ -4,9 +4,8 @@ from collections.abc import Iterable
 
 import numpy as np
 import rerun as rr
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from estimator.arrays import Array
 
 TIMELINE = "time"
 

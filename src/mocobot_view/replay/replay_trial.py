@@ -5,11 +5,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from discrepancy.result.read import WrittenDiagnosis
 from estimator.arm.gimbal import rotation
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
@@ -23,8 +21,6 @@ from mocobot_view.bodies.shapes import Shape
 from mocobot_view.facts.body_facts import BodyFacts, check_robots, facts_of, held
 from mocobot_view.facts.placement import Bases, Grasps, PayloadMotion, placed
 from mocobot_view.replay.signals import Balance, balance, filtered
-
-Array = NDArray[np.float64]
 
 MISFIT_M, MISFIT_RAD = 0.01, 0.03
 """Gaps between flanges and grasps (rms) above which something is wrong; robots that were never calibrated show 6 mm

@@ -3,16 +3,14 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.fusion import fuse
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from estimator.signals.grasp_data import GraspData
 from estimator.signals.process import process_recording
-
-Array = NDArray[np.float64]
 
 CUTOFF_HZ, FILTERED_HZ = 5.0, 50.0
 """Cut-off of the filter, and the rate at which its output is kept."""

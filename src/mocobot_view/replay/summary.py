@@ -2,17 +2,14 @@
 
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from discrepancy.result.read import VERDICTS, WrittenDiagnosis
+from estimator.arrays import Array
 from estimator.statistics import rms, rms_length
 from mocobot_view.facts.placement import Grasps
 from mocobot_view.replay.replay_trial import ReplayTrial
 from mocobot_view.sizes import FORCE_M_PER_N
-
-Array = NDArray[np.float64]
 
 
 def summary(trial: ReplayTrial) -> str:

@@ -1,7 +1,5 @@
 """Mistakes in the wiring of a log that are looked for."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from estimator.arm.design import OmnidDesign

@@ -1,7 +1,5 @@
 """Two groups of a robot exchanged: driven with gimbal angles, or angles with torques."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations

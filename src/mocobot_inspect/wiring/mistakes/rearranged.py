@@ -1,7 +1,5 @@
 """Three channels of a robot in another order or with other signs, one entry of ``REARRANGED`` per suspicion."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import product

@@ -4,8 +4,6 @@ Exchanging *all* groups of two robots only renumbers them, which no data tell; s
 exchanged theta and tau.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Channels in another unit than they are taken for."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any

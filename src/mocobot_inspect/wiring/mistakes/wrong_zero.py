@@ -1,7 +1,5 @@
 """Angles or positions that count from elsewhere."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import product

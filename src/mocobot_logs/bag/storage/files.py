@@ -4,8 +4,6 @@ Only the names of the files and their compression are taken from ``metadata.yaml
 nothing that the files do not say themselves, and are often wrong after a recording was interrupted or repaired.
 """
 
-from __future__ import annotations
-
 import re
 import shutil
 import weakref

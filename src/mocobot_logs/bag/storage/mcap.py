@@ -6,8 +6,6 @@ chunk before it knows how much comes out (a bomb of 260 kB never ended), and tak
 Records are parsed by the ``mcap`` library, except for the headers of chunks and of messages.
 """
 
-from __future__ import annotations
-
 import os
 import struct
 import zlib

@@ -6,8 +6,6 @@ limits and by rows that do not ascend. ``rosbags`` sets no limits (45 kB whose p
 refuses a whole bag for one topic whose definition or quality of service it does not know.
 """
 
-from __future__ import annotations
-
 import contextlib
 import sqlite3
 from collections.abc import Callable, Collection, Iterator

@@ -1,7 +1,5 @@
 """Decompression that never makes more than was claimed, and refuses claims that are too large."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import lz4.frame
