@@ -1,6 +1,6 @@
 """Where the numbers come from: versions, options, files and their hashes."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from estimator.files import file_facts
@@ -52,7 +52,7 @@ def _text(option: Any) -> str:
     return "none" if option is None else str(option)
 
 
-def _files(caption: str, listed: list[Mapping[str, Any]]) -> Node:
+def _files(caption: str, listed: Sequence[Mapping[str, Any]]) -> Node:
     rows: list[list[Entry]] = []
     for entry in listed:
         count, digest = entry.get("bytes"), el("span", str(entry.get("sha256", "")), class_="hash")

@@ -114,9 +114,9 @@ def estimate_clocks(
             results.append(_pair(first, Rates(theta[i], starts[i], rate_hz), i + 1, middle_s, max_offset_s))
     return ClockEstimate(
         middle_s,
-        *(np.array([getattr(r, name) for r in results]) for name in NUMBERS),
-        tuple(r.report for r in results if r.report is not None),
-        tuple(r.why_not for r in results),
+        **{name: np.array([getattr(r, name) for r in results]) for name in NUMBERS},
+        reports=tuple(r.report for r in results if r.report is not None),
+        why_not=tuple(r.why_not for r in results),
     )
 
 

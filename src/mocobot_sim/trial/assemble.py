@@ -135,7 +135,8 @@ def _static_forces(
     if check and unheld > UNHELD_NM:
         raise InputError(SWINGS.format(unheld))
     load = jacobian @ (free * solution[: jacobian.shape[1]]) - needed
-    return solution[jacobian.shape[1] :].reshape(index.spring_dof.shape), unheld, load
+    torques: Array = solution[jacobian.shape[1] :].reshape(index.spring_dof.shape)
+    return torques, unheld, load
 
 
 def _deflection(model: mujoco.MjModel, index: TeamIndex, torque: Array) -> Array:
