@@ -135,7 +135,7 @@ def _static_forces(
     if check and unheld > UNHELD_NM:
         raise InputError(SWINGS.format(unheld))
     load = jacobian @ (free * solution[: jacobian.shape[1]]) - needed
-    torques: Array = solution[jacobian.shape[1] :].reshape(index.spring_dof.shape)
+    torques = np.asarray(solution[jacobian.shape[1] :], dtype=np.float64).reshape(index.spring_dof.shape)
     return torques, unheld, load
 
 
