@@ -2,7 +2,7 @@
 
 *Derived*: follows from something else that is named. *Measured*: on data, as said. *Chosen*: a round number; the
 campaigns in docs/diagnosis/validation.md and docs/emps.md were run with it, and no study compares it with others.
-What one cause alone has (typical sizes, grids of its shapes) is in its file, tolerances are in ``team/tolerances.py``.
+What one cause alone has (tolerances, typical sizes, grids of its shapes) is in its file.
 """
 
 # Evidence: what the data say about one candidate.
