@@ -22,6 +22,7 @@ from mocobot_sim.trial.trial_log import TrialLog
 
 Array = NDArray[np.float64]
 
+RATES_HZ = (50.0, 80.0, 100.0, 125.0, 200.0, 250.0, 400.0, 500.0, 1000.0)
 LEAST_SPACING = 0.05
 """Share of a period that two samples are apart at least, however large the jitter."""
 
@@ -75,6 +76,22 @@ class Logger:
     encoder_bits: int | None = 16
     tau_noise_Nm: float = 0.01
     tau_step_Nm: float = 0.01
+
+    @classmethod
+    def draw(cls, rng: np.random.Generator) -> Logger:
+        """Any logger that a lab may have."""
+        rate_hz = float(rng.choice(RATES_HZ))
+        return cls(
+            rate_hz=rate_hz,
+            jitter_s=float(rng.choice([0.0, 1.0]) * np.exp(rng.uniform(np.log(5e-5), np.log(2e-3)))),
+            drops=float(rng.choice([0.0, rng.uniform(0.0, 0.05)])),
+            stagger_s=float(rng.choice([0.0, rng.uniform(0.0, 0.01)])),
+            offset_s=float(rng.choice([0.0, rng.uniform(-0.05, 0.05)])),
+            drift=float(rng.choice([0.0, rng.uniform(-5e-5, 5e-5)])),
+            encoder_bits=int(rng.integers(12, 21)),
+            tau_noise_Nm=float(np.exp(rng.uniform(np.log(0.003), np.log(0.05)))),
+            tau_step_Nm=float(rng.choice([0.0, 0.001, 0.01, 0.02])),
+        )
 
     def recorded(self, trial: TrialLog, rng: np.random.Generator, name: str = "logged") -> Recording:
         """A trial, logged and brought onto one grid as ``mocobot convert`` does it.

@@ -125,9 +125,9 @@ SHORTEST_HOLD_S = 1.2
 
 # A team: noise of the sensors.
 
-ANGLE_FLOOR_RAD = 1.2e-5
+ANGLE_FLOOR_RAD = 2e-6
 """Noise of an angle at least. Chosen to cover the model's own errors (rods, welds, integration)."""
-TORQUE_FLOOR_NM = 2e-3
+TORQUE_FLOOR_NM = 3e-4
 """Noise of a torque at least. Chosen for the same reason."""
 NOISE_ABOVE_HZ = 25.0
 """Where nothing moves, so that what is there is noise. Chosen."""

@@ -71,12 +71,20 @@ class Sampling:
         native, first, jitter, missing, method, level, steps = (values[key] for key in _KEYS)
         require("native_hz", "a number of hertz, greater than 0 and less than 1e9",
                 good=is_number(native) and 0 < native < 1e9)  # fmt: skip
-        require("first_s", "a number of seconds, between -1e6 and 1e6", good=is_number(first) and abs(first) <= 1e6)
+        require(
+            "first_s",
+            "a number of seconds, between -1e6 and 1e6",
+            good=is_number(first) and abs(first) <= 1e6,
+        )
         require("jitter_s", "a number of seconds, from 0 to one", good=is_number(jitter) and 0 <= jitter <= 1)
-        require("missing", "a share, at least 0 and less than 1", good=is_number(missing) and 0 <= missing < 1)
+        require(
+            "missing", "a share, at least 0 and less than 1", good=is_number(missing) and 0 <= missing < 1
+        )
         require("method", f"one of {', '.join(METHODS)}", good=method in METHODS)
         require("level", "one of joint, wrist", good=level in ("joint", "wrist"))
-        good = isinstance(steps, list) and len(steps) == SENSORS and all(is_number(x) and x >= 0 for x in steps)
+        good = (
+            isinstance(steps, list) and len(steps) == SENSORS and all(is_number(x) and x >= 0 for x in steps)
+        )
         require("steps", f"{SENSORS} numbers, none negative", good=good)
         numbers = float(native), float(first), float(jitter), float(missing)
         return cls(*numbers, method, level, tuple(float(step) for step in steps))

@@ -125,7 +125,9 @@ class RobotStream:
         time_ns, values = (np.concatenate(parts) for parts in zip(*self._head, strict=True))
         self._head = []
         grid, k = self._plan(time_ns[:_LOOK])  # the same rows whatever the chunks
-        self._pipe = _Pipe(grid, k, Tally(self._where, grid.period_ns, self._max_gap_s), self._max_gap_s)
+        native_hz = 1.0 / (grid.period_ns * NS)
+        tally = Tally(self._where, grid.period_ns, self._max_gap_s, native_hz / self._rate_hz)
+        self._pipe = _Pipe(grid, k, tally, self._max_gap_s)
         self._pipe.push(time_ns, values)
         return self._pipe
 

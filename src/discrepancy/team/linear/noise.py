@@ -52,7 +52,8 @@ class Noise:
         for first in range(0, count, _BATCH):
             size = min(_BATCH, count - first)
             parts = [
-                way.converted([self._errors(way.x, i, rng) for _ in range(size)]) for i, way in enumerate(ways)
+                way.converted([self._errors(way.x, i, rng) for _ in range(size)])
+                for i, way in enumerate(ways)
             ]
             for draw in np.moveaxis(np.array(parts), 0, 2):  # (Q, N, 9)
                 phi, theta, tau = np.split(draw, 3, axis=2)
