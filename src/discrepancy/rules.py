@@ -133,6 +133,12 @@ NOISE_ABOVE_HZ = 25.0
 """Where nothing moves, so that what is there is noise. Chosen."""
 TEAM_SMOOTH_HZ = 12.0
 """Cut-off of signals when their rounding is drawn anew, and of rates that say where friction slides. Chosen."""
+SLOW_HZ, SMOOTHER_OCTAVES = 1.0, 3
+"""Where rounding shows as stairs: cut-off of the speed that tells their frequency, and how far that of the signal
+falls with it. Chosen: the trajectory need only be one that the stairs may have come from."""
+PHASE_TRAVEL = 4.0
+"""Steps of travel after which a rounding error is drawn anew. Chosen: independent from one rest to the next, and
+changes an encoder's speed by half at most."""
 NOISE_DRAWS = 24
 """From which the rows' covariance is made. Chosen."""
 PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4

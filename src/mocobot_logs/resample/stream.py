@@ -101,7 +101,7 @@ class RobotStream:
             duplicates=screen.duplicates,
             merged=pipe.merged,
             method=pipe.method,
-            steps=self._steps.steps(SENSORS),
+            steps=self._steps.steps(min(SENSORS, len(self._channels))),
         )
         return screen.first_ns + round(pipe.lead / self._rate_hz / NS), values, report
 

@@ -12,7 +12,7 @@ from scipy.signal import butter, sosfiltfilt
 from discrepancy import rules
 from discrepancy.team.linear.signals import Signals
 from estimator.arrays import Array
-from estimator.filtering import low_pass
+from estimator.filtering import differentiate, low_pass
 from estimator.quantisation import rounding_step
 from estimator.recording.sampling import SENSORS
 from mocobot_logs.resample.errors import Conversion
@@ -47,7 +47,7 @@ class Noise:
 
         Where its samples are not as they were read, errors are drawn at the readings and sent through the conversion.
         """
-        smooth = low_pass(_columns(signals), signals.rate_hz, rules.TEAM_SMOOTH_HZ)
+        smooth = _unrounded(signals, np.moveaxis(self.step, 0, 1).reshape(-1, SENSORS))
         ways = [_Way(smooth[:, i], signals, i, rng) for i in range(smooth.shape[1])]
         for first in range(0, count, _BATCH):
             size = min(_BATCH, count - first)
@@ -100,14 +100,41 @@ def _columns(signals: Signals) -> Array:
 
 
 def _phase(x: Array, rng: np.random.Generator) -> Array:
-    """Where in its step a signal (in steps) truly is: constant while it rests, new after each step of travel.
+    """How far a signal (in steps) truly is from where its readings put it: the same while it rests.
 
-    A resting encoder repeats one rounding error; what was recorded of it always lies on the grid itself.
+    A resting encoder repeats one rounding error; what was recorded of it always lies on the grid itself. The phase is
+    a broken line over travel, drawn anew every ``PHASE_TRAVEL`` steps, uniform modulo one everywhere.
     """
-    travel = np.cumsum(np.abs(np.diff(x, axis=0, prepend=x[:1])), axis=0)
-    segment = np.cumsum(np.diff(np.floor(travel), axis=0, prepend=0.0) > 0, axis=0)
-    phase = rng.uniform(-0.5, 0.5, (int(segment.max()) + 1, *x.shape[1:]))
-    return np.take_along_axis(phase, segment, axis=0)
+    # Beyond two knots a sample nothing is left to repeat.
+    travel = np.minimum(np.abs(np.diff(x, axis=0, prepend=x[:1])), 2 * rules.PHASE_TRAVEL)
+    at = np.cumsum(travel, axis=0) / rules.PHASE_TRAVEL
+    low = np.floor(at).astype(np.intp)
+    knots = rng.uniform(0.0, 2.0, (int(low.max()) + 2, *x.shape[1:]))
+    return np.take_along_axis(knots, low, axis=0) * (1.0 - (at - low)) + np.take_along_axis(
+        knots, low + 1, axis=0
+    ) * (at - low)
+
+
+def _unrounded(signals: Signals, step: Array) -> Array:
+    """A trajectory that the readings may have come from, shape (Q, N, 9), with ``step`` (N, 9).
+
+    Readings of a slow joint are stairs, and no filter with one cut-off leaves of them what it did: where fewer than
+    three stairs go into a period of ``TEAM_SMOOTH_HZ``, the cut-off falls with their frequency.
+    """
+    x, rate_hz = _columns(signals), signals.rate_hz
+    slow = differentiate(low_pass(x, rate_hz, rules.SLOW_HZ), rate_hz)
+    stairs_hz = low_pass(np.abs(slow), rate_hz, rules.SLOW_HZ) / np.where(step > 0, step, 1e-300)
+    cutoffs = rules.TEAM_SMOOTH_HZ * 0.5 ** np.arange(rules.SMOOTHER_OCTAVES + 1)
+    octave = np.log2(rules.TEAM_SMOOTH_HZ / np.maximum(stairs_hz / 3.0, 1e-9)).clip(
+        0.0, rules.SMOOTHER_OCTAVES
+    )
+    octave[stairs_hz < rules.SLOW_HZ] = 0.0  # at rest
+    out = np.zeros_like(x)
+    for k, cutoff in enumerate(cutoffs):
+        weight = np.maximum(1.0 - np.abs(octave - k), 0.0)
+        if weight.any():
+            out += weight * low_pass(x, rate_hz, cutoff)
+    return out
 
 
 def _steps(signals: Signals) -> Array:
