@@ -3,27 +3,43 @@
 import numpy as np
 
 from estimator.quantisation import rounding_step
+from estimator.recording.sampling import SENSORS
 from mocobot_logs.log import Array
 
-ROWS = 1 << 16
-"""Rows that are looked at, from the first on: a minute at 1 kHz."""
+BLOCK = 4096
+BLOCKS = 16
+"""So many blocks of ``BLOCK`` rows are looked at, from the first on: a minute at 1 kHz."""
 
 
 class StepFinder:
-    """Keeps the first rows of a stream."""
+    """Looks at blocks of rows, wherever the pieces end in which they come.
+
+    A block that rests shows no step, and one that moves fast repeats no value; the median of those that tell is taken.
+    """
 
     def __init__(self) -> None:
-        """Start without any."""
-        self._parts: list[Array] = []
+        """Start without any rows."""
+        self._waiting: list[Array] = []
         self._rows = 0
+        self._votes: list[list[float]] = []
 
     def add(self, values: Array) -> None:
         """Look at the next rows, shape (q, C)."""
-        if self._rows < ROWS:
-            self._parts.append(values[: ROWS - self._rows].copy())
-            self._rows += len(self._parts[-1])
+        while len(values) and len(self._votes) < BLOCKS:
+            part, values = np.split(values[:, :SENSORS], [BLOCK - self._rows])
+            self._waiting.append(part.copy())  # the piece that it is cut from may be large
+            self._rows += len(part)
+            if self._rows == BLOCK:
+                self._vote()
 
-    def steps(self, channels: int) -> tuple[float, ...]:
-        """Step of each of the first channels, 0 for none [SI]."""
-        values = np.concatenate(self._parts)
-        return tuple(rounding_step(values[:, channel]) for channel in range(channels))
+    def steps(self) -> tuple[float, ...]:
+        """Step of each of the sensors' channels, 0 for none [SI]."""
+        if self._waiting:
+            self._vote()
+        told = [[step for step in votes if step > 0] for votes in zip(*self._votes, strict=True)]
+        return tuple(float(np.median(steps)) if steps else 0.0 for steps in told)
+
+    def _vote(self) -> None:
+        values = np.concatenate(self._waiting)
+        self._votes.append([rounding_step(channel) for channel in values.T])
+        self._waiting, self._rows = [], 0

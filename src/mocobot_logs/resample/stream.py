@@ -6,7 +6,7 @@ import numpy as np
 
 from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES
-from estimator.recording.sampling import SENSORS, Method
+from estimator.recording.sampling import Method
 from mocobot_logs.log import NS, Array, Samples, Stamps, joined
 from mocobot_logs.resample.fill import Merger
 from mocobot_logs.resample.filter import Decimator, fineness
@@ -101,7 +101,7 @@ class RobotStream:
             duplicates=screen.duplicates,
             merged=pipe.merged,
             method=pipe.method,
-            steps=self._steps.steps(min(SENSORS, len(self._channels))),
+            steps=self._steps.steps(),
         )
         return screen.first_ns + round(pipe.lead / self._rate_hz / NS), values, report
 
