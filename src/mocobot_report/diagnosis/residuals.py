@@ -15,7 +15,7 @@ from mocobot_report.blocks.legend import Key, shared_legend
 from mocobot_report.blocks.numbers import fitting
 from mocobot_report.blocks.prose import paragraph, verdict
 from mocobot_report.blocks.sections import section, tabs
-from mocobot_report.blocks.series import Line, Panel, runs, stacked_chart, thinned
+from mocobot_report.blocks.series import Line, Panel, runs, stacked_chart, thinned, with_breaks
 from mocobot_report.blocks.tables import Entry, table, value
 from mocobot_report.blocks.units import QUANTITIES
 from mocobot_report.diagnosis.keys import CLEAN, misfits
@@ -92,7 +92,8 @@ def _physical(
         limit = _limit(trace.before[:, columns], trace.sigma[:, columns])
         unit, scale = fitting(group.unit, limit)
         lines = _lines(trace, scale * values[:, columns], keys, run)
-        band = 2.0 * scale * float(np.median(trace.sigma[:, columns].max(axis=1)))
+        time, sigma = with_breaks(trace.time[: trace.moving], trace.sigma[: trace.moving, columns], run)
+        band = (time, 2.0 * scale * sigma.max(axis=1)) if trace.moving else None
         panels.append(Panel(group.name, unit, lines, (-scale * limit, scale * limit), band=band))
     legend = [*keys, BAND] if len(keys) > 1 else [BAND]
     label = f"{title}, every group of channels over time; rms values are in the table below."

@@ -138,10 +138,13 @@ def test_channels_are_grouped_by_name() -> None:
     ]
 
 
-def test_whitening_can_be_undone() -> None:
+@pytest.mark.parametrize("uneven", [False, True])
+def test_whitening_can_be_undone(uneven: bool) -> None:
     rng = np.random.default_rng(1)
     draws = np.cumsum(rng.standard_normal((20, 60, 4)), axis=1) * 0.1 + rng.standard_normal((20, 60, 4))
-    white = Whitening.of(draws, 50)
+    draws[:, :3] *= 5.0
+    white = Whitening.of(draws, 50, uneven=uneven)
+    assert np.any(white.loudness > 1.0) == uneven
     assert unwhitened(white, white(draws[0])) == pytest.approx(draws[0], abs=1e-10)
 
 
