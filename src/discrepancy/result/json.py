@@ -8,6 +8,7 @@ causes              list, in the order of discovery, of
     place, sentence                in words
     parameters                     {name: {value, se}}; se is null for what was chosen, not fitted
     explained                      {in_sample, held_out}: share of the nominal model's misfit that the cause removes
+                                   beyond those before it; the shares add up to what all causes remove
     log10_p                        of so much evidence in clean data
     folds                          gain of chi-square on every trial when fitted to the others
     shape                          numbers that change the cause's columns, such as a pendulum's length

@@ -19,7 +19,7 @@ def format_diagnosis(values: Values) -> str:
     """
     lines = list(_wrapped(_verdict(values), ""))
     for k, cause in enumerate(values["causes"], start=1):
-        lines += ["", f"[[Cause {k}: {_label(cause)}]]", *_cause(cause)]
+        lines += ["", f"[[Cause {k}: {_label(cause)}]]", *_cause(cause, further=k > 1)]
     lines += gain_lines(values)
     notes = list(values["notes"])
     if values["not_simulated"] and not values["causes"]:
@@ -64,8 +64,9 @@ def _verdict(values: Values) -> str:
     return f"{said}no cause of the catalogue explains it."
 
 
-def _cause(cause: Values) -> Iterable[str]:
-    explained = f"Explains {_percent(cause['explained']['in_sample'])} of the misfit in sample"
+def _cause(cause: Values, *, further: bool) -> Iterable[str]:
+    more = "a further " if further else ""
+    explained = f"Explains {more}{_percent(cause['explained']['in_sample'])} of the misfit in sample"
     if cause["explained"]["held_out"] is not None:
         explained += f", {_percent(cause['explained']['held_out'])} on held-out trials"
     if cause["folds"]:
