@@ -61,9 +61,10 @@ def shares(problem: Problem, causes: Sequence[int]) -> list[tuple[float, float |
 
 
 def _parts(left: ArrayLike, floor: float) -> list[float]:
-    """How much every step takes of what there is above a floor at first."""
-    left = np.asarray(left)
-    return [float(part) for part in np.clip(-np.diff(left) / max(left[0] - floor, 1e-9), 0.0, 1.0)]
+    """How much every step takes of what there is above a floor at first; a step that takes nothing has no share."""
+    left = np.minimum.accumulate(np.asarray(left))
+    room = max(left[0] - min(floor, left[-1]), 1e-9)
+    return [float(part) for part in np.clip(-np.diff(left) / room, 0.0, 1.0)]
 
 
 def _interleaved(

@@ -47,9 +47,11 @@ def finite_log10_p(value: float) -> float:
 
 
 def place_of(candidate: Candidate) -> dict[str, Any]:
-    """Cause, family and place of a candidate, as in every part of the JSON."""
+    """Cause (its name, in words, in words at its place), family and place of a candidate, as all over the JSON."""
     return {
         "cause": candidate.cause,
+        "kind": candidate.kind,
+        "name": candidate.label,
         "family": candidate.family,
         "robot": candidate.robot,
         "joint": candidate.joint,
@@ -57,11 +59,21 @@ def place_of(candidate: Candidate) -> dict[str, Any]:
     }
 
 
+def name_of(entry: Mapping[str, Any]) -> str:
+    """A cause at its place in words; an earlier version wrote none."""
+    return entry.get("name") or f"{kind_of(entry)} ({entry['place']})"
+
+
+def kind_of(entry: Mapping[str, Any]) -> str:
+    """A cause in words, wherever it sits."""
+    return entry.get("kind") or entry["cause"].replace("_", " ")
+
+
 def label(entry: Mapping[str, Any]) -> str:
-    """Cause and place of an entry, for a plot."""
+    """An entry in words, for a plot."""
     if entry["at"] is None:
-        return f"{entry['cause']} ({entry['place']})"
-    return f"{entry['cause']} (trial {entry['at'][0]}, {entry['at'][1]:.1f} s)"
+        return name_of(entry)
+    return f"{kind_of(entry)} (trial {entry['at'][0]}, {entry['at'][1]:.1f} s)"
 
 
 def relation(entry: Mapping[str, Any], causes: Sequence[Mapping[str, Any]]) -> str:

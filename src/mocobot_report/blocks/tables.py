@@ -8,17 +8,18 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mocobot_report.blocks.html import Child, Node, el, words
-from mocobot_report.blocks.numbers import NONE, PLUS_MINUS, measured, plain
+from mocobot_report.blocks.numbers import NONE, PLUS_MINUS, THIN, measured, plain
 from mocobot_report.blocks.units import spelled_text
 
 
 @dataclass(frozen=True)
 class Num:
-    """A number in a table, with its error or spread; right-aligned."""
+    """A number in a table, with its error or spread, and a unit where the column has none; right-aligned."""
 
     text: str
     error: str = ""
     mark: bool = False
+    unit: str = ""
 
 
 Entry = str | Num | Node
@@ -29,9 +30,9 @@ def value(number: float | None, digits: int = 3, *, mark: bool = False) -> Num:
     return Num(plain(number, digits), mark=mark)
 
 
-def measurement(number: float | None, se: float | None) -> Num:
+def measurement(number: float | None, se: float | None, unit: str = "") -> Num:
     """Value and standard error, rounded to the error's second digit."""
-    return Num(*measured(number, se))
+    return Num(*measured(number, se), unit=unit)
 
 
 def component(values: ArrayLike | None, errors: ArrayLike | None, k: int, scale: float = 1.0) -> Num:
@@ -82,7 +83,8 @@ LONG = 44
 def _cell(entry: Entry, header: bool) -> Node:
     if isinstance(entry, Num):
         error = el("span", f" {PLUS_MINUS} {entry.error}", class_="pm") if entry.error else None
-        return el("td", entry.text, error, class_="num mark" if entry.mark else "num")
+        unit = f"{THIN}{entry.unit}" if entry.unit else None
+        return el("td", entry.text, error, unit, class_="num mark" if entry.mark else "num")
     text = entry if isinstance(entry, str) else words(entry)
     kind = "long" if len(text) > LONG else None
     if header and text:
