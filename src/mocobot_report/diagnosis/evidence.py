@@ -80,7 +80,7 @@ def _along(book: Book, title: str, shares: Values, colour: str) -> Node:
     across = axis("share of the misfit [%]", range=[0, 1.14 * max(shown)], nticks=5)
     said = ", ".join(f"{name} {percent(v)}" for name, v in shares.items())
     label = f"{title}: share of the squared residual along single sources: {said}"
-    note = "share of the squared residual along what one source alone can do"
+    note = "share of the squared residual along what one source alone can do; sources overlap, so shares do not add up"
     return _rows_chart(book, title, [bars], names, across, label, row_px=30, note=note)
 
 

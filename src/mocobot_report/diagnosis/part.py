@@ -191,8 +191,8 @@ def _causes(values: Values) -> list[Node]:
     )
     supports = ["cause", "in sample [%]", "held out [%]", "folds better", "by chance"]
     return [
-        table("What is named", ["cause", "value ± standard error", "of"], sizes, groups=True),
-        table("What supports it", supports, support, note=note),
+        table("What is named", ["cause", "value ± standard error", "of"], sizes, groups=True, stack=True),
+        table("What supports it", supports, support, note=note, stack=True),
         *_rivals(causes),
         *_shapes(causes),
     ]
@@ -217,7 +217,9 @@ def _rivals(causes: Sequence[Values]) -> list[Node]:
     if not rows:
         return [paragraph(f"No other {'cause comes' if len(causes) == 1 else 'causes come'} near.")]
     head = ["named", "alternative", "verdict", "behind by [nats]", "closed loop chi²/n"]
-    out = [table("Alternatives", head, rows, note="how much less the rows speak for it", groups=True)]
+    out = [
+        table("Alternatives", head, rows, note="how much less the rows speak for it", groups=True, stack=True)
+    ]
     return [*out, verdict("warn", "What would tell them apart", bullets(list(advice)))] if advice else out
 
 

@@ -71,7 +71,7 @@ def _limits(values: Values) -> Node:
         last = cause
     return table(
         "Size that would have been noticed nine times in ten", ["cause", "parameter", "best place", "worst place",
-        "unit", "seen at"], rows, groups=True,
+        "unit", "seen at"], rows, groups=True, stack=True,
         note="had it been there, in these very recordings",
     )  # fmt: skip
 
