@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from discrepancy import rules
 from mocobot_report.blocks.html import Node, el
 
 LEFT_ALONE = {
@@ -38,14 +39,14 @@ TERMS = (
          "has its grasp minus where the others have it."),
     Term("chi²/n, misfit", r"chi²/n|[Cc]hi-square|[Mm]isfit",
          "Differences between recording and model, each divided by what noise alone would make of it, squared; chi² is "
-         "their sum, and chi²/n their mean. 1 is noise alone; up to 1.15 counts as clean. The gain of chi² is by how "
-         "much it falls with one more cause in the model."),
+         f"their sum, and chi²/n their mean. 1 is noise alone; up to {rules.CLEAN_CHI2_PER_N:g} counts as clean. The "
+         "gain of chi² is by how much it falls with one more cause in the model."),
     Term("clean data, clean noise", r"[Cc]lean (?:data|noise)|× clean",
          "What these sensors would record if nothing were wrong: their noise and rounding alone."),
     Term("closed loop, response to the commands",
          r"[Cc]losed loop|[Rr]esponse to the (?:recorded )?commands|recorded commands",
-         "The recorded commands are given to the simulated robots, controllers included; what these do is compared with "
-         "what was recorded."),
+         "The recorded commands are given to the simulated robots, controllers included; what these do is compared "
+         "with what was recorded."),
     Term("condition", r"\bcondition\b",
          "Strongest over weakest direction of what a step solves for; large numbers mean that one direction is known "
          "much worse than another."),
@@ -64,8 +65,8 @@ TERMS = (
          "Tried on trials that it was not fitted to. What only imitates one trial fails there."),
     Term("in sample", r"\bin sample\b", "Measured on the same trials that it was fitted to."),
     Term("nat", r"\bnats?\b",
-         "A factor of e = 2.7 in likelihood: 5 nats are a factor of 150, 20 nats of 500 million. Rivals closer than 5 "
-         "nats cannot be told apart."),
+         "A factor of e = 2.7 in likelihood: 5 nats are a factor of 150, 20 nats of 500 million. Rivals closer than "
+         f"{rules.AMBIGUOUS_NATS:g} nats cannot be told apart."),
     Term("phi, theta, tau", r"\b(?:phi|theta|tau)\b",
          "Angles of the driven joints, angles of the gimbal, torques of the springs between motor and link."),
     Term("pooled", r"\bpooled\b", "From all recordings together."),
@@ -85,8 +86,8 @@ TERMS = (
     Term("tolerance", r"\b[Tt]olerances?\b",
          "How far a healthy robot may be from its drawing. Being slightly off within it is normal and never named."),
     Term("whitened", r"\b[Ww]hitened\b",
-         "Divided by the noise and freed of what noise repeats from sample to sample, so that every number of clean data "
-         "is independent and has size 1."),
+         "Divided by the noise and freed of what noise repeats from sample to sample, so that every number of clean "
+         "data is independent and has size 1."),
 )  # fmt: skip
 
 

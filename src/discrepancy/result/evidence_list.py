@@ -7,6 +7,7 @@ import numpy as np
 
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.fit import Fit
+from discrepancy.result.read import kind_of, name_of
 from discrepancy.rig import Candidate
 
 LEAST_LOG10_P = -1e6
@@ -57,16 +58,6 @@ def place_of(candidate: Candidate) -> dict[str, Any]:
         "joint": candidate.joint,
         "place": candidate.place,
     }
-
-
-def name_of(entry: Mapping[str, Any]) -> str:
-    """A cause at its place in words; an earlier version wrote none."""
-    return entry.get("name") or f"{kind_of(entry)} ({entry['place']})"
-
-
-def kind_of(entry: Mapping[str, Any]) -> str:
-    """A cause in words, wherever it sits."""
-    return entry.get("kind") or entry["cause"].replace("_", " ")
 
 
 def label(entry: Mapping[str, Any]) -> str:

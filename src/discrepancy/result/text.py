@@ -6,7 +6,7 @@ from typing import Any
 
 from discrepancy import rules
 from discrepancy.causes.units import Shown, one_each, parameter
-from discrepancy.result.evidence_list import kind_of, name_of
+from discrepancy.result.read import kind_of, name_of
 from discrepancy.result.text_gain import gain_lines
 
 WIDTH = 100

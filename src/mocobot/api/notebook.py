@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 from xml.etree import ElementTree
 
-from discrepancy.result.evidence_list import name_of
+from discrepancy.result.read import name_of
 from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.html import Child, Node, el
 from mocobot_report.blocks.numbers import percent, plain

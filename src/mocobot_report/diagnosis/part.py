@@ -8,8 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discrepancy.causes.units import one_each, parameter
-from discrepancy.result.evidence_list import name_of
-from discrepancy.result.read import VERDICTS, read_diagnosis
+from discrepancy.result.read import VERDICTS, name_of, read_diagnosis
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
@@ -191,7 +190,9 @@ def _causes(values: Values) -> list[Node]:
     )
     supports = ["cause", "in sample [%]", "held out [%]", "folds better", "by chance"]
     return [
-        table("What is named", ["cause", "value ± standard error", "of"], sizes, groups=True, stack=True),
+        table(
+            "What is named", ["cause", "value ± standard error", "parameter"], sizes, groups=True, stack=True
+        ),
         table("What supports it", supports, support, note=note, stack=True),
         *_rivals(causes),
         *_shapes(causes),

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from discrepancy.causes.units import one_each, parameter
-from discrepancy.result.evidence_list import kind_of, name_of
+from discrepancy.result.read import kind_of, name_of
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Child, Node, el
 from mocobot_report.blocks.numbers import plain, size, spelled
@@ -61,17 +61,19 @@ def _limits(values: Values) -> Node:
         words, unit = parameter(name)
         unit, scale = shown.get(unit, (unit, 1.0))
         seen = sorted(scale * limit for limit in found if limit is not None)
-        low, high = (plain(seen[0], 2), plain(seen[-1], 2)) if seen else ("never", "never")
         blind = len(found) - len(seen)
-        where = f"nowhere: these recordings say nothing ({len(found)} places)" if not seen else (
-            f"{len(seen)} of {len(found)}" if blind else "everywhere"
-        )  # fmt: skip
+        sizes_said = Num("never")
+        where = f"nowhere: these recordings say nothing ({len(found)} places)"
+        if seen:
+            low, high = plain(seen[0], 2), plain(seen[-1], 2)
+            sizes_said = Num(low if low == high else f"{low} to {high}", unit=spelled(unit))
+            where = f"{len(seen)} of {len(found)}" if blind else "everywhere"
         who = cause_name(kinds[cause], cause) if cause != last else ""
-        rows.append([who, words, Num(low), Num(high), spelled(unit), where])
+        rows.append([who, words, sizes_said, where])
         last = cause
     return table(
-        "Size that would have been noticed nine times in ten", ["cause", "parameter", "best place", "worst place",
-        "unit", "seen at"], rows, groups=True, stack=True,
+        "Size that would have been noticed nine times in ten", ["cause", "parameter", "best to worst place",
+        "seen at"], rows, groups=True, stack=True,
         note="had it been there, in these very recordings",
     )  # fmt: skip
 
