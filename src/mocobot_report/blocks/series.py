@@ -96,14 +96,14 @@ def _stacked(panels: Sequence[Panel]) -> go.Figure:
     for name, panel in zip(names, panels, strict=True):
         across = {"xref": "paper", "x0": 0, "x1": 1, "yref": name}
         if panel.band:
-            path = _around_zero(*panel.band)
+            path = around_zero(*panel.band)
             shown.add_shape(type="path", path=path, layer="below", line_width=0, xref="x", yref=name)
         if panel.rule is not None:
             shown.add_shape(type="line", y0=panel.rule, y1=panel.rule, line_width=1, **across)
     return shown
 
 
-def _around_zero(time: Array, half: Array) -> str:
+def around_zero(time: Array, half: Array) -> str:
     """The outline of a band as SVG; where its height does not change, only ends are kept."""
     out = []
     for piece in np.split(np.arange(len(time)), np.flatnonzero(np.isnan(time))):

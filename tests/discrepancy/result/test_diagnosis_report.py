@@ -17,7 +17,8 @@ from discrepancy.result.json import plain
 from discrepancy.result.plots import file_names
 from discrepancy.result.plots_evidence import closed_loop_figure
 from discrepancy.result.text import WIDTH, format_diagnosis
-from discrepancy.result.traces import groups
+from discrepancy.result.text_gain import response_units
+from discrepancy.result.traces import Trace, group_units, groups
 from discrepancy.rig import Candidate, Channel
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Cause
@@ -174,6 +175,33 @@ def test_channels_are_grouped_by_name() -> None:
         ("force", (0, 1, 2), ("x", "y", "z")),
         ("gap", (3,), ("gap",)),
     ]
+
+
+def test_one_unit_for_all_channels_of_a_kind() -> None:
+    """That of the largest rms, over groups and trials."""
+    names = {"grasp 2 rotation": "rad", "grasp 3 rotation": "rad", "force": "N", "moment": "N m"}
+    channels = [Channel(f"{name} {a}", "k", None, unit) for name, unit in names.items() for a in "xy"]
+    sizes = np.array([2e-5, 1e-5, 3e-4, 1e-5, 2.0, 1.0, 0.03, 0.2])
+    wave = np.sqrt(2.0) * np.cos(np.linspace(0.0, 20.0 * np.pi, 1000, endpoint=False))[:, None]
+    one = np.ones((1000, 8))
+    traces = [
+        Trace(name, np.arange(1000.0), 1000, 1.0, scale * sizes * wave, one, one, one, one, {})
+        for name, scale in (("small", 0.1), ("large", 1.0))
+    ]
+    assert group_units(traces, groups(channels)) == {
+        "rad": ("mrad", 1e3),
+        "N": ("N", 1.0),
+        "N m": ("N m", 1.0),
+    }
+    gain = small_diagnosis()["gain"]
+    gain["held_out"]["before"] = gain["held_out"]["before"] | {
+        "phi_rms": 3e-5,
+        "theta_rms": 2e-3,
+        "tau_rms": 0.3,
+    }
+    gain["trials"] = []
+    shown = response_units(gain)
+    assert shown == {"phi": ("mrad", 1e3), "theta": ("mrad", 1e3), "tau": ("N m", 1.0)}
 
 
 @pytest.mark.parametrize("uneven", [False, True])
