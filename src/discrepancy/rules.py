@@ -31,6 +31,9 @@ EMPS_AR_ORDER = 8
 """Measured: more does not whiten the benchmark's noise better (by Akaike's criterion)."""
 ROWS_PER_COEFFICIENT = 10
 """A series must have more rows than so many for each coefficient, or stays as it is. Chosen."""
+LOUD_POWER = 2.25
+"""Noise of a row, in squares of that of the others, above which it has a weight of its own. Derived: four standard
+deviations of a mean square of ``NOISE_DRAWS`` draws, sqrt(2/24) = 0.29, above 1."""
 SHRINKAGE_SHARE = 0.05
 """By which the channels' covariance is drawn to its diagonal at least. Chosen."""
 

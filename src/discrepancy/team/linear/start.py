@@ -105,7 +105,7 @@ def linearised(
     linear = linearise(signals, shared, bases, design, reduction, full=True)
     draws, torques = noise_rows(linear, noise, np.random.default_rng([rules.NOISE_SEED, k]))
     moving = reduction.moving
-    return linear, Whitening.of(draws, moving), TorqueNoise.of(draws, torques, moving)
+    return linear, Whitening.of(draws, moving, uneven=True), TorqueNoise.of(draws, torques, moving)
 
 
 def exact_residual(
