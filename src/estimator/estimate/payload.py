@@ -25,6 +25,9 @@ from estimator.estimate.one_payload import check_one_payload, mass_alone
 from estimator.estimate.result import PayloadEstimate, RecordingEstimate
 from estimator.estimate.statics import CONTRADICTION, ComEstimate, estimate_from_holds
 from estimator.estimate.uncertainty import WINDOW_S
+from estimator.leftover.contradiction import contradiction
+from estimator.leftover.leftover import left_over
+from estimator.leftover.steps import steps_of
 from estimator.recording.model import Recording
 from estimator.signals.holds import Hold, find_holds
 from estimator.signals.process import process_recording
@@ -81,7 +84,11 @@ def estimate_payload(
 def _trial(recording: Recording, cutoff_hz: float, trim_s: float) -> Trial:
     labels = recording.metadata
     return Trial(
-        recording.name, labels.trial, labels.payload, process_recording(recording, cutoff_hz, trim_s)
+        recording.name,
+        labels.trial,
+        labels.payload,
+        process_recording(recording, cutoff_hz, trim_s),
+        steps_of(recording, cutoff_hz),
     )
 
 
@@ -108,6 +115,12 @@ def estimate_from_trials(
     flags: list[str] = []
     say("grasps")
     grasps, steps = _grasps(trials, records, flags, window_s)
+    if grasps is not None:
+        for k, trial in enumerate(trials):
+            if trial.steps is not None:
+                records[k] = replace(records[k], leftovers=left_over(trial.data, grasps, trial.steps))
+    contradicts = contradiction([(record.name, record.leftovers) for record in records])
+    flags += [contradicts] if contradicts else []
 
     say("mass and centre of mass")
     every_hold = [hold for found in holds for hold in found]

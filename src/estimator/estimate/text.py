@@ -8,6 +8,7 @@ import numpy as np
 from estimator.estimate.inertia import PARAMETERS
 from estimator.estimate.principal import ORDER
 from estimator.estimate.result import PayloadEstimate
+from estimator.leftover.contradiction import beyond_noise
 from estimator.numbers import measured
 
 
@@ -37,6 +38,8 @@ def format_estimate(estimate: PayloadEstimate) -> str:
             text += ", principal moments " + _row(r.inertia.principal.moments) + " kg m^2"
         if r.force_residual is not None:
             text += f", force left over {100 * r.force_residual:.2g} % of the weight"
+        if wrong := beyond_noise(r.leftovers):
+            text += f", robots apart {max(one.ratio for one in wrong):.2g} times the noise"
         lines.append(text)
     lines += ["[[Excitation]]"]
     for step in estimate.steps:
