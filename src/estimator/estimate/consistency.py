@@ -45,6 +45,7 @@ class Trial:
         payload: label of the payload, or None.
         data: the data points.
         steps: rounding of its channels, or None where nobody asks whether the robots contradict each other.
+        team: number of robots that carried the payload, as far as the metadata say.
     """
 
     name: str
@@ -52,6 +53,7 @@ class Trial:
     payload: str | None
     data: GraspData
     steps: Steps | None = None
+    team: int = 1
 
 
 def check_same_payload(trials: Sequence[Trial]) -> str | None:

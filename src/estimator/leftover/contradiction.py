@@ -29,11 +29,17 @@ def contradiction(found: Sequence[tuple[str, Sequence[Leftover]]]) -> str | None
     name, worst = max(bad, key=lambda entry: max(one.ratio for one in entry[1]))
     where = name if len(bad) == 1 else f"in {len(bad)} of {len(found)} recordings, most in {name}"
     team = any(one.name.startswith("flange") for _, leftovers in found for one in leftovers)
+    moving = any(one.name.startswith("flange") for _, wrong in bad for one in wrong)
+    what = (
+        "Arms that differ from their design (encoder zeros, lengths, springs) do this"
+        if moving or not team
+        else "The flanges agree and the wrenches do not: springs or torque zeros are off, or another robot carries, too, "
+        "and these are not the payload's numbers"
+    )
     return (
         f"The robot{'s contradict each other' if team else ' contradicts itself'} beyond noise ({where}): "
-        f"{', '.join(map(_words, worst))}. Standard errors do not cover this: values may be off by many of them. Arms "
-        "that differ from their design (encoder zeros, lengths, springs) do this: calibrate them; mocobot diagnose "
-        "says what else is wrong."
+        f"{', '.join(map(_words, worst))}. Standard errors do not cover this: values may be off by many of them. "
+        f"{what}: calibrate the arms; mocobot diagnose says what else is wrong."
     )
 
 
