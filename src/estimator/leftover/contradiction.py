@@ -33,8 +33,8 @@ def contradiction(found: Sequence[tuple[str, Sequence[Leftover]]]) -> str | None
     what = (
         "Arms that differ from their design (encoder zeros, lengths, springs) do this"
         if moving or not team
-        else "The flanges agree and the wrenches do not: springs or torque zeros are off, or another robot carries, too, "
-        "and these are not the payload's numbers"
+        else "The flanges agree and the wrenches do not: springs or torque zeros are off, or another robot carries, "
+        "too, and these are not the payload's numbers"
     )
     return (
         f"The robot{'s contradict each other' if team else ' contradicts itself'} beyond noise ({where}): "
