@@ -57,9 +57,5 @@ def errors_table(e: PayloadEstimate, truth: BodyFacts) -> Node:
                 angle = rotation_error_deg(truth.grasps.R_1i[j - 1], e.grasps.R_1i[j - 1])
                 rows.append([quantity(f"R_1{j}"), "deg", Num(NONE), value(angle, 2), Num(NONE), Num(NONE)])
     head = ["", "unit", "truth", "error", "error [%]", "in standard errors"]
-    return table(
-        "Estimate against truth",
-        head,
-        rows,
-        note="error of a rotation: its angle; error [%] of a component: of the vector's length",
-    )
+    note = "error of a rotation: its angle; error [%] of a component: share of the vector's length"
+    return table("Estimate against truth", head, rows, note=note)
