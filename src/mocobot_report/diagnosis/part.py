@@ -33,7 +33,7 @@ KINDS = {"consistent": "good", "explained": "good", "partly_explained": "warn", 
 MEANING = {
     "consistent": "The simulation explains the recordings within noise and tolerances; nothing is named.",
     "explained": "The named causes explain what the simulation got wrong.",
-    "partly_explained": "The named causes are there, but they leave more than noise.",
+    "partly_explained": "The named causes are there, but more than noise is left.",
     "unexplained": "Recordings and simulation differ, and no cause of the catalogue accounts for it.",
 }
 
