@@ -81,8 +81,9 @@ INSIDE_SHARE = 0.1
 
 # Verdict and closed loop.
 
-EXPLAINED_SHARE = 0.8
-"""Of the misfit that causes must remove to be called ``explained`` where what is left is not clean. Chosen."""
+RESPONSE_SHARE = 0.8
+"""Of the response's excess error that causes must remove, or what is left of a visible one is said beside the verdict.
+Chosen."""
 LEAST_SHARE = 0.3
 """Causes that explain less of a large misfit, of rows or closed loop, are no explanation. Chosen."""
 MOST_BELIEVED = 2

@@ -49,6 +49,12 @@ class RecordingMetadata:
     level: Level = "joint"
     sampling: tuple[Sampling, ...] | None = None
 
+    @property
+    def team(self) -> int:
+        """Robots that carried the payload: more than ``robots`` where ``control`` tells of forces of more."""
+        forces = (self.control or {}).get("feed_forward_N")
+        return max(self.robots, len(forces)) if isinstance(forces, list) else self.robots
+
     def to_json(self) -> str:
         """The metadata as JSON text.
 
