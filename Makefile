@@ -4,6 +4,8 @@ PYTHON ?= python3
 JOBS ?= 2
 # The matrices are small, and threads that share them only wait for each other.
 export OPENBLAS_NUM_THREADS ?= 1
+# Many short processes import the same modules; each would compile them again.
+unexport PYTHONDONTWRITEBYTECODE
 BIN := .venv/bin
 MARK := .venv/.installed
 
