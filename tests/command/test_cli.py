@@ -220,7 +220,10 @@ def test_simulate_refuses(
 
 def test_simulate_refuses_bad_targets(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert ".parquet" in refused(capsys, "simulate", "--out", str(tmp_path / "rec.csv"))
-    assert "no such folder" in refused(capsys, "simulate", "--out", str(tmp_path / "none" / "rec.parquet"))
+    (tmp_path / "file").write_text("")
+    assert f"({tmp_path / 'file'} is a file)" in refused(
+        capsys, "simulate", "--out", str(tmp_path / "file" / "rec.parquet")
+    )
 
 
 @pytest.mark.parametrize(

@@ -44,7 +44,7 @@ def look(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[..., tu
 
     def run(log: Path, *arguments: object) -> tuple[str, dict]:
         target = tmp_path / "report.json"
-        main(["inspect", str(log), "--json", str(target), *map(str, arguments)])
+        main(["inspect", str(log), "--json", str(target), "--force", *map(str, arguments)])
         out, err = capsys.readouterr()
         assert err == ""
 
@@ -276,7 +276,7 @@ def test_what_cannot_be_read_or_written(
         "missing": [tmp_path / "none.parquet"],
         "empty": [tmp_path / "empty.parquet"],
         "text": [tmp_path / "text.parquet"],
-        "target": [good, "--json", tmp_path / "no" / "report.json"],
+        "target": [good, "--json", tmp_path / "text.parquet" / "report.json"],
         "itself": [good, "--json", good],
         "map": [good, "--map", "nonsense"],
     }[case]

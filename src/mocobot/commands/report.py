@@ -1,8 +1,10 @@
 """``mocobot report``: one HTML page of a result folder."""
 
+from mocobot.files.recordings import check_no_log
+from mocobot.files.targets import check_output
 from mocobot.options import Report
 from mocobot.progress import stages
-from mocobot_report.page import write_report
+from mocobot_report.page import NAME, SUFFIX, write_report
 
 
 def run(options: Report) -> None:
@@ -11,6 +13,11 @@ def run(options: Report) -> None:
     Raises:
         InputError: the folder holds no result, or one that cannot be read, or the page cannot be written.
     """
+    if options.dir.is_file():
+        check_no_log(options.dir)
+    out = options.out if options.out is not None else options.dir / NAME
+    if options.dir.is_dir():  # else a better sentence follows
+        check_output(out, force=options.force, suffix=SUFFIX)
     with stages() as (say, _):
-        out = write_report(options.dir, options.out, say)
+        write_report(options.dir, out, say)
     print(f"{out}: {out.stat().st_size / 1e6:.1f} MB; open it in a browser, or hand it on.")
