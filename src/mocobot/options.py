@@ -35,7 +35,7 @@ class Paper:
 class Estimate:
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload."""
 
-    rec: tyro.conf.Positional[tuple[Path, ...]]
+    rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
     """Recordings (Parquet), all of one payload."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
     """Write the estimate as JSON, too."""
@@ -52,7 +52,7 @@ class Estimate:
 class Diagnose:
     """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth."""
 
-    rec: tyro.conf.Positional[tuple[Path, ...]]
+    rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
     """Recordings (Parquet), all of one payload; several, so that what is named can be validated. One MAT file with
     --rig emps."""
     rig: Literal["team", "emps"] = "team"
@@ -105,7 +105,7 @@ class Convert:
 class Replay:
     """Watch recordings: the scene moving from the measured angles, estimate against truth, all signals (Rerun)."""
 
-    rec: tyro.conf.Positional[tuple[Path, ...]]
+    rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
     """Recordings (Parquet); several are shown side by side."""
     estimate: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
     """Estimate to show, as `mocobot estimate --out` writes it; made from each recording if not given."""
@@ -126,7 +126,7 @@ class Replay:
 class Inspect:
     """Look at a log before anyone trusts a number of it: stamps, channels, clocks, wiring, excitation."""
 
-    rec: tyro.conf.Positional[Path]
+    rec: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
     """Recording or log of any format that ``convert`` reads; broken ones are looked at, too."""
     map: Annotated[str | None, tyro.conf.arg(metavar="MAP")] = None
     """Map file or the name of a built-in one; see docs/measured-data.md."""

@@ -61,13 +61,16 @@ def _sentence(event: failures.ParseErrorEvent, commands: Mapping[str, type], com
             return f"no command given; it must be one of {', '.join(commands)}"
         case failures.UnrecognizedArgs(tokens=tokens):
             return _unknown(tokens, commands, command, more)
+        case failures.MissingArgs(unrecognized_tokens=tokens) if tokens:
+            return _unknown(tokens, commands, command, more)
         case failures.MissingArgs(missing_arguments=missing):
             names = [_name(each.arg, and_value=True) for each in missing]
             return f"{' and '.join(names)} must be given; {more}"
         case failures.InvalidChoice(argument=argument, value=value, choices=choices):
             return f"{_name(argument)} is {value!r}; it must be one of {', '.join(choices)}"
         case failures.BadValue(argument=argument):
-            return f"{_name(argument, and_value=True)} needs a value; {more}"
+            needs = "must be given" if argument.is_positional() else "needs a value"
+            return f"{_name(argument, and_value=True)} {needs}; {more}"
         case failures.InstantiationFailure(argument=argument, message=message) if argument is not None:
             return f"{_name(argument)} {' '.join(message.split())}"
     return f"these arguments cannot be understood; {more}"
@@ -82,13 +85,11 @@ def _unknown(tokens: Sequence[str], commands: Mapping[str, type], command: str |
         return f"there is no command {token!r}; {hint}"
     if not token.startswith("-"):
         return f"{command} has no use for {token!r} there; {more}"
-    known = (
-        []
-        if command is None
-        else [f"--{field.name.replace('_', '-')}" for field in fields(commands[command])]
-    )
-    close = difflib.get_close_matches(token.partition("=")[0], known, n=1)
-    return f"{command or 'the command line'} has no option {token}; {f'did you mean {close[0]}?' if close else more}"
+    options = [] if command is None else fields(commands[command])
+    known = [o.name.replace("_", "-") for o in options if tyro.conf.Positional not in get_args(o.type)]
+    close = difflib.get_close_matches(token.strip("-").partition("=")[0], known, n=1)
+    hint = f"did you mean --{close[0]}?" if close else more
+    return f"{command or 'the command line'} has no option {token}; {hint}"
 
 
 def _name(argument: Any, *, and_value: bool = False) -> str:

@@ -54,7 +54,7 @@ def _check(options: Convert) -> None:
     out = options.out
     kind = output_kind(out)
     inputs = [options.log, *([options.design] if options.design is not None else [])]
-    if options.map is not None and options.map not in MAPS:
+    if options.map is not None and options.map not in MAPS and Path(options.map).is_file():
         inputs.append(Path(options.map))
     if kind != "folder":
         check_output(out, inputs, force=options.force)

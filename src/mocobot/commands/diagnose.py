@@ -86,7 +86,11 @@ def _check(options: Diagnose, causes: Collection[str], inputs: Sequence[Path]) -
         raise InputError("every cause is excluded; nothing is left to look for")
     if options.out:
         check_folder(options.out, inputs, is_diagnosis, "an earlier diagnosis", force=options.force)
-    if options.rig == "emps" and len(options.rec) > 1:
+    if options.rig == "team":
+        for path in options.rec:
+            if path.suffix == ".mat":
+                raise InputError(f"{path}: is a MAT file; --rig emps reads those of the EMPS benchmark")
+    elif len(options.rec) > 1:
         raise InputError(
             f"{len(options.rec)} recordings are given; the emps rig takes one and cuts it into blocks that validate "
             "each other"

@@ -1,5 +1,6 @@
 """``mocobot report``: one HTML page of a result folder."""
 
+from estimator.errors import InputError
 from mocobot.files.recordings import check_no_log
 from mocobot.files.targets import check_output
 from mocobot.options import Report
@@ -13,8 +14,11 @@ def run(options: Report) -> None:
     Raises:
         InputError: the folder holds no result, or one that cannot be read, or the page cannot be written.
     """
-    if options.dir.is_file():
+    if options.dir.is_file() and options.dir.suffix != ".json":
         check_no_log(options.dir)
+        raise InputError(
+            f"{options.dir}: is a file; name a folder of results, such as mocobot estimate --out results/est.json makes"
+        )
     out = options.out if options.out is not None else options.dir / NAME
     if options.dir.is_dir():  # else a better sentence follows
         check_output(out, force=options.force, suffix=SUFFIX)

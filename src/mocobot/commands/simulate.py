@@ -17,7 +17,8 @@ def run(options: Simulate) -> None:
         InputError: an option that cannot be met, or an output that cannot be written.
         TrialError: the physics of the trial cannot be trusted.
     """
-    inputs = [Path(options.payload)] if options.payload is not None else []
+    given = Path(options.payload or "")
+    inputs = [given] if given.is_file() else []
     check_output(options.out, inputs, force=options.force, suffix=".parquet")
     check_output(truth_path(options.out), inputs, force=options.force)
     check_fits("--vias", options.vias, "random", options.trajectory)

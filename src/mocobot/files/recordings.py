@@ -1,5 +1,6 @@
 """Recordings by their files, and what to do with a file of another format."""
 
+import os
 import shlex
 from pathlib import Path
 
@@ -48,9 +49,10 @@ def check_no_log(path: Path) -> None:
         raise InputError(
             f"{path}: is not a recording of mocobot, and mocobot convert does not read its format; make it {FORMATS}"
         ) from None
-    target = path.with_name(f"{path.name if path.is_dir() else path.stem}.parquet")
+    name = Path(os.path.realpath(path)).name or "log"  # "." and "/" have none
+    target = path.parent / f"{name if path.is_dir() else path.stem}.parquet"
     if target == path:
-        target = path.with_name(f"{path.stem}_recording.parquet")
+        target = path.parent / f"{path.stem}_recording.parquet"
     raise InputError(
         f"{path}: is {KINDS[kind]}, not a recording of mocobot; use "
         f"mocobot convert {shlex.quote(str(path))} {shlex.quote(str(target))}"

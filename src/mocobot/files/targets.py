@@ -57,8 +57,8 @@ def check_no_input(path: Path, inputs: Sequence[Path]) -> None:
         for given in inputs:
             source = Path(os.path.realpath(given))
             if real == source or (source in real.parents and source.is_dir()):
-                where = "is" if real == source else "lies in"
-                raise InputError(f"{path}: {where} the input {given}; write somewhere else")
+                where = "is an input" if real == source else f"lies in the input {given}"
+                raise InputError(f"{path}: {where}; write somewhere else")
 
 
 def check_folder(

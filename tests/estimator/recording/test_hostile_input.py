@@ -107,7 +107,7 @@ def test_a_recording_is_never_overwritten(
     link = tmp_path / "link.json"
     link.symlink_to(rec)
     for target in (rec, tmp_path / ".." / tmp_path.name / rec.name, link):
-        assert "is the input" in refusal(capsys, "estimate", rec, "--out", target, "--force")
+        assert "is an input" in refusal(capsys, "estimate", rec, "--out", target, "--force")
         assert rec.read_bytes() == before
 
 
