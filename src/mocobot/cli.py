@@ -35,9 +35,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     130 interrupted; 141 standard output was closed before everything was printed.
     """
     try:
-        _run(sys.argv[1:] if arguments is None else arguments)
-        if sys.stdout is not None:
-            sys.stdout.flush()
+        try:
+            _run(sys.argv[1:] if arguments is None else arguments)
+        finally:
+            _flush()
     except (InputError, TrialError) as error:
         _exit(str(error), REFUSED)
     except NotGood as error:
@@ -45,9 +46,24 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except KeyboardInterrupt:
         _exit("interrupted", INTERRUPTED)
     except BrokenPipeError:
-        # Python flushes again on its way out; that must not fail a second time.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _forget()
         sys.exit(CLOSED)
+
+
+def _flush() -> None:
+    """Print what is still to be printed; help ends the process, so that there may be some whatever happened."""
+    try:
+        print(end="", flush=True)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        _forget()
+        raise InputError(f"standard output: cannot be written ({error.strerror})") from error
+
+
+def _forget() -> None:
+    """Let go of what cannot be printed: Python tries again on its way out, and that must not fail a second time."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _exit(sentence: str, code: int) -> NoReturn:

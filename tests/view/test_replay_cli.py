@@ -127,22 +127,6 @@ def test_a_file_that_arrived_in_part_is_not_kept(
     assert not list(tmp_path.iterdir())
 
 
-def test_options_that_cannot_be(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rec, target = folder / "rec.parquet", tmp_path / "out.rrd"
-    assert "name at least one file" in refused(capsys)
-    assert "--save replay.rrd" in refused(capsys, rec), "no display"
-    assert "choose a file or a browser" in refused(capsys, rec, "--save", target, "--web")
-    assert "must end in .rrd" in refused(capsys, rec, "--save", tmp_path / "out.mp4")
-    assert "rec.parquet is a file)" in refused(capsys, rec, "--save", rec / "out.rrd")
-    (tmp_path / "folder.rrd").mkdir()
-    assert "is a folder" in refused(capsys, rec, "--save", tmp_path / "folder.rrd")
-    assert "given twice" in refused(capsys, rec, rec, "--save", target)
-    assert "no such file" in refused(capsys, tmp_path / "none.parquet", "--save", target)
-    assert "payloads are a, b, c, d" in refused(capsys, rec, "--payload", "z", "--save", target)
-    assert "not a readable MJCF" in refused(capsys, rec, "--payload", tmp_path / "no.xml", "--save", target)
-    assert not target.exists()
-
-
 def test_without_rerun(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
