@@ -12,8 +12,8 @@ MARK := .venv/.installed
 .PHONY: paper test lint benchmark clean
 
 paper: $(MARK)
-	$(BIN)/mocobot paper --jobs $(JOBS) --out out/paper
-	$(BIN)/mocobot report out/paper
+	$(BIN)/mocobot paper --jobs $(JOBS) --out out/paper --force
+	$(BIN)/mocobot report out/paper --force
 
 test: $(MARK) lint
 	$(BIN)/pytest -n $(JOBS) --dist loadfile
