@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mocobot_view.pictures.camera import MARGIN, NEAREST, Camera, corners, framing, pixels
+from mocobot_view.pictures.camera import MARGIN, NEAREST, Camera, clearest, corners, framing, pixels
 from mocobot_view.pictures.labels import with_labels
 from mocobot_view.pictures.marks import Label, Marks
 from mocobot_view.pictures.render import render
@@ -117,3 +117,11 @@ def test_words_do_not_cover_each_other_nor_leave_the_picture() -> None:
     assert red(written) == pytest.approx(red(alone), rel=0.1), "none of it is cut off"
     outside = with_labels(grey, labels[:2], np.array([[-1.0, 3.0], [np.nan, np.nan]]))
     assert (outside == 128).all()
+
+
+def test_robots_are_not_seen_one_over_the_other() -> None:
+    """Even in a tall picture from high above, where there is most room for that: they are tall themselves."""
+    feet = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    camera = clearest(feet, feet, azimuth=0.0, elevation=-80.0, aspect=0.6, fovy_deg=40.0)
+    (left, right), _ = np.sort(pixels(camera, feet, 0.6, 1.0, 40.0).T)
+    assert right - left > 0.5
