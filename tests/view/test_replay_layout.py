@@ -19,6 +19,7 @@ from mocobot_view.replay.eyes import FOVY_DEG
 from mocobot_view.replay.outputs import save_replay
 from mocobot_view.replay.replay_trial import ReplayTrial, replay_trial
 from mocobot_view.replay.summary import summary
+from mocobot_view.sizes import FORCE_M_PER_N
 from replay_case import Replayed
 
 
@@ -71,7 +72,10 @@ def test_all_robots_and_the_payload_are_in_sight_for_the_whole_trial(trial: Repl
     ]
     corners = trial.shape.triangles.vertices
     held = np.einsum("qij,vj->qvi", trial.motion.R_W1[::20], corners) + trial.motion.p_W1[::20, None]
-    for points in (wrists, wheels, held):
+    assert trial.data is not None
+    forces = FORCE_M_PER_N * np.einsum("qnij,qnj->qni", trial.data.R_bi, trial.data.wrench[..., 3:])
+    tips = np.einsum("nij,qnj->qni", trial.bases.R_Wb, trial.data.p_bi + forces) + trial.bases.p_Wb
+    for points in (wrists, wheels, held, tips):
         assert np.abs(seen(scenes[0], points, aspect)).max() < 1.0
     feet = seen(scenes[0], trial.bases.p_Wb, aspect)
     apart = [np.linalg.norm(feet[i] - feet[j]) for i, j in ((0, 1), (0, 2), (1, 2))]
@@ -84,7 +88,7 @@ def test_paths_fill_their_views(trial: ReplayTrial) -> None:
     assert len(paths) == 3
     assert trial.recording.ref is not None
     for i, view in enumerate(paths):
-        at = seen(view, np.concatenate([trial.bodies.wrist[:, i], trial.recording.ref[:, i]]), aspect=0.85)
+        at = seen(view, np.concatenate([trial.bodies.wrist[:, i], trial.recording.ref[:, i]]), aspect=0.75)
         assert np.abs(at).max() < 1.0
         assert np.ptp(at, axis=0).max() > 1.7
 

@@ -130,7 +130,7 @@ def _paths(trial: ReplayTrial) -> rrb.Grid:
         TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.infinite()
     )
     columns = 1 if trial.robots <= 2 else 2
-    aspect = 0.85 * -(-trial.robots // columns) / columns
+    aspect = 0.75 * -(-trial.robots // columns) / columns
     views = [
         rrb.Spatial3DView(
             origin=f"/{path}",

@@ -7,6 +7,7 @@ from estimator.arrays import Array
 from mocobot_view.bodies.robot import robot_shapes
 from mocobot_view.pictures.camera import CORNERS, Camera, clearest, framing
 from mocobot_view.replay.replay_trial import ReplayTrial
+from mocobot_view.sizes import FORCE_M_PER_N
 
 FOVY_DEG = 55.0
 """Vertical angle of view of the viewer's 3D views [deg]."""
@@ -34,7 +35,7 @@ def path_eye(trial: ReplayTrial, robot: int, aspect: float) -> rrb.EyeControls3D
 
 
 def _seen(trial: ReplayTrial) -> Array:
-    """Corners of the boxes around robots and payload in the world [m], shape (K, 3)."""
+    """Corners of the boxes around robots and payload and the tips of the forces in the world [m], shape (K, 3)."""
     standing = _box(robot_shapes(trial.recording.metadata.design).standing.triangles.vertices)
     every = slice(None, None, max(1, len(trial.time) // INSTANTS))
     points = []
@@ -42,6 +43,12 @@ def _seen(trial: ReplayTrial) -> Array:
         trial.bases.R_Wb, trial.bases.p_Wb, np.swapaxes(trial.bodies.wrist[every], 0, 1), strict=True
     ):
         points += [standing @ R.T + p, wrist @ R.T + p]
+    if trial.data is not None:
+        data, few = trial.data, slice(None, None, max(1, len(trial.data.time) // INSTANTS))
+        tips = data.p_bi[few] + FORCE_M_PER_N * np.einsum(
+            "qnij,qnj->qni", data.R_bi[few], data.wrench[few, :, 3:]
+        )
+        points.append((np.einsum("nij,qnj->qni", trial.bases.R_Wb, tips) + trial.bases.p_Wb).reshape(-1, 3))
     if trial.motion is not None and trial.shape is not None:
         held = _box(trial.shape.triangles.vertices)
         R_W1, p_W1 = trial.motion.R_W1[every], trial.motion.p_W1[every]
