@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import io
 import json
+import re
 import subprocess
 import sys
 from collections.abc import Callable
@@ -198,3 +200,25 @@ def test_help_of_a_command(capsys: pytest.CaptureFixture[str], name: str) -> Non
     code, out, err = run(capsys, name, "--help")
     assert (code, err) == (0, "")
     assert f"usage: mocobot {name}" in out
+
+
+@pytest.mark.parametrize("terminal", [True, False])
+def test_a_simulation_shows_how_much_there_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], terminal: bool
+) -> None:
+    """On standard error, on terminals only."""
+
+    class Screen(io.StringIO):
+        def isatty(self) -> bool:
+            return terminal
+
+    screen = Screen()
+    monkeypatch.setattr(sys, "stderr", screen)
+    main(["simulate", "--vias", "1", "--out", str(tmp_path / "rec.parquet")])
+    assert "s of random motion" in capsys.readouterr().out
+    shown = screen.getvalue()
+    if terminal:
+        (seconds,) = set(re.findall(r"random trial: +\d+%\|.*?\| [\d.]+ of ([\d.]+) s \[", shown))
+        assert float(seconds) == len(pq.read_table(tmp_path / "rec.parquet")) / 100.0
+    else:
+        assert shown == ""

@@ -54,7 +54,7 @@ def simulate(
     model: Path | str | None = None,
     level: Level = "joint",
     gains: ControlGains | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> SimulatedRecording:
     """Simulate one trial and read it through the sensors; equal arguments give equal bits.
 
@@ -71,7 +71,7 @@ def simulate(
         model: folder of an extended model, as a diagnosis writes it, in place of a payload.
         level: what the recording's file will hold: ``"joint"``, driven angles and spring torques, or ``"wrist"``.
         gains: of the arms' control; None for the defaults.
-        progress: called with the number of samples done since the last call.
+        progress: called with the number of samples done and that of all, every second of the trial.
 
     Raises:
         InputError: an argument that cannot be met.

@@ -10,7 +10,7 @@ from estimator.recording.parquet import write_recording
 from mocobot.files.provenance import NAME, folder_provenance, provenance
 from mocobot.files.targets import check_folder
 from mocobot.options import Paper
-from mocobot.progress import bar
+from mocobot.progress import share_bar
 from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
 from mocobot_sim.paper.plots import save_plots
 from mocobot_sim.paper.tables import format_summary, format_tables
@@ -37,8 +37,8 @@ def run(options: Paper) -> None:
     if options.out:
         check_folder(options.out, [], _is_paper, "an earlier experiment", force=options.force)
     start, made_with = time.perf_counter(), provenance("paper", asdict(options))
-    with bar(plan.steps, "paper", "step") as advance:
-        result = run_paper(plan, options.jobs, advance)
+    with share_bar("paper", "steps") as tell:
+        result = run_paper(plan, options.jobs, tell)
     tables = f"{format_tables(result.scores)}\n\n{format_summary(result.scores)}"
     print(tables)
     print(f"\n{_summary(result)} Wall time {time.perf_counter() - start:.0f} s.")

@@ -6,7 +6,8 @@ from estimator.errors import InputError
 from mocobot.api.simulation import check_fits, simulate
 from mocobot.files.targets import check_output
 from mocobot.options import Simulate
-from mocobot.progress import bar
+from mocobot.progress import share_bar
+from mocobot_sim.trial.trajectories import RATE_HZ
 from mocobot_sim.trial.truth import truth_path
 
 
@@ -27,7 +28,11 @@ def run(options: Simulate) -> None:
         raise InputError(
             "--payload and --model are both given; the model has its own payload, so leave one out"
         )
-    with bar(None, "simulating", "sample") as advance:
+    with share_bar(f"{options.trajectory} trial", "s") as tell:
+
+        def advance(done: int, samples: int) -> None:
+            tell(done / RATE_HZ, samples / RATE_HZ, "")
+
         done = simulate(
             options.payload, options.trajectory,
             vias=options.vias, duration_s=options.duration, preset=options.preset, seed=options.seed,
