@@ -12,8 +12,8 @@ MARK := .venv/.installed
 .PHONY: paper test lint style benchmark clean
 
 paper: $(MARK)
-	$(BIN)/mocobot paper --jobs $(JOBS) --out out/paper
-	$(BIN)/mocobot report out/paper
+	$(BIN)/mocobot paper --jobs $(JOBS) --out out/paper --force
+	$(BIN)/mocobot report out/paper --force
 
 # Types are checked beside the tests: pyright uses one core alone. What it says comes last.
 test: $(MARK) style

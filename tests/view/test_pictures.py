@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator.errors import InputError
 from mocobot_sim.base.solo import build_solo, compile_solo
 from mocobot_view.pictures.camera import Camera
 from mocobot_view.pictures.marks import Marks
-from mocobot_view.pictures.render import make_folder, render
+from mocobot_view.pictures.render import render
 from rendering import made
 
 SCENARIOS = Path(__file__).resolve().parents[2] / "scenarios"
@@ -44,14 +43,6 @@ def test_pictures_show_the_states_and_the_marks():
         pure = lambda p, k=colour, o=others: (p[..., k] > 120) & (p[..., o].max(axis=-1) < 80)  # noqa: E731
         assert pure(marked).sum() > 50
         assert not pure(plain).any()
-
-
-def test_a_folder_that_cannot_be_is_refused(tmp_path):
-    (tmp_path / "file").write_text("", encoding="utf-8")
-    with pytest.raises(InputError, match="file: cannot be made a folder for pictures"):
-        make_folder(tmp_path / "file")
-    make_folder(tmp_path / "a" / "b")
-    assert (tmp_path / "a" / "b").is_dir()
 
 
 @pytest.mark.slow
