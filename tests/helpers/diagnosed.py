@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from discrepancy.result.remains import remains
+
 VERDICTS = ("consistent", "explained", "partly_explained", "unexplained")
 PLACE = {"cause", "kind", "name", "family", "robot", "joint", "place"}
 RESPONSE = {f"{c}_{kind}" for c in ("phi", "theta", "tau") for kind in ("nrmse", "rms")} | {"chi2_per_n"}
@@ -17,7 +19,7 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     """
     assert set(values) - {"provenance"} == {
         "format", "version", "recordings", "verdict", "causes", "evidence", "rejected", "gain", "not_simulated",
-        "undecidable", "detection_limits", "residual", "notes",
+        "undecidable", "detection_limits", "residual", "remains", "notes",
     }  # fmt: skip
     assert (values["format"], values["version"]) == ("mocobot-diagnosis", 1)
     assert values["verdict"] in VERDICTS
@@ -51,6 +53,9 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     assert set(residual["tolerances"]) == {"chi2", "freedom", "log10_p"}
     assert {"chi2_per_n", "sentence", "kind", "trial"} <= set(residual["signature"])
     assert all(isinstance(note, str) for note in values["notes"])
+    assert values["remains"] == remains(values)
+    if values["verdict"] == "explained":
+        assert residual["chi2_per_n"] <= 1.15
     check_finite(values)
 
 
@@ -203,5 +208,6 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
         },
         "notes": ["A note."],
     }
+    values["remains"] = remains(values)
     check_schema(values)
     return values

@@ -14,6 +14,7 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from estimator.leftover.leftover import Leftover
 from mocobot_report.blocks.html import data_block, el, raw, to_bytes
 from mocobot_report.blocks.palette import DARK, LIGHT
 from mocobot_report.blocks.series import around_zero
@@ -298,6 +299,21 @@ def test_what_is_not_known_is_said_first(
     answer = text.partition("The estimate in detail")[2].partition("The estimate in detail")[0]
     assert said in answer
     assert ("Nothing speaks against these numbers" in answer) == (missing == {})
+
+
+def test_robots_that_contradict_each_other_are_the_first_thing_said(
+    tmp_path: Path, no_pictures: pytest.MonkeyPatch
+) -> None:
+    estimate = payload_estimate()
+    assert estimate.contradicts is False
+    (recording,) = estimate.recordings
+    wrong = replace(recording, leftovers=(Leftover("force", "N", 3.1, 0.05),))
+    wrong = replace(estimate, recordings=(wrong,), flags=("The robots contradict each other beyond noise.",))
+    (tmp_path / "est.json").write_text(json.dumps(wrong.to_dict()))
+    text = Reader(write_report(tmp_path).read_bytes()).rows()
+    assert "do not trust the standard errors" in text
+    assert "Nothing speaks against these numbers" not in text
+    assert re.search(r"rec.parquet random .* 62", text.replace("\u00a0", " "))
 
 
 def test_provenance_lists_what_was_read(pages: dict[str, Reader], folders: dict[str, Path]) -> None:

@@ -37,6 +37,7 @@ residual            {chi2_per_n, signature} of what the causes (with tolerances)
     chi2_per_n_tolerated           with tolerances and no cause
     tolerances                     {chi2, freedom, log10_p}: how hard they are used
     nominal                        {chi2_per_n, signature} of the simulation as it is
+remains             sentences on what the verdict leaves open: misfit above clean, strained tolerances, response
 notes               sentences
 
 ``mocobot diagnose`` adds ``provenance``: versions, options and hashes of the files it was made from
@@ -56,6 +57,7 @@ from discrepancy.engine.gain import Gain, Response
 from discrepancy.least_squares.fit import Fit
 from discrepancy.result.evidence_list import evidence_list, finite_log10_p, place_of
 from discrepancy.result.read import FORMAT, VERSION
+from discrepancy.result.remains import remains
 from discrepancy.result.sensitivity import blind_spots, detection_limits
 from discrepancy.result.signature import signature
 from discrepancy.rig import Rig
@@ -87,7 +89,7 @@ def diagnosis_to_dict(
         gain["estimates"] = {name: estimates[name] for name in ("before", "after")}
         if "errors" in estimates:
             gain["errors"] = estimates["errors"]
-    return {
+    values: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
         "recordings": list(rig.trials),
@@ -114,6 +116,7 @@ def diagnosis_to_dict(
         },
         "notes": list(diagnosis.notes),
     }
+    return values | {"remains": remains(values)}
 
 
 def _strain(explanation: Explanation) -> tuple[float, float, float]:

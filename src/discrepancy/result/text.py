@@ -7,6 +7,7 @@ from typing import Any
 from discrepancy import rules
 from discrepancy.causes.units import Shown, one_each, parameter
 from discrepancy.result.read import kind_of, name_of
+from discrepancy.result.remains import remains
 from discrepancy.result.text_gain import gain_lines
 
 WIDTH = 100
@@ -54,12 +55,13 @@ def _verdict(values: Values) -> str:
     causes, count = values["causes"], len(values["recordings"])
     data = "the recording" if count == 1 else f"the {count} recordings"
     named = " ".join(cause["sentence"] for cause in causes)
+    open_ = " ".join(remains(values))
     if values["verdict"] == "consistent":
-        return f"CONSISTENT. The simulation explains {data} within noise and tolerances; nothing is named."
+        return f"CONSISTENT. The simulation explains {data} within noise and tolerances; nothing is named. {open_}"
     if values["verdict"] == "explained":
-        return f"EXPLAINED. {named}"
+        return f"EXPLAINED. {named} {open_}"
     if values["verdict"] == "partly_explained":
-        return f"PARTLY EXPLAINED. {named} That is not all: something else is wrong, too."
+        return f"PARTLY EXPLAINED. {named} That is not all. {open_}"
     said = f"UNEXPLAINED. {data[0].upper()}{data[1:]} and the simulation differ, and "
     if causes:
         return f"{said}the catalogue's best explains little of it: {named}"

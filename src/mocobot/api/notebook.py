@@ -5,6 +5,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from discrepancy.result.read import name_of
+from discrepancy.result.remains import remains
 from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.html import Child, Node, el
 from mocobot_report.blocks.numbers import percent, plain
@@ -55,6 +56,7 @@ def diagnosis_html(values: Values) -> str:
     sentences = [tidy(cause["sentence"]) for cause in values["causes"]]
     if not sentences and values["verdict"] != "consistent":
         sentences = [tidy(residual["nominal"]["signature"]["sentence"])]
+    sentences += map(tidy, remains(values))
     return _whole(
         named,
         bullets(sentences) if sentences else None,

@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.causes.units import one_each, parameter
 from discrepancy.result.read import VERDICTS, name_of, read_diagnosis
+from discrepancy.result.remains import remains
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
@@ -34,7 +35,7 @@ KINDS = {"consistent": "good", "explained": "good", "partly_explained": "warn", 
 MEANING = {
     "consistent": "The simulation explains the recordings within noise and tolerances; nothing is named.",
     "explained": "The named causes explain what the simulation got wrong.",
-    "partly_explained": "The named causes are there, but something else is wrong, too.",
+    "partly_explained": "The named causes are there, but more than noise is left.",
     "unexplained": "Recordings and simulation differ, and no cause of the catalogue accounts for it.",
 }
 
@@ -76,7 +77,11 @@ def answer(diagnosed: Diagnosed) -> list[Node]:
         said = bullets([tidy(cause["sentence"]) for cause in values["causes"]])
     elif values["verdict"] != "consistent":
         said = tidy(values["residual"]["nominal"]["signature"]["sentence"])
-    box = verdict(KINDS[values["verdict"]], VERDICTS[values["verdict"]], meaning, said)
+    left = remains(values)
+    kind = KINDS[values["verdict"]]
+    # Green stands beside no figure that contradicts it.
+    kind = "warn" if left and kind == "good" else kind
+    box = verdict(kind, VERDICTS[values["verdict"]], meaning, said, *map(tidy, left))
     return [paragraph(lede, kind="lede"), box, tiles(_tiles(values))]
 
 

@@ -141,8 +141,7 @@ def noise_rows(
 ) -> tuple[Array, Array]:
     """What the sensors' errors alone would leave: residuals (draws, n, C), and the torques' own (draws, n, N, 3)."""
     out, torques = [], []
-    for _ in range(draws):
-        errors = noise.draw(trial.signals, rng)
+    for errors in noise.draws(trial.signals, rng, draws):
         out.append(
             sum(
                 trial.of_signals(i, errors.phi[:, i], errors.theta[:, i], errors.tau[:, i])
