@@ -50,6 +50,8 @@ class Whitening:
             return white
         power = white._power(draws)
         quiet = ~np.any(power > rules.LOUD_POWER * np.median(power, axis=0), axis=1)
+        if 2 * np.count_nonzero(quiet) < moving:  # too few to measure the others by
+            return white
         white = cls._even(draws, moving, order, quiet)
         power = white._power(draws)
         return replace(white, loudness=np.where(power > rules.LOUD_POWER, np.sqrt(power), 1.0))
