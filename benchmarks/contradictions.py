@@ -46,7 +46,7 @@ def main() -> None:
         print(f"{name:<28} {len(found):>10} {min(found):>6.2f} {max(found):>6.2f} {beyond:>9}")
 
 
-def largest(recording: object) -> float:
+def largest(recording: mocobot.Recording) -> float:
     """The largest of what is left over, in noise."""
     (alone,) = mocobot.estimate([recording]).recordings
     return max(one.ratio for one in alone.leftovers)
