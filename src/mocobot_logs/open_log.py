@@ -35,7 +35,7 @@ def open_log(path: Path | str, log_map: LogMap | None = None, episode: int | Non
         InputError: there is no such log, its format is not known, or the map does not suit it.
     """
     path = Path(path)
-    kind = _kind(path)
+    kind = log_kind(path)
     if episode is not None and kind != "lerobot":
         raise InputError(f"{path}: is not a LeRobot dataset, so it has no episode {episode}")
     if kind == "bag":
@@ -46,8 +46,12 @@ def open_log(path: Path | str, log_map: LogMap | None = None, episode: int | Non
     return TableSource(table, log_map or _default_map(table))
 
 
-def _kind(path: Path) -> str:
-    """``bag``, ``csv``, ``npz``, ``parquet`` or ``lerobot``."""
+def log_kind(path: Path) -> str:
+    """``bag``, ``csv``, ``npz``, ``parquet`` or ``lerobot``.
+
+    Raises:
+        InputError: it is none of these, or cannot be read.
+    """
     try:
         if not path.exists():
             raise InputError(f"{path}: there is no such file")
@@ -91,10 +95,17 @@ def _is_bag(path: Path) -> bool:
 
 def _is_of_a_dataset(path: Path) -> bool:
     """A data file in a dataset, unless it is a recording that merely lies there."""
-    if dataset_root(path) is None:
-        return False
+    return dataset_root(path) is not None and not is_recording(path)
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a Parquet file says that it is a recording.
+
+    Raises:
+        InputError: it cannot be read.
+    """
     with opened(path, str(path)) as file:
-        return METADATA_KEY not in (file.schema_arrow.metadata or {})
+        return METADATA_KEY in (file.schema_arrow.metadata or {})
 
 
 def _table(path: Path, kind: str, log_map: LogMap | None, episode: int | None) -> Table:

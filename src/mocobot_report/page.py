@@ -5,18 +5,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
-from estimator.files import whole_file
+from estimator.files import check_target, whole_file
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import el, to_bytes
 from mocobot_report.diagnosis import part as diagnosis_part
 from mocobot_report.document import document
 from mocobot_report.estimate import part as estimate_part
 from mocobot_report.folder import Contents, Diagnosed, Estimated, Paper, complete, read_folder
+from mocobot_report.glossary import glossary, link_terms
 from mocobot_report.paper import part as paper_part
 from mocobot_report.provenance_part import provenance_part
-from mocobot_report.target import check_page
 
-NAME = "report.html"
+NAME, SUFFIX = "report.html", ".html"
 Say = Callable[[str], object]
 
 
@@ -25,7 +25,7 @@ def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: Non
 
     Args:
         folder: what ``mocobot paper``, ``estimate`` or ``diagnose`` wrote.
-        out: file to write; ``report.html`` in the folder if None. An earlier report is replaced.
+        out: file to write; ``report.html`` in the folder if None. An existing file is replaced.
         say: takes the name of every stage that begins.
 
     Returns:
@@ -36,7 +36,7 @@ def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: Non
     """
     contents = read_folder(folder)
     out = folder / NAME if out is None else out
-    check_page(out)
+    check_target(out, SUFFIX)
     with whole_file(out) as temporary:
         temporary.write_bytes(make_page(contents, say))
     return out
@@ -77,6 +77,18 @@ def make_page(contents: Contents, say: Say = lambda _: None) -> bytes:
         )
     say("pictures")
     book.gallery.fill()
+    if terms := link_terms(main):
+        heading = el("h2", "Glossary", id="glossary-heading")
+        main.append(
+            el(
+                "section",
+                heading,
+                glossary(terms),
+                id="glossary",
+                class_="part",
+                aria_labelledby="glossary-heading",
+            )
+        )
     say("page")
     return to_bytes(document(title, main))
 

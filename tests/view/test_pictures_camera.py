@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mocobot_view.pictures.camera import MARGIN, NEAREST, Camera, corners, framing, pixels
+from mocobot_view.pictures.camera import MARGIN, NEAREST, Camera, clearest, corners, framing, pixels
 from mocobot_view.pictures.labels import with_labels
 from mocobot_view.pictures.marks import Label, Marks
 from mocobot_view.pictures.render import render
@@ -117,3 +117,11 @@ def test_words_do_not_cover_each_other_nor_leave_the_picture() -> None:
     assert red(written) == pytest.approx(red(alone), rel=0.1), "none of it is cut off"
     outside = with_labels(grey, labels[:2], np.array([[-1.0, 3.0], [np.nan, np.nan]]))
     assert (outside == 128).all()
+
+
+def test_robots_are_seen_side_by_side() -> None:
+    """Not one above the other, although they would be as far apart in the picture: they are tall."""
+    feet = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+    camera = clearest(feet, feet, azimuth=0.0, elevation=-36.0, aspect=1.0, fovy_deg=40.0)
+    across = np.sort(pixels(camera, feet, 1.0, 1.0, 40.0)[:, 0])
+    assert np.diff(across).min() > 0.25

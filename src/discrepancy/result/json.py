@@ -5,18 +5,21 @@ recordings          names of the trials
 verdict             "consistent", "explained", "partly_explained" or "unexplained"
 causes              list, in the order of discovery, of
     cause, family, robot, joint    robot and joint from 1, or null
-    place, sentence                in words
+    kind, name, place, sentence    in words: the cause, the cause at its place, its place, what it does
     parameters                     {name: {value, se}}; se is null for what was chosen, not fitted
     explained                      {in_sample, held_out}: share of the nominal model's misfit that the cause removes
+                                   beyond those before it; the shares add up to what all causes remove
     log10_p                        of so much evidence in clean data
     folds                          gain of chi-square on every trial when fitted to the others
     shape                          numbers that change the cause's columns, such as a pendulum's length
     separate                       what would tell the cause from its look-alikes
-    alternatives                   list of {cause, family, robot, joint, place, evidence_gap [nats], chi2_per_n,
-                                   ambiguous, separate}; chi2_per_n of its closed loop, null if not simulated
+    alternatives                   list of {cause, kind, name, family, robot, joint, place, evidence_gap [nats],
+                                   chi2_per_n, ambiguous, separate}; chi2_per_n of its closed loop, or null
 evidence            the strongest candidates, see ``evidence_list``: {before, after, by_chance} with nothing named and
-                    with what is named (null), lists of {cause, family, robot, joint, place, at, gain, log10_p}
-rejected            significant candidates that other trials did not confirm: list of {cause, robot, joint, place}
+                    with what is named (null), lists of {cause, kind, name, family, robot, joint, place, at, gain,
+                    log10_p}
+rejected            significant candidates that other trials did not confirm: list of {cause, kind, name, family,
+                    robot, joint, place}
 gain                null where the closed loop was not simulated and there is nothing to estimate, or
     held_out        {before, after}: {<channel>_nrmse, <channel>_rms, chi2_per_n}, means over trials, null if failed
     units           of the channels' rms
@@ -28,8 +31,8 @@ gain                null where the closed loop was not simulated and there is no
     errors          {before, after} against the truth, only where it is known
 not_simulated       why there is no closed-loop comparison, or null
 undecidable         list of {what, why, remedy}: what no recordings of this rig decide, then what these do not
-detection_limits    list of {cause, robot, joint, parameters: {name: size}}: what would have been noticed nine times in
-                    ten; null where these recordings say nothing
+detection_limits    list of {cause, kind, robot, joint, parameters: {name: size}}: what would have been noticed nine
+                    times in ten; null where these recordings say nothing
 residual            {chi2_per_n, signature} of what the causes (with tolerances) leave, and
     chi2_per_n_tolerated           with tolerances and no cause
     tolerances                     {chi2, freedom, log10_p}: how hard they are used

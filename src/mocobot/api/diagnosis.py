@@ -27,7 +27,7 @@ class Cause:
         sentence: what it does, with its numbers.
         parameters: values by name, units in the names; ``make_effect`` takes them.
         standard_errors: by the same names; None for what was chosen, not fitted.
-        in_sample: share of the nominal model's misfit that it removes.
+        in_sample: share of the nominal model's misfit that it removes beyond the causes before it.
         held_out: the same on trials left out of the fit, or None.
     """
 
@@ -73,7 +73,7 @@ class Diagnosis(Diagnosed):
         Raises:
             InputError: the folder holds something else, or cannot be written.
         """
-        check_folder(Path(folder), [], is_diagnosis, "an earlier diagnosis")
+        check_folder(Path(folder), [], is_diagnosis, "an earlier diagnosis", force=True)
         with whole_folder(Path(folder)) as whole:
             self.write_into(whole)
 

@@ -5,7 +5,7 @@ from dataclasses import fields
 from pathlib import Path
 
 from estimator.recording.model import Recording
-from estimator.recording.parquet import read_recording
+from mocobot.files.recordings import read
 
 Given = Recording | Path | str
 """A recording, or the path of its file."""
@@ -18,5 +18,5 @@ def recordings_of(given: Given | Iterable[Given]) -> Iterator[Recording]:
         InputError: a file cannot be read, or is not a plausible recording.
     """
     for each in [given] if isinstance(given, Recording | Path | str) else given:
-        recording = each if isinstance(each, Recording) else read_recording(each)
+        recording = each if isinstance(each, Recording) else read(Path(each))
         yield Recording(**{field.name: getattr(recording, field.name) for field in fields(Recording)})

@@ -54,7 +54,7 @@ def simulate(
     model: Path | str | None = None,
     level: Level = "joint",
     gains: ControlGains | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: Callable[[int, int], object] | None = None,
 ) -> SimulatedRecording:
     """Simulate one trial and read it through the sensors; equal arguments give equal bits.
 
@@ -71,7 +71,7 @@ def simulate(
         model: folder of an extended model, as a diagnosis writes it, in place of a payload.
         level: what the recording's file will hold: ``"joint"``, driven angles and spring torques, or ``"wrist"``.
         gains: of the arms' control; None for the defaults.
-        progress: called with the number of samples done since the last call.
+        progress: called with the number of samples done and that of all, every second of the trial.
 
     Raises:
         InputError: an argument that cannot be met.
@@ -82,7 +82,7 @@ def simulate(
     if model is not None and payload is not None:
         raise InputError("payload and model are both given; the model has its own payload, so leave one out")
     scene = load_extended(Path(model)) if model is not None else None
-    label = str(payload or "a") if model is None else Path(model).resolve().name
+    label = str("a" if payload is None else payload) if model is None else Path(model).resolve().name
     sensors = sensor_preset(preset) if isinstance(preset, str) else preset
     given = {"vias": vias, "duration_s": duration_s}
     request = replace(

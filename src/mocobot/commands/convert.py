@@ -1,11 +1,11 @@
 """``mocobot convert``: read a log of any format, bring it onto one grid, write it as any format, say what was done."""
 
-import os
 from pathlib import Path
 
 from estimator.arm.design import load_design
 from estimator.errors import InputError
-from estimator.files import check_target
+from estimator.files import check_place
+from mocobot.files.targets import check_no_input, check_output
 from mocobot.options import Convert
 from mocobot.progress import bar
 from mocobot_logs.convert import Labels, convert, output_kind, write_converted
@@ -51,23 +51,18 @@ def run(options: Convert) -> None:
 
 def _check(options: Convert) -> None:
     """Everything that can be refused before the log is read."""
-    out, real = options.out, Path(os.path.realpath(options.out))
+    out = options.out
     kind = output_kind(out)
     inputs = [options.log, *([options.design] if options.design is not None else [])]
-    if options.map is not None and options.map not in MAPS:
+    if options.map is not None and options.map not in MAPS and Path(options.map).is_file():
         inputs.append(Path(options.map))
-    for path in inputs:
-        source = Path(os.path.realpath(path))
-        if real == source or (source.is_dir() and source in real.parents):
-            raise InputError(f"{out}: is {path} or lies in it; write the recording somewhere else")
     if kind != "folder":
-        check_target(out)
-    elif not real.parent.is_dir():
-        raise InputError(f"{out.parent}: there is no such folder")
-    elif real.exists() and (not real.is_dir() or any(real.iterdir())):
-        raise InputError(f"{out}: exists; name a new folder for the bag, or a file with a suffix")
-    if not os.access(real.parent, os.W_OK):
-        raise InputError(f"{out}: cannot be written (its folder is read-only)")
+        check_output(out, inputs, force=options.force)
+    else:
+        check_no_input(out, inputs)
+        check_place(out)
+        if out.exists() and (not out.is_dir() or any(out.iterdir())):
+            raise InputError(f"{out}: exists; name a new folder for the bag, or a file with a suffix")
     for option, value, low, high in (
         ("--rate", options.rate, SLOWEST_HZ, FASTEST_HZ),
         ("--max-gap", options.max_gap, 0.0, LONGEST_GAP_S),

@@ -19,11 +19,12 @@ from discrepancy.team.tolerances import default_tolerances
 from estimator.errors import InputError
 from estimator.files import whole_folder
 from estimator.recording.model import Recording
-from estimator.recording.parquet import read_recording
 from mocobot.files.provenance import file_facts, provenance
+from mocobot.files.recordings import read
 from mocobot.files.targets import check_folder, check_recordings
 from mocobot.options import Diagnose
 from mocobot.progress import bar, stages
+from mocobot.strict import NotGood
 from mocobot_sim.trial.truth import truth_path
 
 
@@ -42,6 +43,7 @@ def run(options: Diagnose) -> None:
 
     Raises:
         InputError: recordings, tolerances or options that cannot be used, or an output that cannot be written.
+        NotGood: with ``strict``, the verdict is neither consistent nor explained.
     """
     rig = RIGS[options.rig]
     inputs = [*options.rec, *([options.tolerances] if options.tolerances else [])]
@@ -65,13 +67,15 @@ def run(options: Diagnose) -> None:
     print(found)  # after the folder is in place: whoever reads may close the pipe
     if options.out:
         print(f"\nWritten to {options.out}.")
+    verdict = found.diagnosis.verdict
+    if options.strict and verdict not in ("consistent", "explained"):
+        raise NotGood(f"the verdict is {verdict.replace('_', ' ')}")
 
 
 def _check(options: Diagnose, causes: Collection[str], inputs: Sequence[Path]) -> None:
     """Everything that can be refused before a recording is read."""
-    if not options.rec:
-        hint = "; name them before --exclude" if options.exclude else "; name at least one file"
-        raise InputError(f"no recording given{hint}")
+    if not options.rec and options.exclude:
+        raise InputError("no recording given; name them before --exclude")
     if options.jobs < 1:
         raise InputError(f"jobs is {options.jobs}; it must be at least 1")
     check_recordings(options.rec)
@@ -81,8 +85,12 @@ def _check(options: Diagnose, causes: Collection[str], inputs: Sequence[Path]) -
     if set(causes) <= set(options.exclude):
         raise InputError("every cause is excluded; nothing is left to look for")
     if options.out:
-        check_folder(options.out, inputs, is_diagnosis, "an earlier diagnosis")
-    if options.rig == "emps" and len(options.rec) > 1:
+        check_folder(options.out, inputs, is_diagnosis, "an earlier diagnosis", force=options.force)
+    if options.rig == "team":
+        for path in options.rec:
+            if path.suffix == ".mat":
+                raise InputError(f"{path}: is a MAT file; --rig emps reads those of the EMPS benchmark")
+    elif len(options.rec) > 1:
         raise InputError(
             f"{len(options.rec)} recordings are given; the emps rig takes one and cuts it into blocks that validate "
             "each other"
@@ -93,7 +101,7 @@ def _read(paths: Sequence[Path]) -> list[Recording]:
     recordings = []
     with bar(len(paths), "reading", "file") as advance:
         for path in paths:
-            recordings.append(read_recording(path))
+            recordings.append(read(path))
             advance(1)
     return recordings
 

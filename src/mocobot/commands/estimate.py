@@ -3,15 +3,16 @@
 from collections.abc import Iterator
 from dataclasses import asdict
 
-from estimator.errors import InputError
+from estimator.estimate.result import PayloadEstimate
 from estimator.files import write_json
 from estimator.recording.model import Recording
-from estimator.recording.parquet import read_recording
 from mocobot.api.estimation import estimate
 from mocobot.files.provenance import provenance
-from mocobot.files.targets import check_recordings
+from mocobot.files.recordings import read
+from mocobot.files.targets import check_output, check_recordings
 from mocobot.options import Estimate
 from mocobot.progress import stages
+from mocobot.strict import NotGood
 
 
 def run(options: Estimate) -> None:
@@ -19,19 +20,29 @@ def run(options: Estimate) -> None:
 
     Raises:
         InputError: recordings that cannot be used, or an output that cannot be written.
+        NotGood: with ``strict``, the estimate is flagged, or says nothing.
     """
-    if not options.rec:
-        raise InputError("no recording given; name at least one file")
-    check_recordings(options.rec, options.out)
+    check_recordings(options.rec)
+    if options.out is not None:
+        check_output(options.out, options.rec, force=options.force)
     with stages() as (say, _):
 
         def each() -> Iterator[Recording]:
             for path in options.rec:
                 say(f"reading {path.name}")
-                yield read_recording(path)
+                yield read(path)
 
         found = estimate(each(), method=options.method, cutoff_hz=options.cutoff_hz, say=say)
     if options.out:
         made = provenance("estimate", asdict(options), options.rec)
         write_json(options.out, found.to_dict() | {"provenance": made})
     print(found)
+    if options.strict:
+        _expect_good(found)
+
+
+def _expect_good(found: PayloadEstimate) -> None:
+    if found.flags:
+        raise NotGood(f"the estimate is flagged: {found.flags[0]}")
+    if found.mass is None and found.grasps is None:
+        raise NotGood("the recordings determine neither mass nor grasps")

@@ -1,10 +1,14 @@
 """``mocobot simulate``: simulate one trial, write its recording and the truth beside it."""
 
+from pathlib import Path
+
 from estimator.errors import InputError
-from estimator.files import check_target
 from mocobot.api.simulation import check_fits, simulate
+from mocobot.files.targets import check_output
 from mocobot.options import Simulate
-from mocobot.progress import bar
+from mocobot.progress import share_bar
+from mocobot_sim.trial.trajectories import RATE_HZ
+from mocobot_sim.trial.truth import truth_path
 
 
 def run(options: Simulate) -> None:
@@ -14,14 +18,21 @@ def run(options: Simulate) -> None:
         InputError: an option that cannot be met, or an output that cannot be written.
         TrialError: the physics of the trial cannot be trusted.
     """
-    check_target(options.out, ".parquet")
+    given = Path(options.payload or "")
+    inputs = [given] if given.is_file() else []
+    check_output(options.out, inputs, force=options.force, suffix=".parquet")
+    check_output(truth_path(options.out), inputs, force=options.force)
     check_fits("--vias", options.vias, "random", options.trajectory)
     check_fits("--duration", options.duration, "periodic", options.trajectory)
     if options.model is not None and options.payload is not None:
         raise InputError(
             "--payload and --model are both given; the model has its own payload, so leave one out"
         )
-    with bar(None, "simulating", "sample") as advance:
+    with share_bar(f"{options.trajectory} trial", "s") as tell:
+
+        def advance(done: int, samples: int) -> None:
+            tell(done / RATE_HZ, samples / RATE_HZ, "")
+
         done = simulate(
             options.payload, options.trajectory,
             vias=options.vias, duration_s=options.duration, preset=options.preset, seed=options.seed,

@@ -6,16 +6,20 @@ import numpy as np
 
 from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES
+from estimator.recording.sampling import Method
 from mocobot_logs.log import NS, Array, Samples, Stamps, joined
 from mocobot_logs.resample.fill import Merger
 from mocobot_logs.resample.filter import Decimator, fineness
 from mocobot_logs.resample.grid import Grid, Interpolator
-from mocobot_logs.resample.report import Method, StreamReport
+from mocobot_logs.resample.report import StreamReport
 from mocobot_logs.resample.screen import Screen
+from mocobot_logs.resample.steps import StepFinder
 from mocobot_logs.resample.tally import Tally
 
 SLOWEST, FASTEST_HZ = 0.25, 20e3
 """Slowest native rate over the output rate: signals up to 5 Hz need 25 Hz; and the fastest [Hz]."""
+PLAUSIBLE_HZ = 5.0
+"""Slowest log whose stamps are believed: the rate asked for is blamed, not their unit."""
 _TOLERANCE = 0.01  # of the slowest rate, for clocks and jitter
 _SAME_RATE = 1e-3
 _LOOK = 1024  # rows from which the native rate is found
@@ -47,6 +51,7 @@ class RobotStream:
         self._rows_waiting = 0
         self._head: list[tuple[Stamps, Array]] = []
         self._pipe: _Pipe | None = None
+        self._steps = StepFinder()
 
     @property
     def left_grid(self) -> bool:
@@ -98,6 +103,7 @@ class RobotStream:
             duplicates=screen.duplicates,
             merged=pipe.merged,
             method=pipe.method,
+            steps=self._steps.steps(),
         )
         return screen.first_ns + round(pipe.lead / self._rate_hz / NS), values, report
 
@@ -107,6 +113,7 @@ class RobotStream:
             waiting = [joined(waiting, len(self._channels))]
         for samples in waiting:
             rows = self.screen.keep(samples)
+            self._steps.add(rows[1])
             if self._pipe is not None:
                 self._pipe.push(*rows)
                 continue
@@ -120,7 +127,9 @@ class RobotStream:
         time_ns, values = (np.concatenate(parts) for parts in zip(*self._head, strict=True))
         self._head = []
         grid, k = self._plan(time_ns[:_LOOK])  # the same rows whatever the chunks
-        self._pipe = _Pipe(grid, k, Tally(self._where, grid.period_ns, self._max_gap_s), self._max_gap_s)
+        native_hz = 1.0 / (grid.period_ns * NS)
+        tally = Tally(self._where, grid.period_ns, self._max_gap_s, native_hz / self._rate_hz)
+        self._pipe = _Pipe(grid, k, tally, self._max_gap_s)
         self._pipe.push(time_ns, values)
         return self._pipe
 
@@ -129,9 +138,15 @@ class RobotStream:
         period_ns = float(np.median(np.diff(time_ns)))
         native_hz, slowest_hz = 1.0 / (period_ns * NS), SLOWEST * self._rate_hz
         if not slowest_hz * (1.0 - _TOLERANCE) <= native_hz <= FASTEST_HZ:
+            asked = PLAUSIBLE_HZ <= native_hz < slowest_hz
+            hint = (
+                f"; for a recording of {self._rate_hz:g} Hz {slowest_hz:g} to {FASTEST_HZ:g} Hz are needed, "
+                f"so this log allows a rate of at most {native_hz / SLOWEST:.4g} Hz"
+                if asked
+                else f"; {slowest_hz:g} to {FASTEST_HZ:g} Hz are allowed (is the unit of time right?)"
+            )
             raise InputError(
-                f"{self._where}: samples come {period_ns * NS:.6g} s apart, at {native_hz:.6g} Hz; "
-                f"{slowest_hz:g} to {FASTEST_HZ:g} Hz are allowed (is the unit of time right?)"
+                f"{self._where}: samples come {period_ns * NS:.6g} s apart, at {native_hz:.6g} Hz{hint}"
             )
         k = max(1, round(native_hz / self._rate_hz))
         spacing_ns = 1.0 / (k * self._rate_hz) / NS

@@ -221,7 +221,7 @@ def _excitation(book: Book, e: PayloadEstimate) -> list[Node | None]:
     return [
         paragraph(note, kind="note"),
         excitation_chart(book, e),
-        table("Directions that the data do not determine", ["step", "direction", "reason"], weak)
+        table("Directions that the data do not determine", ["step", "direction", "reason"], weak, stack=True)
         if weak
         else None,
         folded("As a table", table("Excitation of every step", head, rows)),

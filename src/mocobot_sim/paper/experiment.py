@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 from joblib import Parallel, delayed
-from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
 from estimator.estimate.payload import estimate_payload
@@ -22,13 +22,14 @@ from estimator.recording.model import Recording
 from estimator.signals.process import process_recording
 from mocobot_sim.paper.published import payload_truth
 from mocobot_sim.paper.scoring import score
+from mocobot_sim.paper.shares import shares
 from mocobot_sim.scene.models import payload_path
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset, sensor_preset
 from mocobot_sim.trial.simulate import TrialRequest, simulate
 
-Progress = Callable[[int], object]
+Progress = Callable[[float, float, str], object]
 # Positions p_1i and orientations R_1i between processes: arrays keep their bits there, a RigidTransform is normalised.
-Grasps = tuple[NDArray[np.float64], NDArray[np.float64]]
+Grasps = tuple[Array, Array]
 
 
 @dataclass(frozen=True)
@@ -62,8 +63,10 @@ class PaperPlan:
         for preset in self.presets:
             sensor_preset(preset)
         for name, values in (("payload", self.payloads), ("preset", self.presets)):
-            if not values or len(set(values)) != len(values):
-                raise InputError(f"{name} is {' '.join(values) or 'empty'!r}; give at least one, each once")
+            if not values:
+                raise InputError(f"no {name} given; name at least one")
+            if len(set(values)) != len(values):
+                raise InputError(f"{name} is {' '.join(values)!r}; give each once")
         for name, value, least in (("seed", self.seed, 0), ("trials", self.trials, 1)):
             if value < least:
                 raise InputError(f"{name} is {value}; it must be at least {least}")
@@ -122,41 +125,49 @@ def run_paper(plan: PaperPlan, jobs: int = 1, progress: Progress | None = None) 
     Args:
         plan: what to run.
         jobs: parallel processes; the result does not depend on them.
-        progress: called with the number of steps (of ``plan.steps``) done since the last call.
+        progress: called several times a second, from another thread, with the steps done, parts of trials counting, all
+            steps, and the name of the stage that runs.
 
     Raises:
         TrialError: the physics of a trial cannot be trusted.
     """
-    progress = progress or (lambda _: None)
+    progress = progress or (lambda done, steps, stage: None)
     result = PaperResult()
     teams = list(product(plan.payloads, plan.teams()))
+    before = 0
     with Parallel(n_jobs=jobs, return_as="generator") as pool:
 
-        def each(function: Callable[..., Any], tasks: Iterable[tuple[Any, ...]]) -> Iterable[Any]:
-            for outcome in pool(delayed(function)(*task) for task in tasks):
-                progress(1)
-                yield outcome
+        def each(stage: str, function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]) -> Iterable[Any]:
+            """Outcomes of a function of a share to write to and a task."""
+            nonlocal before
+            start, before = before, before + len(tasks)
+            with shares(len(tasks), lambda now: progress(start + now, plan.steps, stage)) as done:
+                calls = (delayed(function)(done[k : k + 1], *task) for k, task in enumerate(tasks))
+                for k, outcome in enumerate(pool(calls)):
+                    done[k] = 1.0
+                    yield outcome
 
         first = [
             (_request(plan, payload, "random", k), team, None)
             for payload, team in teams
             for k in range(plan.trials)
         ]
-        recordings = _collect(first, each(_trial, first), result)
+        recordings = _collect(first, each("random trials", _trial, first), result)
 
         # Grasps from the random trials, read through the team's last (least ideal) preset.
-        grasps = list(each(_grasps, [(recordings[payload, team[-1].name],) for payload, team in teams]))
+        random = [(recordings[payload, team[-1].name],) for payload, team in teams]
+        grasps = list(each("grasps", _grasps, random))
         second = [
             (_request(plan, payload, trial, k), team, held)
             for (payload, team), held in zip(teams, grasps, strict=True)
             for trial, count in (("static", 1), ("periodic", plan.inertia_trials))
             for k in range(count)
         ]
-        for key, more in _collect(second, each(_trial, second), result).items():
+        for key, more in _collect(second, each("other trials", _trial, second), result).items():
             recordings[key] = recordings[key] + more
 
         sets = [(payload, preset) for preset in plan.presets for payload in plan.payloads]
-        estimates = each(estimate_payload, [(recordings[key], "staged") for key in sets])
+        estimates = each("estimates", _estimate, [(recordings[key],) for key in sets])
         for (payload, preset), estimate in zip(sets, estimates, strict=True):
             result.estimates.setdefault(preset, {})[payload] = estimate
             result.recordings.setdefault(preset, {})[payload] = recordings[payload, preset]
@@ -169,10 +180,14 @@ def _request(plan: PaperPlan, payload: str, trial: str, number: int) -> TrialReq
 
 
 def _trial(
-    request: TrialRequest, team: Sequence[SensorPreset], grasps: Grasps | None
+    share: Array, request: TrialRequest, team: Sequence[SensorPreset], grasps: Grasps | None
 ) -> tuple[dict[str, Recording], TrialSummary]:
     X_1i = grasps and RigidTransform.from_components(grasps[0], Rotation.from_matrix(grasps[1]))
-    done = simulate(request, team, X_1i)
+
+    def tell(done: int, samples: int) -> None:
+        share[0] = done / samples
+
+    done = simulate(request, team, X_1i, progress=tell)
     summary = TrialSummary(
         name=f"{request.payload} {request.trial} {request.number} {team[-1].name}",
         rotation_deg=float(np.rad2deg(np.linalg.norm(done.log.payload_rotation(), axis=1).max())),
@@ -198,9 +213,13 @@ def _collect(
     return recordings
 
 
-def _grasps(recordings: Sequence[Recording]) -> Grasps:
+def _grasps(_share: Array, recordings: Sequence[Recording]) -> Grasps:
     estimate, steps = estimate_grasps([process_recording(recording) for recording in recordings])
     if estimate is None:
         weak = [str(direction) for step in steps for direction in step.weak]
         raise InputError(f"the random trials do not determine the grasps: {weak[0]}")
     return estimate.p_1i, estimate.R_1i
+
+
+def _estimate(_share: Array, recordings: Sequence[Recording]) -> PayloadEstimate:
+    return estimate_payload(recordings, "staged")

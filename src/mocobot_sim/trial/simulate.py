@@ -73,7 +73,7 @@ def simulate(
     presets: Sequence[SensorPreset],
     grasps: RigidTransform | None = None,
     gains: ControlGains | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: Callable[[int, int], object] | None = None,
     scene: TeamScene | None = None,
     effects: Sequence[Effect] = (),
 ) -> Simulated:
@@ -88,7 +88,7 @@ def simulate(
         grasps: grasp frames X_1i that the robots believe in when they construct periodic and static
             trajectories, N transforms; None for the true ones.
         gains: control gains; None for the defaults.
-        progress: called with the number of samples done since the last call.
+        progress: called with the number of samples done and that of all.
         scene: the team, in place of one built from ``request.payload``, which then is its label only; its robots are
             what they are, so the presets must be calibrated ones.
         effects: what is hidden in the team.

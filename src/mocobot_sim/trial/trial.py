@@ -24,7 +24,7 @@ def run_trial(
     scene: TeamScene,
     trajectory: Trajectory,
     gains: ControlGains | None = None,
-    progress: Callable[[int], object] | None = None,
+    progress: Callable[[int, int], object] | None = None,
     *,
     trial_number: int | None = None,
     feed_forward: Array | None = None,
@@ -37,7 +37,8 @@ def run_trial(
         scene: the team; its controllers misread what ``scene.units`` says.
         trajectory: commands.
         gains: control gains; None for the defaults.
-        progress: called with the number of samples done since the last call.
+        progress: called with the number of samples done and that of all, at first with 0 and then every second of the
+            trial.
         trial_number: which trial this is, from 1: the scene's pushes for other trials do not act; None lets all act.
         feed_forward: F_ff of every robot in its {b} [N], shape (N, 3), held from the start; None to take it up.
         timestep_s: integration step [s]; None for the scene's.
@@ -69,6 +70,8 @@ def run_trial(
         actor.start(Stage(model, data, index, controller, gains.rate_hz, ticks, len(ref)))
     R_Wb1 = scene.mounts.rotation[0].as_matrix()
     reported, last = 0, len(trajectory.ref_b) - 1
+    if progress:
+        progress(0, last + 1)
     for sample in range(last + 1):
         for tick in range(sample * ticks, (sample + 1) * ticks):
             if pushes or actors:
@@ -91,7 +94,7 @@ def run_trial(
         if sample % 100 == 99 or sample == last:
             log.check(reported, sample + 1, design)
             if progress:
-                progress(sample + 1 - reported)
+                progress(sample + 1, last + 1)
             reported = sample + 1
     phi, theta, tau = (np.ascontiguousarray(sensed[:, :, k]) for k in range(3))
     return log.finish(

@@ -1,6 +1,7 @@
 """MuJoCo's free camera: from where to look so that everything is in the picture, and where points lie in it."""
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import mujoco
 import numpy as np
@@ -15,6 +16,8 @@ MARGIN = 0.04
 """Share of the picture that stays free at each side."""
 NEAREST = 0.1
 """Least distance of the camera from the nearest point, over the points' spread."""
+TURNS = (0.0, *(sign * turn for turn in range(15, 180, 15) for sign in (-1, 1)), 180.0)
+"""Other directions that ``clearest`` tries [deg]; the first of equal ones is taken."""
 CORNERS = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
 
 
@@ -73,6 +76,25 @@ def framing(points: ArrayLike, azimuth: float, elevation: float, aspect: float, 
     shift = [_middle(across, z + distance) for across in (x, y)]
     lookat = np.array(shift) @ axes[:2]
     return Camera((float(lookat[0]), float(lookat[1]), float(lookat[2])), float(distance), azimuth, elevation)
+
+
+def clearest(
+    points: ArrayLike, feet: Array, azimuth: float, elevation: float, aspect: float, fovy_deg: float
+) -> Camera:
+    """The camera of ``framing`` from where robots hide each other least, as near to a direction as that allows.
+
+    Args:
+        points, elevation, aspect, fovy_deg: as for ``framing``.
+        feet: where the robots stand [m], shape (N, 3).
+        azimuth: direction of view that is preferred [deg].
+    """
+
+    def apart(camera: Camera) -> float:
+        """Least distance of two robots in the picture, widths counting double, because robots are tall."""
+        at = [2.0, 1.0] * pixels(camera, feet, aspect, 1.0, fovy_deg)
+        return min((float(np.linalg.norm(a - b)) for a, b in combinations(at, 2)), default=0.0)
+
+    return max((framing(points, azimuth + turn, elevation, aspect, fovy_deg) for turn in TURNS), key=apart)
 
 
 def _middle(across: Array, depth: Array) -> float:

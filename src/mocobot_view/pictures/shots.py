@@ -1,7 +1,6 @@
 """What pictures of teams show: a payload as designed, an estimate, and where a diagnosis sees causes."""
 
 from collections.abc import Sequence
-from itertools import combinations
 from pathlib import Path
 
 import mujoco
@@ -22,7 +21,7 @@ from mocobot_view.bodies.payload_shape import BAR_M, BAR_RGBA
 from mocobot_view.colours import Colour
 from mocobot_view.facts.body_facts import BodyFacts
 from mocobot_view.facts.cause_body import body_of, by_place
-from mocobot_view.pictures.camera import Camera, corners, framing, pixels
+from mocobot_view.pictures.camera import clearest, corners
 from mocobot_view.pictures.marks import Marks
 from mocobot_view.pictures.measured_team import MeasuredTeam, measured_team
 from mocobot_view.pictures.render import Shot
@@ -32,8 +31,6 @@ ASPECT = 1.6
 """Width over height of a picture that shots are framed for, if nothing else is said."""
 AZIMUTH, ELEVATION, FOVY = 125.0, -24.0, 28.0
 """Direction and angle of view [deg]; a long lens, which does not blow up what is near."""
-TURNS = (0.0, *(sign * turn for turn in range(15, 180, 15) for sign in (-1, 1)), 180.0)
-"""Other directions that are tried [deg]; the first of equal ones is taken."""
 ABOVE = -34.0
 """Elevation [deg] where marks at the payload are to be seen."""
 LONG_M = 0.17
@@ -126,7 +123,7 @@ def diagnosis_shot(
     _bars(marks, team, RED if guilty else BAR_RGBA)
     _names(marks, team)
     _causes(marks, team, causes)
-    where = [f"{cause.name} ({_place(cause)})" for cause in causes]
+    where = [f"{cause.label or cause.name} ({_place(cause)})" for cause in causes]
     found = f" Red: {', '.join(where)}." if where else " No cause is named."
     says = _says(recording, team, None, marked=False) + found
     return _shot(team.model, team.qpos, marks, says, aspect, ABOVE)
@@ -148,14 +145,7 @@ def _shot(
     data = posed(model, qpos)
     chassis = [b for b in range(model.nbody) if model.body(b).name.endswith("/chassis")]
     feet = data.xpos[chassis].reshape(-1, 3)
-
-    def apart(camera: Camera) -> float:
-        """Least distance of two robots in the picture, widths counting double, because robots are tall."""
-        at = pixels(camera, feet, 2.0 * aspect, 1.0, FOVY)
-        return min((float(np.linalg.norm(a - b)) for a, b in combinations(at, 2)), default=0.0)
-
-    cameras = [framing(points, AZIMUTH + turn, elevation, aspect, FOVY) for turn in TURNS]
-    best = max(cameras, key=apart)
+    best = clearest(points, feet, AZIMUTH, elevation, aspect, FOVY)
     turn = Rotation.from_rotvec([0.0, 0.0, best.azimuth - AZIMUTH], degrees=True).as_matrix()
     centre = model.stat.center * [1.0, 1.0, 0.0]
     moved = np.append(feet.mean(axis=0)[:2], 0.0) if len(feet) else centre
@@ -251,5 +241,5 @@ def _causes(marks: Marks, team: MeasuredTeam, causes: Sequence[NamedCause]) -> N
         seen = np.isin(team.model.geom_bodyid, bodies)
         team.model.geom_rgba[seen, :3] = RED[:3]
         marks.ellipsoid(where, MARK_M, (*RED[:3], 0.45))
-        text = ", ".join(cause.name for cause in here)
+        text = ", ".join(cause.kind or cause.name for cause in here)
         marks.label(text, where + np.array([0.0, 0.0, 2.0 * MARK_M]), colours.FAULT)

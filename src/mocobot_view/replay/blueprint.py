@@ -1,21 +1,28 @@
-"""The layout of a replay: the scene left, series right, a text below."""
+"""The layout of a replay: the scene left, text and series right."""
 
+import uuid
 from collections.abc import Sequence
 
-import numpy as np
 import rerun as rr
 import rerun.blueprint as rrb
 
-from estimator.arrays import Array
+from mocobot_view.replay.eyes import path_eye, scene_eye
+from mocobot_view.replay.key import key_view
 from mocobot_view.replay.log_robots import trail_paths
 from mocobot_view.replay.log_time import TIMELINE
 from mocobot_view.replay.replay_trial import ReplayTrial
 
 TRAIL_S = 3.0
 """Length of the visible wrist paths."""
-PATH_EYE_M = np.array([0.11, -0.11, 0.08])
-"""From where a wrist's path is seen."""
 BACKGROUND = (100, 108, 120)
+SCENE_ASPECT = {1: 0.7, 2: 1.5}
+"""Width over height of the scene, by the number of trials, in a window 800 wide and a bit higher than that; 1 for more
+trials."""
+KEY_SHARE = 0.07
+"""Height of a key over that of its plots, in a column of full height."""
+ALL_PLOTS = uuid.UUID("5c0dca6a-e63f-9cf7-f657-2602590474cc")
+"""The viewer keeps the range of time that linked plots share with a view of this id (GLOBAL_VIEW_ID in its sources;
+nothing in its interface sets that range). Unset, it is 30 s before and after the cursor for trials of over 60 s."""
 
 
 def blueprint(trials: Sequence[ReplayTrial], tab: str | None = None) -> rrb.Blueprint:
@@ -23,23 +30,27 @@ def blueprint(trials: Sequence[ReplayTrial], tab: str | None = None) -> rrb.Blue
 
     Args:
         trials: what is shown.
-        tab: name of the tab of series that is open at first; None for the joints.
+        tab: name of the tab that is open at first; None for the summary of one trial, the joints of several.
     """
+    aspect = SCENE_ASPECT.get(len(trials), 1.0)
     if len(trials) == 1:
         trial = trials[0]
         body: rrb.Container = rrb.Horizontal(
-            rrb.Vertical(scene_view(trial), _text(trial), row_shares=[3, 1.4]),
-            _tabs(_series(trial, True), tab),
+            scene_view(trial, aspect),
+            _tabs([_text(trial), *_series(trial, KEY_SHARE)], tab),
             column_shares=[1.25, 1],
         )
     else:
         columns = [
             rrb.Vertical(
-                scene_view(trial), _tabs([*_series(trial, False), _text(trial)], tab), row_shares=[1, 1]
+                scene_view(trial, aspect),
+                _tabs([*_series(trial, 2.0 * KEY_SHARE), _text(trial)], tab),
+                row_shares=[1, 1],
             )
             for trial in trials
         ]
         body = rrb.Horizontal(*columns) if len(columns) <= 3 else rrb.Grid(*columns)
+    _share_range(body, max(float(trial.time[-1]) for trial in trials))
     return rrb.Blueprint(
         body,
         rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="playing", loop_mode="all"),
@@ -50,13 +61,13 @@ def blueprint(trials: Sequence[ReplayTrial], tab: str | None = None) -> rrb.Blue
     )
 
 
-def scene_view(trial: ReplayTrial) -> rrb.Spatial3DView:
-    """The 3D view of one trial, seen from the front and above, all robots in sight."""
-    places = trial.bases.p_Wb[:, :2]
-    centre = 0.5 * (places.min(axis=0) + places.max(axis=0))
-    reach = 0.5 * float(np.linalg.norm(np.ptp(places, axis=0))) + 0.6
-    target = np.array([*centre, 0.5])
-    towards = np.array([0.6, -0.6, 0.65])
+def scene_view(trial: ReplayTrial, aspect: float = 1.0) -> rrb.Spatial3DView:
+    """The 3D view of one trial, seen from above, everything in sight.
+
+    Args:
+        trial: what is shown.
+        aspect: width over height of the narrowest view that must hold it.
+    """
     window = rrb.VisibleTimeRange(
         TIMELINE,
         start=rrb.TimeRangeBoundary.cursor_relative(seconds=-TRAIL_S),
@@ -70,13 +81,9 @@ def scene_view(trial: ReplayTrial) -> rrb.Spatial3DView:
         line_grid=rrb.LineGrid3D(
             visible=True, spacing=0.25, plane=rr.components.Plane3D.XY, color=(220, 225, 235, 70)
         ),
-        eye_controls=_eye(target + 1.85 * reach * towards / np.linalg.norm(towards), target),
+        eye_controls=scene_eye(trial, aspect),
         overrides={path: rrb.VisibleTimeRanges([window]) for path in trail_paths(trial)},
     )
-
-
-def _eye(position: Array, target: Array) -> rrb.EyeControls3D:
-    return rrb.EyeControls3D(position=position, look_target=target, eye_up=(0.0, 0.0, 1.0))
 
 
 def _tabs(contents: list[rrb.Container | rrb.View], tab: str | None) -> rrb.Tabs:
@@ -84,11 +91,11 @@ def _tabs(contents: list[rrb.Container | rrb.View], tab: str | None) -> rrb.Tabs
     return rrb.Tabs(*contents, active_tab=names.index(tab) if tab in names else 0)
 
 
-def _series(trial: ReplayTrial, legend: bool) -> list[rrb.Container | rrb.View]:
+def _series(trial: ReplayTrial, key_share: float) -> list[rrb.Container | rrb.View]:
     tabs = {
-        "joints": {"phi": "phi [rad]", "theta": "theta [rad]", "tau": "tau [N m]"},
+        "joints": {"phi": "phi [rad]", "theta": "theta [rad] (1, 2, 3: z, y, x)", "tau": "tau [N m]"},
         "wrist": {
-            f"wrist/omnid{i + 1}": f"omnid{i + 1}: wrist in {{b}}, measured and commanded [m]"
+            f"wrist/omnid{i + 1}": f"omnid{i + 1}: wrist in {{b}} [m] (pale: command)"
             for i in range(trial.robots)
         },
         "twist": {"omega": "omega in {i} [rad/s]", "velocity": "v in {i} [m/s]"},
@@ -99,16 +106,21 @@ def _series(trial: ReplayTrial, legend: bool) -> list[rrb.Container | rrb.View]:
         "residuals": {
             "grasp_position_mm": "flange to grasp frame [mm]",
             "grasp_rotation_mrad": "flange to grasp frame [mrad]",
-            "balance_force": "force balance in {1} [N]",
+            "balance_force": "force balance in {1} [N] (RGB: x, y, z)",
             "balance_moment": "moment balance about the CoM [N m]",
         },
     }
+    keys = {"joints": "joints", "residuals": "robots"}
     missing = _missing(trial)
     shown = []
     for name, plots in tabs.items():
-        views = [_plot(trial, key, title, legend) for key, title in plots.items() if key not in missing]
+        views = [
+            _plot(trial, quantity, title) for quantity, title in plots.items() if quantity not in missing
+        ]
         if views:
-            shown.append(rrb.Vertical(*views, name=name))
+            strip = key_view(trial, keys.get(name, "axes"))
+            shares = [key_share * len(views), *[1.0] * len(views)]
+            shown.append(rrb.Vertical(strip, *views, row_shares=shares, name=name))
     return [*shown[:2], _paths(trial), *shown[2:]]
 
 
@@ -117,20 +129,21 @@ def _paths(trial: ReplayTrial) -> rrb.Grid:
     whole = rrb.VisibleTimeRange(
         TIMELINE, start=rrb.TimeRangeBoundary.infinite(), end=rrb.TimeRangeBoundary.infinite()
     )
-    home = np.array([0.0, 0.0, trial.recording.metadata.design.home_height_m])
+    columns = 1 if trial.robots <= 2 else 2
+    aspect = 0.75 * -(-trial.robots // columns) / columns
     views = [
         rrb.Spatial3DView(
             origin=f"/{path}",
-            name=f"omnid{i}: wrist measured (in colour) and commanded (white)",
+            name=f"omnid{i + 1} (white: command)",
             background=BACKGROUND,
             line_grid=False,
             spatial_information=rrb.SpatialInformation(target_frame=f"tf#/{path}", show_axes=True),
-            eye_controls=_eye(home + PATH_EYE_M, home),
+            eye_controls=path_eye(trial, i, aspect),
             time_ranges=[whole],
         )
-        for i, path in enumerate(trail_paths(trial), start=1)
+        for i, path in enumerate(trail_paths(trial))
     ]
-    return rrb.Grid(*views, grid_columns=1 if trial.robots <= 3 else 2, name="paths")
+    return rrb.Grid(*views, grid_columns=columns, name="paths")
 
 
 def _missing(trial: ReplayTrial) -> set[str]:
@@ -144,7 +157,7 @@ def _missing(trial: ReplayTrial) -> set[str]:
     return {quantity for quantities, source in given.items() if source is None for quantity in quantities}
 
 
-def _plot(trial: ReplayTrial, quantity: str, title: str, legend: bool) -> rrb.TimeSeriesView:
+def _plot(trial: ReplayTrial, quantity: str, title: str) -> rrb.TimeSeriesView:
     top = None
     if trial.motion is not None and quantity.startswith("grasp_"):  # distances: from zero up
         gap = trial.motion.gap_position_m if "position" in quantity else trial.motion.gap_rotation_rad
@@ -154,8 +167,25 @@ def _plot(trial: ReplayTrial, quantity: str, title: str, legend: bool) -> rrb.Ti
         name=title,
         axis_x=rrb.TimeAxis(link="LinkToGlobal"),
         axis_y=None if top is None else rrb.ScalarAxis(range=(0.0, 1.05 * top)),
-        plot_legend=rrb.PlotLegend(corner=rrb.Corner2D.LeftTop, visible=legend),
+        plot_legend=rrb.PlotLegend(visible=False),
     )
+
+
+def _share_range(body: rrb.Container, end_s: float) -> None:
+    """Let all linked plots show the time from 0 to ``end_s``: the first of them holds the range for all."""
+    plot = next(view for view in _views(body) if isinstance(view, rrb.TimeSeriesView))
+    plot.id = ALL_PLOTS
+    boundary = rrb.TimeRangeBoundary.absolute
+    plot.properties["TimeAxis"] = rrb.TimeAxis(
+        link="LinkToGlobal",
+        view_range=rr.encodings.TimeRange(boundary(seconds=0.0), boundary(seconds=end_s)),
+    )
+
+
+def _views(content: rrb.Container | rrb.View) -> list[rrb.View]:
+    if isinstance(content, rrb.View):
+        return [content]
+    return [view for part in content.contents for view in _views(part)]
 
 
 def _text(trial: ReplayTrial) -> rrb.TextDocumentView:

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 import rerun as rr
 
 from mocobot_view.replay.blueprint import blueprint
+from mocobot_view.replay.key import log_keys
 from mocobot_view.replay.log_payload import log_payload
 from mocobot_view.replay.log_robots import log_causes, log_robots
 from mocobot_view.replay.log_series import log_series
@@ -31,7 +32,7 @@ def log_replay(
         stream: where to.
         trials: what is shown.
         progress: called with 1 after each trial.
-        tab: tab of series that is open at first (see ``blueprint``).
+        tab: tab that is open at first (see ``blueprint``).
     """
     stream.send_blueprint(blueprint(trials, tab), make_active=True, make_default=True)
     stream.send_recording_name(", ".join(trial.name for trial in trials))
@@ -44,5 +45,6 @@ def log_replay(
         log_payload(stream, trial)
         log_causes(stream, trial)
         log_series(stream, trial)
+        log_keys(stream, trial)
         if progress:
             progress(1)

@@ -11,6 +11,8 @@ from mocobot_view.facts.placement import Grasps
 from mocobot_view.replay.replay_trial import ReplayTrial
 from mocobot_view.sizes import FORCE_M_PER_N
 
+NOT_KNOWN = "not determined"
+
 
 def summary(trial: ReplayTrial) -> str:
     """Markdown."""
@@ -39,39 +41,30 @@ def _estimate(trial: ReplayTrial) -> str:
     estimate, truth = trial.estimate, trial.truth
     if estimate is None and truth is None:
         return ""
-    facts, known = trial.facts, "not determined"
+    facts = trial.facts
     mass, inertia, com_se = None, None, None
     if estimate is not None:
         mass, inertia, com_se = estimate.mass, estimate.inertia, estimate.p_1c_se_m
     com = facts.p_1c if facts else None
+    true_com, true_moments = (truth.p_1c, truth.principal_kgm2) if truth else (None, None)
+    moments, moments_se = (
+        (inertia.principal.moments, inertia.principal.moments_se) if inertia else (None, None)
+    )
+    # One number per row: the viewer cuts what is wider than its panel.
     rows = [
         (
             "mass [kg]",
-            known if mass is None else f"{mass.mass:.4f} ± {mass.se:.4f}",
+            NOT_KNOWN if mass is None else f"{mass.mass:.4f} ± {mass.se:.4f}",
             "" if truth is None else f"{truth.mass_kg:.4f}",
         ),
-        (
-            "centre of mass in {1} [mm]",
-            known if com is None else _with_errors(1e3 * com, None if com_se is None else 1e3 * com_se, 2),
-            "" if truth is None or truth.p_1c is None else _vector(1e3 * truth.p_1c, 2),
-        ),
-        (
-            "principal moments [kg m²]",
-            known
-            if inertia is None
-            else _with_errors(inertia.principal.moments, inertia.principal.moments_se, 4),
-            "" if truth is None or truth.principal_kgm2 is None else _vector(truth.principal_kgm2, 4),
-        ),
+        *_rows("CoM {} in {{1}} [mm]", "xyz", (com, com_se, true_com), 1e3, 2),
+        *_rows("moment {} [kg m²]", "123", (moments, moments_se, true_moments), 1.0, 4),
     ]
     grasps, true = (of.grasps if of else None for of in (facts, truth))
-    rows += [
-        (
-            f"grasp {i + 1} in {{1}} [mm]; [deg]",
-            known if grasps is None else _pose(grasps, i),
-            "" if true is None else _pose(true, i),
-        )
-        for i in range(1, trial.robots)
-    ]
+    for i in range(1, trial.robots):
+        places, turns = zip(*(_pose(of, i) for of in (grasps, true)), strict=True)
+        rows += _rows(f"grasp {i + 1} {{}} in {{{{1}}}} [mm]", "xyz", (places[0], None, places[1]), 1e3, 2)
+        rows += _rows(f"grasp {i + 1} about {{}} [deg]", "xyz", (turns[0], None, turns[1]), 1.0, 3)
     columns = 2 + (truth is not None)
     head, *lines = ["| " + " | ".join(row[:columns]) + " |" for row in [("", "estimate", "truth"), *rows]]
     table = [head, "|" + "---|" * columns, *lines]
@@ -118,19 +111,29 @@ def _key(trial: ReplayTrial) -> str:
     return "**Key**\n\n" + "\n".join(lines)
 
 
-def _pose(grasps: Grasps, i: int) -> str:
-    turn = Rotation.from_matrix(grasps.R_1i[i]).as_rotvec(degrees=True)
-    return f"{_vector(1e3 * grasps.p_1i[i], 2)}; {_vector(turn, 3)}"
+def _rows(
+    name: str,
+    parts: str,
+    values: tuple[Array | None, Array | None, Array | None],
+    scale: float,
+    digits: int,
+) -> list[tuple[str, str, str]]:
+    """Rows of three numbers with the standard errors and the truth, shapes (3,), as far as they are known."""
+    estimate, errors, truth = (None if value is None else scale * value for value in values)
+    rows = []
+    for k, part in enumerate(parts):
+        text = NOT_KNOWN if estimate is None else _fixed(estimate[k], digits)
+        if estimate is not None and errors is not None:
+            text += f" ± {errors[k]:.{digits}f}"
+        rows.append((name.format(part), text, "" if truth is None else _fixed(truth[k], digits)))
+    return rows
 
 
-def _with_errors(values: Array, errors: Array | None, digits: int) -> str:
-    if errors is None:
-        return _vector(values, digits)
-    return ", ".join(f"{_fixed(v, digits)} ± {e:.{digits}f}" for v, e in zip(values, errors, strict=True))
-
-
-def _vector(values: Array, digits: int) -> str:
-    return ", ".join(_fixed(value, digits) for value in values)
+def _pose(grasps: Grasps | None, i: int) -> tuple[Array | None, Array | None]:
+    """Position [m] and turn [deg] of a grasp in {1}, shapes (3,)."""
+    if grasps is None:
+        return None, None
+    return grasps.p_1i[i], Rotation.from_matrix(grasps.R_1i[i]).as_rotvec(degrees=True)
 
 
 def _fixed(value: float, digits: int) -> str:

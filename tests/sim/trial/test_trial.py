@@ -115,10 +115,11 @@ def test_torque_is_the_springs_deflection_of_the_same_row(monkeypatch, tmp_path)
 def test_teams_of_any_size_run(teams, robots):
     scene = teams[robots]
     done = []
-    log = run_trial(scene, _short(scene), progress=done.append)
+    log = run_trial(scene, _short(scene), progress=lambda *now: done.append(now))
     assert log.robots == robots
     assert log.phi.shape == log.theta.shape == log.tau.shape == log.ref_b.shape == (len(log.time), robots, 3)
-    assert sum(done) == len(log.time)
+    assert done[0] == (0, len(log.time))
+    assert done[1:] == [(now, len(log.time)) for now in [*range(100, len(log.time), 100), len(log.time)]]
     for name, values in _arrays(log).items():
         assert np.isfinite(values).all(), name
     assert np.ptp(log.phi, axis=0).min() > 0.01
