@@ -24,6 +24,12 @@ from mocobot_sim.trial.truth import GroundTruth, write_truth
 from payload_mjcf import TEAMS
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Files with slow tests first: none of them is then the last, which one process runs while the others wait."""
+    slow = {item.path for item in items if item.get_closest_marker("slow")}
+    items.sort(key=lambda item: item.path not in slow)
+
+
 @pytest.fixture(scope="session")
 def teams(tmp_path_factory) -> dict[int, TeamScene]:
     """Teams of 1, 2 and 5 robots as designed."""
