@@ -86,6 +86,14 @@ class Convert:
     """Rate of the recording [Hz]."""
     max_gap: Annotated[float, tyro.conf.arg(metavar="S")] = 0.05
     """Longest time without samples that is filled in [s]."""
+    crop: Annotated[str | None, tyro.conf.arg(metavar="FROM:TO")] = None
+    """Keep a part of the log only, in seconds from its start: 12:95, 12: or :95."""
+    drop: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="robot=N:FROM-TO")] = ()
+    """Leave out samples of one robot, in seconds from the log's start: robot=2:30-31. May be given several times."""
+    split_at_gaps: bool = False
+    """Make a recording of every part between gaps too long to be filled: OUT-1, OUT-2, ..."""
+    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
+    """Write the report as JSON, too."""
     episode: int | None = None
     """Episode of a LeRobot dataset that holds several."""
 

@@ -55,6 +55,7 @@ def to_recording(
     payload: str | None = None,
     source: str | None = None,
     correct: bool = False,
+    cut: bool = False,
 ) -> tuple[Recording, ClockReport]:
     """Put all robots on one clock.
 
@@ -68,6 +69,8 @@ def to_recording(
         source: what produced the samples; by default the log's name.
         correct: whether to take out the offset and the drift of every clock against that of robot 1. Otherwise
             stamps are believed.
+        cut: whether the log is a part of another, cut out by stamps: robots whose stamps end together do not break
+            off then, whatever their clocks.
 
     Returns:
         The recording, joint level in memory whatever the log's level, and what was found.
@@ -89,7 +92,8 @@ def to_recording(
         estimate.middle_s + (stamp - estimate.middle_s - offset_s) / (1.0 + drift)
         for stamp in (resampled.start_s, ends_s)
     )
-    _check_ends(resampled.name, to_s, estimate, correct=correct)
+    if not (cut and np.ptp(ends_s) <= EARLY_S):
+        _check_ends(resampled.name, to_s, estimate, correct=correct)
     first = math.ceil((from_s.max() - resampled.start_s[0] - _SAME_S) * rate_hz)
     last = math.floor((to_s.min() - resampled.start_s[0] + _SAME_S) * rate_hz)
     if last - first + 1 < MIN_SAMPLES:
@@ -176,7 +180,7 @@ def _check_ends(name: str, ends_s: Array, estimate: ClockEstimate, *, correct: b
         )
     raise InputError(
         f"{name}: the log of robot {early + 1} ends {short_s:.4g} s before that of robot {late + 1}; "
-        f"at most {EARLY_S:g} s is allowed{hint}"
+        f"at most {EARLY_S:g} s is allowed{hint or ' (convert --crop keeps what all have)'}"
     )
 
 

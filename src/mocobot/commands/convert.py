@@ -1,15 +1,20 @@
 """``mocobot convert``: read a log of any format, bring it onto one grid, write it as any format, say what was done."""
 
 import os
+import re
+from collections.abc import Sequence
 from pathlib import Path
 
 from estimator.arm.design import load_design
 from estimator.errors import InputError
-from estimator.files import check_target
+from estimator.files import check_target, write_json
 from mocobot.options import Convert
 from mocobot.progress import bar
-from mocobot_logs.convert import Labels, convert, output_kind, write_converted
-from mocobot_logs.convert_report import format_conversion
+from mocobot_logs.convert import Converted, Labels, convert, convert_parts, output_kind, write_converted
+from mocobot_logs.convert_json import conversion_dict
+from mocobot_logs.convert_report import format_conversion, format_omissions
+from mocobot_logs.cut.choice import parse_choice
+from mocobot_logs.cut.split import Omission
 from mocobot_logs.map.files import MAPS, read_map
 from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design
@@ -26,6 +31,27 @@ def run(options: Convert) -> None:
         InputError: log, map or options that cannot be used, or an output that cannot be written.
     """
     _check(options)
+    parts, left_out = _converted(options)
+    targets = _targets(options.out, len(parts)) if options.split_at_gaps else [options.out]
+    for target in targets if options.split_at_gaps else ():
+        _check_target(options, target)
+    for part, target in zip(parts, targets, strict=True):
+        with bar(len(part.recording.time), "writing", "sample") as advance:
+            write_converted(part.recording, target, advance)
+    if options.json is not None:
+        written = list(zip(parts, targets, strict=True))
+        write_json(options.json, conversion_dict(str(options.log), written, left_out))
+    for part, target in zip(parts, targets, strict=True):
+        print(format_conversion(part, str(options.log), target))
+    if options.split_at_gaps:
+        if left_out:
+            print(format_omissions(left_out))
+        for old in _earlier(options.out, targets):
+            print(f"{old} is of an earlier conversion, and was left as it is")
+
+
+def _converted(options: Convert) -> tuple[list[Converted], Sequence[Omission]]:
+    """The recordings, and what is in none of them."""
     log_map = read_map(options.map) if options.map is not None else None
     labels = Labels(
         trial=options.trial or (log_map.trial if log_map is not None else None),
@@ -33,30 +59,65 @@ def run(options: Convert) -> None:
         design=load_design(options.design) if options.design is not None else None,
         level=options.level,
     )
+    choice = parse_choice(options.crop, options.drop)
     source = open_log(options.log, log_map, options.episode)
     with bar(source.size, "reading", "") as advance:
-        converted = convert(
-            source,
-            labels,
-            omnid_design(),
-            rate_hz=options.rate,
-            max_gap_s=options.max_gap,
-            correct=options.clock == "correct",
-            advance=advance,
-        )
-    with bar(len(converted.recording.time), "writing", "sample") as advance:
-        write_converted(converted.recording, options.out, advance)
-    print(format_conversion(converted, str(options.log), options.out))
+        how = {
+            "choice": choice,
+            "rate_hz": options.rate,
+            "max_gap_s": options.max_gap,
+            "correct": options.clock == "correct",
+            "advance": advance,
+        }
+        if options.split_at_gaps:
+            return convert_parts(source, labels, omnid_design(), **how)
+        converted = convert(source, labels, omnid_design(), **how)
+    return [converted], converted.left_out
+
+
+def _targets(out: Path, count: int) -> list[Path]:
+    width = len(str(count))
+    return [out.with_name(f"{out.stem}-{k:0{width}}{out.suffix}") for k in range(1, count + 1)]
+
+
+def _earlier(out: Path, targets: list[Path]) -> list[Path]:
+    """Numbered recordings that this conversion did not write."""
+    numbered = re.compile(re.escape(out.stem) + r"-[0-9]+" + re.escape(out.suffix))
+    names = {target.name for target in targets}
+    return sorted(
+        path for path in out.parent.iterdir() if numbered.fullmatch(path.name) and path.name not in names
+    )
 
 
 def _check(options: Convert) -> None:
     """Everything that can be refused before the log is read."""
-    out, real = options.out, Path(os.path.realpath(options.out))
-    kind = output_kind(out)
+    _check_target(options, _targets(options.out, 1)[0] if options.split_at_gaps else options.out)
+    if options.json is not None:
+        check_target(options.json)
+        real = os.path.realpath(options.json)
+        if real in map(os.path.realpath, [*_inputs(options), options.out]):
+            raise InputError(
+                f"{options.json}: is the log, a map, a design or the recording; name another file"
+            )
+    for option, value, low, high in (
+        ("--rate", options.rate, SLOWEST_HZ, FASTEST_HZ),
+        ("--max-gap", options.max_gap, 0.0, LONGEST_GAP_S),
+    ):
+        if not low <= value <= high:
+            raise InputError(f"{option} is {value:g}; it must be from {low:g} to {high:g}")
+
+
+def _inputs(options: Convert) -> list[Path]:
     inputs = [options.log, *([options.design] if options.design is not None else [])]
     if options.map is not None and options.map not in MAPS:
         inputs.append(Path(options.map))
-    for path in inputs:
+    return inputs
+
+
+def _check_target(options: Convert, out: Path) -> None:
+    real = Path(os.path.realpath(out))
+    kind = output_kind(out)
+    for path in _inputs(options):
         source = Path(os.path.realpath(path))
         if real == source or (source.is_dir() and source in real.parents):
             raise InputError(f"{out}: is {path} or lies in it; write the recording somewhere else")
@@ -68,9 +129,3 @@ def _check(options: Convert) -> None:
         raise InputError(f"{out}: exists; name a new folder for the bag, or a file with a suffix")
     if not os.access(real.parent, os.W_OK):
         raise InputError(f"{out}: cannot be written (its folder is read-only)")
-    for option, value, low, high in (
-        ("--rate", options.rate, SLOWEST_HZ, FASTEST_HZ),
-        ("--max-gap", options.max_gap, 0.0, LONGEST_GAP_S),
-    ):
-        if not low <= value <= high:
-            raise InputError(f"{option} is {value:g}; it must be from {low:g} to {high:g}")

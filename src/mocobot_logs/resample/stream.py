@@ -72,9 +72,10 @@ class RobotStream:
         """
         self._flush()
         screen = self.screen
-        rows = screen.rows - screen.duplicates
+        rows = screen.rows - screen.duplicates - screen.blank
         if screen.first_ns is None or screen.last_ns is None or rows < MIN_SAMPLES:
-            raise InputError(f"{self._where} has {rows} samples; at least {MIN_SAMPLES} are needed")
+            blank = f" ({screen.blank} rows lack a value)" if screen.blank else ""
+            raise InputError(f"{self._where} has {rows} samples{blank}; at least {MIN_SAMPLES} are needed")
         pipe = self._pipe or self._begin()
         values = pipe.finish(rows)
         span_s = (screen.last_ns - screen.first_ns) * NS
@@ -95,6 +96,12 @@ class RobotStream:
             gaps=tally.gaps,
             longest_gap_s=tally.longest_gap_s,
             filled=tally.filled,
+            blank=screen.blank,
+            blank_channels={
+                name: int(count)
+                for name, count in zip(self._channels, screen.blank_channels, strict=True)
+                if count
+            },
             duplicates=screen.duplicates,
             merged=pipe.merged,
             method=pipe.method,

@@ -1,13 +1,24 @@
 """Gaps and jitter of a robot's stamps."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.errors import InputError
-from mocobot_logs.log import NS, Stamps
+from mocobot_logs.log import NS, Array, Stamps
 
 MOST_MISSING = 0.1
 """Largest share of samples that may be missing; the same for samples that crowd."""
 _STAMP_S = 1e-6  # gaps are measured no finer
+
+
+def beyond_s(interval_ns: Stamps, period_ns: float) -> Array:
+    """How much longer than one period the intervals are in which samples are missing [s], 0 for the others."""
+    return np.where(np.rint(interval_ns / period_ns) > 1, (interval_ns - period_ns) * NS, 0.0)
+
+
+def is_hole(interval_ns: Stamps, period_ns: float, max_gap_s: float) -> NDArray[np.bool_]:
+    """Whether intervals between stamps are too long to be filled."""
+    return beyond_s(interval_ns, period_ns) > max_gap_s + _STAMP_S
 
 
 class Tally:
@@ -39,19 +50,19 @@ class Tally:
         if not len(interval):
             return
         periods = np.maximum(np.rint(interval / self._period_ns), 1.0)
-        beyond_s = np.where(periods > 1, (interval - self._period_ns) * NS, 0.0)
-        bad = np.flatnonzero(beyond_s > self._max_gap_s + _STAMP_S)
+        bad = np.flatnonzero(is_hole(interval, self._period_ns, self._max_gap_s))
         if len(bad):
             raise InputError(
                 f"{self._where}: no samples for {interval[bad[0]] * NS:.6g} s, from "
                 f"{time_ns[bad[0]] * NS:.9g} s after its first sample on; they usually come "
-                f"{self._period_ns * NS:.6g} s apart, and at most {self._max_gap_s:g} s more may pass"
+                f"{self._period_ns * NS:.6g} s apart, and at most {self._max_gap_s:g} s more may pass; "
+                "rows with NaN count as missing (convert --split-at-gaps makes trials of the parts between gaps, --crop keeps one part)"
             )
         jitter_s = (interval - periods * self._period_ns) * NS
         self._intervals += len(interval)
         self.filled += int(np.sum(periods - 1))
         self.gaps += int(np.sum(periods > 1))
-        self.longest_gap_s = max(self.longest_gap_s, float(np.max(beyond_s)))
+        self.longest_gap_s = max(self.longest_gap_s, float(np.max(beyond_s(interval, self._period_ns))))
         self._squares += float(np.sum(jitter_s**2))
         self.jitter_max_s = max(self.jitter_max_s, float(np.max(np.abs(jitter_s))))
 
@@ -65,7 +76,8 @@ class Tally:
         if self.filled > MOST_MISSING * expected:
             raise InputError(
                 f"{self._where}: {self.filled} of {expected} samples are missing "
-                f"({100 * self.filled / expected:.3g} %); at most {100 * MOST_MISSING:g} % may be"
+                f"({100 * self.filled / expected:.3g} %); at most {100 * MOST_MISSING:g} % may be "
+                "(convert --crop keeps a part of the log)"
             )
         if merged > MOST_MISSING * rows:
             raise InputError(
