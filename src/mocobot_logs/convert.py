@@ -72,8 +72,8 @@ class Converted:
     level: Level
     streams: tuple[StreamReport, ...]
     clocks: ClockReport
-    span: Span | None = None
-    left_out: tuple[Omission, ...] = ()
+    span: Span | None
+    left_out: tuple[Omission, ...]
 
 
 def convert(
@@ -193,7 +193,7 @@ def _convert(source: LogSource, how: _How, advance: Callable[[int], object] = la
     streams = resampled.reports
     del resampled  # as large as the recording
     check_recording(recording)
-    return Converted(recording, source.level, streams, clocks)
+    return Converted(recording, source.level, streams, clocks, None, ())
 
 
 def output_kind(path: Path) -> Kind:

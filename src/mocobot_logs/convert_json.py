@@ -20,7 +20,7 @@ from typing import Any
 
 from mocobot_logs.convert import Converted
 from mocobot_logs.cut.split import Omission
-from mocobot_logs.log import NS, Array
+from mocobot_logs.log import Array
 
 FORMAT, VERSION = "mocobot-conversion", 1
 
@@ -43,8 +43,8 @@ def conversion_dict(
         "recordings": [_recording(*each) for each in recordings],
         "left_out": [
             {
-                "from_s": each.span.first_ns * NS,
-                "to_s": each.span.last_ns * NS,
+                "from_s": each.span.first_ns / 1e9,
+                "to_s": each.span.last_ns / 1e9,
                 "robot": each.robot,
                 "samples": each.samples,
                 "why": each.why,
@@ -65,8 +65,8 @@ def _recording(converted: Converted, file: Path | None) -> dict[str, Any]:
         "level": metadata.level,
         "trial": metadata.trial,
         "payload": metadata.payload,
-        "from_s": None if span is None else span.first_ns * NS,
-        "to_s": None if span is None else span.last_ns * NS,
+        "from_s": None if span is None else span.first_ns / 1e9,
+        "to_s": None if span is None else span.last_ns / 1e9,
         "streams": [
             stream.to_dict() | {"on_grid": same}
             for stream, same in zip(converted.streams, converted.clocks.untouched, strict=True)

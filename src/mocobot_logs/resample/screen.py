@@ -1,5 +1,7 @@
 """A robot's rows in order: each a whole, finite sample at a later time than the one before."""
 
+from collections import Counter
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -19,7 +21,7 @@ class Screen:
         rows: rows seen.
         duplicates: rows dropped because they repeat the one before.
         blank: rows dropped because a channel is NaN: samples that are missing.
-        blank_channels: how many of them by channel, shape (C,).
+        blank_channels: how many of them by channel that is.
         first_ns, last_ns: first and last stamp [ns], None before the first row.
         log_ns: first and last time of the recorder [ns], None where the log has none.
     """
@@ -27,7 +29,7 @@ class Screen:
     def __init__(self, name: str, robot: int, channels: tuple[str, ...]) -> None:
         """Take the names that messages need; ``robot`` counts from 1."""
         self.rows = self.duplicates = self.blank = 0
-        self.blank_channels = np.zeros(len(channels), np.int64)
+        self.blank_channels: Counter[str] = Counter()
         self.first_ns: int | None = None
         self.last_ns: int | None = None
         self.log_ns: tuple[int, int] | None = None
@@ -45,7 +47,8 @@ class Screen:
         row = self.rows + np.flatnonzero(~lacking.any(axis=1))
         self.rows += len(lacking)
         self.blank += len(lacking) - len(row)
-        self.blank_channels += lacking.sum(axis=0)
+        for k in np.flatnonzero(lacking.any(axis=0)):
+            self.blank_channels[self._channels[k]] += int(lacking[:, k].sum())
         if not len(row):
             return samples.stamp_ns[:0], samples.values[:0]
         if len(row) < len(lacking):

@@ -97,11 +97,7 @@ class RobotStream:
             longest_gap_s=tally.longest_gap_s,
             filled=tally.filled,
             blank=screen.blank,
-            blank_channels={
-                name: int(count)
-                for name, count in zip(self._channels, screen.blank_channels, strict=True)
-                if count
-            },
+            blank_channels=dict(screen.blank_channels),
             duplicates=screen.duplicates,
             merged=pipe.merged,
             method=pipe.method,
