@@ -99,6 +99,18 @@ class Convert:
 
 
 @dataclass(frozen=True)
+class Map:
+    """Draft the map of a log, for `convert --map`: which column or topic is what, by names, units in them and values."""
+
+    log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
+    """Log of any format that ``convert`` reads."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="MAP.toml")] = None
+    """Write the draft to a new file instead of the terminal."""
+    episode: int | None = None
+    """Episode of a LeRobot dataset that holds several."""
+
+
+@dataclass(frozen=True)
 class Replay:
     """Watch recordings: the scene moving from the measured angles, estimate against truth, all signals (Rerun)."""
 

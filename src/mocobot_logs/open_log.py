@@ -1,14 +1,17 @@
 """Any log by its path: what it is shows in its first bytes, or in what its folder holds."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.parquet import METADATA_KEY
 from mocobot_logs.faults import detail_of
 from mocobot_logs.log import LogSource
-from mocobot_logs.map.files import LogMap, builtin_map
+from mocobot_logs.map.files import CsvMap, LogMap, builtin_map
 from mocobot_logs.map.parse import MAX_ROBOTS
 from mocobot_logs.table.csv import CsvTable
 from mocobot_logs.table.lerobot import LeRobotTable, dataset_root
@@ -16,6 +19,7 @@ from mocobot_logs.table.npz import NpzTable
 from mocobot_logs.table.parquet import ParquetTable, opened
 from mocobot_logs.table.table import Table, TableSource
 
+Kind = Literal["bag", "csv", "npz", "parquet", "lerobot"]
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt")
 FORMATS = (
     "a rosbag2 folder, .mcap or .db3, a CSV file (.csv, .tsv, .txt), an .npz archive, a .parquet file or a LeRobot "
@@ -35,19 +39,42 @@ def open_log(path: Path | str, log_map: LogMap | None = None, episode: int | Non
         InputError: there is no such log, its format is not known, or the map does not suit it.
     """
     path = Path(path)
-    kind = _kind(path)
+    kind = kind_of(path)
     if episode is not None and kind != "lerobot":
         raise InputError(f"{path}: is not a LeRobot dataset, so it has no episode {episode}")
     if kind == "bag":
         from mocobot_logs.bag.read import open_bag
 
-        return open_bag(path, log_map)
-    table = _table(path, kind, log_map, episode)
-    return TableSource(table, log_map or _default_map(table))
+        if log_map is not None:
+            return open_bag(path, log_map)
+        with draft_suggested(path):
+            return open_bag(path)
+    table = open_table(path, kind, (log_map or builtin_map("mocobot")).csv, episode)
+    if log_map is not None or table.metadata is not None:
+        return TableSource(table, log_map or _default_map(table))
+    with draft_suggested(path):
+        return TableSource(table, _default_map(table))
 
 
-def _kind(path: Path) -> str:
-    """``bag``, ``csv``, ``npz``, ``parquet`` or ``lerobot``."""
+@contextmanager
+def draft_suggested(path: Path) -> Iterator[None]:
+    """A block in which a log is read without a map, and what is said if it cannot be.
+
+    Raises:
+        InputError: it cannot be.
+    """
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{error}. No map was given (--map): `mocobot map {path}` drafts one") from error
+
+
+def kind_of(path: Path) -> Kind:
+    """What a log is, by its first bytes or by what its folder holds.
+
+    Raises:
+        InputError: there is no such log, or its format is not known.
+    """
     try:
         if not path.exists():
             raise InputError(f"{path}: there is no such file")
@@ -97,10 +124,20 @@ def _is_of_a_dataset(path: Path) -> bool:
         return METADATA_KEY not in (file.schema_arrow.metadata or {})
 
 
-def _table(path: Path, kind: str, log_map: LogMap | None, episode: int | None) -> Table:
+def open_table(path: Path, kind: Kind, options: CsvMap, episode: int | None = None) -> Table:
+    """Open a table of any format.
+
+    Args:
+        path: a file, or the folder of a dataset.
+        kind: what it is, see ``kind_of``; no bag.
+        options: how a text table is written.
+        episode: as in ``open_log``.
+
+    Raises:
+        InputError: it is damaged, or the episode must be named.
+    """
     name = str(path)
     if kind == "csv":
-        options = (log_map or builtin_map("mocobot")).csv
         return CsvTable(path, options, name)
     if kind == "npz":
         return NpzTable(path, name)
