@@ -32,7 +32,9 @@ class Estimate:
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload."""
 
     rec: tyro.conf.Positional[tuple[Path, ...]]
-    """Recordings (Parquet), all of one payload."""
+    """Recordings (Parquet), or logs of any format that ``convert`` reads, all of one payload."""
+    map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
+    """Map of the logs that are no recordings; found out if not given."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
     """Write the estimate as JSON, too."""
     method: Literal["auto", "staged", "joint"] = "auto"
@@ -46,8 +48,10 @@ class Diagnose:
     """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth."""
 
     rec: tyro.conf.Positional[tuple[Path, ...]]
-    """Recordings (Parquet), all of one payload; several, so that what is named can be validated. One MAT file with
-    --rig emps."""
+    """Recordings (Parquet), or logs of any format that ``convert`` reads, all of one payload; several, so that what is
+    named can be validated. One MAT file with --rig emps."""
+    map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
+    """Map of the logs that are no recordings; found out if not given."""
     rig: Literal["team", "emps"] = "team"
     """What was recorded: a team of mocobots, or the EMPS benchmark's axis (docs/emps.md)."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
@@ -100,7 +104,7 @@ class Convert:
 
 @dataclass(frozen=True)
 class Map:
-    """Draft the map of a log, for `convert --map`: which column or topic is what, by names, units in them and values."""
+    """Draft the map of a log, for `convert --map`: what is which channel, by names, the units in them, and values."""
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
     """Log of any format that ``convert`` reads."""

@@ -71,6 +71,19 @@ def format_conversion(converted: Converted, name: str, out: Path) -> str:
     return "\n".join(lines)
 
 
+def format_on_the_fly(converted: Converted, name: str) -> str:
+    """One line about a log that was converted in passing, with what may be wrong with that."""
+    metadata, streams = converted.recording.metadata, converted.streams
+    duration_s = (len(converted.recording.time) - 1) / metadata.rate_hz
+    robots = f"{metadata.robots} robot{'s' * (metadata.robots > 1)}"
+    text = f"{name}: read as {robots}, {converted.level} level, {duration_s:.2f} s"
+    if filled := sum(stream.filled for stream in streams):
+        text += f"; {filled} missing samples filled in"
+    if _differ(converted.clocks.estimate):
+        text += "; the robots' clocks differ (see mocobot convert)"
+    return text
+
+
 def format_omissions(left_out: Sequence[Omission]) -> str:
     """What of a log is in no recording, one line each."""
     lines = ["[[Left out of the log]]"]

@@ -8,6 +8,7 @@ from pathlib import Path
 from estimator.arm.design import load_design
 from estimator.errors import InputError
 from estimator.files import check_target, write_json
+from mocobot.files.targets import map_file
 from mocobot.options import Convert
 from mocobot.progress import bar
 from mocobot_logs.convert import Converted, Labels, convert, convert_parts, output_kind, write_converted
@@ -15,7 +16,7 @@ from mocobot_logs.convert_json import conversion_dict
 from mocobot_logs.convert_report import format_conversion, format_omissions
 from mocobot_logs.cut.choice import parse_choice
 from mocobot_logs.cut.split import Omission
-from mocobot_logs.map.files import MAPS, read_map
+from mocobot_logs.map.files import read_map
 from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design
 
@@ -108,10 +109,8 @@ def _check(options: Convert) -> None:
 
 
 def _inputs(options: Convert) -> list[Path]:
-    inputs = [options.log, *([options.design] if options.design is not None else [])]
-    if options.map is not None and options.map not in MAPS:
-        inputs.append(Path(options.map))
-    return inputs
+    design = [options.design] if options.design is not None else []
+    return [options.log, *design, *map_file(options.map)]
 
 
 def _check_target(options: Convert, out: Path) -> None:

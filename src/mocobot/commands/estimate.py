@@ -6,12 +6,13 @@ from dataclasses import asdict
 from estimator.errors import InputError
 from estimator.files import write_json
 from estimator.recording.model import Recording
-from estimator.recording.parquet import read_recording
 from mocobot.api.estimation import estimate
+from mocobot.api.given import Logs
 from mocobot.files.provenance import provenance
-from mocobot.files.targets import check_recordings
+from mocobot.files.targets import check_recordings, map_file
 from mocobot.options import Estimate
 from mocobot.progress import stages
+from mocobot_logs.convert_report import format_on_the_fly
 
 
 def run(options: Estimate) -> None:
@@ -23,15 +24,19 @@ def run(options: Estimate) -> None:
     if not options.rec:
         raise InputError("no recording given; name at least one file")
     check_recordings(options.rec, options.out)
+    logs = Logs(options.map)
     with stages() as (say, _):
 
         def each() -> Iterator[Recording]:
             for path in options.rec:
                 say(f"reading {path.name}")
-                yield read_recording(path)
+                yield logs.read(path)
+            logs.check_map()
 
         found = estimate(each(), method=options.method, cutoff_hz=options.cutoff_hz, say=say)
     if options.out:
-        made = provenance("estimate", asdict(options), options.rec)
+        made = provenance("estimate", asdict(options), [*options.rec, *map_file(options.map)])
         write_json(options.out, found.to_dict() | {"provenance": made})
+    for path, converted in logs.converted.items():
+        print(format_on_the_fly(converted, str(path)))
     print(found)

@@ -26,6 +26,13 @@ def check_recordings(recordings: Sequence[Path], out: Path | None = None) -> Non
         check_target(out)
 
 
+def map_file(name: str | None) -> list[Path]:
+    """The file that a map is read from, none for a built-in one."""
+    from mocobot_logs.map.files import MAPS
+
+    return [] if name is None or name in MAPS else [Path(name)]
+
+
 def check_folder(path: Path, inputs: Sequence[Path], is_ours: Callable[[Path], bool], what: str) -> None:
     """Find out that a folder cannot be written before the work is done whose result it would hold.
 

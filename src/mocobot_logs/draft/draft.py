@@ -51,8 +51,8 @@ def put_together(name: str, found: Found, settings: Sequence[str]) -> Draft:
     }
     missing = tuple(channel for channel, entry in entries.items() if entry.startswith("#"))
     lines = [
-        f"# Draft of a map for {printable(name)}. What is doubtful says so; docs/measured-data.md says what may stand here.",
-        f"# Then: mocobot inspect {printable(name)} --map THIS_FILE",
+        f"# Draft of a map for {printable(name)}. Lines that need a look say that they are doubtful;",
+        f"# docs/measured-data.md says what may stand here. Then: mocobot inspect {printable(name)} --map THIS_FILE",
         "version = 1",
         f'level = "{level}"',
     ]
