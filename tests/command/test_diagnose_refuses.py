@@ -101,7 +101,7 @@ def test_bad_options_are_refused_before_anything_is_read(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("mocobot.commands.diagnose.read_recording", None)
+    monkeypatch.setattr("mocobot.api.given.read_recording", None)
     assert "no recording given" in refused(capsys)
     assert "given twice" in refused(capsys, biased_trials[0], biased_trials[0])
     assert "jobs is 0" in refused(capsys, *biased_trials, "--jobs", "0")
@@ -116,7 +116,7 @@ def test_bad_targets_are_refused_before_anything_is_read(
     capsys: pytest.CaptureFixture[str],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("mocobot.commands.diagnose.read_recording", None)
+    monkeypatch.setattr("mocobot.api.given.read_recording", None)
     (tmp_path / "file").write_text("x")
     (tmp_path / "full").mkdir()
     (tmp_path / "full" / "x").write_text("x")
