@@ -124,7 +124,7 @@ def joined(parts: Sequence[Samples], channels: int) -> Samples:
     )
 
 
-def rows_of(samples: Samples, keep: NDArray[np.bool_]) -> Samples:
-    """Some of the rows."""
+def rows_of(samples: Samples, keep: NDArray[np.bool_] | NDArray[np.intp]) -> Samples:
+    """Some of the rows, by a mask or by their numbers."""
     log_ns = None if samples.log_ns is None else samples.log_ns[keep]
     return Samples(samples.stamp_ns[keep], samples.values[keep], log_ns)

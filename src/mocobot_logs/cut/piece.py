@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from mocobot_logs.cut.choice import Drop, Span
-from mocobot_logs.log import LogSource, Samples, rows_of
+from mocobot_logs.log import Level, LogSource, Samples, rows_of
 
 
 class Piece:
@@ -21,7 +21,8 @@ class Piece:
             drops: what is left out.
         """
         self.name = source.name if span is None else f"{source.name} ({span})"
-        self.level, self.robots, self.channels = source.level, source.robots, source.channels
+        self.level: Level = source.level
+        self.robots, self.channels = source.robots, source.channels
         self.metadata, self.size = source.metadata, source.size
         self.span, self._source, self._origin_ns = span, source, origin_ns
         self._drops = [[d.span for d in drops if d.robot == i + 1] for i in range(source.robots)]

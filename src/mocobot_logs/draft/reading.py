@@ -16,19 +16,8 @@ _DRIVEN = {"phi", "q", "joint", "motor", "driven", "leg", "sea", "actuator"}
 _WRIST = {"h", "wrist", "hand"}
 _PLACE = {"pos", "position", "p", "point", "angle"}
 _OTHER = {
-    "velocity",
-    "vel",
-    "dq",
-    "qd",
-    "speed",
-    "current",
-    "temp",
-    "temperature",
-    "voltage",
-    "acc",
-    "imu",
-    "status",
-}
+    "velocity", "vel", "dq", "qd", "speed", "rate", "current", "temp", "temperature", "voltage", "acc", "imu", "status"
+}  # fmt: skip
 _TIME = {"time", "t", "stamp", "timestamp", "clock", "ts", "epoch"}
 _WORDS = _COMMAND | _TORQUE | _EFFORT | _FORCE | _GIMBAL | _DRIVEN | _WRIST | _PLACE
 _UNITS = {
@@ -117,7 +106,7 @@ def _read(
     if words & _OTHER or "{" in name:
         return None
     axes = [k for k, (text, _, _) in enumerate(tokens) if text in INDEX]
-    if axes and words & _WORDS:
+    if axes and (words & _WORDS or tokens[axes[-1]][0] in _TURNS):
         return _axis(tokens, words, axes[-1], unit)
     digits = [k for k, (text, _, _) in enumerate(tokens) if text.isdigit()]
     if element and words & (_COMMAND | _FORCE | _WRIST) and not words & _TORQUE:

@@ -44,7 +44,8 @@ class Screen:
             InputError: a value is infinite, time goes back or leaps, or one stamp has two values.
         """
         lacking = np.isnan(samples.values)
-        row = self.rows + np.flatnonzero(~lacking.any(axis=1))
+        whole = np.flatnonzero(~lacking.any(axis=1))
+        row = self.rows + whole
         self.rows += len(lacking)
         self.blank += len(lacking) - len(row)
         for k in np.flatnonzero(lacking.any(axis=0)):
@@ -52,7 +53,7 @@ class Screen:
         if not len(row):
             return samples.stamp_ns[:0], samples.values[:0]
         if len(row) < len(lacking):
-            samples = rows_of(samples, ~lacking.any(axis=1))
+            samples = rows_of(samples, whole)
         stamp, values = samples.stamp_ns, samples.values
         self._note(samples)
         before = np.concatenate([[stamp[0] if self.last_ns is None else self.last_ns], stamp[:-1]])

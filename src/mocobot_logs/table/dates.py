@@ -47,39 +47,33 @@ class TextClock:
             InputError: a time is neither a number nor a date, of another form than the first one, or out of range.
         """
         if self._form is None and values.null_count < len(values):
-            first = values.drop_null()[0].as_py()
-            self._form = (
-                ("zone" if _ISO.fullmatch(first.strip())["zone"] else "local") if is_date(first) else "number"
-            )
+            self._form = _form(values.drop_null()[0].as_py())
         if self._form in (None, "number"):
             return from_text(values, self._unit_ns, self._where, row)
-        return self._dates(pc.utf8_trim_whitespace(values), row)
+        return self._dates(pc.call_function("utf8_trim_whitespace", [values]), row)
 
     def _dates(self, values: pa.Array, row: int) -> tuple[Stamps, Given]:
         given = values.is_valid().to_numpy(zero_copy_only=False)
-        parts = pc.extract_regex(values, f"^(?:{_PATTERN})$")
+        parts = pc.call_function("extract_regex", [values], pc.ExtractRegexOptions(f"^(?:{_PATTERN})$"))
         no_date = given & ~parts.is_valid().to_numpy(zero_copy_only=False)
         if no_date.any():
             self._refuse(values, no_date, row, f"a time must be a date like {EXAMPLE}, as the first one is")
-        zone = pc.fill_null(pc.struct_field(parts, "zone"), "")
-        zoned = np.asarray(pc.not_equal(zone, ""))
+        zone = _part(parts, "zone", "")
+        zoned = pc.call_function("not_equal", [zone, pa.scalar("")]).to_numpy(zero_copy_only=False)
         if (other := given & (zoned != (self._form == "zone"))).any():
             which = "with a time zone" if self._form == "zone" else "without a time zone"
             self._refuse(values, other, row, f"all times must be {which}, as the first one is")
-        date = pc.replace_substring(pc.fill_null(pc.struct_field(parts, "date"), "19700101"), "-", "")
-        clock = pc.replace_substring(pc.fill_null(pc.struct_field(parts, "time"), "00"), ":", "")
-        digits = pc.utf8_rpad(pc.binary_join_element_wise(date, clock, ""), 14, "0")
-        fraction = pc.fill_null(pc.struct_field(parts, "fraction"), "")
-        below = pc.utf8_slice_codeunits(pc.utf8_rpad(fraction, 9, "0"), 0, 9).cast(pa.int64())
-        seconds = self._seconds(values, digits, row) - _zone_s(zone)
+        date, clock = _digits(_part(parts, "date", "19700101")), _digits(_part(parts, "time", "00"))
+        moment = _padded(date, 8) * 10**6 + _padded(clock, 6)
+        below = _padded(_part(parts, "fraction", ""), 9)
+        seconds = self._seconds(values, moment, row) - _zone_s(zone)
         beyond = np.abs(seconds) >= LARGEST_NS // _S
         if beyond.any():
             self._refuse(values, beyond, row, "it must be within 292 years of 1970")
-        return np.where(given, seconds * _S + np.asarray(below), 0), given
+        return np.where(given, seconds * _S + below, 0), given
 
-    def _seconds(self, values: pa.Array, digits: pa.Array, row: int) -> Stamps:
-        """Seconds of UTC from 14 digits each."""
-        number = np.asarray(digits.cast(pa.int64()))
+    def _seconds(self, values: pa.Array, number: Stamps, row: int) -> Stamps:
+        """Seconds of UTC from numbers of 14 digits each: year, month, day, hour, minute, second."""
         months, days, hours, minutes, seconds = (number // 10**k % 100 for k in (8, 6, 4, 2, 0))
         first = ((number // 10**10 - 1970) * 12 + months - 1).astype("datetime64[M]").astype("datetime64[D]")
         date = first + (days - 1)
@@ -94,8 +88,32 @@ class TextClock:
         raise InputError(f"{self._where} is {values[first].as_py()!r:.60} in row {row + first}; {why}")
 
 
+def _form(text: str) -> str:
+    """Whether a time is a number, or a date with or without a zone."""
+    found = _ISO.fullmatch(text.strip())
+    return "number" if found is None else "zone" if found["zone"] else "local"
+
+
+def _part(parts: pa.Array, name: str, default: str) -> pa.Array:
+    """One group of the pattern, the default where there is none."""
+    return pc.fill_null(pc.call_function("struct_field", [parts], pc.StructFieldOptions([name])), default)
+
+
+def _digits(text: pa.Array) -> pa.Array:
+    options = pc.ReplaceSubstringOptions("[^0-9]", "")
+    return pc.call_function("replace_substring_regex", [text], options)
+
+
+def _padded(digits: pa.Array, width: int) -> Stamps:
+    """Digits as numbers, zeros added behind or digits left out there so that each has as many."""
+    padded = pc.call_function("utf8_rpad", [digits], pc.PadOptions(width, "0"))
+    cut = pc.call_function("utf8_slice_codeunits", [padded], pc.SliceOptions(0, width))
+    return cut.cast(pa.int64()).to_numpy(zero_copy_only=False)
+
+
 def _zone_s(zone: pa.Array) -> Stamps:
     """Seconds that clocks of each zone are ahead of UTC."""
-    digits = pc.utf8_rpad(pc.replace_substring_regex(zone, "[^0-9]", ""), 4, "0")
-    number = np.asarray(digits.cast(pa.int64()))
-    return np.where(np.asarray(pc.starts_with(zone, "-")), -1, 1) * (number // 100 * 3600 + number % 100 * 60)
+    number = _padded(_digits(zone), 4)
+    behind = pc.call_function("starts_with", [zone], pc.MatchSubstringOptions("-"))
+    sign = np.where(behind.to_numpy(zero_copy_only=False), -1, 1)
+    return sign * (number // 100 * 3600 + number % 100 * 60)

@@ -344,3 +344,20 @@ def test_clocks_far_apart_do_not_hinder_a_crop(robots_on_other_clocks: Callable[
     assert found.clocks.estimate.offset_s[1] == pytest.approx(2.0, abs=1e-3)
     assert len(found.recording.time) == pytest.approx(1800, abs=2)
     np.testing.assert_allclose(found.recording.theta[:, 1], found.recording.theta[:, 0], atol=1e-5)
+
+
+def test_only_what_is_taken_as_it_is_is_said_to_be(tmp_path: Path) -> None:
+    """Robots 2 and 3 sample 3.7 and 7.4 ms after robot 1: each on a grid of its own, but not on that of robot 1."""
+    time = np.arange(ROWS) / 100.0
+    lines = ["time," + ",".join(k for k in RECORDING.columns() if k != "time")]
+    for k in range(ROWS):
+        for robot in range(3):
+            own = [0.6, 0.6, 0.6, 0.1 * np.sin(time[k]), 0.0, 0.0, 3.0, 3.0, 3.0]
+            cells = [repr(float(v)) if i // 9 == robot else "" for i, v in enumerate(own * 3)]
+            lines.append(",".join([f"{time[k] + 3.7e-3 * robot:.4f}", *cells]))
+    (tmp_path / "log.csv").write_text("\n".join(lines) + "\n")
+    found = mocobot.convert(tmp_path / "log.csv")
+    report = found.report("out.parquet")
+    assert "samples of robot 1: taken as they are\n" in report
+    assert "samples of robots 2, 3: interpolated onto the grid of robot 1\n" in report
+    assert [s["on_grid"] for s in found.to_dict()["recordings"][0]["streams"]] == [True, False, False]

@@ -81,7 +81,9 @@ LOGS: dict[str, tuple[Name, Callable[[str], float], tuple[str, float]]] = {
     "ROS": (lambda r, c: f"/omnid{r + 1}/joint_states/{ros(c)}", lambda _: 1.0, ("t", 1.0)),
     "sparse numbers": (lambda r, c: f"cobot{3 * r + 4}.{c}", lambda _: 1.0, ("t", 1.0)),
     "camels": (lambda r, c: f"Robot{r + 1}{c.capitalize()}", lambda _: 1.0, ("time", 1.0)),
-    "torque3": (lambda r, c: f"{PEOPLE[r]}_{c.replace('tau', 'torque').replace('phi', 'q')}", lambda _: 1.0, ("t", 1.0)),
+    "other words": (
+        lambda r, c: f"{PEOPLE[r]}_{c.replace('tau', 'torque').replace('phi', 'q')}", lambda _: 1.0, ("t", 1.0)
+    ),
 }  # fmt: skip
 
 
@@ -227,6 +229,7 @@ def test_what_is_not_there(tmp_path: Path) -> None:
     text = draft_of(write_text(tmp_path / "log.csv", columns)).text
     assert "doubtful: nothing is called like time" in text
     assert "no such name for bob" in text
+    assert "nothing is called like theta_x" in text
     assert "temperature" not in text
 
 
