@@ -61,9 +61,9 @@ def test_estimate(folder: Path, log: Path, recording: Recording, capsys: pytest.
     assert text.startswith(f"my.csv: read as 3 robots, joint level, {recording.time[-1]:.2f} s\n[[Payload]]")
     found = json.loads((folder / "est.json").read_text())
     expected = mocobot.estimate("rec.parquet").to_dict()
-    np.testing.assert_allclose(found["mass"]["mass_kg"], expected["mass"]["mass_kg"], rtol=1e-9)
+    np.testing.assert_allclose(found["mass"]["m_kg"], expected["mass"]["m_kg"], rtol=1e-9)
     np.testing.assert_allclose(
-        found["centre_of_mass"]["p_1c_m"], expected["centre_of_mass"]["p_1c_m"], atol=1e-9
+        found["com"]["p_1c_m"], expected["com"]["p_1c_m"], atol=1e-9
     )
     assert [file["path"] for file in found["provenance"]["files"]] == ["my.csv", "my.toml"]
     assert found["provenance"]["options"]["map"] == "my.toml"
@@ -83,7 +83,7 @@ def test_bags_and_recordings_together(
     assert text.startswith("bag: read as 3 robots")
     found = json.loads((folder / "est.json").read_text())
     twice = mocobot.estimate([read_recording("rec.parquet"), read_recording("rec.parquet")])
-    assert found["mass"]["mass_kg"] == twice.to_dict()["mass"]["mass_kg"]
+    assert found["mass"]["m_kg"] == twice.to_dict()["mass"]["m_kg"]
     names = [file["name"] for file in found["provenance"]["files"]]
     assert names == ["rec.parquet", *sorted(path.name for path in (folder / "bag").iterdir())]
 
