@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hidden.limits import LIMITS, pendulum_limit_kg
+from hidden.of_log import Place
 from hidden.schedule import moving_intervals
 from mocobot_sim.effects import EFFECTS, Effect, make_effect
 from mocobot_sim.scene.models import omnid_design
@@ -33,11 +35,13 @@ class Ground:
         robots: number of robots.
         p_1c: centre of mass in {1} [m], shape (3,).
         moving: trial number, begin and end of motion [s].
+        limits: detection limits over those of ``hidden.limits``, by place; one where it is not there.
     """
 
     robots: int
     p_1c: Array
     moving: list[tuple[int, float, float]]
+    limits: Mapping[Place, float] = field(default_factory=dict)
 
     @classmethod
     def of(cls, scene: TeamScene, trajectories: list[Trajectory]) -> Ground:
@@ -51,6 +55,7 @@ def draw_effect(cause: str, factor: float, ground: Ground, rng: np.random.Genera
     joints = [joint for joint in (1, 2, 3) if (cause, joint) not in UNDECIDABLE]
     robot = int(rng.integers(1, ground.robots + 1)) if "robot" in names else None
     joint = int(rng.choice(joints)) if "joint" in names else None
+    factor *= ground.limits.get((cause, robot, joint, None), 1.0)
     if cause == "push":
         parameters = _push(factor, ground, rng)
     elif cause == "slosh":
@@ -82,6 +87,7 @@ def _sized(cause: str, factor: float, rng: np.random.Generator) -> dict[str, flo
 def _push(factor: float, ground: Ground, rng: np.random.Generator) -> dict[str, float]:
     number, begin, end = ground.moving[rng.integers(len(ground.moving))]
     duration = rng.uniform(0.5, 2.0)
+    factor *= ground.limits.get(("push", None, None, number), 1.0)
     force = factor * np.array(list(LIMITS["push"].values())) * _direction(rng, 3)
     return {"trial": number, "start_s": rng.uniform(begin, end - duration), "duration_s": duration} | (
         _vector("force", "N", force) | _vector("point", "m", _near(ground.p_1c, rng))

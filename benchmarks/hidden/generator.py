@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -12,11 +12,14 @@ from scipy.spatial.transform import Rotation
 from estimator.recording.model import Recording
 from hidden.background import draw_background
 from hidden.draw import Ground, draw_effect
+from hidden.logger import Logger
+from hidden.of_log import limits_of
 from hidden.schedule import Schedule
 from hidden.sealed import Sealed
 from mocobot_sim.effects import Effect, apply_effects, effect_to_dict
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.sensors import measure, sensor_preset
+from mocobot_sim.trial.trajectories import Trajectory
 from mocobot_sim.trial.trial import run_trial
 
 PAYLOADS = "abcd"
@@ -40,6 +43,8 @@ class HiddenSet:
         preset: sensors.
         schedule: what is recorded.
         timestep_s: integration step [s].
+        logger: what stands between the sensors and the recordings, as ``mocobot convert`` makes them of its log;
+            sizes are then over the detection limits of that very log. None for samples as they are simulated.
     """
 
     kind: Kind
@@ -51,15 +56,15 @@ class HiddenSet:
     preset: str = "nominal"
     schedule: Schedule = field(default_factory=Schedule)
     timestep_s: float = TIMESTEP_S
+    logger: Logger | None = None
 
     @property
     def key(self) -> str:
         """Name of the set."""
         what = ["+".join(self.causes), f"x{self.factor:g}"] if self.causes else []
         preset = [self.preset] if self.preset != "nominal" else []
-        return "-".join(
-            [self.kind, *what, *(["tolerances"] if self.background else []), *preset, str(self.seed)]
-        )
+        more = [*(["logged"] if self.logger else []), *(["tolerances"] if self.background else []), *preset]
+        return "-".join([self.kind, *what, *more, str(self.seed)])
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -80,13 +85,12 @@ def generate(request: HiddenSet) -> tuple[list[Recording], Sealed]:
     payload = request.payload or str(request.rng("payload").choice(list(PAYLOADS)))
     team = build_team(payload)
     trajectories = request.schedule.trajectories(team, request.rng("trajectories"))
-    hidden, background = _effects(request, Ground.of(team, trajectories))
-    recordings = []
-    for number, trajectory in enumerate(trajectories, start=1):
-        scene = apply_effects(build_team(payload, timestep_s=request.timestep_s), [*hidden, *background])
-        log = run_trial(scene, trajectory, trial_number=number)
-        noise = request.rng(f"sensors {number}")
-        recordings.append(measure(log, sensor_preset(request.preset), noise, name=f"trial {number}"))
+    ground = Ground.of(team, trajectories)
+    if request.logger and request.causes:
+        clean = replace(request, kind="clean", causes=())
+        ground = replace(ground, limits=limits_of(_recorded(clean, payload, trajectories, [])))
+    hidden, background = _effects(request, ground)
+    recordings = _recorded(request, payload, trajectories, [*hidden, *background])
     truth = {
         "payload": payload,
         "effects": [effect_to_dict(effect) for effect in hidden],
@@ -94,6 +98,21 @@ def generate(request: HiddenSet) -> tuple[list[Recording], Sealed]:
         "gimbal_axes_1": _gimbal_axes(team),
     }
     return recordings, Sealed(truth)
+
+
+def _recorded(
+    request: HiddenSet, payload: str, trajectories: Sequence[Trajectory], effects: Sequence[Effect]
+) -> list[Recording]:
+    recordings = []
+    for number, trajectory in enumerate(trajectories, start=1):
+        scene = apply_effects(build_team(payload, timestep_s=request.timestep_s), effects)
+        log, noise = run_trial(scene, trajectory, trial_number=number), request.rng(f"sensors {number}")
+        name = f"trial {number}"
+        if request.logger:
+            recordings.append(request.logger.recorded(log, noise, name))
+        else:
+            recordings.append(measure(log, sensor_preset(request.preset), noise, name=name))
+    return recordings
 
 
 def _effects(request: HiddenSet, ground: Ground) -> tuple[list[Effect], list[Effect]]:

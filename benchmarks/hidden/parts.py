@@ -9,9 +9,11 @@ from typing import Literal
 import numpy as np
 
 from discrepancy.team.causes import CAUSES
-from hidden.generator import PAYLOADS, HiddenSet
+from hidden.generator import PAYLOADS, HiddenSet, Kind
+from hidden.logger import Logger
+from hidden.schedule import SHORT
 
-Part = Literal["clean", "tolerance", "single", "pairs", "leave-one-out"]
+Part = Literal["clean", "tolerance", "single", "pairs", "leave-one-out", "logs", "hidden-in-logs"]
 LEFT_OUT_FACTOR = 4.0
 
 
@@ -51,6 +53,10 @@ def tasks(
             Task(part, HiddenSet("pair", seed, _pair(seed), background=background, preset=preset))
             for seed in seeds
         ]
+    if part == "logs":
+        return [Task(part, _logged("clean", seed, ())) for seed in seeds]
+    if part == "hidden-in-logs":  # the causes take turns
+        return [Task(part, _logged("single", seed, (names[seed % len(names)],))) for seed in seeds]
     if part == "leave-one-out":
         factors = [LEFT_OUT_FACTOR]
     return [
@@ -71,3 +77,10 @@ def _pair(seed: int) -> tuple[str, str]:
     first = str(rng.choice(list(CAUSES)))
     others = [cause for cause in CAUSES if CAUSES[cause].family != CAUSES[first].family]
     return first, str(rng.choice(others))
+
+
+def _logged(kind: Kind, seed: int, causes: tuple[str, ...]) -> HiddenSet:
+    """A set from a logger of its own; payloads and kinds of trials take turns."""
+    rng = np.random.default_rng([seed, *b"logger"])
+    payload, schedule = PAYLOADS[seed % len(PAYLOADS)], SHORT[seed // len(PAYLOADS) % len(SHORT)]
+    return HiddenSet(kind, seed, causes, payload=payload, schedule=schedule, logger=Logger.draw(rng))

@@ -32,6 +32,7 @@ def tables(results: Iterable[Result]) -> str:
                 ", tolerances besides" if background else ""
             )
             out.append(_singles(title, [r for r in chosen if _factor(r) == factor]))
+    out.append(_singles("One effect at 4 times the limit of its log", parts.get("hidden-in-logs", [])))
     out += [_pairs(parts.get("pairs", [])), _left_out(parts.get("leave-one-out", []))]
     if len(sound) < len(results):
         out.append(f"{len(results) - len(sound)} sets ended in an error and are not counted.")
@@ -53,6 +54,14 @@ def _alarms(parts: Mapping[str, Sequence[Result]]) -> str:
             what = ", ".join(f"{cause} {n}" for cause, n in causes.items()) or "-"
             share = f"{100 * low:.0f} .. {100 * high:.0f} %"
             rows.append([f"{part}, {preset} sensors", len(runs), alarms, share, what])
+    if runs := parts.get("logs", []):
+        named = [r["verdict"]["found"] for r in runs]
+        alarms = sum(r["verdict"]["verdict"] != "consistent" for r in runs)
+        low, high = interval(alarms, len(runs))
+        left = np.sort([r["verdict"]["after"] for r in runs])
+        causes = Counter(item["cause"] for found in named for item in found)
+        what = f"{_counts(causes)}; chi2/n {left[0]:.2f} .. {left[-1]:.2f}"
+        rows.append(["converted logs", len(runs), alarms, f"{100 * low:.0f} .. {100 * high:.0f} %", what])
     return _markdown("False alarms", ["sets", "number", "something named", "95 % interval", "what"], rows)
 
 

@@ -1,5 +1,6 @@
 """What the diagnosis needs to know of a rig: rows, unknowns, causes, and how to resimulate it."""
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -62,6 +63,7 @@ class Candidate:
         shape: further numbers that change the columns themselves, by name.
         transient: when it acts, of an event; None of what lasts.
         where: the place in words, of what sits at no robot and no joint.
+        title: the cause in words (``causes.base.Cause``).
     """
 
     cause: str
@@ -72,6 +74,7 @@ class Candidate:
     shape: Mapping[str, float] = field(default_factory=dict)
     transient: Transient | None = None
     where: str = "payload"
+    title: str = ""
 
     def acts_in(self, trial: int) -> bool:
         """Whether it can act in a trial (index from 0)."""
@@ -90,9 +93,21 @@ class Candidate:
         return ", ".join(words) or self.where
 
     @property
+    def kind(self) -> str:
+        """The cause in words, wherever it sits: ``friction in a driven joint``."""
+        return re.sub(r"\{(.*?)\}", r"a \1", self.title) or self.cause.replace("_", " ")
+
+    @property
     def label(self) -> str:
-        """Cause and place."""
-        return f"{self.cause} ({self.place})"
+        """The cause at its place, in words: ``friction in joint 1 of robot 2``."""
+        if "{" not in self.title:
+            return f"{self.kind} ({self.place})" if self.robot else self.kind
+        return re.sub(r"\{(.*?)\}", lambda part: self._at(part[1]), self.title)
+
+    def _at(self, part: str) -> str:
+        if self.joint:
+            return f"{part.removeprefix('driven ')} {self.joint} of robot {self.robot}"
+        return f"robot {self.robot}" if part == "robot" else f"the {part} of robot {self.robot}"
 
     @property
     def key(self) -> tuple[str, int | None, int | None]:

@@ -31,6 +31,9 @@ EMPS_AR_ORDER = 8
 """Measured: more does not whiten the benchmark's noise better (by Akaike's criterion)."""
 ROWS_PER_COEFFICIENT = 10
 """A series must have more rows than so many for each coefficient, or stays as it is. Chosen."""
+LOUD_POWER = 2.25
+"""Noise of a row, in squares of that of the others, above which it has a weight of its own. Derived: four standard
+deviations of a mean square of ``NOISE_DRAWS`` draws, sqrt(2/24) = 0.29, above 1."""
 SHRINKAGE_SHARE = 0.05
 """By which the channels' covariance is drawn to its diagonal at least. Chosen."""
 
@@ -78,8 +81,9 @@ INSIDE_SHARE = 0.1
 
 # Verdict and closed loop.
 
-EXPLAINED_SHARE = 0.8
-"""Of the misfit that causes must remove to be called ``explained`` where what is left is not clean. Chosen."""
+RESPONSE_SHARE = 0.8
+"""Of the response's excess error that causes must remove, or what is left of a visible one is said beside the verdict.
+Chosen."""
 LEAST_SHARE = 0.3
 """Causes that explain less of a large misfit, of rows or closed loop, are no explanation. Chosen."""
 MOST_BELIEVED = 2
@@ -125,14 +129,20 @@ SHORTEST_HOLD_S = 1.2
 
 # A team: noise of the sensors.
 
-ANGLE_FLOOR_RAD = 1.2e-5
+ANGLE_FLOOR_RAD = 2e-6
 """Noise of an angle at least. Chosen to cover the model's own errors (rods, welds, integration)."""
-TORQUE_FLOOR_NM = 2e-3
+TORQUE_FLOOR_NM = 3e-4
 """Noise of a torque at least. Chosen for the same reason."""
 NOISE_ABOVE_HZ = 25.0
 """Where nothing moves, so that what is there is noise. Chosen."""
 TEAM_SMOOTH_HZ = 12.0
 """Cut-off of signals when their rounding is drawn anew, and of rates that say where friction slides. Chosen."""
+SLOW_HZ, SMOOTHER_OCTAVES = 1.0, 3
+"""Where rounding shows as stairs: cut-off of the speed that tells their frequency, and how far that of the signal
+falls with it. Chosen: the trajectory need only be one that the stairs may have come from."""
+PHASE_TRAVEL = 4.0
+"""Steps of travel after which a rounding error is drawn anew. Chosen: independent from one rest to the next, and
+changes an encoder's speed by half at most."""
 NOISE_DRAWS = 24
 """From which the rows' covariance is made. Chosen."""
 PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4

@@ -33,3 +33,8 @@ def quantisation_step(values: Array, levels: int = 8) -> float | None:
     if 2 * len(whole) < len(gaps) or np.max(np.abs(ratio[near] - whole)) > _OFF:
         return None
     return float(np.sum(gaps[near]) / whole.sum())
+
+
+def rounding_step(values: Array) -> float:
+    """Step by which a sensor's errors repeat, or 0: where values hardly repeat, rounding is as good as noise."""
+    return 0.0 if len(np.unique(values)) > 0.9 * len(values) else quantisation_step(values, levels=2) or 0.0

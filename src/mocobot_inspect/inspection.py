@@ -27,6 +27,21 @@ MOSTLY = 0.5
 """A channel that stands for more than this share of its log is wrong as a whole."""
 
 
+@dataclass(frozen=True)
+class Standing:
+    """A channel that is stuck or clipped at times.
+
+    Attributes:
+        channel: its name, robot included.
+        seconds: for how long in all.
+        mostly: whether for so much of the log that nothing is left without.
+    """
+
+    channel: str
+    seconds: float
+    mostly: bool
+
+
 @dataclass(frozen=True, eq=False)
 class Inspection:
     """What was found in a log.
@@ -61,6 +76,23 @@ class Inspection:
     wiring: Wiring | None = None
     ready: Readiness | None = None
     ready_undone: Readiness | None = None
+
+    @property
+    def standing(self) -> tuple[Standing, ...]:
+        """Channels that are stuck or clipped at times, all of them harmful to an estimate from the log as it is."""
+        found = []
+        for robot, (channels, timing) in enumerate(
+            zip(self.survey.channels, self.survey.timing, strict=True)
+        ):
+            for c in channels:
+                seconds = sum(s.duration_s for s in (*c.stuck, *c.clipped))
+                if seconds:
+                    mostly = any(
+                        sum(s.duration_s for s in every) >= MOSTLY * timing.duration_s
+                        for every in (c.stuck, c.clipped)
+                    )
+                    found.append(Standing(f"omnid{robot + 1}.{c.name}", seconds, mostly))
+        return tuple(found)
 
 
 def inspect_log(

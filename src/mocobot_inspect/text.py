@@ -7,6 +7,7 @@ from mocobot_inspect.inspection import Inspection
 from mocobot_inspect.readiness import AXES, Readiness
 from mocobot_inspect.stream.channels import Channel
 from mocobot_inspect.wiring.mistakes import Mistake
+from mocobot_inspect.wiring.mistakes.base import listed
 
 UNITS = {"phi": "rad", "the": "rad", "tau": "N m", "h_x": "m", "h_y": "m", "h_z": "m", "for": "N", "ref": "m"}
 _HIDDEN = 6
@@ -163,18 +164,30 @@ def hidden_words(mistakes: tuple[Mistake, ...]) -> list[str]:
 
 
 def ready_line(found: Inspection) -> str:
-    """The verdict."""
+    """The verdict; an estimate takes all of a log, so stretches in which a channel stands spoil it."""
     if found.unchecked is not None or found.ready is None or found.wiring is None:
         return f"ready for: nothing ({found.unchecked})"
     clocks = "; clocks to be corrected" if found.skewed else ""
+    standing = found.standing
+    if any(stands.mostly for stands in standing):
+        names = listed([stands.channel for stands in standing if stands.mostly][:_HIDDEN])
+        return f"ready for: nothing ({names} stand{'s' * (names.count('omnid') == 1)} still)"
+    out = ""
+    if standing:
+        worst = max(standing, key=lambda stands: stands.seconds)
+        who = f"{worst.channel} stands" if len(standing) == 1 else f"{worst.channel} and others stand"
+        out = f"the {worst.seconds:.2g} s left out in which {who} still"
     if found.ready_undone is not None:
         count = len(found.wiring.found)
         what = "the mistake above" if count == 1 else f"the {count} mistakes above"
         if found.wiring.undone.suspicious:
             return f"ready for: nothing (even with {what} undone, the robots do not carry one rigid payload)"
-        return f"ready for: nothing as it is; with {what} undone: {verdict(found.ready_undone)}{clocks}"
+        undone = f"{what} undone{f' and {out}' if out else ''}"
+        return f"ready for: nothing as it is; with {undone}: {verdict(found.ready_undone)}{clocks}"
     if found.wiring.as_is.suspicious:
         return "ready for: nothing (the channels do not fit robots that carry one rigid payload)"
+    if out:
+        return f"ready for: nothing as it is; with {out}: {verdict(found.ready)}{clocks}"
     return f"ready for: {verdict(found.ready)}{clocks}"
 
 

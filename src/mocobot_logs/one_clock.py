@@ -7,6 +7,7 @@ others are read between their samples by a quintic spline: of a sine of 5 Hz sam
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,7 +20,8 @@ from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import Recording
-from mocobot_logs.log import CHANNELS, REF, THETA, Array
+from estimator.recording.sampling import Sampling
+from mocobot_logs.log import CHANNELS, NS, REF, THETA, Array
 from mocobot_logs.resample.log import Resampled
 
 EARLY_S = 1.0
@@ -115,6 +117,11 @@ def to_recording(
         )
         if ref is not None:
             ref[:, i] = values[:, 9:]
+    read_s = np.array([(report.first_ns - resampled.origin_ns) * NS for report in resampled.reports])
+    read_s = estimate.middle_s + (read_s - estimate.middle_s - offset_s) / (1.0 + drift) - time_s[0]
+    metadata = replace(
+        metadata, sampling=_sampling(resampled, float(time_s[0]), read_s, 1.0 + drift, untouched)
+    )
     if resampled.level == "wrist":
         _to_joints(arrays["position"], arrays["effort"], metadata.design, resampled.name, rate_hz)
     recording = Recording(
@@ -155,6 +162,40 @@ def _metadata(
             raise InputError(f"{resampled.name}: says nothing about its {key}, which must be given")
     rest = {"source": f"log {resampled.name}", "payload": None, "seed": None}
     return RecordingMetadata(**(rest | given | fixed))
+
+
+def _sampling(
+    resampled: Resampled, start_s: float, first_s: Array, speed: Array, untouched: Sequence[bool]
+) -> tuple[Sampling, ...] | None:
+    """How the sensors were read, or None where the samples are as they were read.
+
+    Args:
+        resampled: the log.
+        start_s: the recording's beginning after the log's origin [s].
+        first_s: when each robot's first sample was taken, in the recording's time [s], shape (N,).
+        speed: how fast each robot's clock runs by that of robot 1, shape (N,).
+        untouched: whether each robot kept its samples as they were on its own grid.
+    """
+    known = None if resampled.metadata is None else resampled.metadata.sampling
+    if known is not None:  # what was converted before: the errors are still those of the first reading
+        # Stamps of what was written as a recording are its time; this one may begin in the middle of it.
+        return tuple(sampling.later(resampled.origin_ns * NS + start_s) for sampling in known)
+    reports = resampled.reports
+    if all(untouched) and all(report.method == "untouched" and not report.filled for report in reports):
+        return None
+    return tuple(
+        Sampling(
+            native_hz=report.native_hz * float(speed[i]),
+            first_s=float(first_s[i]),
+            # An interval has the errors of both of its ends.
+            jitter_s=report.jitter_rms_s / math.sqrt(2.0),
+            missing=report.filled_share,
+            method=report.method,
+            level=resampled.level,
+            steps=report.steps,
+        )
+        for i, report in enumerate(reports)
+    )
 
 
 def _check_determined(name: str, estimate: ClockEstimate) -> None:

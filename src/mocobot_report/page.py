@@ -12,6 +12,7 @@ from mocobot_report.diagnosis import part as diagnosis_part
 from mocobot_report.document import document
 from mocobot_report.estimate import part as estimate_part
 from mocobot_report.folder import Contents, Diagnosed, Estimated, Paper, complete, read_folder
+from mocobot_report.glossary import glossary, link_terms
 from mocobot_report.paper import part as paper_part
 from mocobot_report.provenance_part import provenance_part
 from mocobot_report.target import check_page
@@ -77,6 +78,18 @@ def make_page(contents: Contents, say: Say = lambda _: None) -> bytes:
         )
     say("pictures")
     book.gallery.fill()
+    if terms := link_terms(main):
+        heading = el("h2", "Glossary", id="glossary-heading")
+        main.append(
+            el(
+                "section",
+                heading,
+                glossary(terms),
+                id="glossary",
+                class_="part",
+                aria_labelledby="glossary-heading",
+            )
+        )
     say("page")
     return to_bytes(document(title, main))
 

@@ -58,7 +58,7 @@ def _files(caption: str, listed: Sequence[Mapping[str, Any]]) -> Node:
         count, digest = entry.get("bytes"), el("span", str(entry.get("sha256", "")), class_="hash")
         name = el("code", str(entry.get("path", entry.get("name", ""))))
         rows.append([name, Num(size(count) if isinstance(count, int) else ""), digest])
-    return table(caption, ["file", "size", "SHA-256"], rows)
+    return table(caption, ["file", "size", "SHA-256"], rows, stack=True)
 
 
 def _read(contents: Contents) -> Node:

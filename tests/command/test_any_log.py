@@ -62,9 +62,7 @@ def test_estimate(folder: Path, log: Path, recording: Recording, capsys: pytest.
     found = json.loads((folder / "est.json").read_text())
     expected = mocobot.estimate("rec.parquet").to_dict()
     np.testing.assert_allclose(found["mass"]["m_kg"], expected["mass"]["m_kg"], rtol=1e-9)
-    np.testing.assert_allclose(
-        found["com"]["p_1c_m"], expected["com"]["p_1c_m"], atol=1e-9
-    )
+    np.testing.assert_allclose(found["com"]["p_1c_m"], expected["com"]["p_1c_m"], atol=1e-9)
     assert [file["path"] for file in found["provenance"]["files"]] == ["my.csv", "my.toml"]
     assert found["provenance"]["options"]["map"] == "my.toml"
     assert [each["name"] for each in found["recordings"]] == ["my.csv"]

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from discrepancy.result.remains import remains
+
 VERDICTS = ("consistent", "explained", "partly_explained", "unexplained")
-PLACE = {"cause", "family", "robot", "joint", "place"}
+PLACE = {"cause", "kind", "name", "family", "robot", "joint", "place"}
 RESPONSE = {f"{c}_{kind}" for c in ("phi", "theta", "tau") for kind in ("nrmse", "rms")} | {"chi2_per_n"}
 
 
@@ -17,7 +19,7 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     """
     assert set(values) - {"provenance"} == {
         "format", "version", "recordings", "verdict", "causes", "evidence", "rejected", "gain", "not_simulated",
-        "undecidable", "detection_limits", "residual", "notes",
+        "undecidable", "detection_limits", "residual", "remains", "notes",
     }  # fmt: skip
     assert (values["format"], values["version"]) == ("mocobot-diagnosis", 1)
     assert values["verdict"] in VERDICTS
@@ -44,13 +46,16 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     for entry in values["undecidable"]:
         assert set(entry) == {"what", "why", "remedy"}
     for entry in values["detection_limits"]:
-        assert set(entry) == {"cause", "robot", "joint", "parameters"}
+        assert set(entry) == {"cause", "kind", "robot", "joint", "parameters"}
         assert all(size is None or size > 0 for size in entry["parameters"].values())
     residual = values["residual"]
     assert set(residual) == {"chi2_per_n", "signature", "chi2_per_n_tolerated", "tolerances", "nominal"}
     assert set(residual["tolerances"]) == {"chi2", "freedom", "log10_p"}
     assert {"chi2_per_n", "sentence", "kind", "trial"} <= set(residual["signature"])
     assert all(isinstance(note, str) for note in values["notes"])
+    assert values["remains"] == remains(values)
+    if values["verdict"] == "explained":
+        assert residual["chi2_per_n"] <= 1.15
     check_finite(values)
 
 
@@ -99,11 +104,27 @@ def check_finite(values: Any) -> None:
         assert math.isfinite(values)
 
 
+def _limit(
+    cause: str, kind: str, robot: int | None, joint: int | None, **sizes: float | None
+) -> dict[str, Any]:
+    return {"cause": cause, "kind": kind, "robot": robot, "joint": joint, "parameters": sizes}
+
+
 def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
     """A diagnosis as ``diagnosis_to_dict`` gives it, made up."""
-    place = {"cause": "sea_bias", "family": "sea_torque", "robot": 2, "joint": 1, "place": "robot 2, joint 1"}
+    place = {
+        "cause": "sea_bias",
+        "kind": "torque zero of a driven joint",
+        "name": "torque zero of joint 1 of robot 2",
+        "family": "sea_torque",
+        "robot": 2,
+        "joint": 1,
+        "place": "robot 2, joint 1",
+    }
     rival = {
         "cause": "sea_scale",
+        "kind": "spring stiffness of a driven joint",
+        "name": "spring stiffness of joint 1 of robot 2",
         "family": "sea_torque",
         "robot": 2,
         "joint": 1,
@@ -142,6 +163,8 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
                 {**rival, "at": None, "gain": 350.0, "log10_p": -70.0},
                 {
                     "cause": "push",
+                    "kind": "push on the payload",
+                    "name": "push on the payload",
                     "family": "push",
                     "robot": None,
                     "joint": None,
@@ -169,11 +192,12 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
         "not_simulated": None,
         "undecidable": [{"what": "this", "why": "of that", "remedy": "a weight"}],
         "detection_limits": [
-            {"cause": "sea_bias", "robot": 1, "joint": 1, "parameters": {"bias_Nm": 0.0213}},
-            {"cause": "sea_bias", "robot": 1, "joint": 2, "parameters": {"bias_Nm": 0.0189}},
-            {"cause": "theta_zero", "robot": 1, "joint": 1, "parameters": {"zero_rad": 6e-4}},
-            {"cause": "theta_zero", "robot": 1, "joint": 3, "parameters": {"zero_rad": None}},
-            {"cause": "slosh", "robot": None, "joint": None, "parameters": {"mass_kg": None}},
+            _limit("sea_bias", "torque zero of a driven joint", 1, 1, bias_Nm=0.0213),
+            _limit("sea_bias", "torque zero of a driven joint", 1, 2, bias_Nm=0.0189),
+            _limit("phi_zero", "encoder zero of a driven joint", 1, 1, zero_rad=4e-5),
+            _limit("theta_zero", "encoder zero of a gimbal axis", 1, 1, zero_rad=6e-4),
+            _limit("theta_zero", "encoder zero of a gimbal axis", 1, 3, zero_rad=None),
+            _limit("slosh", "mass that swings in the payload", None, None, mass_kg=None),
         ],
         "residual": {
             "chi2_per_n": 1.1,
@@ -184,5 +208,6 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
         },
         "notes": ["A note."],
     }
+    values["remains"] = remains(values)
     check_schema(values)
     return values

@@ -15,7 +15,7 @@ LOWER = {
     "mocobot_logs": {"estimator"},
     "mocobot_inspect": {"estimator", "mocobot_logs"},
     "mocobot_sim": {"estimator"},
-    "discrepancy": {"estimator", "mocobot_sim"},
+    "discrepancy": {"estimator", "mocobot_logs", "mocobot_sim"},
     "mocobot_view": {"estimator", "mocobot_sim", "discrepancy"},
     "mocobot_report": {"estimator", "mocobot_sim", "discrepancy", "mocobot_view"},
     "mocobot": {

@@ -67,7 +67,7 @@ def _roll(array: np.ndarray, robot: int) -> None:
     array[:, robot] = np.roll(array[:, robot], 1, axis=-1)
 
 
-def _shift(array: np.ndarray, robot: int, channel: int, by: float) -> None:
+def _shift(array: np.ndarray, robot: int | slice, channel: int, by: float) -> None:
     array[:, robot, channel] += by
 
 
@@ -113,6 +113,10 @@ MISTAKES = [
     ),
     Miswired("joint zero", lambda p, t, f: _shift(p, 1, 2, 0.35), "wrong_zero", (2,), ("phi3",), "phi3 reads 20"),
     Miswired("gimbal zero", lambda p, t, f: _shift(t, 0, 0, -0.3), "wrong_zero", (1,), ("theta_z",), "reads 17"),
+    Miswired(
+        "offset of the wrong sign", lambda p, t, f: _shift(p, EVERY, 1, np.deg2rad(20.0)), "wrong_zero", ALL, ("phi2",),
+        "phi2 reads 20.0 deg too much (the map lacks an offset, or has one of 10.0 deg with the wrong sign)",
+    ),
     Miswired(
         "phi and theta exchanged", lambda p, t, f: _columns_of_each_other(p, t, 1), "exchanged_groups", (2,),
         PHI + THETA, "the columns of phi and theta are exchanged",

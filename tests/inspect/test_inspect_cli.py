@@ -6,6 +6,8 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -17,6 +19,8 @@ from estimator.recording.parquet import write_recording
 from log_files import write_text
 from miswired import miswire
 from mocobot.cli import main
+from mocobot_inspect.inspection import Standing
+from mocobot_inspect.text import ready_line
 from mocobot_logs.bag.write import write_bag
 from mocobot_sim.trial.sensors import PRESETS, measure
 from mocobot_sim.trial.trial_log import TrialLog
@@ -198,7 +202,31 @@ def test_a_broken_log_is_reported_and_not_refused(
             "value": value,
         }
     ]
-    assert out.splitlines()[-1].startswith("ready for: grasps yes")
+    last = out.splitlines()[-1]
+    assert last.startswith("ready for: nothing as it is; with the ")
+    assert "s left out in which omnid1.tau3 and others stand still: grasps yes" in last
+
+
+def test_a_stuck_channel_is_not_ready_and_a_dead_one_never(
+    look: Callable[..., tuple[str, dict]], recording: Recording, tmp_path: Path
+) -> None:
+    """An estimate takes the whole log: two seconds without a sensor are enough to spoil it."""
+
+    phi = recording.phi.copy()
+    phi[900:1100, 1, 1] = phi[900, 1, 1]
+    write_recording(replace(recording, phi=phi), tmp_path / "stuck.parquet")
+    assert look(tmp_path / "stuck.parquet")[0].splitlines()[-1] == (
+        "ready for: nothing as it is; with the 2 s left out in which omnid2.phi2 stands still: "
+        "grasps yes, mass yes, centre of mass yes, inertia yes"
+    )
+    dead: Any = SimpleNamespace(
+        unchecked=None,
+        ready=1,
+        wiring=1,
+        skewed=False,
+        standing=(Standing("omnid2.phi2", 19.0, mostly=True),),
+    )
+    assert ready_line(dead) == "ready for: nothing (omnid2.phi2 stands still)"
 
 
 def test_a_robot_that_the_log_lacks(

@@ -183,6 +183,27 @@ def test_rest_is_not_stuck() -> None:
     assert frozen(exact, RATE) == []
 
 
+def test_rest_after_interpolation_is_not_stuck() -> None:
+    """Rounded encoders of a hold, on another grid: no step tells rest, and only noise moves the torques."""
+    values = motion(60.0, noise=0.0)
+    blend = np.clip((np.arange(6000) - 2000) / 500, 0, 1)[:, None]
+    values = values * (1 - blend) + values[2000] * blend
+    values[4000:] = values[4000]
+    values[:, :6] = np.round(values[:, :6] / 1e-4) * 1e-4
+    values[:, 6:] += 0.005 * np.random.default_rng(2).standard_normal((6000, 3))
+    time = np.arange(6000) / RATE
+    grid = np.arange(0.0, time[-1], 0.008)
+    resampled = np.column_stack([np.interp(grid, time, channel) for channel in values.T])
+    assert frozen(resampled, 125.0) == []
+
+
+@pytest.mark.parametrize("length", [25, 50, 200])
+def test_a_short_stuck_stretch_is_found(length: int) -> None:
+    values = motion(30.0, noise=1e-5)
+    values[1237 : 1237 + length, 4] = values[1237, 4]
+    assert [(f.kind, f.channel, f.start) for f in frozen(values, RATE)] == [("stuck", 4, 1237)]
+
+
 def test_a_channel_that_is_not_moved_is_not_stuck() -> None:
     """One gimbal axis is left alone for a while and then moved gently; the others go on."""
     values = motion(60.0, noise=0.0)

@@ -240,6 +240,33 @@ def test_motion_is_reduced_and_print_shows_all(browser: object, pages: dict[str,
         assert seen.page.evaluate(hidden) > 0
 
 
+def test_phones_show_what_tables_hold(browser: object, pages: dict[str, Path]) -> None:
+    """Rows with long names stack and fit; other tables fade where they go on, say so, and stop at the end."""
+    with opened(browser, pages["diagnosis"], PHONE) as seen:
+        page = seen.page
+        seen.draw_all()
+        stacked = page.evaluate(
+            """() => [...document.querySelectorAll('.stack')].map((box) => [box.scrollWidth - box.clientWidth,
+                 box.querySelector('tbody td').checkVisibility(), box.querySelector('table').getAttribute('role')])"""
+        )
+        assert len(stacked) >= 5
+        assert {tuple(one) for one in stacked} == {(0, True, "table")}
+        value = page.locator(".stack td.num").first
+        assert value.inner_text().replace("\u00a0", " ") == "0.0500 ± 0.0010 N m"
+        box = value.bounding_box()
+        assert box["x"] + box["width"] < PHONE[0]
+        wide = page.locator(".scroll.more").first.element_handle()
+        assert "scroll sideways" in wide.inner_text()
+        assert "gradient" in wide.evaluate("(b) => getComputedStyle(b).maskImage")
+        wide.evaluate("(b) => { b.scrollLeft = b.scrollWidth; }")
+        page.wait_for_function(
+            "(b) => b.classList.contains('before') && !b.classList.contains('more')", arg=wide
+        )
+    with opened(browser, pages["diagnosis"], DESKTOP) as seen:
+        seen.draw_all()
+        assert seen.page.locator(".scroll.more:visible").count() == 0
+
+
 def test_tables_are_there_without_scripts(browser: object, pages: dict[str, Path]) -> None:
     with opened(browser, pages["diagnosis"], java_script_enabled=False) as seen:
         assert "Plots need JavaScript" in seen.page.locator("noscript").inner_text()

@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from discrepancy.causes.units import fitting, one_each, parameter
 from discrepancy.result.residual_statistics import binned, running_rms, spectrum
 from discrepancy.result.traces import Trace
-from mocobot_report.blocks.numbers import about, fitting, measured, percent, plain, power, size, with_error
+from mocobot_report.blocks.numbers import about, measured, percent, plain, power, size, spelled, with_error
 from mocobot_report.blocks.series import runs, thinned
-from mocobot_report.blocks.units import parameter, short_names
+from mocobot_report.blocks.units import short_names
 
 SUPERSCRIPTS = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
@@ -66,10 +67,14 @@ def test_shares_ratios_sizes_and_probabilities() -> None:
 
 
 def test_units_fit_the_size() -> None:
-    assert fitting("rad", 3e-5) == ("µrad", 1e6)
+    assert fitting("rad", 3e-5) == ("urad", 1e6)
+    assert fitting("m/N", 2e-5) == ("um/N", 1e6)
     assert fitting("m", 0.02) == ("mm", 1e3)
     assert fitting("N", 0.5) == ("N", 1.0)
     assert fitting("parrots", 1e-9) == ("parrots", 1.0)
+    found = one_each([("rad", 3e-5), ("rad", -2e-3), ("m", 1e-5), ("", 4.0)])
+    assert found == {"rad": ("mrad", 1e3), "m": ("um", 1e6), "": ("", 1.0)}
+    assert [spelled(unit) for unit in ("um/N", "urad", "us", "N/um")] == ["µm/N", "µrad", "µs", "N/µm"]
 
 
 def test_parameters_carry_their_units() -> None:
@@ -79,7 +84,7 @@ def test_parameters_carry_their_units() -> None:
     )}  # fmt: skip
     assert found == {
         "coulomb_Nm": ("coulomb", "N m"), "viscous_Nms_per_rad": ("viscous", "N m s/rad"),
-        "cubic_Nm_per_rad3": ("cubic", "N m/rad³"), "time_constant_s": ("time constant", "s"), "scale": ("scale", ""),
+        "cubic_Nm_per_rad3": ("cubic", "N m/rad^3"), "time_constant_s": ("time constant", "s"), "scale": ("scale", ""),
         "excess_per_s": ("excess", "1/s"), "stiffness_N_per_m": ("stiffness", "N/m"), "force_x_N": ("force x", "N"),
         "base_radius_m": ("base radius", "m"), "x_mps": ("x", "m/s"), "made_up": ("made up", ""),
     }  # fmt: skip

@@ -14,9 +14,12 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from estimator.leftover.leftover import Leftover
 from mocobot_report.blocks.html import data_block, el, raw, to_bytes
 from mocobot_report.blocks.palette import DARK, LIGHT
+from mocobot_report.blocks.series import around_zero
 from mocobot_report.folder import read_folder
+from mocobot_report.glossary import link_terms
 from mocobot_report.page import write_report
 from mocobot_report.sources import sources
 from mocobot_sim.paper.published import published_errors
@@ -44,6 +47,7 @@ class Reader(HTMLParser):
         self.open: list[tuple[str, dict[str, str | None]]] = []
         self.tags: list[tuple[str, dict[str, str | None]]] = []
         self.text: list[str] = []
+        self.code = ""
         self.blocks: dict[str, dict] = {}
         """Figures."""
         self.templates: dict[str, dict] = {}
@@ -67,6 +71,7 @@ class Reader(HTMLParser):
             self.blocks[str(attributes["id"])] = json.loads(data)
         elif tag not in ("script", "style"):
             self.text.append(data)
+            self.code += f" {data}" if tag == "code" else ""
 
     def rows(self) -> str:
         return re.sub(r"\s+", " ", " ".join(self.text))
@@ -296,6 +301,21 @@ def test_what_is_not_known_is_said_first(
     assert ("Nothing speaks against these numbers" in answer) == (missing == {})
 
 
+def test_robots_that_contradict_each_other_are_the_first_thing_said(
+    tmp_path: Path, no_pictures: pytest.MonkeyPatch
+) -> None:
+    estimate = payload_estimate()
+    assert estimate.contradicts is False
+    (recording,) = estimate.recordings
+    wrong = replace(recording, leftovers=(Leftover("force", "N", 3.1, 0.05),))
+    wrong = replace(estimate, recordings=(wrong,), flags=("The robots contradict each other beyond noise.",))
+    (tmp_path / "est.json").write_text(json.dumps(wrong.to_dict()))
+    text = Reader(write_report(tmp_path).read_bytes()).rows()
+    assert "do not trust the standard errors" in text
+    assert "Nothing speaks against these numbers" not in text
+    assert re.search(r"rec.parquet random .* 62", text.replace("\u00a0", " "))
+
+
 def test_provenance_lists_what_was_read(pages: dict[str, Reader], folders: dict[str, Path]) -> None:
     for kind, name in (("paper", "paper.json"), ("diagnosis", "residuals.npz"), ("estimate", "est.json")):
         text = pages[kind].rows()
@@ -307,11 +327,90 @@ def test_provenance_lists_what_was_read(pages: dict[str, Reader], folders: dict[
     )
 
 
+def test_how_a_result_was_made_can_be_read(pages: dict[str, Reader], folders: dict[str, Path]) -> None:
+    """The texts, not only the names in front of them: an element without children once counted as nothing."""
+    files = {"paper": "provenance.json", "diagnosis": "diagnosis.json", "estimate": "est.json"}
+    for kind, file in files.items():
+        values = json.loads((folders[kind] / file).read_text())
+        made = values if kind == "paper" else values["provenance"]
+        text = pages[kind].rows()
+        assert f"command mocobot {made['command']} mocobot {made['mocobot']} commit {made['commit']}" in text
+        assert f"Python {made['python']} on {made['platform']} packages" in text
+
+
 def test_options_are_shown_as_they_were_given(pages: dict[str, Reader]) -> None:
     """0 is a number, and no "no"."""
     assert "option seed 0" in pages["paper"].rows()
     assert "option closed_loop yes" in pages["diagnosis"].rows()
     assert "option closed_loop no" in pages["axis"].rows()
+
+
+def test_causes_are_read_in_words(pages: dict[str, Reader]) -> None:
+    """What the command line calls them stands softly behind, as code; nowhere else."""
+    page = pages["diagnosis"]
+    text = page.rows()
+    assert re.search(r"Torque zero of joint 1 of robot 2 sea_bias 0\.0500 ± 0\.0010 N m bias", text)
+    assert "Spring stiffness of joint 1 of robot 2 sea_scale cannot be told apart" in text
+    assert "Encoder zero of a gimbal axis theta_zero zero 0.60 mrad 1 of 2" in text
+    assert "Encoder zero of a driven joint phi_zero zero 0.040 mrad everywhere" in text  # the same unit
+    for name in ("sea_bias", "sea_scale", "theta_zero", "slosh"):
+        assert "".join(page.text).count(name) == page.code.count(name) > 0
+    plots = json.dumps(list(page.blocks.values()))
+    assert "torque zero of joint 1 of robot 2" in plots
+    assert "sea_" not in plots
+
+
+def test_shares_of_causes_add_up(tmp_path: Path, no_pictures: pytest.MonkeyPatch) -> None:
+    folder = diagnosis_folder(tmp_path / "two")
+    values = json.loads((folder / "diagnosis.json").read_text())
+    first = values["causes"][0] | {"explained": {"in_sample": 0.7, "held_out": 0.65}}
+    values["causes"] = [first, first | {"explained": {"in_sample": 0.2, "held_out": 0.25}}]
+    (folder / "diagnosis.json").write_text(json.dumps(values))
+    text = Reader(write_report(folder).read_bytes()).rows()
+    assert "All together 90 90" in text
+    assert "beyond those above it, so that shares add up" in text
+
+
+def test_terms_are_explained_where_they_stand(pages: dict[str, Reader]) -> None:
+    for page in pages.values():
+        entries = {a["id"] for tag, a in page.tags if tag == "dt" and "id" in a}
+        links = [a for tag, a in page.tags if tag == "a" and a.get("class") == "term"]
+        assert {a["href"] for a in links} == {f"#{name}" for name in entries}
+        assert all(a["title"] for a in links)
+    terms = {a["id"] for tag, a in pages["diagnosis"].tags if tag == "dt" and "id" in a}
+    assert {"term-nat", "term-chi-n-misfit", "term-whitened", "term-held-out", "term-in-sample"} <= terms
+    assert "5 nats are a factor of 150" in pages["diagnosis"].rows()
+    assert "term-frame-grasp-frame" in {a.get("id") for _, a in pages["estimate"].tags}
+    section = el(
+        "section", el("p", "A nat, two nats, <rms>"), el("h3", "nats"), el("section", el("td", "nat"))
+    )
+    assert [term.name for term in link_terms([section])] == ["nat", "rms"]
+    shown = to_bytes(section).decode()
+    assert shown.count('class="term"') == 3  # once in every section, never in a heading
+    assert "</a>, two nats, &lt;<a" in shown
+
+
+def test_evidence_is_dots_on_one_scale(pages: dict[str, Reader]) -> None:
+    """A bar would need a zero, which a logarithmic axis has not; what gains less than 1 is not drawn."""
+    shown = [b for b in pages["diagnosis"].blocks.values() if "gain of chi-square" in json.dumps(b)]
+    (before,) = shown  # with the cause in the model nothing is left that gains 1
+    assert {trace["type"] for trace in before["data"]} == {"scatter"}
+    assert sorted(x for trace in before["data"] for x in trace["x"]) == [3.0, 350.0, 400.0]
+    assert before["layout"]["xaxis"]["range"][0] == pytest.approx(np.log10(3.0) - 0.15)
+
+
+def test_one_plot_per_robot(pages: dict[str, Reader]) -> None:
+    block = next(b for b in pages["estimate"].blocks.values() if "robot 3: gap" in json.dumps(b))
+    assert [trace["yaxis"] for trace in block["data"]] == ["y", "y2", "y3", "y4", "y5", "y6"]
+    ranges = [block["layout"][f"yaxis{k}"]["range"] for k in ("", 2, 3)]
+    assert ranges[0] == ranges[1] == ranges[2]
+    assert "robot 2: gap angle" in block["layout"]["yaxis5"]["title"]["text"]
+
+
+def test_band_follows_the_noise_of_every_row() -> None:
+    time = np.array([0.0, 1.0, 2.0, 3.0, np.nan, 6.0, 7.0])
+    half = np.array([4.0, 1.0, 1.0, 1.0, np.nan, 2.0, 2.0])
+    assert around_zero(time, half) == "M0,4L1,1L3,1L3,-1L1,-1L0,-4ZM6,2L7,2L7,-2L6,-2Z"
 
 
 def test_one_page_for_several_results(tmp_path: Path, no_pictures: pytest.MonkeyPatch) -> None:

@@ -29,7 +29,9 @@ from mocobot_view.pictures.views import diagnosis_view, emps_view, estimate_view
 from rendering import made
 from replay_case import BODIES, Placed, payload_body, placed_trial, robot_body, true_estimate
 
-FRICTION = NamedCause("joint_friction", 2, 3, "It rubs.")
+FRICTION = NamedCause(
+    "joint_friction", 2, 3, "It rubs.", "friction in a driven joint", "friction in joint 3 of robot 2"
+)
 ASPECT, WIDTH, HEIGHT = 1.6, 480, 300
 
 
@@ -147,7 +149,7 @@ def test_words_say_what_is_shown_and_what_is_not_known(placed_a: Placed) -> None
     assert "drawn in a row, without a payload" in row.says
     assert not row.marks.arrows
     assert diagnosis_shot(recording, whole_estimate(placed_a), [FRICTION]).says.endswith(
-        "Red: joint_friction (omnid2, proximal3)."
+        "Red: friction in joint 3 of robot 2 (omnid2, proximal3)."
     )
 
 
@@ -162,7 +164,7 @@ def test_causes_are_red_where_they_sit(placed_a: Placed) -> None:
     where = [data.body("omnid2/proximal3").xpos, data.site("payload/com").xpos, data.body("omnid3/base").xpos]
     assert [row[:3] for row in shot.marks.ellipsoids] == [pytest.approx(p, abs=2e-6) for p in where]
     assert [label.text for label in shot.marks.labels] == [
-        "omnid1", "omnid2", "omnid3", "joint_friction, sea_bias", "payload_mass", "base_tilt"
+        "omnid1", "omnid2", "omnid3", "friction in a driven joint, sea_bias", "payload_mass", "base_tilt"
     ]  # fmt: skip
     red = np.array(colours.FAULT) / 255.0
     is_red = np.abs(shot.model.geom_rgba[:, :3] - red).max(axis=1) < 1e-6

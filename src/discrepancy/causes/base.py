@@ -18,7 +18,9 @@ class Cause(ABC):
     """One physical cause, as the diagnosis and the report know it.
 
     Attributes:
-        name: as in the verdict: that of the class, in lower case with underscores.
+        name: as on the command line: that of the class, in lower case with underscores.
+        title: in words, for people; the part it sits at in braces, such as ``friction in {driven joint}``. The name
+            without underscores, if a cause does not say.
         family: causes of one family look alike.
         parameters: names of the columns' parameters, units as suffix.
         tolerances: of the parameters, standard deviations that are no news; none where the cause is an event.
@@ -30,6 +32,7 @@ class Cause(ABC):
     """
 
     name: ClassVar[str]
+    title: ClassVar[str] = ""
     family: ClassVar[str]
     parameters: ClassVar[tuple[str, ...]]
     tolerances: ClassVar[tuple[float, ...]] = ()
@@ -56,7 +59,9 @@ class Cause(ABC):
             Parameter(name, given.get(name, 0.0), scale)
             for name, scale in zip(self.parameters, self.tolerances or self.scales, strict=True)
         )
-        return Candidate(self.name, self.family, robot, joint, parameters, dict(shape), where=self.where)
+        return Candidate(
+            self.name, self.family, robot, joint, parameters, dict(shape), where=self.where, title=self.title
+        )  # fmt: skip
 
     def event(self, given: Mapping[str, float], when: Transient) -> Candidate:
         """A transient cause during an interval."""

@@ -138,8 +138,9 @@ def _swaps(rig: Rig, explanation: Explanation) -> tuple[Problem, list[Swap]]:
 
 
 def labels(found: Iterable[Found]) -> str:
-    """Causes and their places, for a sentence."""
-    return ", ".join(item.candidate.label for item in found)
+    """Causes and their places, as a sentence begins."""
+    text = ", ".join(item.candidate.label for item in found)
+    return text[:1].upper() + text[1:]
 
 
 def _in_closed_loop(before: float, after: float) -> str:

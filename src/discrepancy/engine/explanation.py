@@ -21,7 +21,6 @@ class Named:
         candidate: what and where, with its best shape.
         evidence: when it was chosen.
         rivals: other candidates then, best first, with the gap of their score [nats].
-        in_sample, held_out: share of the nominal model's misfit that it removes (see ``held_out.shares``).
         folds: gain of chi-square on every trial when fitted to the others.
     """
 
@@ -29,8 +28,6 @@ class Named:
     candidate: Candidate
     evidence: Evidence
     rivals: tuple[tuple[Candidate, float], ...]
-    in_sample: float
-    held_out: float | None
     folds: tuple[float, ...]
 
 
@@ -41,10 +38,14 @@ class Found(Named):
     Attributes:
         values: its parameters, in their own units, shape (k,).
         covariance: of the values and of what is determined of its shape (see ``best_shape``), in their own units.
+        in_sample, held_out: share of the nominal model's misfit that it removes beyond the causes before it (see
+            ``held_out.shares``).
     """
 
     values: Array
     covariance: Array
+    in_sample: float
+    held_out: float | None
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

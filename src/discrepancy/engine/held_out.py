@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from discrepancy import rules
 from discrepancy.least_squares.fit import Fit
@@ -34,30 +35,36 @@ def held_out_gains(problem: Problem, free: Sequence[int], index: int) -> list[fl
     return gains
 
 
-def shares(problem: Problem, free: Sequence[int], index: int) -> tuple[float, float | None]:
-    """Share of the nominal model's misfit that a cause removes, in sample and on trials left out of the fit.
+def shares(problem: Problem, causes: Sequence[int]) -> list[tuple[float, float | None]]:
+    """What every cause removes beyond those before it: in sample, and on trials left out of the fit.
 
-    Nominal is the model with the causes before it and nothing else off; the room for improvement ends where the
-    cause and every tolerance together leave the data.
+    Both are shares of the misfit of the nominal model, in which nothing is off, so they add up to what all causes
+    remove together. The room for improvement ends where the causes and every tolerance together leave the data.
     """
-    after = [*free, index]
-    full = Fit.of(problem, after)
-    nominal, with_it = (Fit.of(problem, chosen, background=False) for chosen in (free, after))
-    trials = range(len(problem.rows))
+    trials, steps = range(len(problem.rows)), [list(causes[:k]) for k in range(len(causes) + 1)]
+    full = Fit.of(problem, causes)
     floor = sum(full.held_out(t) for t in trials)
-    in_sample = (nominal.misfit - with_it.misfit) / max(nominal.misfit - floor, 1e-9)
-    if len(trials) < 2 or problem.candidates[index].transient:
-        return float(np.clip(in_sample, 0.0, 1.0)), None
-    gained, room = 0.0, 0.0
+    in_sample = _parts([Fit.of(problem, step, background=False).misfit for step in steps], floor)
+    if len(trials) < 2:
+        return [(share, None) for share in in_sample]
+    left, best = np.zeros(len(steps)), 0.0
     for t in trials:
         others = [k for k in trials if k != t]
-        before, after_it, best = (
-            Fit.of(problem, free, others, background=False).held_out(t),
-            Fit.of(problem, after, others, background=False).held_out(t),
-            Fit.of(problem, after, others).held_out(t),
-        )
-        gained, room = gained + before - after_it, room + before - best
-    return float(np.clip(in_sample, 0.0, 1.0)), float(np.clip(gained / max(room, 1e-9), 0.0, 1.0))
+        left += [Fit.of(problem, step, others, background=False).held_out(t) for step in steps]
+        best += Fit.of(problem, causes, others).held_out(t)
+    # What acts in one trial only cannot be fitted to the others.
+    lasting = [problem.candidates[index].transient is None for index in causes]
+    return [
+        (share, held_out if lasts else None)
+        for share, held_out, lasts in zip(in_sample, _parts(left, best), lasting, strict=True)
+    ]
+
+
+def _parts(left: ArrayLike, floor: float) -> list[float]:
+    """How much every step takes of what there is above a floor at first; a step that takes nothing has no share."""
+    left = np.minimum.accumulate(np.asarray(left))
+    room = max(left[0] - min(floor, left[-1]), 1e-9)
+    return [float(part) for part in np.clip(-np.diff(left) / room, 0.0, 1.0)]
 
 
 def _interleaved(

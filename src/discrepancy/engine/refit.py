@@ -60,11 +60,14 @@ def explanation_of(
         rejected, nominal, before: as of ``Explanation``.
     """
     found = []
-    for cause in named:
+    removed = shares(fit.problem, [cause.index for cause in named])
+    for cause, (in_sample, held_out) in zip(named, removed, strict=True):
         values = fit.part(cause.index)[0] * cause.candidate.units
         known = {key: value for key, value in vars(cause).items() if key in Named.__dataclass_fields__}
         covariance = covariance_with_shape(rig, fit, cause.index)
-        found.append(Found(**known, values=values, covariance=covariance))
+        found.append(
+            Found(**known, values=values, covariance=covariance, in_sample=in_sample, held_out=held_out)
+        )
     return Explanation(
         found=tuple(found),
         rejected=tuple(rejected),
@@ -98,15 +101,12 @@ def with_rival(rig: Rig, explanation: Explanation, problem: Problem, cause: Name
     free = [index if other is cause else other.index for other in explanation.found]
     fit = refit(rig, problem, free)
     rival, others = fit.problem.candidates[index], [i for i in free if i != index]
-    in_sample, held_out = shares(fit.problem, others, index)
     named = replace(
         cause,
         index=index,
         candidate=rival,
         evidence=Fit.of(fit.problem, others).evidence_of(index) or cause.evidence,
         rivals=tuple((cause.candidate, -gap) if c.key == rival.key else (c, gap) for c, gap in cause.rivals),
-        in_sample=in_sample,
-        held_out=held_out,
         folds=tuple(held_out_gains(fit.problem, others, index)),
     )
     return _again(rig, explanation, fit, [named if other is cause else other for other in explanation.found])

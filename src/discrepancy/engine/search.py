@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Sequence
 
 from discrepancy import rules
 from discrepancy.engine.explanation import Explanation, Named
-from discrepancy.engine.held_out import confirmed, held_out_gains, shares
+from discrepancy.engine.held_out import confirmed, held_out_gains
 from discrepancy.engine.imitation import imitated
 from discrepancy.engine.leaders import Leader, in_best_shapes, leaders, with_transient
 from discrepancy.engine.refit import explanation_of, idlest, refit
@@ -47,16 +47,12 @@ def search(
                 break
             continue
         rivals = _rivals(fit, ranked)
-        free_before = fit.free
-        fit = refit(rig, best.problem, [*free_before, best.index])
-        in_sample, held_out = shares(fit.problem, free_before, best.index)
+        fit = refit(rig, best.problem, [*fit.free, best.index])
         new = Named(
             index=best.index,
             candidate=best.candidate,
             evidence=best.evidence,
             rivals=rivals,
-            in_sample=in_sample,
-            held_out=held_out,
             folds=tuple(folds),
         )
         # What was named first may have stood in for what was found since.

@@ -9,12 +9,12 @@ Verdict = Literal["consistent", "explained", "partly_explained", "unexplained"]
 
 
 def verdict_of(explanation: Explanation) -> Verdict:
-    """The verdict by what the causes remove, and by whether they can be believed together."""
+    """The verdict by what the causes leave and remove, and by whether they can be believed together."""
     if not explanation.found:
         return "consistent" if explanation.clean else "unexplained"
     if only_add_up(explanation):
         return "unexplained"
-    if explanation.clean or explanation.explained >= rules.EXPLAINED_SHARE:
+    if explanation.clean:
         return "explained"
     return "partly_explained" if explanation.explained >= rules.LEAST_SHARE else "unexplained"
 

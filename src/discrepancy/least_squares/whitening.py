@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz, solve_triangular
 
 from discrepancy import rules
@@ -20,6 +21,8 @@ class Whitening:
         chol_moving, chol_alone: lower Cholesky factors of the channels' covariance, shape (C, C).
         ar: autoregressive coefficients of every whitened channel, shape (C, p).
         innovation: standard deviation of what they leave, shape (C,).
+        loudness: standard deviation of every moving row's noise over that of the quiet ones, shape (moving, C); or
+            (1, C), all 1.
     """
 
     moving: int
@@ -27,32 +30,57 @@ class Whitening:
     chol_alone: Array
     ar: Array
     innovation: Array
+    loudness: Array
 
     @classmethod
-    def of(cls, draws: Array, moving: int, order: int = rules.AR_ORDER) -> Whitening:
+    def of(cls, draws: Array, moving: int, order: int = rules.AR_ORDER, *, uneven: bool = False) -> Whitening:
         """Whitening from noise draws, shape (D, n, C), of which the first ``moving`` rows are a series.
 
         Args:
             draws: of the noise alone.
             moving: number of leading rows that follow each other.
             order: of the autoregression.
+            uneven: whether some moving rows may be louder than the others, as where a motion begins and encoders
+                repeat a rounding error that the filter averages out later. They are found in the draws, left out of
+                what the other rows are whitened by, and given less weight.
         """
+        white = cls._even(draws, moving, order, np.ones(moving, dtype=bool))
+        if not (uneven and moving):
+            return white
+        power = white._power(draws)
+        quiet = ~np.any(power > rules.LOUD_POWER * np.median(power, axis=0), axis=1)
+        white = cls._even(draws, moving, order, quiet)
+        power = white._power(draws)
+        return replace(white, loudness=np.where(power > rules.LOUD_POWER, np.sqrt(power), 1.0))
+
+    def _power(self, draws: Array) -> Array:
+        """Mean square of every moving row of draws once whitened, shape (moving, C)."""
+        return np.mean(self(np.moveaxis(draws, 0, 2))[: self.moving] ** 2, axis=2)
+
+    @classmethod
+    def _even(cls, draws: Array, moving: int, order: int, quiet: NDArray[np.bool_]) -> Whitening:
+        """The same for every row, from the moving rows that are quiet, shape (moving,)."""
         channels = draws.shape[2]
-        chol_moving = _cholesky(draws[:, :moving])
+        chol_moving = _cholesky(draws[:, :moving][:, quiet])
         chol_alone = _cholesky(draws[:, moving:])
         ar, innovation = np.zeros((channels, order)), np.ones(channels)
         if order and moving > rules.ROWS_PER_COEFFICIENT * order:
             flat = _per_row(chol_moving, draws[:, :moving].reshape(-1, channels))
             white = flat.reshape(len(draws), moving, channels)
             lag = np.array(
-                [np.mean(white[:, k:] * white[:, : moving - k], axis=(0, 1)) for k in range(order + 1)]
+                [
+                    np.mean(
+                        (white[:, k:] * white[:, : moving - k])[:, quiet[k:] & quiet[: moving - k]], (0, 1)
+                    )
+                    for k in range(order + 1)
+                ]
             )
             for c in range(channels):
                 if lag[0, c] < 1e-12:  # a channel without noise
                     continue
                 ar[c] = solve_toeplitz(lag[:order, c], lag[1:, c])  # Yule and Walker
                 innovation[c] = np.sqrt(max(lag[0, c] - ar[c] @ lag[1:, c], 1e-6))
-        return cls(moving, chol_moving, chol_alone, ar, innovation)
+        return cls(moving, chol_moving, chol_alone, ar, innovation, np.ones((1, channels)))
 
     def __call__(self, x: Array) -> Array:
         """Whiten rows and channels, shape (n, C, ...) -> the same."""
@@ -67,7 +95,7 @@ class Whitening:
         # The first rows have no past to predict them from; they keep their own variance of one.
         series[order:] /= scale
         series[:order] = z[:order]
-        y[: self.moving] = series
+        y[: self.moving] = series / self.loudness.reshape(*self.loudness.shape, *shape[2:])
         return y
 
     def rows_only(self, x: Array) -> Array:

@@ -7,6 +7,7 @@ import numpy as np
 
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.fit import Fit
+from discrepancy.result.read import kind_of, name_of
 from discrepancy.rig import Candidate
 
 LEAST_LOG10_P = -1e6
@@ -47,9 +48,11 @@ def finite_log10_p(value: float) -> float:
 
 
 def place_of(candidate: Candidate) -> dict[str, Any]:
-    """Cause, family and place of a candidate, as in every part of the JSON."""
+    """Cause (its name, in words, in words at its place), family and place of a candidate, as all over the JSON."""
     return {
         "cause": candidate.cause,
+        "kind": candidate.kind,
+        "name": candidate.label,
         "family": candidate.family,
         "robot": candidate.robot,
         "joint": candidate.joint,
@@ -58,10 +61,10 @@ def place_of(candidate: Candidate) -> dict[str, Any]:
 
 
 def label(entry: Mapping[str, Any]) -> str:
-    """Cause and place of an entry, for a plot."""
+    """An entry in words, for a plot."""
     if entry["at"] is None:
-        return f"{entry['cause']} ({entry['place']})"
-    return f"{entry['cause']} (trial {entry['at'][0]}, {entry['at'][1]:.1f} s)"
+        return name_of(entry)
+    return f"{kind_of(entry)} (trial {entry['at'][0]}, {entry['at'][1]:.1f} s)"
 
 
 def relation(entry: Mapping[str, Any], causes: Sequence[Mapping[str, Any]]) -> str:

@@ -5,18 +5,21 @@ recordings          names of the trials
 verdict             "consistent", "explained", "partly_explained" or "unexplained"
 causes              list, in the order of discovery, of
     cause, family, robot, joint    robot and joint from 1, or null
-    place, sentence                in words
+    kind, name, place, sentence    in words: the cause, the cause at its place, its place, what it does
     parameters                     {name: {value, se}}; se is null for what was chosen, not fitted
     explained                      {in_sample, held_out}: share of the nominal model's misfit that the cause removes
+                                   beyond those before it; the shares add up to what all causes remove
     log10_p                        of so much evidence in clean data
     folds                          gain of chi-square on every trial when fitted to the others
     shape                          numbers that change the cause's columns, such as a pendulum's length
     separate                       what would tell the cause from its look-alikes
-    alternatives                   list of {cause, family, robot, joint, place, evidence_gap [nats], chi2_per_n,
-                                   ambiguous, separate}; chi2_per_n of its closed loop, null if not simulated
+    alternatives                   list of {cause, kind, name, family, robot, joint, place, evidence_gap [nats],
+                                   chi2_per_n, ambiguous, separate}; chi2_per_n of its closed loop, or null
 evidence            the strongest candidates, see ``evidence_list``: {before, after, by_chance} with nothing named and
-                    with what is named (null), lists of {cause, family, robot, joint, place, at, gain, log10_p}
-rejected            significant candidates that other trials did not confirm: list of {cause, robot, joint, place}
+                    with what is named (null), lists of {cause, kind, name, family, robot, joint, place, at, gain,
+                    log10_p}
+rejected            significant candidates that other trials did not confirm: list of {cause, kind, name, family,
+                    robot, joint, place}
 gain                null where the closed loop was not simulated and there is nothing to estimate, or
     held_out        {before, after}: {<channel>_nrmse, <channel>_rms, chi2_per_n}, means over trials, null if failed
     units           of the channels' rms
@@ -28,12 +31,13 @@ gain                null where the closed loop was not simulated and there is no
     errors          {before, after} against the truth, only where it is known
 not_simulated       why there is no closed-loop comparison, or null
 undecidable         list of {what, why, remedy}: what no recordings of this rig decide, then what these do not
-detection_limits    list of {cause, robot, joint, parameters: {name: size}}: what would have been noticed nine times in
-                    ten; null where these recordings say nothing
+detection_limits    list of {cause, kind, robot, joint, parameters: {name: size}}: what would have been noticed nine
+                    times in ten; null where these recordings say nothing
 residual            {chi2_per_n, signature} of what the causes (with tolerances) leave, and
     chi2_per_n_tolerated           with tolerances and no cause
     tolerances                     {chi2, freedom, log10_p}: how hard they are used
     nominal                        {chi2_per_n, signature} of the simulation as it is
+remains             sentences on what the verdict leaves open: misfit above clean, strained tolerances, response
 notes               sentences
 
 ``mocobot diagnose`` adds ``provenance``: versions, options and hashes of the files it was made from
@@ -53,6 +57,7 @@ from discrepancy.engine.gain import Gain, Response
 from discrepancy.least_squares.fit import Fit
 from discrepancy.result.evidence_list import evidence_list, finite_log10_p, place_of
 from discrepancy.result.read import FORMAT, VERSION
+from discrepancy.result.remains import remains
 from discrepancy.result.sensitivity import blind_spots, detection_limits
 from discrepancy.result.signature import signature
 from discrepancy.rig import Rig
@@ -84,7 +89,7 @@ def diagnosis_to_dict(
         gain["estimates"] = {name: estimates[name] for name in ("before", "after")}
         if "errors" in estimates:
             gain["errors"] = estimates["errors"]
-    return {
+    values: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
         "recordings": list(rig.trials),
@@ -111,6 +116,7 @@ def diagnosis_to_dict(
         },
         "notes": list(diagnosis.notes),
     }
+    return values | {"remains": remains(values)}
 
 
 def _strain(explanation: Explanation) -> tuple[float, float, float]:

@@ -14,7 +14,7 @@ from discrepancy.causes.words import Words
 from discrepancy.result.plots_against import AFTER, BEFORE, against_figure, scale_multiples, titled
 from discrepancy.result.plots_evidence import closed_loop_figure, evidence_figure
 from discrepancy.result.residual_statistics import multiples
-from discrepancy.result.traces import Group, Trace, groups
+from discrepancy.result.traces import Group, Trace, group_units, groups
 from estimator.arrays import Array
 
 PLOTS = ("residual_*.png", "evidence.png", "closed_loop.png")
@@ -65,12 +65,13 @@ def file_names(names: Sequence[str]) -> list[str]:
 
 def _time_figure(trace: Trace, grouped: Sequence[Group], *, named: bool) -> Figure:
     columns = 3 if named else 2
+    units = group_units([trace], grouped)
     figure = Figure(figsize=(5.2 * columns, 1.75 * len(grouped) + 0.9), layout="constrained")
     axes = figure.subplots(len(grouped), columns, sharex=True, squeeze=False)
     for row, group in zip(axes, grouped, strict=True):
-        prefix, scale = _prefix(np.abs(trace.before[:, list(group.columns)]).max())
+        unit, scale = units[group.unit]
         _components(row[0], trace, group, scale * trace.before, scale)
-        row[0].set_ylabel(f"{group.name}\n[{prefix}{group.unit}]", fontsize=9)
+        row[0].set_ylabel(f"{group.name}\n[{unit}]", fontsize=9)
         if named:
             _components(row[1], trace, group, scale * trace.after, scale)
             row[1].set_ylim(*row[0].get_ylim())
@@ -84,11 +85,6 @@ def _time_figure(trace: Trace, grouped: Sequence[Group], *, named: bool) -> Figu
     for axis in axes[-1]:
         axis.set_xlabel("time [s]")
     return titled(figure, f"Residual of {trace.name}", handles, labels, len(labels))
-
-
-def _prefix(largest: float) -> tuple[str, float]:
-    """Prefix of the unit in which a number is easy to read, and the factor that goes with it."""
-    return ("", 1.0) if largest >= 0.1 else ("m", 1e3) if largest >= 1e-4 else ("u", 1e6)
 
 
 def _components(axis: Axes, trace: Trace, group: Group, values: Array, scale: float) -> None:

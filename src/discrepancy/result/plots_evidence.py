@@ -9,49 +9,59 @@ from matplotlib.figure import Figure
 
 from discrepancy.result.evidence_list import label, relation
 from discrepancy.result.plots_against import AFTER, BEFORE, log_scale, titled
-from discrepancy.result.text_gain import SMALL_UNITS
+from discrepancy.result.text_gain import response_units
 
-NAMED, FAMILY, OTHER = "#2f6fd0", "#8fb3e8", "#b9bfc9"
+RELATIONS = {
+    "named": ("named", "#2f6fd0", "s"),
+    "family": ("same family", "#3f8f6b", "o"),
+    "other": ("other", "#6b7280", "D"),
+}
 
 
 def evidence_figure(values: Mapping[str, Any]) -> Figure:
-    """Evidence of the strongest candidates: nothing named yet, and with what is named in the model."""
+    """Evidence of the strongest candidates: nothing named yet, and with what is named in the model; on one scale."""
     evidence = values["evidence"]
-    panels = [("nothing is named yet", evidence["before"])]
+    panels = [("nothing is named yet", drawn(evidence["before"]))]
     if evidence["after"] is not None:
-        panels.append(("the named causes are in the model", evidence["after"]))
+        panels.append(("the named causes are in the model", drawn(evidence["after"])))
     figure = Figure(figsize=(7.5 * len(panels), 5.2), layout="constrained")
-    axes = figure.subplots(1, len(panels), squeeze=False)[0]
+    axes = figure.subplots(1, len(panels), squeeze=False, sharex=True)[0]
     for axis, (title, strongest) in zip(axes, panels, strict=True):
-        _bars(axis, strongest, values["causes"], evidence["by_chance"])
+        _dots(axis, strongest, values["causes"], evidence["by_chance"])
         axis.set_title(f"when {title}", loc="left", fontsize=10)
-    handles = [axes[0].barh(np.nan, np.nan, color=c) for c in (NAMED, FAMILY, OTHER)]
+    seen = [evidence["by_chance"], *(entry["gain"] for _, strongest in panels for entry in strongest)]
+    axes[0].set_xlim(
+        0.6 * min(seen), 3.0 * max(seen)
+    )  # dots: bars would need a zero, which a log axis has not
     if values["causes"]:
-        figure.legend(
-            handles, ["named", "same family", "other"], loc="outside upper right", ncols=3, frameon=False,
-            fontsize=9,
-        )  # fmt: skip
+        handles = [axes[0].plot([], [], mark, color=colour)[0] for _, colour, mark in RELATIONS.values()]
+        words = [word for word, _, _ in RELATIONS.values()]
+        figure.legend(handles, words, loc="outside upper right", ncols=3, frameon=False, fontsize=9)
     figure.suptitle("Evidence: how much chi-square falls if the cause leaves its tolerance", x=0.01, ha="left",
                     fontsize=11)  # fmt: skip
     return figure
 
 
-def _bars(
+def drawn(strongest: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Candidates with a gain of at least 1; less is nothing on a scale of multiples."""
+    return [entry for entry in strongest if entry["gain"] >= 1.0]
+
+
+def _dots(
     axis: Axes, strongest: Sequence[Mapping[str, Any]], causes: Sequence[Mapping[str, Any]], by_chance: float
 ) -> None:
-    gains = [max(entry["gain"], 1.0) for entry in strongest]
-    at = list(range(len(gains)))[::-1]
-    colours = {"named": NAMED, "family": FAMILY, "other": OTHER}
-    axis.barh(at, gains, color=[colours[relation(entry, causes)] for entry in strongest])
-    axis.set_yticks(at, [label(entry) for entry in strongest], fontsize=9)
-    axis.set_ylim(-0.7, max(len(gains), 1) - 0.3)
+    at = list(range(len(strongest)))[::-1]
     axis.set_xscale("log")
-    axis.set_xlim(1.0, 3.0 * max([by_chance, *gains]))
-    for y, gain, entry in zip(at, gains, strongest, strict=True):
-        axis.text(1.05 * gain, y, f"{entry['gain']:.3g}", va="center", fontsize=8)
+    for y, entry in zip(at, strongest, strict=True):
+        _, colour, mark = RELATIONS[relation(entry, causes)]
+        axis.plot(entry["gain"], y, mark, color=colour, markersize=7)
+        axis.annotate(f"{entry['gain']:.3g}", (entry["gain"], y), (8, 0), textcoords="offset points", va="center",
+                      fontsize=8)  # fmt: skip
+    axis.set_yticks(at, [label(entry) for entry in strongest], fontsize=9)
+    axis.set_ylim(-0.7, max(len(strongest), 1) - 0.3)
     axis.axvline(by_chance, color="black", linewidth=0.8, linestyle="--")
     axis.set_xlabel("gain of chi-square (dashed: what chance can do)")
-    axis.grid(axis="x", alpha=0.25)
+    axis.grid(alpha=0.25)
 
 
 def closed_loop_figure(values: Mapping[str, Any]) -> Figure | None:
@@ -61,26 +71,32 @@ def closed_loop_figure(values: Mapping[str, Any]) -> Figure | None:
     if not trials:
         return None
     named = bool(values["causes"])
-    panels = [
-        (f"{name}_rms", f"{name} rms", *SMALL_UNITS.get(unit, (unit, 1.0)))
-        for name, unit in gain["units"].items()
-    ]
+    panels = [(f"{name}_rms", f"{name} rms", *shown) for name, shown in response_units(gain).items()]
     panels.append(("chi2_per_n", "chi2/n", "", 1.0))
     figure = Figure(figsize=(3.6 * len(panels), 4.0), layout="constrained")
     axes = figure.subplots(1, len(panels), squeeze=False)[0]
     at = np.arange(len(trials))
     for axis, (key, title, unit, scale) in zip(axes, panels, strict=True):
-        series = [("before", -0.2, BEFORE), ("after", 0.2, AFTER)] if named else [("before", 0.0, BEFORE)]
+        series = (
+            [("before", -0.1, BEFORE, "s"), ("after", 0.1, AFTER, "o")]
+            if named
+            else [("before", 0.0, BEFORE, "s")]
+        )
         low, high = np.inf, 0.0
-        for which, shift, colour in series:
+        for which, shift, colour, mark in series:
             heights = np.array([np.nan if t[which] is None else scale * t[which][key] for t in trials])
-            axis.bar(at + shift, heights, 0.38, color=colour, label=which if named else "error")
+            axis.plot(
+                at + shift, heights, mark, color=colour, markersize=8, label=which if named else "error"
+            )
             low, high = min(low, float(np.nanmin(heights))), max(high, float(np.nanmax(heights)))
         floor = scale * gain["noise"][key] if key in gain["noise"] else 1.0
         axis.axhline(floor, color="black", linewidth=0.8, linestyle="--", label="noise and integration error")
         low, high = min(low, floor), max(high, floor)
         if high > 12.0 * low:
             log_scale(axis, 10 ** np.floor(np.log10(0.9 * low)), 10 ** np.ceil(np.log10(1.1 * high)))
+        else:
+            axis.set_ylim(0.0, 1.15 * high)
+        axis.set_xlim(-0.6, len(trials) - 0.4)
         axis.set_xticks(at, [f"{k + 1}" for k in at])
         axis.set_xlabel("trial")
         axis.set_title(

@@ -26,12 +26,16 @@ class NamedCause:
         name: of the cause, such as ``sea_bias``.
         robot, joint: where it sits, counted from 1; None where it has no such place.
         sentence: what it does, with its numbers.
+        kind: the cause in words, such as ``torque zero of a driven joint``.
+        label: the same at its place, such as ``torque zero of joint 1 of robot 2``.
     """
 
     name: str
     robot: int | None
     joint: int | None
     sentence: str
+    kind: str = ""
+    label: str = ""
 
 
 @dataclass(frozen=True)
@@ -95,4 +99,14 @@ def _cause(values: Mapping[str, Any]) -> NamedCause:
     for what, number, most in (("robot", robot, None), ("joint", joint, 3)):
         if number is not None and (type(number) is not int or number < 1 or (most and number > most)):
             raise ValueError(f"{what} is {number!r:.40}")
-    return NamedCause(name, robot, joint, str(values["sentence"]))
+    return NamedCause(name, robot, joint, str(values["sentence"]), kind_of(values), name_of(values))
+
+
+def name_of(entry: Mapping[str, Any]) -> str:
+    """A cause at its place in words; an earlier version wrote none."""
+    return entry.get("name") or f"{kind_of(entry)} ({entry['place']})"
+
+
+def kind_of(entry: Mapping[str, Any]) -> str:
+    """A cause in words, wherever it sits."""
+    return entry.get("kind") or entry["cause"].replace("_", " ")

@@ -11,7 +11,7 @@ from discrepancy.rig import Candidate
 
 
 def detection_limits(explanation: Explanation) -> list[dict[str, Any]]:
-    """Detection limit of every parameter at every place: {cause, robot, joint, parameters: {name: size}}.
+    """Detection limit of every parameter at every place: {cause, kind, robot, joint, parameters: {name: size}}.
 
     A size is None where the data say nothing about it. Causes that are named, and transients, are left out.
     """
@@ -23,7 +23,7 @@ def blind_spots(explanation: Explanation) -> list[dict[str, Any]]:
     places: dict[str, list[str]] = {}
     for candidate, entry in _judged(explanation):
         if all(size is None for size in entry["parameters"].values()):
-            places.setdefault(candidate.cause, []).append(candidate.place)
+            places.setdefault(candidate.kind, []).append(candidate.place)
     return [
         {
             "what": f"{cause} ({'; '.join(where)})",
@@ -43,5 +43,5 @@ def _judged(explanation: Explanation) -> Iterator[tuple[Candidate, dict[str, Any
             p.name: float(size) if size < rules.ABSURD_UNITS * p.unit else None
             for p, size in zip(candidate.parameters, np.asarray(sizes), strict=True)
         }
-        place = zip(("cause", "robot", "joint"), candidate.key, strict=True)
-        yield candidate, {**dict(place), "parameters": parameters}
+        place = dict(zip(("cause", "robot", "joint"), candidate.key, strict=True))
+        yield candidate, {"kind": candidate.kind, **place, "parameters": parameters}

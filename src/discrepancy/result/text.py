@@ -5,6 +5,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from discrepancy import rules
+from discrepancy.causes.units import Shown, one_each, parameter
+from discrepancy.result.read import kind_of, name_of
+from discrepancy.result.remains import remains
 from discrepancy.result.text_gain import gain_lines
 
 WIDTH = 100
@@ -19,7 +22,7 @@ def format_diagnosis(values: Values) -> str:
     """
     lines = list(_wrapped(_verdict(values), ""))
     for k, cause in enumerate(values["causes"], start=1):
-        lines += ["", f"[[Cause {k}: {_label(cause)}]]", *_cause(cause)]
+        lines += ["", f"[[Cause {k}: {name_of(cause)} ({cause['cause']})]]", *_cause(cause, further=k > 1)]
     lines += gain_lines(values)
     notes = list(values["notes"])
     if values["not_simulated"] and not values["causes"]:
@@ -28,7 +31,7 @@ def format_diagnosis(values: Values) -> str:
             "the commands stays open."
         )
     if values["rejected"]:
-        names = ", ".join(_label(candidate) for candidate in values["rejected"])
+        names = ", ".join(name_of(candidate) for candidate in values["rejected"])
         notes.append(f"Looked likely, but did not hold on other trials: {names}.")
     if notes:
         lines += ["", "[[Notes]]"]
@@ -52,20 +55,22 @@ def _verdict(values: Values) -> str:
     causes, count = values["causes"], len(values["recordings"])
     data = "the recording" if count == 1 else f"the {count} recordings"
     named = " ".join(cause["sentence"] for cause in causes)
+    open_ = " ".join(remains(values))
     if values["verdict"] == "consistent":
-        return f"CONSISTENT. The simulation explains {data} within noise and tolerances; nothing is named."
+        return f"CONSISTENT. The simulation explains {data} within noise and tolerances; nothing is named. {open_}"
     if values["verdict"] == "explained":
-        return f"EXPLAINED. {named}"
+        return f"EXPLAINED. {named} {open_}"
     if values["verdict"] == "partly_explained":
-        return f"PARTLY EXPLAINED. {named} That is not all: something else is wrong, too."
+        return f"PARTLY EXPLAINED. {named} That is not all. {open_}"
     said = f"UNEXPLAINED. {data[0].upper()}{data[1:]} and the simulation differ, and "
     if causes:
         return f"{said}the catalogue's best explains little of it: {named}"
     return f"{said}no cause of the catalogue explains it."
 
 
-def _cause(cause: Values) -> Iterable[str]:
-    explained = f"Explains {_percent(cause['explained']['in_sample'])} of the misfit in sample"
+def _cause(cause: Values, *, further: bool) -> Iterable[str]:
+    more = "a further " if further else ""
+    explained = f"Explains {more}{_percent(cause['explained']['in_sample'])} of the misfit in sample"
     if cause["explained"]["held_out"] is not None:
         explained += f", {_percent(cause['explained']['held_out'])} on held-out trials"
     if cause["folds"]:
@@ -75,7 +80,7 @@ def _cause(cause: Values) -> Iterable[str]:
     alike = [rival for rival in cause["alternatives"] if rival["ambiguous"]]
     ruled_out = [rival for rival in cause["alternatives"] if not rival["ambiguous"]]
     if alike:
-        names = ", ".join(f"{_label(rival)} by {rival['evidence_gap']:.1f} nats" for rival in alike)
+        names = ", ".join(f"{name_of(rival)} by {rival['evidence_gap']:.1f} nats" for rival in alike)
         yield from _wrapped(f"Cannot be told from: {names}.")
         advice = dict.fromkeys(text for rival in [cause, *alike] if (text := rival["separate"]))
         yield from _wrapped("To tell them apart: " + " ".join(advice)) if advice else ()
@@ -88,7 +93,7 @@ def _cause(cause: Values) -> Iterable[str]:
 def _rival(rival: Values) -> str:
     loop = "" if rival["chi2_per_n"] is None else f", closed loop chi2/n {rival['chi2_per_n']:.3g}"
     gap = rival["evidence_gap"]
-    return f"{_label(rival)} ({abs(gap):.0f} nats {'worse' if gap >= 0 else 'better in the rows'}{loop})"
+    return f"{name_of(rival)} ({abs(gap):.0f} nats {'worse' if gap >= 0 else 'better in the rows'}{loop})"
 
 
 def _residual(values: Values) -> Iterable[str]:
@@ -113,26 +118,29 @@ def _residual(values: Values) -> Iterable[str]:
 
 
 def _limits(limits: Sequence[Values]) -> Iterable[str]:
-    """One line per cause: each parameter's smallest and largest limit over the places."""
+    """One line per cause: each parameter's smallest and largest limit over the places, in one unit per quantity."""
     sizes: dict[str, dict[str, list[float | None]]] = {}
+    kinds = {entry["cause"]: kind_of(entry) for entry in limits}
     for entry in limits:
         for name, size in entry["parameters"].items():
             sizes.setdefault(entry["cause"], {}).setdefault(name, []).append(size)
+    shown = one_each(
+        (parameter(name)[1], size)
+        for parameters in sizes.values() for name, values in parameters.items() for size in values if size is not None
+    )  # fmt: skip
     for cause, parameters in sizes.items():
-        each = ", ".join(f"{name} {_range(values)}" for name, values in parameters.items())
-        yield from _wrapped(f"{cause}: {each}")
+        each = ", ".join(_range(*parameter(name), values, shown) for name, values in parameters.items())
+        yield from _wrapped(f"{kinds[cause]} ({cause}): {each}")
 
 
-def _range(sizes: Sequence[float | None]) -> str:
+def _range(words: str, unit: str, sizes: Sequence[float | None], shown: Mapping[str, Shown]) -> str:
     seen = sorted(size for size in sizes if size is not None)
     if not seen:
-        return "never"
-    low, high = f"{seen[0]:.2g}", f"{seen[-1]:.2g}"
-    return (low if low == high else f"{low}-{high}") + (", not everywhere" if len(seen) < len(sizes) else "")
-
-
-def _label(candidate: Values) -> str:
-    return f"{candidate['cause']} ({candidate['place']})"
+        return f"{words} never"
+    unit, scale = shown[unit]
+    low, high = f"{scale * seen[0]:.2g}", f"{scale * seen[-1]:.2g}"
+    both = low if low == high else f"{low} to {high}"
+    return f"{words} {both} {unit}".rstrip() + (" (not everywhere)" if len(seen) < len(sizes) else "")
 
 
 def _percent(share: float) -> str:

@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from discrepancy.causes.units import Shown, one_each
+
 Values = Mapping[str, Any]
 
-SMALL_UNITS = {"rad": ("mrad", 1e3), "N m": ("mN m", 1e3), "m": ("mm", 1e3)}
 ERRORS = {
     "mass_percent": "mass [%]",
     "com_mm": "centre of mass [mm]",
@@ -40,8 +41,9 @@ def _closed_loop(gain: Values, *, named: bool) -> Iterable[str]:
     yield from ("", f"[[Response to the recorded commands, simulated again ({what})]]")
     heads = ["before", "after", "noise alone"] if named else ["error", "noise alone"]
     yield f"    {'':<26}" + "".join(f"{head:>14}" for head in heads)
-    for channel, unit in gain["units"].items():
-        shown, scale = SMALL_UNITS.get(unit, (unit, 1.0))
+    units = response_units(gain)
+    for channel in gain["units"]:
+        shown, scale = units[channel]
         noise = scale * gain["noise"][f"{channel}_rms"]
         rms = [scale * which[f"{channel}_rms"] for which in (before, after)]
         share = [100.0 * which[f"{channel}_nrmse"] for which in (before, after)]
@@ -55,6 +57,18 @@ def _closed_loop(gain: Values, *, named: bool) -> Iterable[str]:
         if low is not None and high is not None and count > 1:
             text += f" (95 % interval over {count} trials: {100 * low:.1f} to {100 * high:.1f} %)"
         yield text
+
+
+def response_units(gain: Values) -> dict[str, Shown]:
+    """In which unit every channel's error is shown: one for all channels of a kind, by the largest error."""
+    errors = [gain["held_out"]["before"], *(trial["before"] for trial in gain["trials"])]
+    shown = one_each(
+        (unit, error[f"{channel}_rms"])
+        for error in errors
+        if error
+        for channel, unit in gain["units"].items()
+    )
+    return {channel: shown[unit] for channel, unit in gain["units"].items()}
 
 
 def _rows(estimates: Values) -> tuple[dict[str, dict[str, float]], dict[str, str]]:

@@ -3,6 +3,9 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
+from discrepancy.causes.units import Shown, one_each
 from discrepancy.rig import Channel
 from estimator.arrays import Array
 
@@ -49,6 +52,14 @@ class Group:
     unit: str
     columns: tuple[int, ...]
     components: tuple[str, ...]
+
+
+def group_units(traces: Sequence[Trace], grouped: Sequence[Group]) -> dict[str, Shown]:
+    """For every unit of some channels the one in which all of them are shown, by the largest rms as simulated."""
+    return one_each(
+        (group.unit, float(np.sqrt(np.mean(trace.before[:, k] ** 2))))
+        for trace in traces for group in grouped for k in group.columns
+    )  # fmt: skip
 
 
 def groups(channels: Sequence[Channel]) -> list[Group]:

@@ -44,7 +44,7 @@ def diagnose_team(
     """
     check_recordings(recordings)
     say("estimate")
-    estimate = estimate_payload(recordings, compare_masses=True)
+    estimate = estimate_payload(recordings, compare_masses=True, withhold=False)
     check_estimate(estimate)
     say("linearise")
     known = read_tolerances(None) if tolerances is None else tolerances

@@ -4,7 +4,7 @@ from typing import Any
 
 UNDECIDABLE = (
     (
-        "zero of the last gimbal axis (theta_zero, joint 3)",
+        "zero of the last gimbal axis",
         "it turns the grasp frame by a constant, and the grasp frame is itself unknown",
         "a grasp whose orientation is known",
     ),
@@ -14,12 +14,12 @@ UNDECIDABLE = (
         "a run of the arm alone",
     ),
     (
-        "a scale common to all torques (sea_scale everywhere)",
+        "a scale common to all torques",
         "it scales the payload's mass and inertia and nothing else",
         "a known weight on the payload",
     ),
     (
-        "which robot's gimbal rubs (gimbal_friction)",
+        "which robot's gimbal rubs",
         "a pure moment about parallel axes is the same wherever it acts; only the axis shows",
         "one robot released at a time",
     ),

@@ -19,6 +19,7 @@ from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.identifiability import StepReport
 from estimator.estimate.inertia import InertiaEstimate, inertia_regressor
 from estimator.estimate.principal import inertia_parameters
+from estimator.leftover.steps import Steps
 from estimator.signals.grasp_data import GraspData
 from estimator.signals.holds import STILL_RATE_RADPS, STILL_SPEED_MPS
 from estimator.statistics import rms_length
@@ -43,12 +44,16 @@ class Trial:
         kind: ``"random"``, ``"periodic"`` or ``"static"``.
         payload: label of the payload, or None.
         data: the data points.
+        steps: rounding of its channels, or None where nobody asks whether the robots contradict each other.
+        team: number of robots that carried the payload, as far as the metadata say.
     """
 
     name: str
     kind: str
     payload: str | None
     data: GraspData
+    steps: Steps | None = None
+    team: int = 1
 
 
 def check_same_payload(trials: Sequence[Trial]) -> str | None:

@@ -25,6 +25,10 @@ from estimator.estimate.one_payload import check_one_payload, mass_alone
 from estimator.estimate.result import PayloadEstimate, RecordingEstimate
 from estimator.estimate.statics import CONTRADICTION, ComEstimate, estimate_from_holds
 from estimator.estimate.uncertainty import WINDOW_S
+from estimator.estimate.withheld import withheld
+from estimator.leftover.contradiction import contradiction
+from estimator.leftover.leftover import left_over
+from estimator.leftover.steps import steps_of
 from estimator.recording.model import Recording
 from estimator.signals.holds import Hold, find_holds
 from estimator.signals.process import process_recording
@@ -44,6 +48,7 @@ def estimate_payload(
     say: Callable[[str], object] = lambda _: None,
     *,
     compare_masses: bool = False,
+    withhold: bool = True,
 ) -> PayloadEstimate:
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
 
@@ -58,6 +63,7 @@ def estimate_payload(
         window_s: length of the windows for standard errors [s].
         say: takes the name of the stage that begins.
         compare_masses: also refuse recordings that, each alone, say different masses (see ``check_one_payload``).
+        withhold: leave out what the balance of forces does not bear out (see ``withheld``).
 
     Raises:
         InputError: the recordings do not belong together or contradict each other, the method needs what
@@ -71,7 +77,9 @@ def estimate_payload(
                 names.append(recording.name)
                 trials.append(_trial(recording, cutoff_hz, trim_s))
                 del recording  # or the next one would be read before this one is let go
-            return estimate_from_trials(trials, method, window_s, say, compare_masses=compare_masses)
+            return estimate_from_trials(
+                trials, method, window_s, say, compare_masses=compare_masses, withhold=withhold
+            )
     except (FloatingPointError, np.linalg.LinAlgError) as error:
         raise InputError(
             f"{', '.join(names)}: the equations cannot be solved ({error}); are the numbers in 'design' plausible?"
@@ -81,7 +89,12 @@ def estimate_payload(
 def _trial(recording: Recording, cutoff_hz: float, trim_s: float) -> Trial:
     labels = recording.metadata
     return Trial(
-        recording.name, labels.trial, labels.payload, process_recording(recording, cutoff_hz, trim_s)
+        recording.name,
+        labels.trial,
+        labels.payload,
+        process_recording(recording, cutoff_hz, trim_s),
+        steps_of(recording, cutoff_hz),
+        labels.team,
     )
 
 
@@ -92,6 +105,7 @@ def estimate_from_trials(
     say: Callable[[str], object] = lambda _: None,
     *,
     compare_masses: bool = False,
+    withhold: bool = True,
 ) -> PayloadEstimate:
     """The same from processed data; see ``estimate_payload``."""
     if method not in ("auto", "staged", "joint"):
@@ -108,6 +122,12 @@ def estimate_from_trials(
     flags: list[str] = []
     say("grasps")
     grasps, steps = _grasps(trials, records, flags, window_s)
+    if grasps is not None:
+        for k, trial in enumerate(trials):
+            if trial.steps is not None:
+                records[k] = replace(records[k], leftovers=left_over(trial.data, grasps, trial.steps))
+    contradicts = contradiction([(record.name, record.leftovers) for record in records])
+    flags += [contradicts] if contradicts else []
 
     say("mass and centre of mass")
     every_hold = [hold for found in holds for hold in found]
@@ -147,7 +167,7 @@ def estimate_from_trials(
     if inertia is not None:
         flags += _inertia_flags(inertia)
     doubts = {weak.reason for step in steps for weak in step.weak if CONTRADICTION in weak.reason}
-    flags += [f"No centre of mass, and a doubtful mass: {doubt}." for doubt in sorted(doubts)[:1]]
+    flags += [f"No centre of mass: {doubt}." for doubt in sorted(doubts)[:1]]
     if mass is None and inertia is None and (grasps is None or grasps.robots == 1):
         raise InputError(f"nothing can be estimated from these recordings: {_why(steps)}")
     if compare_masses and len(trials) > 1:
@@ -156,7 +176,7 @@ def estimate_from_trials(
             (trial.name, mass_alone(trial.data, found, record.grasps, window_s))
             for trial, found, record in zip(trials, holds, records, strict=True)
         )
-    return PayloadEstimate(
+    estimate = PayloadEstimate(
         payload=payload,
         robots=trials[0].data.robots,
         method=method,
@@ -169,6 +189,7 @@ def estimate_from_trials(
         recordings=tuple(records),
         flags=tuple(flags),
     )
+    return withheld(estimate, max(trial.team for trial in trials)) if withhold else estimate
 
 
 def _grasps(

@@ -26,7 +26,9 @@ steps                      list of {step, parameters, unit, singular_values, noi
                            weak: [{direction, vector, reason}]}; condition null if infinite
 undetermined               list of {step, direction, vector, reason}: all weak directions again
 recordings                 list of {name, trial, duration_s, holds, grasps, inertia, force_residual,
-                           moment_residual_m}
+                           moment_residual_m, leftovers: list of {name, unit, left, noise}: rms of what no rigid payload
+                           explains ("flange_position", "flange_rotation", "force", "moment"), and what noise leaves}
+contradicts                true if some of these are beyond noise: standard errors are too small then; null if not known
 flags                      list of sentences
 
 ``mocobot estimate`` adds ``provenance``: versions, options and hashes of the recordings (``mocobot.files.provenance``).
@@ -48,6 +50,8 @@ from estimator.estimate.identifiability import StepReport, WeakDirection
 from estimator.estimate.inertia import InertiaEstimate
 from estimator.estimate.statics import MassEstimate
 from estimator.estimate.uncertainty import norm_se, standard_errors
+from estimator.leftover.contradiction import beyond_noise
+from estimator.leftover.leftover import Leftover
 
 Given = TypeVar("Given")
 
@@ -68,6 +72,7 @@ class RecordingEstimate:
         force_residual: rms of f - m (a_c + g up) over m g, or None without a mass and a centre of mass.
         moment_residual_m: rms moment about the centre of mass that the inertia leaves, over m g [m]: the
             error of the centre of mass that would explain it; None where it cannot be told.
+        leftovers: what no rigid payload explains, beside noise; empty where the grasps are not known.
     """
 
     name: str
@@ -78,6 +83,7 @@ class RecordingEstimate:
     inertia: InertiaEstimate | None = None
     force_residual: float | None = None
     moment_residual_m: float | None = None
+    leftovers: tuple[Leftover, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Plain types; keys as the fields."""
@@ -85,6 +91,7 @@ class RecordingEstimate:
             **vars(self),
             "grasps": self.grasps and self.grasps.to_dict(),
             "inertia": self.inertia and self.inertia.to_dict(),
+            "leftovers": [one.to_dict() for one in self.leftovers],
         }
 
     @classmethod
@@ -93,6 +100,8 @@ class RecordingEstimate:
         parts = {
             "grasps": _if_given(values["grasps"], lambda grasps: GraspEstimate.from_dict(grasps, robots)),
             "inertia": _if_given(values["inertia"], InertiaEstimate.from_dict),
+            # Earlier versions did not write them.
+            "leftovers": tuple(Leftover(**one) for one in values.get("leftovers", ())),
         }
         return cls(**(values | parts))
 
@@ -140,6 +149,12 @@ class PayloadEstimate:
         return norm_se(self.p_1c, self.p_1c_covariance)
 
     @property
+    def contradicts(self) -> bool | None:
+        """Whether the robots contradict each other beyond noise, which no standard error covers; None if unknown."""
+        found = [one for recording in self.recordings for one in recording.leftovers]
+        return bool(beyond_noise(found)) if found else None
+
+    @property
     def undetermined(self) -> tuple[WeakDirection, ...]:
         """Every direction of every step that the data do not determine."""
         return tuple(weak for step in self.steps for weak in step.weak)
@@ -168,6 +183,7 @@ class PayloadEstimate:
             "steps": [step.to_dict() for step in self.steps],
             "undetermined": [{"step": weak.step, **weak.to_dict()} for weak in self.undetermined],
             "recordings": [recording.to_dict() for recording in self.recordings],
+            "contradicts": self.contradicts,
             "flags": list(self.flags),
         }
 

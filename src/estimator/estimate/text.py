@@ -8,7 +8,10 @@ import numpy as np
 from estimator.estimate.inertia import PARAMETERS
 from estimator.estimate.principal import ORDER
 from estimator.estimate.result import PayloadEstimate
+from estimator.leftover.contradiction import beyond_noise
 from estimator.numbers import measured
+
+_ZERO_SIGMAS = 2.0
 
 
 def format_estimate(estimate: PayloadEstimate) -> str:
@@ -37,6 +40,8 @@ def format_estimate(estimate: PayloadEstimate) -> str:
             text += ", principal moments " + _row(r.inertia.principal.moments) + " kg m^2"
         if r.force_residual is not None:
             text += f", force left over {100 * r.force_residual:.2g} % of the weight"
+        if wrong := beyond_noise(r.leftovers):
+            text += f", robots apart {max(one.ratio for one in wrong):.2g} times the noise"
         lines.append(text)
     lines += ["[[Excitation]]"]
     for step in estimate.steps:
@@ -62,7 +67,7 @@ def _grasps(estimate: PayloadEstimate) -> list[str]:
             continue
         pair = estimate.grasps.pair(i, j)
         angles, angles_se = np.rad2deg(pair.axis_angle_rad), np.rad2deg(pair.axis_angle_se_rad)
-        lines += _vector(f"R_{i}{j}", angles, angles_se, "deg", percent=False)
+        lines += _vector(f"R_{i}{j}", angles, angles_se, "deg")
         lines += _vector(f"p_{i}{j}", pair.p_ij, pair.p_se_m, "m")
         lines.append(_line(f"|p_{i}{j}|", float(np.linalg.norm(pair.p_ij)), pair.distance_se_m, "m"))
     return lines
@@ -81,18 +86,18 @@ def _inertia(estimate: PayloadEstimate) -> list[str]:
     if principal.axis_angle_rad is None or principal.axis_angle_se_rad is None:
         return [*lines, _none("R_1c")]
     angles, errors = np.rad2deg(principal.axis_angle_rad), np.rad2deg(principal.axis_angle_se_rad)
-    return [*lines, *_vector("R_1c", angles, errors, "deg", percent=False)]
+    return [*lines, *_vector("R_1c", angles, errors, "deg")]
 
 
-def _vector(
-    name: str, values: np.ndarray, errors: np.ndarray, unit: str, *, percent: bool = True
-) -> list[str]:
+def _vector(name: str, values: np.ndarray, errors: np.ndarray, unit: str) -> list[str]:
+    """Components, without percentages: a component may be zero where the vector is not."""
     each = zip("xyz", values, errors, strict=True)
-    return [_line(f"{name} {axis}", value, se, unit, percent=percent) for axis, value, se in each]
+    return [_line(f"{name} {axis}", value, se, unit, percent=False) for axis, value, se in each]
 
 
 def _line(name: str, value: float, se: float, unit: str, *, percent: bool = True) -> str:
-    share = f" ({100 * se / abs(value):.2g} %)" if percent and value else ""
+    # A value that is zero within its error has no share.
+    share = f" ({100 * se / abs(value):.2g} %)" if percent and abs(value) > _ZERO_SIGMAS * se else ""
     shown, error = measured(value, se) if 0 < se < np.inf else (f"{value:.6f}", f"{se:.6f}")
     return f"    {name + ':':<14}{shown:>14} +- {error} {unit}{share}"
 

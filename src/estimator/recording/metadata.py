@@ -8,11 +8,12 @@ from typing import Any, Literal
 
 from estimator.arm.design import OmnidDesign
 from estimator.errors import InputError
+from estimator.recording.sampling import Sampling
 from estimator.strict import Fields, parse_json
 
 FORMAT = "mocobot-recording"
-VERSIONS = (1, 2)
-"""Version 2 has the key ``level``; files of version 1 are joint level, and joint level is still written as such."""
+VERSIONS = (1, 2, 3)
+"""Version 2 has the key ``level``, version 3 ``sampling`` besides; each is written only where it is needed."""
 TRIALS = ("random", "periodic", "static")
 Level = Literal["joint", "wrist"]
 LEVELS: tuple[Level, ...] = ("joint", "wrist")
@@ -34,6 +35,7 @@ class RecordingMetadata:
         design: numbers of the robots (all alike).
         control: gains, feed-forward and inner loop as plain JSON values, or None.
         level: how the file tells the samples: "joint" (phi, theta, tau) or "wrist" (h, theta, force).
+        sampling: how each robot's sensors were read, N entries, where the samples are not as they were read.
     """
 
     robots: int
@@ -45,6 +47,13 @@ class RecordingMetadata:
     design: OmnidDesign
     control: dict[str, Any] | None = None
     level: Level = "joint"
+    sampling: tuple[Sampling, ...] | None = None
+
+    @property
+    def team(self) -> int:
+        """Robots that carried the payload: more than ``robots`` where ``control`` tells of forces of more."""
+        forces = (self.control or {}).get("feed_forward_N")
+        return max(self.robots, len(forces)) if isinstance(forces, list) else self.robots
 
     def to_json(self) -> str:
         """The metadata as JSON text.
@@ -54,12 +63,14 @@ class RecordingMetadata:
         """
         values: dict[str, Any] = {
             "format": FORMAT,
-            "version": 1 if self.level == "joint" else 2,
+            "version": 3 if self.sampling else 2 if self.level != "joint" else 1,
             **{key: getattr(self, key) for key in _REQUIRED[2:]},
             "design": self.design.to_dict(),
         }
-        if self.level != "joint":
+        if values["version"] > 1:
             values["level"] = self.level
+        if self.sampling:
+            values["sampling"] = [sampling.to_dict() for sampling in self.sampling]
         if self.control is not None:
             values["control"] = self.control
         try:
@@ -83,10 +94,13 @@ class RecordingMetadata:
         """
         values = parse_json(text, where)
         _check_format(values, where)
-        required = _REQUIRED + (("level",) if values.get("version") == 2 else ())
+        required = _REQUIRED + ("level", "sampling")[: values.get("version", 1) - 1]
         _check_values(Fields(values, required, where, _OPTIONAL))
         kept = {key: value for key, value in values.items() if key not in ("format", "version")}
         design = OmnidDesign.from_dict(values["design"], where=f"{where}: design")
+        if "sampling" in values:
+            parts = enumerate(values["sampling"])
+            kept["sampling"] = tuple(Sampling.from_dict(x, f"{where}: sampling[{k}]") for k, x in parts)
         return cls(**kept | {"rate_hz": float(values["rate_hz"]), "design": design})
 
 
@@ -120,5 +134,9 @@ def _check_values(fields: Fields) -> None:
     fields.object("design")
     if "level" in fields:
         require("level", f"one of {', '.join(LEVELS)}", good=values["level"] in LEVELS)
+    if "sampling" in fields:
+        sampling = values["sampling"]
+        good = isinstance(sampling, list) and len(sampling) == robots
+        require("sampling", "a list with one object for each robot", good=good)
     if "control" in fields:
         require("control", "an object (leave it out if unknown)", good=isinstance(values["control"], dict))

@@ -27,7 +27,7 @@ class Cause:
         sentence: what it does, with its numbers.
         parameters: values by name, units in the names; ``make_effect`` takes them.
         standard_errors: by the same names; None for what was chosen, not fitted.
-        in_sample: share of the nominal model's misfit that it removes.
+        in_sample: share of the nominal model's misfit that it removes beyond the causes before it.
         held_out: the same on trials left out of the fit, or None.
     """
 

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 from xml.etree import ElementTree
 
+from discrepancy.result.read import name_of
+from discrepancy.result.remains import remains
 from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.html import Child, Node, el
 from mocobot_report.blocks.numbers import percent, plain
@@ -40,8 +42,9 @@ def diagnosis_html(values: Values) -> str:
     rows: list[list[Entry]] = []
     for cause in values["causes"]:
         for k, (name, entry) in enumerate(cause["parameters"].items()):
-            first = (cause["cause"], cause["place"]) if k == 0 else ("", "")
-            rows.append([*first, name, measurement(entry["value"], entry["se"])])
+            rows.append(
+                [tidy(name_of(cause)) if k == 0 else "", name, measurement(entry["value"], entry["se"])]
+            )
     residual = values["residual"]
     misfit: list[list[Entry]] = [["chi²/n as simulated", Num(plain(residual["nominal"]["chi2_per_n"]))]]
     if rows:
@@ -53,12 +56,11 @@ def diagnosis_html(values: Values) -> str:
     sentences = [tidy(cause["sentence"]) for cause in values["causes"]]
     if not sentences and values["verdict"] != "consistent":
         sentences = [tidy(residual["nominal"]["signature"]["sentence"])]
+    sentences += map(tidy, remains(values))
     return _whole(
         named,
         bullets(sentences) if sentences else None,
-        table("Named causes", ["cause", "place", "parameter", "value ± standard error"], rows)
-        if rows
-        else None,
+        table("Named causes", ["cause", "parameter", "value ± standard error"], rows) if rows else None,
         table(
             "Misfit", ["", ""], misfit, note=f"of {len(values['recordings'])} trials; chi²/n of 1 is clean"
         ),

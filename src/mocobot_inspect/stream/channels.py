@@ -6,12 +6,11 @@ import numpy as np
 
 from estimator.arrays import Array
 from estimator.quantisation import quantisation_step
+from estimator.recording.sampling import SENSORS
 from mocobot_inspect.stream.frozen import Frozen, frozen
 from mocobot_inspect.stream.noise import noise_level
 from mocobot_logs.log import NS, Stamps
 
-SENSORS = 9
-"""Channels of a robot before its commands."""
 LISTED = 100
 """So many stuck and clipped stretches of a channel are kept; all are counted."""
 

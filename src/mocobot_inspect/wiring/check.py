@@ -178,7 +178,8 @@ def _best(
     limit = ALIKE * min(entry[0] for entry in top) + 1e-9
     # Among those that cannot be told apart, the earliest suspicion comes first.
     alike = sorted((entry for entry in (*top, *tried[_REFINED:]) if entry[0] <= limit), key=lambda e: e[1])
-    return alike[0][2], tuple(_distinct([entry[2] for entry in alike[1:]])), alike[0][0]
+    first, *others = _distinct([entry[2] for entry in alike])
+    return first, tuple(others), alike[0][0]
 
 
 def _alike(others: Team, best: Mistake, alike: tuple[Mistake, ...]) -> tuple[Mistake, ...]:

@@ -1,10 +1,9 @@
 """What resampling found in a robot's stream, and what it did to it."""
 
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import Any
 
-Method = Literal["untouched", "filtered", "interpolated"]
-"""Samples as they came; low-passed and thinned; interpolated, then low-passed and thinned."""
+from estimator.recording.sampling import Method
 
 
 @dataclass(frozen=True)
@@ -25,6 +24,7 @@ class StreamReport:
         duplicates: rows that repeat the row before, stamp and values; dropped.
         merged: rows closer than a quarter of a period to the row before; averaged with it.
         method: what was done.
+        steps: rounding step of every sensor's channel, 0 for none [SI].
     """
 
     robot: int
@@ -42,6 +42,7 @@ class StreamReport:
     duplicates: int
     merged: int
     method: Method
+    steps: tuple[float, ...]
 
     @property
     def filled_share(self) -> float:

@@ -6,12 +6,14 @@ import numpy as np
 
 from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES
+from estimator.recording.sampling import Method
 from mocobot_logs.log import NS, Array, Samples, Stamps, joined
 from mocobot_logs.resample.fill import Merger
 from mocobot_logs.resample.filter import Decimator, fineness
 from mocobot_logs.resample.grid import Grid, Interpolator
-from mocobot_logs.resample.report import Method, StreamReport
+from mocobot_logs.resample.report import StreamReport
 from mocobot_logs.resample.screen import Screen
+from mocobot_logs.resample.steps import StepFinder
 from mocobot_logs.resample.tally import Tally
 
 SLOWEST, FASTEST_HZ = 0.25, 20e3
@@ -47,6 +49,7 @@ class RobotStream:
         self._rows_waiting = 0
         self._head: list[tuple[Stamps, Array]] = []
         self._pipe: _Pipe | None = None
+        self._steps = StepFinder()
 
     @property
     def left_grid(self) -> bool:
@@ -101,6 +104,7 @@ class RobotStream:
             duplicates=screen.duplicates,
             merged=pipe.merged,
             method=pipe.method,
+            steps=self._steps.steps(),
         )
         return screen.first_ns + round(pipe.lead / self._rate_hz / NS), values, report
 
@@ -110,6 +114,7 @@ class RobotStream:
             waiting = [joined(waiting, len(self._channels))]
         for samples in waiting:
             rows = self.screen.keep(samples)
+            self._steps.add(rows[1])
             if self._pipe is not None:
                 self._pipe.push(*rows)
                 continue
@@ -123,7 +128,9 @@ class RobotStream:
         time_ns, values = (np.concatenate(parts) for parts in zip(*self._head, strict=True))
         self._head = []
         grid, k = self._plan(time_ns[:_LOOK])  # the same rows whatever the chunks
-        self._pipe = _Pipe(grid, k, Tally(self._where, grid.period_ns, self._max_gap_s), self._max_gap_s)
+        native_hz = 1.0 / (grid.period_ns * NS)
+        tally = Tally(self._where, grid.period_ns, self._max_gap_s, native_hz / self._rate_hz)
+        self._pipe = _Pipe(grid, k, tally, self._max_gap_s)
         self._pipe.push(time_ns, values)
         return self._pipe
 

@@ -6,8 +6,9 @@ from numpy.typing import NDArray
 from estimator.errors import InputError
 from mocobot_logs.log import NS, Array, Stamps
 
-MOST_MISSING = 0.1
-"""Largest share of samples that may be missing; the same for samples that crowd."""
+MOST_MISSING, MOST_MISSING_OF_MANY, MANY = 0.1, 0.5, 3
+"""Largest share of samples that may be missing, and the same where at least ``MANY`` make one sample of the output:
+half of them are still more than enough. The same for samples that crowd."""
 _STAMP_S = 1e-6  # gaps are measured no finer
 
 
@@ -28,8 +29,12 @@ class Tally:
         gaps, filled, longest_gap_s, jitter_max_s: as in ``StreamReport``.
     """
 
-    def __init__(self, where: str, period_ns: float, max_gap_s: float) -> None:
-        """``where`` names file and robot in messages; periods and gaps as in ``resample``."""
+    def __init__(self, where: str, period_ns: float, max_gap_s: float, thinned: float) -> None:
+        """``where`` names file and robot in messages; periods and gaps as in ``resample``.
+
+        ``thinned`` samples make one of the output.
+        """
+        self._most = MOST_MISSING if thinned < MANY else MOST_MISSING_OF_MANY
         self.gaps = self.filled = 0
         self.longest_gap_s = self.jitter_max_s = 0.0
         self._where, self._period_ns, self._max_gap_s = where, period_ns, max_gap_s
@@ -74,15 +79,15 @@ class Tally:
             InputError: too many are missing, or crowd.
         """
         expected = rows + self.filled
-        if self.filled > MOST_MISSING * expected:
+        if self.filled > self._most * expected:
             raise InputError(
                 f"{self._where}: {self.filled} of {expected} samples are missing "
-                f"({100 * self.filled / expected:.3g} %); at most {100 * MOST_MISSING:g} % may be "
+                f"({100 * self.filled / expected:.3g} %); at most {100 * self._most:g} % may be "
                 "(convert --crop keeps a part of the log)"
             )
-        if merged > MOST_MISSING * rows:
+        if merged > self._most * rows:
             raise InputError(
                 f"{self._where}: {merged} of {rows} samples come within a quarter of the usual "
-                f"{self._period_ns * NS:.6g} s of the one before; at most {100 * MOST_MISSING:g} % may "
+                f"{self._period_ns * NS:.6g} s of the one before; at most {100 * self._most:g} % may "
                 "(does the rate change, or do stamps tell when messages arrived?)"
             )

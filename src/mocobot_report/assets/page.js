@@ -96,12 +96,22 @@
     for (const tabs of document.querySelectorAll(".tabs")) show(tabs);
   });
 
-  // A table that is wider than its place can be scrolled with the keyboard.
+  // A table that is wider than its place can be scrolled with the keyboard, and shows on which side it goes on.
+  const hint = (box) => {
+    box.classList.toggle("more", box.scrollLeft + box.clientWidth < box.scrollWidth - 2);
+    box.classList.toggle("before", box.scrollLeft > 2);
+  };
   const reachable = () => {
     for (const box of document.querySelectorAll(".scroll")) {
       if (box.scrollWidth > box.clientWidth + 1) box.tabIndex = 0; else box.removeAttribute("tabindex");
+      hint(box);
     }
   };
+  for (const box of document.querySelectorAll(".scroll")) {
+    box.querySelector("caption").append(Object.assign(document.createElement("span"), {
+      className: "swipe", textContent: "\u2194 more columns: scroll sideways" }));
+    box.addEventListener("scroll", () => hint(box), { passive: true });
+  }
   new ResizeObserver(reachable).observe(document.body);
 
   // Where in the page the reader is.

@@ -1,6 +1,7 @@
 """Numbers as people read them: as many digits as the standard error has meaning, units that fit their size."""
 
 import math
+import re
 
 from estimator.numbers import decimals
 
@@ -77,20 +78,9 @@ def size(count: int) -> str:
     return f"{count}{THIN}B"
 
 
-SMALL = {"m": ("mm", 1e3), "rad": ("mrad", 1e3), "N m": ("mN m", 1e3), "m/s": ("mm/s", 1e3), "V": ("mV", 1e3),
-         "s": ("ms", 1e3)}  # fmt: skip
-SMALLER = {"m": ("µm", 1e6), "rad": ("µrad", 1e6), "N m": ("µN m", 1e6), "N": ("mN", 1e3), "s": ("µs", 1e6)}
-
-
-def fitting(unit: str, largest: float) -> tuple[str, float]:
-    """A unit in which numbers of up to a size are easy to read, and the factor to it."""
-    if largest < 1e-4 and unit in SMALLER:
-        return SMALLER[unit]
-    return SMALL[unit] if largest < 0.1 and unit in SMALL else (unit, 1.0)
-
-
 def spelled(unit: str) -> str:
-    """A unit as printed: ``kg m^2`` with a superscript."""
+    """A unit as printed: ``kg m^2`` with a superscript, ``um`` with a Greek letter."""
+    unit = re.sub(r"\bu(?=(m|rad|N m|s)\b)", "µ", unit)
     for ascii_power, shown in (("^2", "²"), ("^3", "³"), ("^4", "⁴")):
         unit = unit.replace(ascii_power, shown)
     return unit.replace(" ", THIN)

@@ -46,7 +46,7 @@ class Panel:
         unit: of its values.
         lines: to draw.
         limits: of the vertical axis, or None for all that there is.
-        band: half height of a shaded band around zero, or None.
+        band: times and half heights of a shaded band around zero, shape (n,) each, or None; NaN breaks it.
         rule: where a dashed line runs, or None.
         log: whether the axis is logarithmic; then it starts at ``limits``.
     """
@@ -55,7 +55,7 @@ class Panel:
     unit: str
     lines: Sequence[Line] = field(default_factory=list)
     limits: tuple[float, float] | None = None
-    band: float | None = None
+    band: tuple[Array, Array] | None = None
     rule: float | None = None
     log: bool = False
 
@@ -96,10 +96,25 @@ def _stacked(panels: Sequence[Panel]) -> go.Figure:
     for name, panel in zip(names, panels, strict=True):
         across = {"xref": "paper", "x0": 0, "x1": 1, "yref": name}
         if panel.band:
-            shown.add_shape(type="rect", y0=-panel.band, y1=panel.band, layer="below", line_width=0, **across)
+            path = around_zero(*panel.band)
+            shown.add_shape(type="path", path=path, layer="below", line_width=0, xref="x", yref=name)
         if panel.rule is not None:
             shown.add_shape(type="line", y0=panel.rule, y1=panel.rule, line_width=1, **across)
     return shown
+
+
+def around_zero(time: Array, half: Array) -> str:
+    """The outline of a band as SVG; where its height does not change, only ends are kept."""
+    out = []
+    for piece in np.split(np.arange(len(time)), np.flatnonzero(np.isnan(time))):
+        k = piece[~np.isnan(time[piece])]
+        change = np.abs(np.diff(half[k])) > 1e-3 * np.nanmax(half)
+        k = k[np.concatenate([[True], change]) | np.concatenate([change, [True]])] if len(k) else k
+        points = [*zip(time[k], half[k], strict=True), *zip(time[k][::-1], -half[k][::-1], strict=True)]
+        out += [f"{'L' if n else 'M'}{x:.5g},{y:.4g}" for n, (x, y) in enumerate(points)] + [
+            "Z" * bool(len(k))
+        ]
+    return "".join(out)
 
 
 def _vertical(panel: Panel) -> Axis:
@@ -144,6 +159,11 @@ def thinned(time: Array, values: Array, run: Array | None = None, most: int = MO
                 kept.update(start + np.argmax(values[start:end], axis=0))
         chosen = np.array(sorted(int(k) for k in kept))
         time, values, run = time[chosen], values[chosen], run[chosen]
+    return with_breaks(time, values, run)
+
+
+def with_breaks(time: Array, values: Array, run: Array) -> tuple[Array, Array]:
+    """Times, shape (n,), and values, shape (n, C), with a NaN row wherever another run begins."""
     breaks = np.flatnonzero(np.diff(run) > 0) + 1
     return np.insert(time.astype(float), breaks, np.nan), np.insert(
         values.astype(float), breaks, np.nan, axis=0

@@ -6,6 +6,7 @@ from typing import Any
 import plotly.graph_objects as go
 
 from discrepancy.result.evidence_list import label, relation
+from discrepancy.result.plots_evidence import drawn
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.charts import Axis, axis, chart, dots, figure, log_axis, row_axis
 from mocobot_report.blocks.html import Node, el
@@ -17,6 +18,7 @@ from mocobot_report.diagnosis.keys import CLEAN, misfits
 from mocobot_report.folder import Diagnosed
 
 Values = Mapping[str, Any]
+GAIN = "gain of chi-square"
 CHANCE = Key("", "what chance can do", "text", "dash")
 RELATIONS = (
     Key("named", "named", "before", "square"),
@@ -78,7 +80,7 @@ def _along(book: Book, title: str, shares: Values, colour: str) -> Node:
     across = axis("share of the misfit [%]", range=[0, 1.14 * max(shown)], nticks=5)
     said = ", ".join(f"{name} {percent(v)}" for name, v in shares.items())
     label = f"{title}: share of the squared residual along single sources: {said}"
-    note = "share of the squared residual along what one source alone can do"
+    note = "share of the squared residual along what one source alone can do; sources overlap, so shares do not add up"
     return _rows_chart(book, title, [bars], names, across, label, row_px=30, note=note)
 
 
@@ -100,20 +102,27 @@ def _strongest_sections(book: Book, values: Values) -> list[Node]:
     if not isinstance(evidence, Mapping):  # a diagnosis of an earlier version
         return []
     panels = {"Nothing is named yet": evidence["before"], "What is named is in the model": evidence["after"]}
+    worth = {title: drawn(entries or []) for title, entries in panels.items()}
+    seen = [evidence["by_chance"], *(entry["gain"] for entries in worth.values() for entry in entries)]
     charts = [
-        _strongest(book, title, entries, values["causes"], evidence["by_chance"])
-        for title, entries in panels.items()
+        _strongest(book, title, entries, values["causes"], evidence["by_chance"], log_axis(GAIN, seen))
+        for title, entries in worth.items()
         if entries
     ]
     said = (
         "How much chi-square falls if a cause leaves its tolerance, for the strongest candidates. Chance can do what "
-        "is left of the dashed line."
+        "is left of the dashed line. Both plots have the same logarithmic scale."
     )
     return _section(book, "Evidence", said, charts)
 
 
 def _strongest(
-    book: Book, title: str, entries: Sequence[Values], causes: Sequence[Values], by_chance: float
+    book: Book,
+    title: str,
+    entries: Sequence[Values],
+    causes: Sequence[Values],
+    by_chance: float,
+    across: Axis,
 ) -> Node:
     names, gains = [label(entry) for entry in entries], [entry["gain"] for entry in entries]
     traces, keys = [], []
@@ -124,10 +133,10 @@ def _strongest(
             text = [
                 f"{names[k]}: gain {plain(gains[k])}, by chance 10^{entries[k]['log10_p']:.0f}" for k in rows
             ]
-            traces.append(dots([max(gains[k], 1.0) for k in rows], rows, key, text))
+            traces.append(dots([gains[k] for k in rows], rows, key, text))
     said = ", ".join(f"{name} {plain(gain)}" for name, gain in zip(names, gains, strict=True))
     return _rows_chart(
-        book, title, traces, names, log_axis("gain of chi-square", [1.0, max(1.0, by_chance, *gains)]),
+        book, title, traces, names, across,
         f"{title}: gain of chi-square of the strongest candidates, {said}",
         rule=by_chance, left_px=190, most=40, font_px=9, keys=[*keys, CHANCE] if causes else [CHANCE],
     )  # fmt: skip

@@ -5,12 +5,12 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.result.text_gain import ERRORS
+from discrepancy.result.text_gain import ERRORS, response_units
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.charts import chart, column_axis, dots, figure, literal, log_axis
 from mocobot_report.blocks.html import Node, el
 from mocobot_report.blocks.legend import Key, shared_legend
-from mocobot_report.blocks.numbers import NONE, fitting, percent, plain
+from mocobot_report.blocks.numbers import NONE, percent, plain, spelled
 from mocobot_report.blocks.prose import folded, paragraph, tidy, verdict
 from mocobot_report.blocks.sections import section
 from mocobot_report.blocks.tables import Entry, Num, table, value
@@ -91,11 +91,12 @@ def _response(gain: Values, shown: Mapping[str, Key]) -> Node:
     """Error of every channel, absolute and as a share of its motion."""
     held = [gain["held_out"][which] for which in shown]
     rows: list[list[Entry]] = []
-    for channel, unit in gain["units"].items():
+    for channel, (unit, scale) in response_units(gain).items():
         key = f"{channel}_rms"
-        unit, scale = fitting(unit, gain["held_out"]["before"][key])
         errors = [value(scale * w[key], 3) for w in (*held, gain["noise"])]
-        rows.append([channel, unit, *errors, *(value(100.0 * w[f"{channel}_nrmse"], 2) for w in held)])
+        rows.append(
+            [channel, spelled(unit), *errors, *(value(100.0 * w[f"{channel}_nrmse"], 2) for w in held)]
+        )
     rows.append(
         ["chi²/n", "", *(value(w["chi2_per_n"], 3) for w in held), Num("1"), *(Num(NONE) for _ in held)]
     )
@@ -109,8 +110,8 @@ def _trials_chart(book: Book, gain: Values, key: str, names: Sequence[str], show
     trials, channel = gain["trials"], key.removesuffix("_rms")
     unit, scale, floor, title = "", 1.0, 1.0, "chi²/n"
     if channel != key:
-        largest = max((t["before"][key] for t in trials if t["before"] is not None), default=1.0)
-        unit, scale = fitting(gain["units"][channel], largest)
+        unit, scale = response_units(gain)[channel]
+        unit = spelled(unit)
         floor, title = scale * gain["noise"][key], f"{channel} rms"
     traces, seen = [], [floor]
     for which, entry in shown.items():

@@ -1,6 +1,8 @@
-"""What a diagnosis' plots compare."""
+"""How a diagnosis' plots and tables name things: what they compare, and causes."""
 
+from mocobot_report.blocks.html import Node, el
 from mocobot_report.blocks.legend import Key
+from mocobot_report.blocks.prose import tidy
 
 CLEAN = Key("", "clean data", "text", "dash")
 
@@ -10,3 +12,8 @@ def misfits(*, named: bool, lines: bool = False) -> tuple[Key, Key]:
     after = "with causes and tolerances" if named else "with tolerances"
     square, circle = ("line", "line") if lines else ("square", "circle")
     return Key("before", "as simulated", "before", square), Key("after", after, "after", circle)
+
+
+def cause_name(words: str, cause: str) -> Node:
+    """A cause in words, and softly what the command line calls it."""
+    return el("span", tidy(words), " ", el("code", cause, class_="id"))

@@ -7,20 +7,23 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from discrepancy.result.read import VERDICTS, read_diagnosis
+from discrepancy.causes.units import one_each, parameter
+from discrepancy.result.read import VERDICTS, name_of, read_diagnosis
+from discrepancy.result.remains import remains
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Node
-from mocobot_report.blocks.numbers import NONE, fitting, percent, plain, power
+from mocobot_report.blocks.numbers import NONE, percent, plain, power, spelled
 from mocobot_report.blocks.pictures import ASPECT
 from mocobot_report.blocks.prose import bullets, facts, folded, paragraph, tidy, tiles, verdict
 from mocobot_report.blocks.sections import section
 from mocobot_report.blocks.tables import Entry, Num, measurement, table, value
-from mocobot_report.blocks.units import parameter, short_names
+from mocobot_report.blocks.units import short_names
 from mocobot_report.diagnosis.evidence import evidence_sections
 from mocobot_report.diagnosis.gain import gain_section
+from mocobot_report.diagnosis.keys import cause_name
 from mocobot_report.diagnosis.residuals import residual_sections
 from mocobot_report.diagnosis.rest import rest_sections
 from mocobot_report.folder import Diagnosed
@@ -32,7 +35,7 @@ KINDS = {"consistent": "good", "explained": "good", "partly_explained": "warn", 
 MEANING = {
     "consistent": "The simulation explains the recordings within noise and tolerances; nothing is named.",
     "explained": "The named causes explain what the simulation got wrong.",
-    "partly_explained": "The named causes are there, but something else is wrong, too.",
+    "partly_explained": "The named causes are there, but more than noise is left.",
     "unexplained": "Recordings and simulation differ, and no cause of the catalogue accounts for it.",
 }
 
@@ -74,7 +77,11 @@ def answer(diagnosed: Diagnosed) -> list[Node]:
         said = bullets([tidy(cause["sentence"]) for cause in values["causes"]])
     elif values["verdict"] != "consistent":
         said = tidy(values["residual"]["nominal"]["signature"]["sentence"])
-    box = verdict(KINDS[values["verdict"]], VERDICTS[values["verdict"]], meaning, said)
+    left = remains(values)
+    kind = KINDS[values["verdict"]]
+    # Green stands beside no figure that contradicts it.
+    kind = "warn" if left and kind == "good" else kind
+    box = verdict(kind, VERDICTS[values["verdict"]], meaning, said, *map(tidy, left))
     return [paragraph(lede, kind="lede"), box, tiles(_tiles(values))]
 
 
@@ -158,41 +165,47 @@ def _grasped(values: Values) -> PayloadEstimate:
 
 def _causes(values: Values) -> list[Node]:
     """What is named and what supports it."""
+    causes = values["causes"]
+    units = one_each(
+        (parameter(name)[1], entry["value"])
+        for cause in causes
+        for name, entry in cause["parameters"].items()
+    )
     sizes: list[list[Entry]] = []
     support: list[list[Entry]] = []
-    for cause in values["causes"]:
-        who = (cause["cause"], cause["place"])
+    for cause in causes:
+        who = cause_name(name_of(cause), cause["cause"])
         for k, (name, entry) in enumerate(cause["parameters"].items()):
             words, unit = parameter(name)
-            unit, scale = fitting(unit, abs(entry["value"])) if unit in ("s", "m", "rad") else (unit, 1.0)
+            unit, scale = units[unit] if unit in ("s", "m", "rad", "m/N") else (unit, 1.0)
             se = None if entry["se"] is None else scale * entry["se"]
-            sizes.append(
-                [*(who if k == 0 else ("", "")), words, measurement(scale * entry["value"], se), unit]
-            )
+            shown = measurement(scale * entry["value"], se, spelled(unit))
+            sizes.append([who if k == 0 else "", shown, words])
         shares = (Num(_share(cause["explained"][kind])) for kind in ("in_sample", "held_out"))
         folds = cause["folds"]
         better = f"{sum(gain > 0 for gain in folds)} of {len(folds)}" if folds else NONE
-        support.append([*who, *shares, Num(better), Num(power(cause["log10_p"]))])
+        support.append([tidy(name_of(cause)), *shares, Num(better), Num(power(cause["log10_p"]))])
+    if len(causes) > 1:
+        each = ([cause["explained"][kind] for cause in causes] for kind in ("in_sample", "held_out"))
+        sums = [Num(NONE) if None in shares else Num(_share(sum(shares))) for shares in each]
+        support.append(["All together", *sums, Num(""), Num("")])
     note = (
-        "share of the misfit as simulated that goes away; held out: fitted to the other trials; by chance: probability "
-        "of so much evidence in clean data"
+        "share of the misfit as simulated that a cause removes beyond those above it, so that shares add up; held out: "
+        "fitted to the other trials; by chance: probability of so much evidence in clean data"
     )
-    head = ["cause", "place", "parameter", "value ± standard error", "unit"]
-    supports = ["cause", "place", "in sample [%]", "held out [%]", "folds better", "by chance"]
+    supports = ["cause", "in sample [%]", "held out [%]", "folds better", "by chance"]
     return [
-        table("What is named", head, sizes, groups=True),
-        table("What supports it", supports, support, note=note),
-        *_rivals(values["causes"]),
-        *_shapes(values["causes"]),
+        table(
+            "What is named", ["cause", "value ± standard error", "parameter"], sizes, groups=True, stack=True
+        ),
+        table("What supports it", supports, support, note=note, stack=True),
+        *_rivals(causes),
+        *_shapes(causes),
     ]
 
 
 def _share(share: float | None) -> str:
     return percent(share).removesuffix("\u00a0%")
-
-
-def _label(cause: Values) -> str:
-    return f"{cause['cause']} ({cause['place']})"
 
 
 def _rivals(causes: Sequence[Values]) -> list[Node]:
@@ -205,11 +218,14 @@ def _rivals(causes: Sequence[Values]) -> list[Node]:
         for k, rival in enumerate(cause["alternatives"]):
             gap, chi2 = value(rival["evidence_gap"]), value(rival["chi2_per_n"])
             said = "cannot be told apart" if rival["ambiguous"] else "fits worse"
-            rows.append([_label(cause) if k == 0 else "", _label(rival), gap, chi2, said])
+            named, other = tidy(name_of(cause)) if k == 0 else "", cause_name(name_of(rival), rival["cause"])
+            rows.append([named, other, said, gap, chi2])
     if not rows:
         return [paragraph(f"No other {'cause comes' if len(causes) == 1 else 'causes come'} near.")]
-    head = ["named", "alternative", "behind by [nats]", "closed loop chi²/n", "verdict"]
-    out = [table("Alternatives", head, rows, note="how much less the rows speak for it", groups=True)]
+    head = ["named", "alternative", "verdict", "behind by [nats]", "closed loop chi²/n"]
+    out = [
+        table("Alternatives", head, rows, note="how much less the rows speak for it", groups=True, stack=True)
+    ]
     return [*out, verdict("warn", "What would tell them apart", bullets(list(advice)))] if advice else out
 
 
@@ -218,7 +234,9 @@ def _shapes(causes: Sequence[Values]) -> list[Node]:
     entries = []
     for cause in causes:
         named = ((*parameter(name), number) for name, number in cause["shape"].items())
-        said = ", ".join(f"{words} {plain(number, 4)} {unit}".rstrip() for words, unit, number in named)
+        said = ", ".join(
+            f"{words} {plain(number, 4)} {spelled(unit)}".rstrip() for words, unit, number in named
+        )
         if said:
-            entries.append((_label(cause), said))
+            entries.append((tidy(name_of(cause)), said))
     return [folded("Shape parameters", facts(entries))] if entries else []

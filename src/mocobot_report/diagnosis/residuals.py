@@ -1,21 +1,22 @@
 """The residual over time, against what it may depend on, and by channel, without and with the named causes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import zip_longest
 
 import numpy as np
 
+from discrepancy.causes.units import Shown
 from discrepancy.result.residual_statistics import binned, multiples, spectrum
-from discrepancy.result.traces import Group, Trace, groups
+from discrepancy.result.traces import Group, Trace, group_units, groups
 from estimator.arrays import Array
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.charts import axis, chart, figure, line, log_axis
 from mocobot_report.blocks.html import Node, el
 from mocobot_report.blocks.legend import Key, shared_legend
-from mocobot_report.blocks.numbers import fitting
+from mocobot_report.blocks.numbers import spelled
 from mocobot_report.blocks.prose import paragraph, verdict
 from mocobot_report.blocks.sections import section, tabs
-from mocobot_report.blocks.series import Line, Panel, runs, stacked_chart, thinned
+from mocobot_report.blocks.series import Line, Panel, runs, stacked_chart, thinned, with_breaks
 from mocobot_report.blocks.tables import Entry, table, value
 from mocobot_report.blocks.units import QUANTITIES
 from mocobot_report.diagnosis.keys import CLEAN, misfits
@@ -35,10 +36,11 @@ def residual_sections(book: Book, diagnosed: Diagnosed, names: Sequence[str]) ->
         )
         return [section(book, "Residuals", verdict("warn", "No residuals", said))]
     grouped, named = groups(diagnosed.channels), bool(diagnosed.values["causes"])
+    units = group_units(traces, grouped)
     trials = []
     for trace, name in zip(traces, names, strict=True):
         book.say(f"residuals of {name}")
-        trials.append((name, _over_time(book, trace, name, grouped, named=named)))
+        trials.append((name, _over_time(book, trace, name, grouped, units, named=named)))
     note = (
         "Recorded minus simulated, in physical units and in multiples of what clean data of these sensors would leave: "
         "1 is clean. Zooming one plot in time zooms those above and below."
@@ -46,7 +48,7 @@ def residual_sections(book: Book, diagnosed: Diagnosed, names: Sequence[str]) ->
     over_time = [
         paragraph(note, kind="note"),
         tabs(book, "Trial", trials),
-        _rms(traces, grouped, named=named),
+        _rms(traces, grouped, units, named=named),
     ]
     against = _against(book, traces, grouped, misfits(named=named, lines=True))
     return [
@@ -55,12 +57,14 @@ def residual_sections(book: Book, diagnosed: Diagnosed, names: Sequence[str]) ->
     ]
 
 
-def _over_time(book: Book, trace: Trace, name: str, grouped: Sequence[Group], *, named: bool) -> Node:
+def _over_time(
+    book: Book, trace: Trace, name: str, grouped: Sequence[Group], units: Mapping[str, Shown], *, named: bool
+) -> Node:
     run = runs(trace.time[: trace.moving], 1.0 / trace.rate_hz)
     views = {"as simulated": trace.before} | ({"with the named causes": trace.after} if named else {})
     note = "same scale as simulated and with the causes" if named else None
     physical = [
-        _physical(book, trace, f"{name}: residual {view}", values, grouped, run, note)
+        _physical(book, trace, f"{name}: residual {view}", values, grouped, units, run, note)
         for view, values in views.items()
     ]
     multiples = _multiples(book, trace, name, grouped, run, named=named)
@@ -79,6 +83,7 @@ def _physical(
     title: str,
     values: Array,
     grouped: Sequence[Group],
+    units: Mapping[str, Shown],
     run: Array,
     note: str | None,
 ) -> Node:
@@ -90,10 +95,11 @@ def _physical(
     for group in grouped:
         columns = list(group.columns)
         limit = _limit(trace.before[:, columns], trace.sigma[:, columns])
-        unit, scale = fitting(group.unit, limit)
+        unit, scale = units[group.unit]
         lines = _lines(trace, scale * values[:, columns], keys, run)
-        band = 2.0 * scale * float(np.median(trace.sigma[:, columns].max(axis=1)))
-        panels.append(Panel(group.name, unit, lines, (-scale * limit, scale * limit), band=band))
+        time, sigma = with_breaks(trace.time[: trace.moving], trace.sigma[: trace.moving, columns], run)
+        band = (time, 2.0 * scale * sigma.max(axis=1)) if trace.moving else None
+        panels.append(Panel(group.name, spelled(unit), lines, (-scale * limit, scale * limit), band=band))
     legend = [*keys, BAND] if len(keys) > 1 else [BAND]
     label = f"{title}, every group of channels over time; rms values are in the table below."
     return stacked_chart(book, title, panels, keys=legend, note=note, label=label)
@@ -135,16 +141,18 @@ def _multiples(
     )  # fmt: skip
 
 
-def _rms(traces: Sequence[Trace], grouped: Sequence[Group], *, named: bool) -> Node:
+def _rms(
+    traces: Sequence[Trace], grouped: Sequence[Group], units: Mapping[str, Shown], *, named: bool
+) -> Node:
     """Physical and whitened rms of every channel, over all trials."""
     rows: list[list[Entry]] = []
     for group in grouped:
         roots = [_roots(traces, column) for column in group.columns]
-        unit, scale = fitting(group.unit, max(before for before, *_ in roots))
+        unit, scale = units[group.unit]
         for k, ((before, after, *white), component) in enumerate(zip(roots, group.components, strict=True)):
             physical = [scale * root for root in (before, after)[: 1 + named]]
             names = [group.name if k == 0 else "", component if len(roots) > 1 else ""]
-            rows.append([*names, unit, *map(value, physical + white)])
+            rows.append([*names, spelled(unit), *map(value, physical + white)])
     head = ["channel", "", "unit", *(["before", "after"] if named else ["rms"])]
     head += ["before [× clean]", ("after" if named else "within tolerances") + " [× clean]"]
     return table("Rms of the residual over all trials", head, rows, groups=True, headers=2)

@@ -4,13 +4,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from discrepancy.causes.units import one_each, parameter
+from discrepancy.result.read import kind_of, name_of
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Child, Node, el
-from mocobot_report.blocks.numbers import plain, size
+from mocobot_report.blocks.numbers import plain, size, spelled
 from mocobot_report.blocks.prose import bullets, folded, paragraph, tidy
 from mocobot_report.blocks.sections import section
 from mocobot_report.blocks.tables import Entry, Num, table
-from mocobot_report.blocks.units import parameter
+from mocobot_report.diagnosis.keys import cause_name
 from mocobot_report.folder import Diagnosed
 
 Values = Mapping[str, Any]
@@ -29,7 +31,7 @@ def rest_sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
     ]
     notes = [tidy(note) for note in values["notes"]]
     if values["rejected"]:
-        names = ", ".join(f"{c['cause']} ({c['place']})" for c in values["rejected"])
+        names = ", ".join(name_of(c) for c in values["rejected"])
         notes.append(f"Looked likely, but did not hold on other trials: {names}.")
     outline = [
         ("What would have been noticed", limits),
@@ -43,24 +45,35 @@ def rest_sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
 def _limits(values: Values) -> Node:
     """One row per cause and parameter: smallest and largest limit over the places."""
     sizes: dict[tuple[str, str], list[float | None]] = {}
+    kinds = {entry["cause"]: kind_of(entry) for entry in values["detection_limits"]}
     for entry in values["detection_limits"]:
         for name, limit in entry["parameters"].items():
             sizes.setdefault((entry["cause"], name), []).append(limit)
+    shown = one_each(
+        (parameter(name)[1], limit)
+        for (_, name), found in sizes.items()
+        for limit in found
+        if limit is not None
+    )
     rows: list[list[Entry]] = []
     last = ""
     for (cause, name), found in sizes.items():
         words, unit = parameter(name)
-        seen = sorted(limit for limit in found if limit is not None)
-        low, high = (plain(seen[0], 2), plain(seen[-1], 2)) if seen else ("never", "never")
+        unit, scale = shown.get(unit, (unit, 1.0))
+        seen = sorted(scale * limit for limit in found if limit is not None)
         blind = len(found) - len(seen)
-        where = f"nowhere: these recordings say nothing ({len(found)} places)" if not seen else (
-            f"{len(seen)} of {len(found)}" if blind else "everywhere"
-        )  # fmt: skip
-        rows.append([cause if cause != last else "", words, Num(low), Num(high), unit, where])
+        sizes_said = Num("never")
+        where = f"nowhere: these recordings say nothing ({len(found)} places)"
+        if seen:
+            low, high = plain(seen[0], 2), plain(seen[-1], 2)
+            sizes_said = Num(low if low == high else f"{low} to {high}", unit=spelled(unit))
+            where = f"{len(seen)} of {len(found)}" if blind else "everywhere"
+        who = cause_name(kinds[cause], cause) if cause != last else ""
+        rows.append([who, words, sizes_said, where])
         last = cause
     return table(
-        "Size that would have been noticed nine times in ten", ["cause", "parameter", "best place", "worst place",
-        "unit", "seen at"], rows, groups=True,
+        "Size that would have been noticed nine times in ten", ["cause", "parameter", "best to worst place",
+        "seen at"], rows, groups=True, stack=True,
         note="had it been there, in these very recordings",
     )  # fmt: skip
 

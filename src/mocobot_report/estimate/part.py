@@ -9,6 +9,7 @@ import numpy as np
 
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
+from estimator.leftover.contradiction import CONTRADICTS
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import NONE, percent, plain, with_error
@@ -86,8 +87,10 @@ def _doubts(e: PayloadEstimate) -> Node:
         said = "The recordings determine every one of them and fit one rigid payload."
         return verdict("good", "Nothing speaks against these numbers", said)
     return verdict(
-        "warn",
-        "What to know before these numbers are trusted",
+        "bad" if e.contradicts else "warn",
+        "The robots contradict each other: do not trust the standard errors"
+        if e.contradicts
+        else "What to know before these numbers are trusted",
         bullets(list(e.flags)) if e.flags else None,
         f"The recordings do not give: {', '.join(missing)}." if missing else None,
         *(
@@ -183,16 +186,21 @@ def _recordings(e: PayloadEstimate) -> Node:
         "holds",
         "force left over [% of weight]",
         "moment left over [mm]",
+        "most left over [times noise]",
     ]
     rows = [
         [
             Path(r.name).name, r.trial, Num(f"{r.duration_s:.1f}"), Num(str(r.holds)),
             value(None if r.force_residual is None else 100.0 * r.force_residual, 2),
             value(None if r.moment_residual_m is None else 1e3 * r.moment_residual_m, 2),
+            value(max((one.ratio for one in r.leftovers), default=None), 2),
         ]
         for r in e.recordings
     ]  # fmt: skip
-    note = "moment left over: the error of the centre of mass that would explain it"
+    note = (
+        "moment left over: the error of the centre of mass that would explain it; times noise: gaps at the flanges, "
+        f"forces and moments that no rigid payload explains; beyond {CONTRADICTS:g} the robots contradict each other"
+    )
     return table("Recordings", head, rows, note=note)
 
 
@@ -213,7 +221,7 @@ def _excitation(book: Book, e: PayloadEstimate) -> list[Node | None]:
     return [
         paragraph(note, kind="note"),
         excitation_chart(book, e),
-        table("Directions that the data do not determine", ["step", "direction", "reason"], weak)
+        table("Directions that the data do not determine", ["step", "direction", "reason"], weak, stack=True)
         if weak
         else None,
         folded("As a table", table("Excitation of every step", head, rows)),

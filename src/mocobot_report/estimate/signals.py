@@ -99,7 +99,7 @@ def _plots(book: Book, name: str, left: list[Left], notes: list[str]) -> list[No
     gaps, balance = [one for one in left if one.keys is not AXES], [one for one in left if one.keys is AXES]
     out: list[Node] = []
     if gaps:
-        out.append(_over_time(book, "Flanges and grasps apart", gaps, name))
+        out.append(_robot_by_robot(book, "Flanges and grasps apart", gaps, name))
     if balance:
         out.append(_over_time(book, "Wrenches minus what the motion needs, in {1}", balance, name))
         out.append(el("div", *(_spectrum(book, one) for one in balance), class_="pair"))
@@ -115,6 +115,20 @@ def _over_time(book: Book, title: str, left: list[Left], name: str) -> Node:
         )
     label = f"{title}, over time, {name}; rms values are in the table."
     return stacked_chart(book, title, panels, keys=left[0].keys, label=label)
+
+
+def _robot_by_robot(book: Book, title: str, left: list[Left], name: str) -> Node:
+    """One plot per robot, on one scale per quantity: on top of each other the last would hide the others."""
+    panels = []
+    for one in left:
+        time, values = thinned(one.time, one.values)
+        limits = (min(0.0, 1.05 * float(np.nanmin(values))), 1.05 * float(np.nanmax(values)) or 1.0)
+        panels += [
+            Panel(f"{key.label}: {one.name}", one.unit, [Line(key, time, values[:, k])], limits)
+            for k, key in enumerate(one.keys)
+        ]
+    label = f"{title}, over time, robot by robot, {name}; rms values are in the table."
+    return stacked_chart(book, title, panels, keys=[], label=label, note="the same scale for every robot")
 
 
 def _spectrum(book: Book, one: Left) -> Node:

@@ -15,14 +15,21 @@ def errors_table(e: PayloadEstimate, truth: BodyFacts) -> Node:
     rows: list[list[Entry]] = []
 
     def row(
-        name: str, unit: str, true: float, found: float | None, se: float | None, scale: float = 1.0
+        name: str,
+        unit: str,
+        true: float,
+        found: float | None,
+        se: float | None,
+        scale: float = 1.0,
+        of: float = 0.0,
     ) -> None:
+        of = of or true
         known: list[float | None] = [None, None, None]
         if found is not None:
             error = found - true
             known = [
                 scale * error,
-                100.0 * abs(error / true) if true else None,
+                100.0 * abs(error / of) if of else None,
                 abs(error) / se if se else None,
             ]
         rows.append([quantity(name), unit, value(scale * true, 5), *(value(v, 2) for v in known)])
@@ -33,7 +40,7 @@ def errors_table(e: PayloadEstimate, truth: BodyFacts) -> Node:
         p, errors = e.p_1c, e.p_1c_se_m
         for k, name in enumerate("xyz"):
             found, se = (None, None) if p is None or errors is None else (float(p[k]), float(errors[k]))
-            row(f"p_1c {name}", "mm", float(truth.p_1c[k]), found, se, 1e3)
+            row(f"p_1c {name}", "mm", float(truth.p_1c[k]), found, se, 1e3, float(np.linalg.norm(truth.p_1c)))
     if truth.principal_kgm2 is not None:
         for k, true in enumerate(np.sort(truth.principal_kgm2)):
             p = None if e.inertia is None else e.inertia.principal
@@ -45,9 +52,10 @@ def errors_table(e: PayloadEstimate, truth: BodyFacts) -> Node:
             pair = None if e.grasps is None else e.grasps.pair(1, j)
             for k, name in enumerate("xyz"):
                 found, se = (None, None) if pair is None else (float(pair.p_ij[k]), float(pair.p_se_m[k]))
-                row(f"p_1{j} {name}", "mm", float(true[k]), found, se, 1e3)
+                row(f"p_1{j} {name}", "mm", float(true[k]), found, se, 1e3, float(np.linalg.norm(true)))
             if e.grasps is not None:
                 angle = rotation_error_deg(truth.grasps.R_1i[j - 1], e.grasps.R_1i[j - 1])
                 rows.append([quantity(f"R_1{j}"), "deg", Num(NONE), value(angle, 2), Num(NONE), Num(NONE)])
     head = ["", "unit", "truth", "error", "error [%]", "in standard errors"]
-    return table("Estimate against truth", head, rows, note="error of a rotation: its angle")
+    note = "error of a rotation: its angle; error [%] of a component: share of the vector's length"
+    return table("Estimate against truth", head, rows, note=note)

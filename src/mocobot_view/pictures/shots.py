@@ -126,7 +126,7 @@ def diagnosis_shot(
     _bars(marks, team, RED if guilty else BAR_RGBA)
     _names(marks, team)
     _causes(marks, team, causes)
-    where = [f"{cause.name} ({_place(cause)})" for cause in causes]
+    where = [f"{cause.label or cause.name} ({_place(cause)})" for cause in causes]
     found = f" Red: {', '.join(where)}." if where else " No cause is named."
     says = _says(recording, team, None, marked=False) + found
     return _shot(team.model, team.qpos, marks, says, aspect, ABOVE)
@@ -251,5 +251,5 @@ def _causes(marks: Marks, team: MeasuredTeam, causes: Sequence[NamedCause]) -> N
         seen = np.isin(team.model.geom_bodyid, bodies)
         team.model.geom_rgba[seen, :3] = RED[:3]
         marks.ellipsoid(where, MARK_M, (*RED[:3], 0.45))
-        text = ", ".join(cause.name for cause in here)
+        text = ", ".join(cause.kind or cause.name for cause in here)
         marks.label(text, where + np.array([0.0, 0.0, 2.0 * MARK_M]), colours.FAULT)

@@ -37,7 +37,7 @@ def values(diagnosis: Diagnosis) -> dict[str, float]:
 def test_friction_of_the_axis_is_named(first) -> None:
     _, diagnosis, _, _ = first
     found = values(diagnosis)
-    assert diagnosis.verdict == "explained"
+    assert diagnosis.verdict == "partly_explained"  # 99.9 % of the misfit, but what is left is not noise
     assert {"mass", "coulomb_friction", "viscous_friction", "asymmetric_viscous"} <= set(found)
     assert not set(found) & {"force_offset", "push", "backlash", "injected_force", "injected_voltage"}
     assert 100.0 + found["mass"] == pytest.approx(95.0, abs=1.5)  # 94.7 by the reference

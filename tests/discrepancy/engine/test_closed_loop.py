@@ -83,7 +83,7 @@ def test_cause_that_cannot_be_simulated_is_dropped():
     diagnosis = diagnose(FakeRig({2: 25.0}, loop=lambda c, t: None if c else 9.0))
     assert diagnosis.causes == ()
     assert diagnosis.notes == (
-        "cause 2 (robot 1): with it the recorded commands cannot be simulated, so it is not named.",
+        "Cause 2 (robot 1): with it the recorded commands cannot be simulated, so it is not named.",
     )
 
 
@@ -117,5 +117,5 @@ def test_what_a_replaced_cause_left_goes_with_it():
     assert names(confirmed.explanation.found) == [other.cause]
     assert [a.candidate.cause for (a,) in confirmed.alternatives] == [found.candidate.cause]
     assert [r.chi2_per_n for r in confirmed.gain.after] == pytest.approx([1.1] * 4)
-    assert confirmed.notes[1] == "cause 6 (robot 1): tells nothing any more beside that, so it is not named."
+    assert confirmed.notes[1] == "Cause 6 (robot 1): tells nothing any more beside that, so it is not named."
     assert rig.calls[-1][1] == (other.cause,)  # simulated again without it

@@ -70,6 +70,11 @@ def test_trials_that_confirm(folds, expected):
 def test_two_causes_are_found_the_larger_first():
     explanation = search(FakeRig({2: 20.0, 5: [40.0, -30.0]}))
     assert names(explanation.found) == ["cause 5", "cause 2"]
+    # Columns are independent and alike in size, so shares are those of the squares: 2500 and 400 of 2900.
+    for kind in ("in_sample", "held_out"):
+        shares = [getattr(found, kind) for found in explanation.found]
+        np.testing.assert_allclose(shares, [25 / 29, 4 / 29], atol=0.06)
+        assert 0.95 < sum(shares) <= 1.0 + 1e-9
     np.testing.assert_allclose(explanation.found[0].values, [40.0, -30.0], atol=2.5)
     assert explanation.found[1].values[0] == pytest.approx(20.0, abs=2.5)
     assert diagnose(FakeRig({2: 20.0, 5: [40.0, -30.0]}), closed_loop=False).verdict == "explained"

@@ -125,3 +125,34 @@ def test_as_many_series_rows_as_channels(rng):
     lagged = Whitening.of(draws, 24)
     np.testing.assert_allclose(lagged.ar, 0.0, atol=0.15)
     np.testing.assert_allclose(lagged.innovation, 1.0, atol=0.1)
+
+
+def uneven_noise(rng, draws):
+    """AR(2) noise whose first four rows are three times as loud in the first two channels before they are mixed."""
+    white = lfilter([1.0], [1.0, -AR[0], -AR[1]], rng.standard_normal((draws, 360, 3)), axis=1)[:, 200:]
+    white /= white[:, 10:].std()
+    white[:, :4, :2] *= 3.0
+    return white @ MIX.T
+
+
+def test_loud_rows_weigh_less_and_leave_the_others_as_they_are(rng):
+    draws = uneven_noise(rng, 24)
+    even, white = Whitening.of(draws, 160), Whitening.of(draws, 160, uneven=True)
+    new = uneven_noise(rng, 400)
+    power, before = (np.mean(each(w, new) ** 2, axis=0) for w in (white, even))
+    assert before[:3, :2].min() > 4.0
+    assert before[10:].mean() < 0.96  # the loud rows are in what all are measured by
+    np.testing.assert_allclose(power[10:].mean(axis=0), 1.0, atol=0.08)
+    np.testing.assert_allclose(power[:4], 1.0, atol=1.2)  # a mean square of 24 draws
+    np.testing.assert_allclose(power[:4].mean(), 1.0, atol=0.3)
+    assert np.all(white.loudness[10:] == 1.0)
+    assert np.all(white.loudness[:, 2] == 1.0)
+
+
+def test_even_noise_has_no_loud_rows(rng):
+    draws = noise(rng, 24, 300, 30)
+    even, white = Whitening.of(draws, 300), Whitening.of(draws, 300, uneven=True)
+    assert np.mean(white.loudness > 1.0) < 0.003
+    x = rng.standard_normal((330, 3))
+    quiet = np.all(white.loudness == 1.0, axis=1)
+    np.testing.assert_allclose(white(x)[:300][quiet], even(x)[:300][quiet], rtol=0.1, atol=0.1)

@@ -11,12 +11,14 @@ import pytest
 
 from diagnosed import small_diagnosis
 from discrepancy.causes.numbers import number
+from discrepancy.emps.causes import CAUSES as AXIS
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.result.json import plain
 from discrepancy.result.plots import file_names
 from discrepancy.result.plots_evidence import closed_loop_figure
 from discrepancy.result.text import WIDTH, format_diagnosis
-from discrepancy.result.traces import groups
+from discrepancy.result.text_gain import response_units
+from discrepancy.result.traces import Trace, group_units, groups
 from discrepancy.rig import Candidate, Channel
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Cause
@@ -34,7 +36,8 @@ def test_verdict_comes_first_and_lines_are_short() -> None:
     assert max(map(len, text.splitlines())) <= WIDTH
     for words in (
         "Explains 99 % of the misfit in sample, 98 % on held-out trials (a gain on 2 of 2 folds)",
-        "Cannot be told from: sea_scale (robot 2, joint 1) by 2.0 nats.",
+        "[[Cause 1: torque zero of joint 1 of robot 2 (sea_bias)]]",
+        "Cannot be told from: spring stiffness of joint 1 of robot 2 by 2.0 nats.",
         "A known weight separates them.",
         "99.0 % of the excess error removed (95 % interval over 2 trials: 90.0 to 100.0 %)",
         "A note.",
@@ -47,11 +50,12 @@ def test_verdict_comes_first_and_lines_are_short() -> None:
 def test_consistent_data_have_a_short_report() -> None:
     text = format_diagnosis(small_diagnosis("consistent"))
     assert text.startswith("CONSISTENT.")
-    assert len(text.splitlines()) <= 23
+    assert len(text.splitlines()) <= 24
     assert "cannot decide" not in text
-    assert "sea_bias: bias_Nm 0.019-0.021" in text
-    assert "theta_zero: zero_rad 0.0006, not everywhere" in text
-    assert "slosh: mass_kg never" in text
+    assert "torque zero of a driven joint (sea_bias): bias 19 to 21 mN m" in text
+    assert "encoder zero of a driven joint (phi_zero): zero 0.04 mrad" in text  # the unit of the next one
+    assert "encoder zero of a gimbal axis (theta_zero): zero 0.6 mrad (not everywhere)" in text
+    assert "mass that swings in the payload (slosh): mass never" in text
 
 
 def test_unexplained_data_say_where_the_misfit_is() -> None:
@@ -67,7 +71,7 @@ def test_a_rival_that_the_closed_loop_rules_out() -> None:
     values = small_diagnosis()
     values["causes"][0]["alternatives"][0] |= {"ambiguous": False, "evidence_gap": -3.0, "chi2_per_n": 40.0}
     text = " ".join(format_diagnosis(values).split())
-    assert "sea_scale (robot 2, joint 1) (3 nats better in the rows, closed loop chi2/n 40)" in text
+    assert "spring stiffness of joint 1 of robot 2 (3 nats better in the rows, closed loop chi2/n 40)" in text
     assert "Cannot be told" not in text
 
 
@@ -83,6 +87,41 @@ def test_errors_against_the_truth_are_shown() -> None:
     assert "centre of mass [mm]" in format_diagnosis(values)
     with pytest.raises(ValueError, match="not"):
         errors(estimate, estimate | {"p_1c_m": [0.1, 0.2]})
+
+
+def test_causes_are_named_in_words_where_they_sit() -> None:
+    robot, joint = 3, 2
+    for cause in [*CAUSES.values(), *AXIS.values()]:
+        at = getattr(cause, "per", "payload")
+        place = (None if at == "payload" else robot, joint if at == "joint" else None)
+        candidate = cause.candidate({}, {}, *place)
+        for words in (candidate.kind, candidate.label):
+            assert cause.title
+            assert cause.name not in words or cause.name in (
+                "push",
+                "tether",
+                "drag",
+                "mass",
+                "delay",
+                "backlash",
+            )
+            assert not set("_{}()") & set(words)
+        assert ("robot 3" in candidate.label) == (at != "payload")
+        assert (" 2 of robot 3" in candidate.label) == (at == "joint")
+    assert CAUSES["joint_friction"].candidate({}, {}, 3, 2).label == "friction in joint 2 of robot 3"
+    assert CAUSES["gimbal_friction"].candidate({}, {}, 3, 2).label == "friction in gimbal axis 2 of robot 3"
+    assert CAUSES["grasp_flex"].candidate({}, {}, 1).label == "compliance of the grasp of robot 1"
+    assert CAUSES["clock_delay"].candidate({}, {}, 1).label == "clock delay of robot 1"
+    assert Candidate("made_up", "", 2, None, ()).label == "made up (robot 2)"
+
+
+def test_a_share_beyond_the_first_is_a_further_one() -> None:
+    values = small_diagnosis()
+    second = values["causes"][0] | {"explained": {"in_sample": 0.01, "held_out": None}}
+    values["causes"].append(second)
+    text = " ".join(format_diagnosis(values).split())
+    assert text.count("Explains 99 % of") == 1
+    assert "Explains a further 1 % of the misfit in sample" in text
 
 
 @pytest.mark.parametrize("cause", sorted(CAUSES))
@@ -138,10 +177,40 @@ def test_channels_are_grouped_by_name() -> None:
     ]
 
 
-def test_whitening_can_be_undone() -> None:
+def test_one_unit_for_all_channels_of_a_kind() -> None:
+    """That of the largest rms, over groups and trials."""
+    names = {"grasp 2 rotation": "rad", "grasp 3 rotation": "rad", "force": "N", "moment": "N m"}
+    channels = [Channel(f"{name} {a}", "k", None, unit) for name, unit in names.items() for a in "xy"]
+    sizes = np.array([2e-5, 1e-5, 3e-4, 1e-5, 2.0, 1.0, 0.03, 0.2])
+    wave = np.sqrt(2.0) * np.cos(np.linspace(0.0, 20.0 * np.pi, 1000, endpoint=False))[:, None]
+    one = np.ones((1000, 8))
+    traces = [
+        Trace(name, np.arange(1000.0), 1000, 1.0, scale * sizes * wave, one, one, one, one, {})
+        for name, scale in (("small", 0.1), ("large", 1.0))
+    ]
+    assert group_units(traces, groups(channels)) == {
+        "rad": ("mrad", 1e3),
+        "N": ("N", 1.0),
+        "N m": ("N m", 1.0),
+    }
+    gain = small_diagnosis()["gain"]
+    gain["held_out"]["before"] = gain["held_out"]["before"] | {
+        "phi_rms": 3e-5,
+        "theta_rms": 2e-3,
+        "tau_rms": 0.3,
+    }
+    gain["trials"] = []
+    shown = response_units(gain)
+    assert shown == {"phi": ("mrad", 1e3), "theta": ("mrad", 1e3), "tau": ("N m", 1.0)}
+
+
+@pytest.mark.parametrize("uneven", [False, True])
+def test_whitening_can_be_undone(uneven: bool) -> None:
     rng = np.random.default_rng(1)
     draws = np.cumsum(rng.standard_normal((20, 60, 4)), axis=1) * 0.1 + rng.standard_normal((20, 60, 4))
-    white = Whitening.of(draws, 50)
+    draws[:, :3] *= 5.0
+    white = Whitening.of(draws, 50, uneven=uneven)
+    assert np.any(white.loudness > 1.0) == uneven
     assert unwhitened(white, white(draws[0])) == pytest.approx(draws[0], abs=1e-10)
 
 

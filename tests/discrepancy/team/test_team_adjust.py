@@ -30,7 +30,7 @@ def noise():
 
 def measured(case, noise, rng):
     """The trial as noisy sensors see it, linearised where the exact one is."""
-    errors = noise.draw(case.signals, rng)
+    errors = next(noise.draws(case.signals, rng, 1))
     signals = case.signals.minus(-errors.phi, -errors.theta, -errors.tau)
     rate = signals.rate_hz
     parts = with_rates(signals.phi, rate), with_rates(signals.theta, rate), with_rates(signals.tau, rate)[:1]

@@ -399,3 +399,17 @@ def test_report_shows_values_errors_and_doubts():
 def test_recordings_of_the_same_name_are_told_apart():
     estimate = estimate_from_trials([trial("random", name="a", seed=1), trial("random", name="a", seed=2)])
     assert [r.name for r in estimate.recordings] == ["a", "a (2)"]
+
+
+def test_no_percentages_of_what_may_be_zero():
+    """A component may be zero where its vector is not, and a value within its error of zero has no share."""
+    estimate = estimate_from_trials(team())
+    lines = format_estimate(estimate).splitlines()
+    components = [line for line in lines if line.split(":")[0].rsplit(" ", 1)[-1] in ("x", "y", "z")]
+    assert len(components) > 15
+    assert not any("%" in line for line in components)
+    assert all("%" in line for line in lines if line.strip().startswith(("m:", "|p_")))
+    doubtful = replace(estimate, mass=MassEstimate(0.02, 0.011, 0.0))
+    (mass,) = (line for line in format_estimate(doubtful).splitlines() if line.strip().startswith("m:"))
+    assert "0.020 +- 0.011 kg" in mass
+    assert "%" not in mass

@@ -116,7 +116,7 @@ def test_draws_have_the_variance_of_real_rounding_in_motion(rng, sigma_steps):
     for _ in range(12):
         recorded = read(true, step, sigma_steps * step, rng, rng.uniform(0, step, (2, 3)))
         real.append(recorded - true)
-        errors = noise.draw(Signals(TIME, recorded, recorded, recorded, RATE), rng)
+        errors = next(noise.draws(Signals(TIME, recorded, recorded, recorded, RATE), rng, 1))
         drawn += [errors.phi, errors.tau]
     for part in (lambda x: x, smoothed):
         a, b = (np.std([part(x)[200:-200] for x in group]) for group in (real, drawn))
@@ -133,7 +133,7 @@ def test_draws_have_the_variance_of_real_rounding_at_rest(rng, sigma_steps):
         true = np.tile(rng.uniform(0.2, 0.9, (2, 3)), (SAMPLES, 1, 1))
         recorded = read(true, step, sigma_steps * step, rng)
         real.append(recorded - true)
-        errors = noise.draw(Signals(TIME, recorded, recorded, recorded, RATE), rng)
+        errors = next(noise.draws(Signals(TIME, recorded, recorded, recorded, RATE), rng, 1))
         drawn += [errors.phi, errors.theta]
     means = [np.std([x.mean(axis=0) for x in group]) for group in (real, drawn)]
     whole = [np.std(group) for group in (real, drawn)]
@@ -147,7 +147,7 @@ def test_draws_have_the_variance_of_real_rounding_at_rest(rng, sigma_steps):
 
 def test_draws_of_continuous_channels_are_white(rng):
     noise = Noise(np.zeros((3, 2, 3)), np.full((3, 2, 3), 0.01))
-    errors = noise.draw(trial(rng), rng)
+    errors = next(noise.draws(trial(rng), rng, 1))
     assert np.std(errors.tau) == pytest.approx(0.01, rel=0.05)
     x = errors.phi.reshape(SAMPLES, 6)
     assert np.max(np.abs(np.mean(x[1:] * x[:-1], axis=0))) < 0.1 * 0.01**2
@@ -166,6 +166,6 @@ def test_channels_have_resolutions_of_their_own(rng):
     np.testing.assert_allclose(noise.step[0], expected, rtol=1e-6)
     assert noise.sigma[0, 0, 0] == pytest.approx(1e-3, rel=0.1)
     assert noise.sigma[0, 0, 1] == pytest.approx(ANGLE_FLOOR_RAD)
-    errors = noise.draw(Signals(TIME, phi, x.theta, x.tau, RATE), rng)
+    errors = next(noise.draws(Signals(TIME, phi, x.theta, x.tau, RATE), rng, 1))
     assert np.std(errors.phi[:, 0, 0]) == pytest.approx(1e-3, rel=0.1)
     assert np.std(errors.phi[:, 0, 1]) == pytest.approx(ANGLE_FLOOR_RAD, rel=0.1)

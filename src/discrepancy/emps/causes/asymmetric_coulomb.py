@@ -16,6 +16,7 @@ def each_way(n: Numbers, name: str, unit: str) -> str:
 class AsymmetricCoulomb(Cause):
     """Dry friction is larger forwards and smaller backwards, by ``asymmetry_N`` each; while it slides, a constant."""
 
+    title = "Coulomb friction that differs by direction"
     family = "constant_force"
     parameters = ("asymmetry_N",)
     scales = (1.0,)

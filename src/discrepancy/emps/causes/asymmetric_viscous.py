@@ -9,6 +9,7 @@ from discrepancy.emps.causes.base import Cause, filtered, force
 class AsymmetricViscous(Cause):
     """Viscous friction is larger forwards and smaller backwards, by ``asymmetry_Ns_per_m`` each."""
 
+    title = "viscous friction that differs by direction"
     family = "asymmetric_viscous"
     parameters = ("asymmetry_Ns_per_m",)
     scales = (10.0,)

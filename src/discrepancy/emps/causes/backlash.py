@@ -11,6 +11,7 @@ from estimator.filtering import differentiate, low_pass
 class Backlash(Cause):
     """The carriage, half of the mass and all of the friction, follows the motor with a play of ``play_m`` in all."""
 
+    title = "backlash"
     family = "backlash"
     parameters = ("play_m",)
     scales = (1e-5,)

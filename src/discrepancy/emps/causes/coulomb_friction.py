@@ -7,6 +7,7 @@ from discrepancy.emps.causes.sliding import SLOW, direction, rests
 class CoulombFriction(Cause):
     """A force against the motion that does not depend on the speed; below ``slow_mps`` it fades."""
 
+    title = "Coulomb friction"
     family = "dry_friction"
     parameters = ("coulomb_N",)
     scales = (1.0,)

@@ -8,6 +8,7 @@ from estimator.filtering import differentiate
 class Delay(Cause):
     """The force follows the voltage late, beyond the half period that its hold takes anyway."""
 
+    title = "delay of the drive"
     family = "delay"
     where = "drive"
     parameters = ("delay_s",)

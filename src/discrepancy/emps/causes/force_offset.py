@@ -8,6 +8,7 @@ from discrepancy.emps.causes.base import Cause, force
 class ForceOffset(Cause):
     """A constant force resists the motion forwards and helps it backwards."""
 
+    title = "constant force"
     family = "constant_force"
     parameters = ("resisting_N",)
     scales = (1.0,)

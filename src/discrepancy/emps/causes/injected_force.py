@@ -6,6 +6,7 @@ from discrepancy.emps.causes.train import Pulses, train
 class InjectedForce(Pulses):
     """Rectangular pulses of force on the carriage: the drive's voltage shows only what the loop does about them."""
 
+    title = "injected pulses of force"
     parameters = ("resisting_N",)
     scales = (1.0,)
     adds_to = "force"

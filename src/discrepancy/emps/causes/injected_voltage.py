@@ -6,6 +6,7 @@ from discrepancy.emps.causes.train import Pulses, train
 class InjectedVoltage(Pulses):
     """Rectangular pulses between the loop's law and the drive: the drive gets, and the log has, law plus pulse."""
 
+    title = "injected pulses of voltage"
     where = "loop"
     parameters = ("size_V",)
     scales = (0.1,)

@@ -8,6 +8,7 @@ from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG
 class Mass(Cause):
     """The axis moves another mass than assumed."""
 
+    title = "moving mass"
     family = "inertia"
     parameters = ("excess_kg",)
     scales = (1.0,)

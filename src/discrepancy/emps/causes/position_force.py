@@ -9,6 +9,7 @@ from discrepancy.emps.causes.base import Cause, force
 class PositionForce(Cause):
     """A force that resists or helps with the position, periodic over ``wavelength_m``."""
 
+    title = "force that repeats along the way"
     family = "position_force"
     parameters = ("cosine_N", "sine_N")
     scales = (1.0, 1.0)

@@ -7,6 +7,7 @@ from discrepancy.emps.causes.base import Cause, voltage
 class PositionGain(Cause):
     """The position loop is stronger than its nominal gain says."""
 
+    title = "gain of the position loop"
     family = "position_gain"
     where = "loop"
     parameters = ("excess_per_s",)

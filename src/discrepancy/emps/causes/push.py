@@ -6,6 +6,7 @@ from discrepancy.emps.causes.base import Cause, force
 class Push(Cause):
     """A constant outside force on the carriage during an interval of one block."""
 
+    title = "push on the carriage"
     family = "push"
     parameters = ("force_N",)
     transient = True

@@ -10,6 +10,7 @@ from discrepancy.emps.causes.sliding import direction
 class Stribeck(Cause):
     """Dry friction differs near standstill, by ``excess_N`` that fades with exp(-|v| / ``speed_mps``)."""
 
+    title = "Stribeck friction"
     family = "low_speed_friction"
     parameters = ("excess_N",)
     scales = (1.0,)

@@ -7,6 +7,7 @@ from discrepancy.emps.causes.base import Cause, voltage
 class VelocityGain(Cause):
     """The velocity loop is stronger than its nominal gain says."""
 
+    title = "gain of the velocity loop"
     family = "velocity_gain"
     where = "loop"
     parameters = ("excess_Vs_per_m",)

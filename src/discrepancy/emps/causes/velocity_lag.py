@@ -7,6 +7,7 @@ from discrepancy.emps.recording.signals import at_delay
 class VelocityLag(Cause):
     """The loop uses a velocity that is ``lag_s`` old."""
 
+    title = "age of the velocity in the loop"
     family = "velocity_lag"
     where = "loop"
     parameters = ("lag_s",)

@@ -6,6 +6,7 @@ from discrepancy.emps.causes.base import Cause, force
 class ViscousFriction(Cause):
     """A force against the motion in proportion to the speed."""
 
+    title = "viscous friction"
     family = "viscous_friction"
     parameters = ("viscous_Ns_per_m",)
     scales = (10.0,)

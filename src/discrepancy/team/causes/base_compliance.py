@@ -10,6 +10,7 @@ from estimator.arm.delta import leg_geometry, wrist_motion
 class BaseCompliance(Cause):
     """The base moves by compliance times the horizontal force, which is the reaction to arm and payload."""
 
+    title = "compliance of {base}"
     family = "compliance"
     parameters = ("compliance_m_per_N",)
     tolerances = (1e-7,)

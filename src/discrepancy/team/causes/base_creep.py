@@ -8,6 +8,7 @@ from discrepancy.team.causes.base import Cause, stack
 class BaseCreep(Cause):
     """The base moves at constant velocity (x, y in its own axes) during a trial."""
 
+    title = "creep of {base}"
     family = "base_creep"
     parameters = ("x_mps", "y_mps")
     tolerances = (2e-8, 2e-8)

@@ -10,6 +10,7 @@ from estimator.arm.delta import jacobian_of, leg_geometry
 class BaseTilt(Cause):
     """{b} is turned by the rotation vector (roll, pitch, 0), in its own axes; yaw is an unknown of each trial."""
 
+    title = "tilt of {base}"
     family = "base_tilt"
     parameters = ("roll_rad", "pitch_rad")
     tolerances = (1e-4, 1e-4)

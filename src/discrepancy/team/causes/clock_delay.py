@@ -6,6 +6,7 @@ from discrepancy.team.causes.shift import Late
 class ClockDelay(Late):
     """Everything a robot logs is that of ``delay_s`` ago."""
 
+    title = "clock delay of {robot}"
     family = "clock"
     tolerances = (1e-5,)
     readings = ("phi", "theta", "tau")

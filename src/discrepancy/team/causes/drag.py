@@ -10,6 +10,7 @@ from estimator.estimate.fusion import fuse, fusion_matrix
 class Drag(Cause):
     """Force -c v on the payload at its centre of mass."""
 
+    title = "drag on the payload"
     family = "dissipation"
     parameters = ("coefficient_Ns_per_m",)
     tolerances = (0.05,)

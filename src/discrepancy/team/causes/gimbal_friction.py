@@ -14,6 +14,7 @@ class GimbalFriction(Friction):
     A pure moment is the same wherever it acts, so robots with parallel axes share the blame.
     """
 
+    title = "friction in {gimbal axis}"
     at = "gimbal joint"
     moves = "theta"
     separate = "Which robot's gimbal rubs shows only with one robot released at a time."

@@ -8,6 +8,7 @@ from discrepancy.team.causes.base import Cause, stack
 class GraspFlex(Cause):
     """The payload's grasp site lags behind the flange by compliance times the force on the payload."""
 
+    title = "compliance of {grasp}"
     family = "compliance"
     parameters = ("compliance_m_per_N",)
     tolerances = (1e-7,)

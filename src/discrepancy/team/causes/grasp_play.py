@@ -13,6 +13,7 @@ class GraspPlay(Cause):
     Below ``force_N`` it has not settled there, and is anywhere between the ends.
     """
 
+    title = "play in {grasp}"
     family = "compliance"
     parameters = ("play_m",)
     tolerances = (3e-6,)

@@ -14,6 +14,7 @@ class LinkLength(ReadingError):
     is weighed at the true angle.
     """
 
+    title = "lengths of {leg}"
     family = "arm_geometry"
     adjusted = True
     parameters = ("proximal_m", "rod_m", "base_radius_m")

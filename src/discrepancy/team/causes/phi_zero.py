@@ -8,6 +8,7 @@ from discrepancy.team.causes.base import ReadingError
 class PhiZero(ReadingError):
     """phi reads too much by a constant."""
 
+    title = "encoder zero of {driven joint}"
     family = "arm_geometry"
     parameters = ("zero_rad",)
     tolerances = (1e-4,)

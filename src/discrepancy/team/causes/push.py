@@ -16,6 +16,7 @@ def during(trial: TrialLinear, shape: Shape) -> Array:
 class Push(Cause):
     """Force (axes of {b1}) at a payload point, as force and moment at the origin of {1}."""
 
+    title = "push on the payload"
     family = "push"
     parameters = ("force_x_N", "force_y_N", "force_z_N", "moment_x_Nm", "moment_y_Nm", "moment_z_Nm")
     tolerances = (

@@ -8,6 +8,7 @@ from discrepancy.team.causes.base import ReadingError
 class SeaBias(ReadingError):
     """tau reads too much by a constant."""
 
+    title = "torque zero of {driven joint}"
     family = "sea_torque"
     parameters = ("bias_Nm",)
     tolerances = (3e-3,)

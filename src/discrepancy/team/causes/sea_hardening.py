@@ -6,6 +6,7 @@ from discrepancy.team.causes.base import ReadingError, one_joint
 class SeaHardening(ReadingError):
     """Torque k d + k3 d^3 of deflection d, read as k d."""
 
+    title = "hardening of the spring of {driven joint}"
     family = "sea_torque"
     parameters = ("cubic_Nm_per_rad3",)
     tolerances = (3.0,)

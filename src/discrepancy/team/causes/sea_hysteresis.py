@@ -9,6 +9,7 @@ class SeaHysteresis(Friction):
     Torque that changes more slowly than ``slow_Nm_per_s`` counts as at rest.
     """
 
+    title = "friction inside the spring of {driven joint}"
     parameters = ("friction_Nm",)
     tolerances = (2e-3,)
     clipped = ()

@@ -9,6 +9,7 @@ class SeaScale(ReadingError):
     A scale common to all springs cannot be told from the payload's mass; a single one can.
     """
 
+    title = "spring stiffness of {driven joint}"
     family = "sea_torque"
     parameters = ("scale",)
     tolerances = (1e-3,)

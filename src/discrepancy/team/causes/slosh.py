@@ -18,6 +18,7 @@ class Slosh(Cause):
     -mass x'' at the point. Its weight and rigid part are in the payload's own parameters.
     """
 
+    title = "mass that swings in the payload"
     family = "slosh"
     parameters = ("mass_kg", "moment_x_kgm", "moment_y_kgm", "moment_z_kgm")
     scales = (0.01, 0.005, 0.005, 0.005)

@@ -11,6 +11,7 @@ class Tether(Cause):
     The columns are the force at the home position and the stiffness.
     """
 
+    title = "tether at {grasp}"
     family = "sea_torque"
     parameters = ("force_x_N", "force_y_N", "force_z_N", "stiffness_N_per_m")
     scales = (0.1, 0.1, 0.1, 1.0)

@@ -8,6 +8,7 @@ from discrepancy.team.causes.base import ReadingError
 class ThetaZero(ReadingError):
     """theta reads too much by a constant; joints 1, 2, 3 are z, y, x."""
 
+    title = "encoder zero of {gimbal axis}"
     family = "gimbal_zero"
     parameters = ("zero_rad",)
     tolerances = (1e-4,)

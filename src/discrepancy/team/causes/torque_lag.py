@@ -7,6 +7,7 @@ from discrepancy.team.linear.signals import with_rates
 class TorqueLag(ReadingError):
     """All torques of a robot lag by a first-order filter, which the controller sees as well."""
 
+    title = "lag of the torque sensors of {robot}"
     family = "dissipation"
     parameters = ("time_constant_s",)
     tolerances = (1e-4,)

@@ -6,6 +6,7 @@ from discrepancy.team.causes.shift import Late
 class TorqueSkew(Late):
     """All torques of a robot are those of ``delay_s`` ago; only the log is late, the controller is not."""
 
+    title = "late torque log of {robot}"
     family = "dissipation"
     tolerances = (1e-4,)
     separate = "The commands separate a late log from a lag inside the sensor, which the controller sees too."

@@ -1,17 +1,23 @@
-"""How finely each sensor reads: rounding step and white noise, found in the recording itself."""
+"""How finely each sensor reads: rounding step and white noise of a reading, found in the recording itself."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 from discrepancy import rules
 from discrepancy.team.linear.signals import Signals
 from estimator.arrays import Array
-from estimator.filtering import low_pass
-from estimator.quantisation import quantisation_step
+from estimator.filtering import differentiate, low_pass
+from estimator.quantisation import rounding_step
+from estimator.recording.sampling import SENSORS
+from mocobot_logs.resample.errors import Conversion
+
+_BATCH = 8  # draws that are converted at a time
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +26,7 @@ class Noise:
 
     Attributes:
         step: rounding step, 0 for a continuous channel [rad, rad, N m].
-        sigma: standard deviation of white noise before rounding [rad, rad, N m].
+        sigma: standard deviation of white noise of a reading before rounding [rad, rad, N m].
     """
 
     step: Array
@@ -29,50 +35,137 @@ class Noise:
     @classmethod
     def of(cls, trials: list[Signals]) -> Noise:
         """Resolution of the sensors behind some trials."""
-        step, sigma = [], []
+        # Trial by trial: the grid may lie differently in each.
+        step = np.median([_steps(trial) for trial in trials], axis=0)
+        white = np.sqrt(np.mean([_white(trial) ** 2 for trial in trials], axis=0))
         angle, torque = rules.ANGLE_FLOOR_RAD, rules.TORQUE_FLOOR_NM
-        for field, floor in (("phi", angle), ("theta", angle), ("tau", torque)):
-            x = [getattr(trial, field) for trial in trials]
-            # Trial by trial: the grid may lie differently in each.
-            steps = np.median([np.apply_along_axis(_step, 0, a) for a in x], axis=0)
-            white = np.sqrt(
-                np.mean([_white(a, t.rate_hz) ** 2 for a, t in zip(x, trials, strict=True)], axis=0)
-            )
-            sigma.append(np.sqrt(np.maximum(np.maximum(white, floor) ** 2 - steps**2 / 12.0, 0.0)))
-            step.append(steps)
-        return cls(np.array(step), np.array(sigma))
+        floor = np.array([angle, angle, torque])[:, None, None]
+        return cls(step, np.sqrt(np.maximum(np.maximum(white, floor) ** 2 - step**2 / 12.0, 0.0)))
 
-    def draw(self, signals: Signals, rng: np.random.Generator) -> Signals:
-        """One realisation of the sensors' errors on a trial: what they would add to its smooth signals."""
-        errors: list[Array] = []
-        for k, field in enumerate(("phi", "theta", "tau")):
-            x = low_pass(getattr(signals, field), signals.rate_hz, rules.TEAM_SMOOTH_HZ)
-            step = np.where(self.step[k] > 0, self.step[k], 1.0)
-            x = x + step * _phase(x / step, rng)
-            read = x + self.sigma[k] * rng.standard_normal(x.shape)
-            errors.append(np.where(self.step[k] > 0, np.round(read / step) * step, read) - x)
-        return Signals(signals.time, errors[0], errors[1], errors[2], signals.rate_hz)
+    def draws(self, signals: Signals, rng: np.random.Generator, count: int) -> Iterator[Signals]:
+        """Realisations of the sensors' errors on a trial: what they add to its smooth signals.
+
+        Where its samples are not as they were read, errors are drawn at the readings and sent through the conversion.
+        """
+        smooth = _unrounded(signals, np.moveaxis(self.step, 0, 1).reshape(-1, SENSORS))
+        ways = [_Way(smooth[:, i], signals, i, rng) for i in range(smooth.shape[1])]
+        for first in range(0, count, _BATCH):
+            size = min(_BATCH, count - first)
+            parts = [
+                way.converted([self._errors(way.x, i, rng) for _ in range(size)])
+                for i, way in enumerate(ways)
+            ]
+            for draw in np.moveaxis(np.array(parts), 0, 2):  # (Q, N, 9)
+                phi, theta, tau = np.split(draw, 3, axis=2)
+                yield Signals(signals.time, phi, theta, tau, signals.rate_hz)
+
+    def _errors(self, x: Array, robot: int, rng: np.random.Generator) -> Array:
+        """Errors of one robot's readings, whose true values are ``x``, shape (q, 9)."""
+        step, sigma = self.step[:, robot].ravel(), self.sigma[:, robot].ravel()
+        rounds = step > 0
+        step = np.where(rounds, step, 1.0)
+        x = x + step * _phase(x / step, rng)
+        read = x + sigma * rng.standard_normal(x.shape)
+        return np.where(rounds, np.round(read / step) * step, read) - x
+
+
+class _Way:
+    """One robot's signals at its readings, and what becomes of errors there.
+
+    Attributes:
+        x: signals at the readings, shape (q, 9).
+    """
+
+    def __init__(self, smooth: Array, signals: Signals, robot: int, rng: np.random.Generator) -> None:
+        self._conversion: Conversion | None = None
+        self.x = smooth
+        if signals.sampling is not None:
+            sampling, start_s = signals.sampling[robot], float(signals.time[0])
+            self._conversion = Conversion.of(sampling.later(start_s), signals.rate_hz, len(smooth), rng)
+            time = signals.time - start_s
+            at = np.clip(self._conversion.instants, 0.0, time[-1])
+            self.x = CubicSpline(time, smooth)(at)
+
+    def converted(self, errors: list[Array]) -> Array:
+        """Errors of the recording's samples, shape (D, Q, 9), from those of the readings, (q, 9) each."""
+        if self._conversion is None:
+            return np.array(errors)
+        made = self._conversion(np.concatenate(errors, axis=1))
+        return np.moveaxis(made.reshape(len(made), len(errors), SENSORS), 1, 0)
+
+
+def _columns(signals: Signals) -> Array:
+    """The sensors' channels of all robots, shape (Q, N, 9)."""
+    return np.concatenate([signals.phi, signals.theta, signals.tau], axis=2)
 
 
 def _phase(x: Array, rng: np.random.Generator) -> Array:
-    """Where in its step a signal (in steps) truly is: constant while it rests, new after each step of travel.
+    """How far a signal (in steps) truly is from where its readings put it: the same while it rests.
 
-    A resting encoder repeats one rounding error; what was recorded of it always lies on the grid itself.
+    A resting encoder repeats one rounding error; what was recorded of it always lies on the grid itself. The phase is
+    a broken line over travel, drawn anew every ``PHASE_TRAVEL`` steps, uniform modulo one everywhere.
     """
-    travel = np.cumsum(np.abs(np.diff(x, axis=0, prepend=x[:1])), axis=0)
-    segment = np.floor(travel).astype(np.intp)
-    phase = rng.uniform(-0.5, 0.5, (int(segment.max()) + 1, *x.shape[1:]))
-    return np.take_along_axis(phase, segment, axis=0)
+    # Beyond two knots a sample nothing is left to repeat.
+    travel = np.minimum(np.abs(np.diff(x, axis=0, prepend=x[:1])), 2 * rules.PHASE_TRAVEL)
+    at = np.cumsum(travel, axis=0) / rules.PHASE_TRAVEL
+    low = np.floor(at).astype(np.intp)
+    knots = rng.uniform(0.0, 2.0, (int(low.max()) + 2, *x.shape[1:]))
+    return np.take_along_axis(knots, low, axis=0) * (1.0 - (at - low)) + np.take_along_axis(
+        knots, low + 1, axis=0
+    ) * (at - low)
 
 
-def _step(x: Array) -> float:
-    """Rounding step of a channel, or 0 without one; where values hardly repeat, rounding is as good as noise."""
-    return 0.0 if len(np.unique(x)) > 0.9 * len(x) else quantisation_step(x, levels=2) or 0.0
+def _unrounded(signals: Signals, step: Array) -> Array:
+    """A trajectory that the readings may have come from, shape (Q, N, 9), with ``step`` (N, 9).
+
+    Readings of a slow joint are stairs, and no filter with one cut-off leaves of them what it did: where fewer than
+    three stairs go into a period of ``TEAM_SMOOTH_HZ``, the cut-off falls with their frequency.
+    """
+    x, rate_hz = _columns(signals), signals.rate_hz
+    slow = differentiate(low_pass(x, rate_hz, rules.SLOW_HZ), rate_hz)
+    stairs_hz = low_pass(np.abs(slow), rate_hz, rules.SLOW_HZ) / np.where(step > 0, step, 1e-300)
+    cutoffs = rules.TEAM_SMOOTH_HZ * 0.5 ** np.arange(rules.SMOOTHER_OCTAVES + 1)
+    octave = np.log2(rules.TEAM_SMOOTH_HZ / np.maximum(stairs_hz / 3.0, 1e-9)).clip(
+        0.0, rules.SMOOTHER_OCTAVES
+    )
+    octave[stairs_hz < rules.SLOW_HZ] = 0.0  # at rest
+    out = np.zeros_like(x)
+    for k, cutoff in enumerate(cutoffs):
+        weight = np.maximum(1.0 - np.abs(octave - k), 0.0)
+        if weight.any():
+            out += weight * low_pass(x, rate_hz, cutoff)
+    return out
 
 
-def _white(x: Array, rate_hz: float) -> Array:
-    """Standard deviation of white noise, from what lies above 25 Hz (a robust mean square), shape (N, 3)."""
-    high = min(rules.NOISE_ABOVE_HZ, 0.4 * rate_hz)
-    y = sosfiltfilt(butter(4, high, btype="high", fs=rate_hz, output="sos"), x, axis=0)
-    share = 1.0 - high / (rate_hz / 2.0)
-    return 1.4826 * np.median(np.abs(y), axis=0) / np.sqrt(share)
+def _steps(signals: Signals) -> Array:
+    """Rounding step of every channel, shape (3, N, 3)."""
+    if signals.sampling is not None:
+        return np.array([[sampling.steps_of(kind) for sampling in signals.sampling] for kind in range(3)])
+    steps = np.apply_along_axis(rounding_step, 0, _columns(signals))
+    return np.moveaxis(steps.reshape(len(steps), 3, 3), 1, 0)
+
+
+def _white(signals: Signals) -> Array:
+    """Standard deviation of white noise of a reading, from what lies above 25 Hz, shape (3, N, 3).
+
+    A conversion leaves less of it there; how much, it shows on noise of one.
+    """
+    rate_hz, x = signals.rate_hz, _columns(signals)
+    native_hz = [s.native_hz for s in signals.sampling or ()]
+    high = min(rules.NOISE_ABOVE_HZ, 0.4 * min([rate_hz, *native_hz]))
+    band = butter(4, high, btype="high", fs=rate_hz, output="sos")
+    white = _spread(sosfiltfilt(band, x, axis=0))
+    if signals.sampling is None:
+        white /= np.sqrt(1.0 - high / (rate_hz / 2.0))
+    else:
+        rng = np.random.default_rng(rules.NOISE_SEED)
+        for i, sampling in enumerate(signals.sampling):
+            way = Conversion.of(sampling.later(float(signals.time[0])), rate_hz, len(x), rng)
+            left = way(rng.standard_normal((len(way.instants), SENSORS)))
+            white[i] /= np.median(_spread(sosfiltfilt(band, left, axis=0)))
+    return np.moveaxis(white.reshape(len(white), 3, 3), 1, 0)
+
+
+def _spread(x: Array) -> Array:
+    """A robust root mean square along the first axis."""
+    return np.asarray(1.4826 * np.median(np.abs(x), axis=0), dtype=np.float64)

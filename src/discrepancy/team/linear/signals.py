@@ -10,6 +10,7 @@ from discrepancy import rules
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass, trim_slice
 from estimator.recording.model import Recording
+from estimator.recording.sampling import Sampling
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,6 +21,7 @@ class Signals:
         time: [s], shape (Q,).
         phi, theta, tau: as recorded or corrected, shape (Q, N, 3).
         rate_hz: sampling rate [Hz].
+        sampling: how each robot's sensors were read, where the samples are not as they were read.
     """
 
     time: Array
@@ -27,11 +29,15 @@ class Signals:
     theta: Array
     tau: Array
     rate_hz: float
+    sampling: tuple[Sampling, ...] | None = None
 
     @classmethod
     def of(cls, recording: Recording) -> Signals:
         """The signals of a recording, untouched."""
-        return cls(recording.time, recording.phi, recording.theta, recording.tau, recording.metadata.rate_hz)
+        known = recording.metadata
+        return cls(
+            recording.time, recording.phi, recording.theta, recording.tau, known.rate_hz, known.sampling
+        )
 
     def minus(
         self, phi: Array | float = 0.0, theta: Array | float = 0.0, tau: Array | float = 0.0

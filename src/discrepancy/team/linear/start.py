@@ -105,7 +105,7 @@ def linearised(
     linear = linearise(signals, shared, bases, design, reduction, full=True)
     draws, torques = noise_rows(linear, noise, np.random.default_rng([rules.NOISE_SEED, k]))
     moving = reduction.moving
-    return linear, Whitening.of(draws, moving), TorqueNoise.of(draws, torques, moving)
+    return linear, Whitening.of(draws, moving, uneven=True), TorqueNoise.of(draws, torques, moving)
 
 
 def exact_residual(
@@ -141,8 +141,7 @@ def noise_rows(
 ) -> tuple[Array, Array]:
     """What the sensors' errors alone would leave: residuals (draws, n, C), and the torques' own (draws, n, N, 3)."""
     out, torques = [], []
-    for _ in range(draws):
-        errors = noise.draw(trial.signals, rng)
+    for errors in noise.draws(trial.signals, rng, draws):
         out.append(
             sum(
                 trial.of_signals(i, errors.phi[:, i], errors.theta[:, i], errors.tau[:, i])

@@ -45,7 +45,7 @@ class CountsFromElsewhere(Mistake):
 
 @dataclass(frozen=True)
 class WrongZero(Mistake):
-    """One encoder with another zero.
+    """One encoder with another zero, of one robot or of all: an offset of the map is missing, or has the wrong sign.
 
     Attributes:
         joint: which of the three.
@@ -69,7 +69,13 @@ class WrongZero(Mistake):
 
     def what(self) -> str:
         amount = np.rad2deg(abs(self.offset_rad))
-        return f"{self.channels[0]} reads {amount:.1f} deg too {'little' if self.offset_rad > 0 else 'much'}"
+        of_all = len(self.robots) == self.team > 1
+        why = (
+            f" (the map lacks an offset, or has one of {amount / 2:.1f} deg with the wrong sign)"
+            if of_all
+            else ""
+        )
+        return f"{self.channels[0]} reads {amount:.1f} deg too {'little' if self.offset_rad > 0 else 'much'}{why}"
 
     def refined(self, total: Callable[[Mistake], float]) -> Mistake:
         found = minimize_scalar(
@@ -85,7 +91,7 @@ class WrongZero(Mistake):
 
 
 def suspects(signals: Signals, design: OmnidDesign) -> Iterator[Mistake]:
-    """Conventions of all robots and of each, then every single encoder."""
+    """Conventions of all robots and of each, then every encoder, of all robots and of each."""
     level, N = signals.level, signals.robots
     home = np.array([0.0, 0.0, design.home_height_m])
     x, y, z = (float(x) for x in (inverse_kinematics(home, design) if level == "joint" else home))
@@ -98,5 +104,5 @@ def suspects(signals: Signals, design: OmnidDesign) -> Iterator[Mistake]:
             words, up = f"phi counts from the vertical, {way}", (np.pi / 2,) * 3
             yield CountsFromElsewhere("counts_from_vertical", level, robots, N, positions, words, sign, up)
     groups: tuple[Kind, ...] = ("position", "theta") if level == "joint" else ("theta",)
-    for robot, group, joint, k in product(range(N), groups, range(3), STEPS):
-        yield WrongZero("wrong_zero", level, (robot,), N, (group,), joint, k * STEP_RAD)
+    for robots, group, joint, k in product(teams(N), groups, range(3), STEPS):
+        yield WrongZero("wrong_zero", level, robots, N, (group,), joint, k * STEP_RAD)

@@ -1,0 +1,1 @@
+"""What no rigid payload explains of a recording, beside what noise leaves."""

@@ -1,0 +1,78 @@
+"""What a conversion makes of the sensors' errors: drawn where samples were read, and sent the same way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from estimator.recording.sampling import Sampling
+from mocobot_logs.log import NS, Array, Stamps
+from mocobot_logs.resample.fill import Merger
+from mocobot_logs.resample.filter import Decimator, fineness
+from mocobot_logs.resample.grid import TOLERANCE_NS, Grid, Interpolator
+
+_MARGIN_S = 0.3
+"""Read before and after the recording, so that the low-pass is filled [s]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Conversion:
+    """The way from one robot's readings to its samples in a recording, as far as ``Sampling`` tells it.
+
+    Jitter and gaps are drawn; the way itself is that of ``resample`` and ``one_clock``.
+
+    Attributes:
+        instants_ns: when samples are read, in the recording's time [ns], shape (q,).
+        grid: onto which they are brought.
+        thinned: so many samples of the grid make one of the recording.
+        rate_hz: of the recording [Hz].
+        samples: of the recording.
+    """
+
+    instants_ns: Stamps
+    grid: Grid
+    thinned: int
+    rate_hz: float
+    samples: int
+
+    @classmethod
+    def of(cls, sampling: Sampling, rate_hz: float, samples: int, rng: np.random.Generator) -> Conversion:
+        """Draw one; the recording has ``samples`` at ``rate_hz`` [Hz]."""
+        fits = sampling.method != "interpolated"
+        k = max(1, round(sampling.native_hz / rate_hz)) if fits else fineness(sampling.native_hz, rate_hz)
+        spacing_s = 1.0 / (k * rate_hz)
+        period_s = spacing_s if fits else 1.0 / sampling.native_hz
+        before = np.ceil((sampling.first_s + _MARGIN_S) / period_s)
+        count = int(np.ceil((samples / rate_hz + 2 * _MARGIN_S) / period_s)) + 2
+        at = sampling.first_s + (np.arange(count) - before) * period_s
+        if not fits:
+            at = np.sort(at + sampling.jitter_s * rng.standard_normal(count))
+        kept = rng.uniform(size=count) >= sampling.missing
+        kept[[0, -1]] = True
+        grid = Grid(spacing_s / NS, period_s / NS, fits)
+        return cls(np.rint(at[kept] / NS).astype(np.int64), grid, k, rate_hz, samples)
+
+    @property
+    def instants(self) -> Array:
+        """When samples are read, in the recording's time [s], shape (q,)."""
+        return np.asarray(self.instants_ns * NS, dtype=np.float64)
+
+    def __call__(self, values: Array) -> Array:
+        """Samples of the recording from readings at ``instants``, shape (q, C) -> (Q, C)."""
+        time_ns = self.instants_ns - self.instants_ns[0]
+        if not self.grid.fits:
+            merger = Merger(self.grid.period_ns)
+            parts = merger.push(time_ns, values), merger.finish()
+            time_ns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+        interpolator = Interpolator(self.grid, float(np.max(np.diff(time_ns))) * NS)
+        fine = [*interpolator.push(time_ns, values), interpolator.finish()]
+        decimator = Decimator(self.thinned)
+        own = decimator.push(np.concatenate(fine))
+        first_s = self.instants_ns[0] * NS + decimator.lead / self.rate_hz
+        at = np.arange(self.samples) - first_s * self.rate_hz
+        whole = np.rint(at).astype(np.int64)
+        if np.all(np.abs(at - whole) <= TOLERANCE_NS * NS * self.rate_hz):
+            return own[whole]
+        return make_interp_spline(np.arange(len(own)), own, k=5)(at)

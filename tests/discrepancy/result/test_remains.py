@@ -1,0 +1,66 @@
+"""No verdict stands beside a figure that contradicts it unexplained."""
+
+from __future__ import annotations
+
+import pytest
+
+from diagnosed import small_diagnosis
+from discrepancy.result.remains import remains
+from discrepancy.result.text import format_diagnosis
+from mocobot_report.diagnosis.part import KINDS
+
+
+def words(text: str) -> str:
+    return " ".join(text.split())
+
+
+def test_clean_verdicts_stand_alone() -> None:
+    for verdict in ("explained", "consistent"):
+        assert remains(small_diagnosis(verdict)) == []
+
+
+def test_a_misfit_beside_a_verdict_is_told_with_its_place() -> None:
+    """The figures of the EMPS benchmark's first recording."""
+    values = small_diagnosis("partly_explained")
+    values["residual"] |= {"chi2_per_n": 5.16}
+    values["residual"]["nominal"] = values["residual"]["nominal"] | {"chi2_per_n": 7350.0}
+    (said,) = remains(values)
+    assert said == "A misfit of chi2/n 5.16 remains of 7.35e+03, where up to 1.15 is clean: somewhere."
+    text = words(format_diagnosis(values))
+    assert text.startswith(
+        "PARTLY EXPLAINED. Robot 2, joint 1: the torque sensor reads 0.0500 +- 0.0010 N m too much."
+    )
+    assert said in text
+
+
+def test_consistent_within_wide_tolerances_says_what_the_response_is_off_by() -> None:
+    values = small_diagnosis("consistent")
+    response = values["gain"]["held_out"]["before"] | {"chi2_per_n": 6123.0}
+    values["gain"]["held_out"] = {"before": response, "after": response}
+    (said,) = remains(values)
+    assert "off by chi2/n 6.12e+03, where noise alone leaves 1" in said
+    assert "tolerances" in said
+    assert said in words(format_diagnosis(values))
+
+
+@pytest.mark.parametrize(("share", "told"), [(0.79, True), (0.81, False)])
+def test_a_response_that_causes_hardly_mend_is_told(share: float, told: bool) -> None:
+    values = small_diagnosis()
+    values["gain"]["held_out"]["after"] |= {"chi2_per_n": 3.1}
+    values["gain"]["removed"]["share"] = share
+    assert bool(remains(values)) == told
+    values["gain"]["held_out"]["after"] |= {"chi2_per_n": 2.9}
+    assert remains(values) == []
+
+
+def test_strained_tolerances_are_told() -> None:
+    values = small_diagnosis("partly_explained")
+    values["residual"] |= {"tolerances": {"chi2": 90.0, "freedom": 30.0, "log10_p": -9.0}}
+    (said,) = remains(values)
+    assert "by chance once in 10^9" in said
+
+
+def test_every_verdict_has_its_colour() -> None:
+    assert {verdict: KINDS[verdict] for verdict in ("partly_explained", "unexplained")} == {
+        "partly_explained": "warn", "unexplained": "bad"
+    }  # fmt: skip
