@@ -361,3 +361,15 @@ def test_only_what_is_taken_as_it_is_is_said_to_be(tmp_path: Path) -> None:
     assert "samples of robot 1: taken as they are\n" in report
     assert "samples of robots 2, 3: interpolated onto the grid of robot 1\n" in report
     assert [s["on_grid"] for s in found.to_dict()["recordings"][0]["streams"]] == [True, False, False]
+
+
+def test_how_sensors_were_read_moves_with_a_crop(tmp_path: Path) -> None:
+    """Of a recording that was interpolated once: its first sample is then before the part begins."""
+    slow = {k: 0.01 * np.sin(RECORDING.time) + v[0] for k, v in RECORDING.columns().items()}
+    log = write_text(tmp_path / "log.csv", slow | {"time": np.arange(ROWS) * 0.004})
+    whole = mocobot.convert(log)
+    whole.write(tmp_path / "whole.parquet")
+    part = mocobot.convert(tmp_path / "whole.parquet", crop="5:10").recording
+    for one, other in zip(whole.recording.metadata.sampling or (), part.metadata.sampling or (), strict=True):
+        assert other.first_s == pytest.approx(one.first_s - 5.0, abs=1e-9)
+        assert other.native_hz == pytest.approx(250.0)
