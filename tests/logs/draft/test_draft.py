@@ -5,15 +5,21 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import command
 from estimator.errors import InputError
 from log_files import channels_of, read_log, write_lerobot, write_text
 from mocobot_logs.bag.write import write_bag
+from mocobot_logs.draft.candidates import Candidate
+from mocobot_logs.draft.channels import find_channels
+from mocobot_logs.draft.draft import put_together
 from mocobot_logs.draft.of_log import draft_of
 from mocobot_logs.draft.reading import read_name
 from mocobot_logs.map.files import read_map
@@ -303,3 +309,28 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert command.run(capsys, "map", write_text(tmp_path / "a.csv", {"a": RECORDING.time}))[2].startswith(
         "mocobot: 1 robot; the draft is not complete: "
     )
+
+
+WORDS = st.lists(
+    st.sampled_from(
+        ["phi", "tau", "theta", "q", "x", "y", "z", "1", "2", "3", "0", "_", "/", ".", " ", "[", "]", "deg", "mNm",
+         "force", "ref", "time", "t", "alice", "bob", "\x1f", "\0", '"', "\\", "\n", "{", "}", "é", "#"]
+    ), max_size=9,
+)  # fmt: skip
+
+
+@settings(max_examples=150, deadline=None)
+@given(st.lists(WORDS.map("".join), max_size=25, unique=True), st.floats(-1e12, 1e12))
+def test_whatever_columns_are_called_the_draft_is_toml(names: list[str], value: float) -> None:
+    values = np.array([value, 0.0])
+    found = [
+        Candidate(n, ("column",), r, values)
+        for n in names
+        if "\x1f" not in n and (r := read_name(n)) is not None
+    ]
+    draft = put_together("log\n.csv", find_channels(found), [])
+    parsed = tomllib.loads(draft.text)
+    assert parsed["version"] == 1
+    if not draft.missing:
+        with suppress(InputError):  # names without a robot in them, for example
+            parse_map(parsed, "draft")
