@@ -4,14 +4,16 @@ PYTHON ?= python3
 JOBS ?= 2
 # The matrices are small, and threads that share them only wait for each other.
 export OPENBLAS_NUM_THREADS ?= 1
+# Many short processes import the same modules; each would compile them again.
+unexport PYTHONDONTWRITEBYTECODE
 BIN := .venv/bin
 MARK := .venv/.installed
 
 .PHONY: paper test lint benchmark clean
 
 paper: $(MARK)
-	$(BIN)/mocobot paper --jobs $(JOBS) --out out/paper
-	$(BIN)/mocobot report out/paper
+	$(BIN)/mocobot paper --jobs $(JOBS) --out out/paper --force
+	$(BIN)/mocobot report out/paper --force
 
 test: $(MARK) lint
 	$(BIN)/pytest -n $(JOBS) --dist loadfile

@@ -36,7 +36,9 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     try:
         return tomllib.loads(Path(path).read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path}: not a readable {what} ({error})") from error
+        raise InputError(
+            f"{path}: not a readable {what} ({getattr(error, 'strerror', None) or error})"
+        ) from error
 
 
 def read_json(path: Path, what: str) -> dict[str, Any]:

@@ -5,12 +5,12 @@ import os
 import sys
 from collections.abc import Callable, Sequence
 from importlib import import_module
-from typing import Annotated, Any, Union
-
-import tyro
+from typing import Any, NoReturn
 
 from estimator.errors import InputError
 from mocobot import options
+from mocobot.parsing import parse
+from mocobot.strict import NotGood
 from mocobot_sim.errors import TrialError
 
 COMMANDS = {
@@ -25,45 +25,58 @@ COMMANDS = {
     "simulate": options.Simulate,
 }
 """Options by command; ``mocobot.commands`` has a module of each name, whose ``run`` takes them."""
+NOT_GOOD, REFUSED, INTERRUPTED, CLOSED = 1, 2, 130, 141
+"""Exit codes; the last two are 128 and the signal that other programs die of."""
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Entry point: exit code 0, or 2 after one sentence on standard error.
+    """Entry point: ends the process with a code of the README's, unless all is well.
 
-    130 when interrupted, and 1 when standard output was closed before everything was printed.
+    0 done; 1 done, and with ``--strict`` the answer is not good; 2 refused after one sentence on standard error;
+    130 interrupted; 141 standard output was closed before everything was printed.
     """
     try:
-        _run(arguments)
-        sys.stdout.flush()
+        try:
+            _run(sys.argv[1:] if arguments is None else arguments)
+        finally:
+            _flush()
+    except (InputError, TrialError) as error:
+        _exit(str(error), REFUSED)
+    except NotGood as error:
+        _exit(str(error), NOT_GOOD)
     except KeyboardInterrupt:
-        print("mocobot: interrupted", file=sys.stderr)
-        sys.exit(130)
+        _exit("interrupted", INTERRUPTED)
     except BrokenPipeError:
-        # Python flushes again on its way out; that must not fail a second time.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(1)
+        _forget()
+        sys.exit(CLOSED)
 
 
-def _run(arguments: Sequence[str] | None) -> None:
+def _flush() -> None:
+    """Print what is still to be printed; help ends the process, so that there may be some whatever happened."""
+    try:
+        print(end="", flush=True)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        _forget()
+        raise InputError(f"standard output: cannot be written ({error.strerror})") from error
+
+
+def _forget() -> None:
+    """Let go of what cannot be printed: Python tries again on its way out, and that must not fail a second time."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _exit(sentence: str, code: int) -> NoReturn:
+    print(f"mocobot: {sentence}", file=sys.stderr)
+    sys.exit(code)
+
+
+def _run(arguments: Sequence[str]) -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):  # names may hold what the terminal cannot show
         sys.stdout.reconfigure(errors="backslashreplace")
-    kinds: Any = Union[  # noqa: UP007  (of a list that is made)
-        tuple(Annotated[kind, tyro.conf.subcommand(name)] for name, kind in COMMANDS.items())
-    ]
-    parsed = tyro.cli(
-        kinds,
-        prog="mocobot",
-        description="Simulate mobile cobots that carry an unknown payload together, estimate it, and find out what "
-        "the simulation gets wrong.",
-        args=arguments,
-        config=(tyro.conf.OmitSubcommandPrefixes, tyro.conf.OmitArgPrefixes),
-    )
-    command = _command(parsed)
-    try:
-        command(parsed)
-    except (InputError, TrialError) as error:
-        print(f"mocobot: {error}", file=sys.stderr)
-        sys.exit(2)
+    options = parse(COMMANDS, arguments)
+    _command(options)(options)
 
 
 def _command(parsed: Any) -> Callable[[Any], None]:
@@ -76,11 +89,9 @@ def _command(parsed: Any) -> Callable[[Any], None]:
         if not renderer:
             raise
         said = " ".join(str(error).split())
-        print(
-            f"mocobot: MUJOCO_GL is {renderer!r} and MuJoCo does not load so ({said}); unset it",
-            file=sys.stderr,
-        )
-        sys.exit(2)
+        raise InputError(
+            f"MUJOCO_GL is {renderer!r} and MuJoCo does not load so ({said}); unset it"
+        ) from error
 
 
 if __name__ == "__main__":

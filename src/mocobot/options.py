@@ -6,6 +6,9 @@ from typing import Annotated, Literal
 
 import tyro
 
+Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
+Force = Annotated[Flag, tyro.conf.arg(help="Replace what exists there; nothing is overwritten without it.")]
+
 
 @dataclass(frozen=True)
 class Paper:
@@ -23,6 +26,7 @@ class Paper:
     """Seed of trajectories, noise and calibration errors."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Folder for paper.json, tables.txt, the estimates and plots."""
+    force: Force = False
     recordings: bool = False
     """Write the recordings, too (needs --out)."""
 
@@ -31,12 +35,15 @@ class Paper:
 class Estimate:
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload."""
 
-    rec: tyro.conf.Positional[tuple[Path, ...]]
+    rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
     """Recordings (Parquet), or logs of any format that ``convert`` reads, all of one payload."""
     map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
     """Map of the logs that are no recordings; found out if not given."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
     """Write the estimate as JSON, too."""
+    force: Force = False
+    strict: Flag = False
+    """Exit with 1 if the estimate is flagged, or nothing could be determined."""
     method: Literal["auto", "staged", "joint"] = "auto"
     """The paper's stages, one joint least squares, or stages where static holds allow."""
     cutoff_hz: float = 5.0
@@ -47,7 +54,7 @@ class Estimate:
 class Diagnose:
     """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth."""
 
-    rec: tyro.conf.Positional[tuple[Path, ...]]
+    rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
     """Recordings (Parquet), or logs of any format that ``convert`` reads, all of one payload; several, so that what is
     named can be validated. One MAT file with --rig emps."""
     map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
@@ -55,7 +62,10 @@ class Diagnose:
     rig: Literal["team", "emps"] = "team"
     """What was recorded: a team of mocobots, or the EMPS benchmark's axis (docs/emps.md)."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
-    """Folder for diagnosis.json, report.txt, the extended model and plots; an earlier diagnosis is replaced."""
+    """Folder for diagnosis.json, report.txt, the extended model and plots."""
+    force: Force = False
+    strict: Flag = False
+    """Exit with 1 if the verdict is neither consistent nor explained."""
     jobs: int = 2
     """Parallel processes."""
     tolerances: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
@@ -73,7 +83,8 @@ class Convert:
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="IN")]
     """Log: a rosbag2 folder, .mcap, .db3, .csv, .npz or .parquet file, or a LeRobot dataset."""
     out: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="OUT")]
-    """Recording to write: .parquet; .csv, .npz, .mcap or .db3; or a rosbag2 folder if it has no suffix."""
+    """Recording to write: .parquet; .csv, .npz, .mcap or .db3; or a new rosbag2 folder if it has no suffix."""
+    force: Force = False
     map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
     """Where the log has which channel, by file or built-in name (docs/measured-data.md); found out if not given."""
     trial: Literal["random", "periodic", "static"] | None = None
@@ -94,7 +105,7 @@ class Convert:
     """Keep a part of the log only, in seconds from its start: 12:95, 12: or :95."""
     drop: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="robot=N:FROM-TO")] = ()
     """Leave out samples of one robot, in seconds from the log's start: robot=2:30-31. May be given several times."""
-    split_at_gaps: bool = False
+    split_at_gaps: Flag = False
     """Make a recording of every part between gaps too long to be filled: OUT-1, OUT-2, ..."""
     json: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
     """Write the report as JSON, too."""
@@ -109,7 +120,8 @@ class Map:
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
     """Log of any format that ``convert`` reads."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="MAP.toml")] = None
-    """Write the draft to a new file instead of the terminal."""
+    """Write the draft to a file instead of the terminal."""
+    force: Force = False
     episode: int | None = None
     """Episode of a LeRobot dataset that holds several."""
 
@@ -118,7 +130,7 @@ class Map:
 class Replay:
     """Watch recordings: the scene moving from the measured angles, estimate against truth, all signals (Rerun)."""
 
-    rec: tyro.conf.Positional[tuple[Path, ...]]
+    rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
     """Recordings (Parquet); several are shown side by side."""
     estimate: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
     """Estimate to show, as `mocobot estimate --out` writes it; made from each recording if not given."""
@@ -130,6 +142,7 @@ class Replay:
     """Geometry of the payload; that of the recording's label, or bars between the grasps, if not given."""
     save: Annotated[Path | None, tyro.conf.arg(metavar="OUT.rrd")] = None
     """Write a file for the Rerun viewer instead of opening it."""
+    force: Force = False
     web: bool = False
     """Serve to a browser instead of opening the viewer."""
 
@@ -138,12 +151,15 @@ class Replay:
 class Inspect:
     """Look at a log before anyone trusts a number of it: stamps, channels, clocks, wiring, excitation."""
 
-    rec: tyro.conf.Positional[Path]
+    rec: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
     """Recording or log of any format that ``convert`` reads; broken ones are looked at, too."""
     map: Annotated[str | None, tyro.conf.arg(metavar="MAP")] = None
     """Map file or the name of a built-in one; see docs/measured-data.md."""
     json: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
     """Write the report as JSON, too."""
+    force: Force = False
+    strict: Flag = False
+    """Exit with 1 if the log is ready for nothing."""
     design: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """Numbers of the robots, where the log does not say; the Omnid's if not given."""
     episode: int | None = None
@@ -157,7 +173,8 @@ class Report:
     dir: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
     """Folder of `mocobot paper --out` or `mocobot diagnose --out`, or one with files of `mocobot estimate --out`."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.html")] = None
-    """Page to write; DIR/report.html if not given. An earlier report is replaced."""
+    """Page to write; DIR/report.html if not given."""
+    force: Force = False
 
 
 @dataclass(frozen=True)
@@ -166,6 +183,7 @@ class Simulate:
 
     out: Annotated[Path, tyro.conf.arg(metavar="REC.parquet")]
     """Recording to write; the truth goes beside it as REC.truth.json."""
+    force: Force = False
     payload: str | None = None
     """Payload configuration, or the path of a payload MJCF (body 'payload', sites grasp1 .. graspN); 'a' if neither
     this nor a model is given."""

@@ -1,5 +1,6 @@
 """Any log by its path: what it is shows in its first bytes, or in what its folder holds."""
 
+import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -39,7 +40,7 @@ def open_log(path: Path | str, log_map: LogMap | None = None, episode: int | Non
         InputError: there is no such log, its format is not known, or the map does not suit it.
     """
     path = Path(path)
-    kind = kind_of(path)
+    kind = log_kind(path)
     if episode is not None and kind != "lerobot":
         raise InputError(f"{path}: is not a LeRobot dataset, so it has no episode {episode}")
     if kind == "bag":
@@ -66,10 +67,11 @@ def draft_suggested(path: Path) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise InputError(f"{error}. No map was given (--map): `mocobot map {path}` drafts one") from error
+        said = f"No map was given (--map): `mocobot map {shlex.quote(str(path))}` drafts one"
+        raise InputError(f"{error}. {said}") from error
 
 
-def kind_of(path: Path) -> Kind:
+def log_kind(path: Path) -> Kind:
     """What a log is, by its first bytes or by what its folder holds.
 
     Raises:
@@ -118,10 +120,17 @@ def _is_bag(path: Path) -> bool:
 
 def _is_of_a_dataset(path: Path) -> bool:
     """A data file in a dataset, unless it is a recording that merely lies there."""
-    if dataset_root(path) is None:
-        return False
+    return dataset_root(path) is not None and not is_recording(path)
+
+
+def is_recording(path: Path) -> bool:
+    """Whether a Parquet file says that it is a recording.
+
+    Raises:
+        InputError: it cannot be read.
+    """
     with opened(path, str(path)) as file:
-        return METADATA_KEY not in (file.schema_arrow.metadata or {})
+        return METADATA_KEY in (file.schema_arrow.metadata or {})
 
 
 def open_table(path: Path, kind: Kind, options: CsvMap, episode: int | None = None) -> Table:
@@ -129,7 +138,7 @@ def open_table(path: Path, kind: Kind, options: CsvMap, episode: int | None = No
 
     Args:
         path: a file, or the folder of a dataset.
-        kind: what it is, see ``kind_of``; no bag.
+        kind: what it is, see ``log_kind``; no bag.
         options: how a text table is written.
         episode: as in ``open_log``.
 

@@ -8,7 +8,6 @@ from plotly.offline import get_plotlyjs
 from mocobot_report.blocks import palette
 from mocobot_report.blocks.html import Node, data_block, el, raw, variables, words
 from mocobot_report.blocks.theme import TEMPLATES
-from mocobot_report.target import MARK
 
 POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:; base-uri 'none'; "
@@ -38,7 +37,7 @@ def document(title: str, main: list[Node]) -> Node:
         el(
             "head",
             el("meta", charset="utf-8"),
-            el("meta", name="generator", content=MARK),
+            el("meta", name="generator", content="mocobot report"),
             el("title", f"{title} | mocobot report"),
             el("meta", name="viewport", content="width=device-width, initial-scale=1"),
             el("meta", http_equiv="Content-Security-Policy", content=POLICY),

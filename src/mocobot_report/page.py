@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
-from estimator.files import whole_file
+from estimator.files import check_target, whole_file
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import el, to_bytes
 from mocobot_report.diagnosis import part as diagnosis_part
@@ -15,9 +15,8 @@ from mocobot_report.folder import Contents, Diagnosed, Estimated, Paper, complet
 from mocobot_report.glossary import glossary, link_terms
 from mocobot_report.paper import part as paper_part
 from mocobot_report.provenance_part import provenance_part
-from mocobot_report.target import check_page
 
-NAME = "report.html"
+NAME, SUFFIX = "report.html", ".html"
 Say = Callable[[str], object]
 
 
@@ -26,7 +25,7 @@ def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: Non
 
     Args:
         folder: what ``mocobot paper``, ``estimate`` or ``diagnose`` wrote.
-        out: file to write; ``report.html`` in the folder if None. An earlier report is replaced.
+        out: file to write; ``report.html`` in the folder if None. An existing file is replaced.
         say: takes the name of every stage that begins.
 
     Returns:
@@ -37,7 +36,7 @@ def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: Non
     """
     contents = read_folder(folder)
     out = folder / NAME if out is None else out
-    check_page(out)
+    check_target(out, SUFFIX)
     with whole_file(out) as temporary:
         temporary.write_bytes(make_page(contents, say))
     return out

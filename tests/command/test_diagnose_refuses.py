@@ -93,37 +93,3 @@ def test_bad_tolerances_are_refused(
     message = refused(capsys, *biased_trials, "--tolerances", path)
     for word in ["tolerances.toml", *words]:
         assert word in message
-
-
-def test_bad_options_are_refused_before_anything_is_read(
-    biased_trials: list[Path],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("mocobot.api.given.read_recording", None)
-    assert "no recording given" in refused(capsys)
-    assert "given twice" in refused(capsys, biased_trials[0], biased_trials[0])
-    assert "jobs is 0" in refused(capsys, *biased_trials, "--jobs", "0")
-    message = refused(capsys, *biased_trials, "--exclude", "ghost")
-    assert "cause 'ghost' does not exist; the causes are phi_zero, theta_zero" in message
-    assert "missing.toml" in refused(capsys, *biased_trials, "--tolerances", tmp_path / "missing.toml")
-
-
-def test_bad_targets_are_refused_before_anything_is_read(
-    biased_trials: list[Path],
-    tmp_path: Path,
-    capsys: pytest.CaptureFixture[str],
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    monkeypatch.setattr("mocobot.api.given.read_recording", None)
-    (tmp_path / "file").write_text("x")
-    (tmp_path / "full").mkdir()
-    (tmp_path / "full" / "x").write_text("x")
-    assert "is a file" in refused(capsys, *biased_trials, "--out", tmp_path / "file")
-    assert "no such folder" in refused(capsys, *biased_trials, "--out", tmp_path / "none" / "verdict")
-    assert "not an earlier diagnosis" in refused(capsys, *biased_trials, "--out", tmp_path / "full")
-    assert "would be lost" in refused(capsys, *biased_trials, "--out", biased_trials[0].parent)
-    monkeypatch.chdir(tmp_path)
-    assert "current folder" in refused(capsys, *biased_trials, "--out", ".")
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["file", "full"]

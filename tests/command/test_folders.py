@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
 import pytest
 
 from estimator.errors import InputError
-from estimator.files import whole_folder
+from estimator.files import check_target, make_folder, whole_file, whole_folder
 from mocobot.files.targets import check_folder
 
 
@@ -71,7 +72,62 @@ def test_inputs_inside_the_folder_are_not_lost(tmp_path: Path) -> None:
     out.mkdir()
     (out / "rec").write_text("1")
     with pytest.raises(InputError, match="rec, which would be lost"):
-        check_folder(out, [out / "rec"], lambda _: True, "a result")
-    check_folder(out, [], lambda _: True, "a result")
+        check_folder(out, [out / "rec"], lambda _: True, "a result", force=True)
+    check_folder(out, [], lambda _: True, "a result", force=True)
+    with pytest.raises(InputError, match="out: is a result; give --force"):
+        check_folder(out, [], lambda _: True, "a result", force=False)
+    with pytest.raises(InputError, match="out: exists and is not a result"):
+        check_folder(out, [], lambda _: False, "a result", force=True)
     with pytest.raises(InputError, match="cannot be written"):
-        check_folder(tmp_path / ("x" * 300), [], lambda _: True, "a result")
+        check_folder(tmp_path / ("x" * 300), [], lambda _: True, "a result", force=True)
+
+
+def test_missing_folders_are_made_and_do_not_outlive_a_failure(tmp_path: Path) -> None:
+    """For files as for folders; what was there before stays."""
+    (tmp_path / "there").mkdir()
+    for whole in (whole_file, whole_folder):
+        target = tmp_path / "there" / "a" / "b" / "out"
+
+        def half(whole=whole, target=target) -> None:
+            with whole(target):
+                raise ValueError("stop")
+
+        with pytest.raises(ValueError, match="stop"):
+            half()
+        assert [path.name for path in tmp_path.rglob("*")] == ["there"]
+        with whole(target) as temporary:
+            (temporary / "in" if temporary.is_dir() else temporary).write_text("1")
+        assert [path.name for path in target.parent.iterdir()] == ["out"]
+        (target / "in" if target.is_dir() else target).unlink()
+        shutil.rmtree(tmp_path / "there" / "a")
+
+
+def test_places_are_tried_before_the_work(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The superuser may write against all permission bits, so the system's own refusal is what counts."""
+    (tmp_path / "file").write_text("1")
+    for target in (tmp_path / "file" / "out", tmp_path / "file" / "a" / "b" / "out"):
+        with pytest.raises(InputError, match=r"out: cannot be written \(.*/file is a file\)"):
+            check_target(target)
+    with pytest.raises(InputError, match=r"/proc/self/a/out: cannot be written \("):
+        check_target(Path("/proc/self/a/out"))
+    with pytest.raises(InputError, match="not a regular file"):
+        check_target(Path("/dev/null"))
+    check_target(tmp_path / "a" / "b" / "out")
+    (tmp_path / "b").mkdir()
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["b", "file"]
+
+    def read_only(*_: object, **__: object) -> None:
+        raise OSError(30, "Read-only file system", "/a/name/of/no/interest")
+
+    monkeypatch.setattr("tempfile.TemporaryFile", read_only)
+    with pytest.raises(InputError, match=r"out: cannot be written \(Read-only file system\)$"):
+        check_target(tmp_path / "out")
+    with pytest.raises(InputError, match="Read-only"):
+        make_folder(tmp_path / "b")
+
+
+def test_a_folder_that_cannot_be_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="file: cannot be made a folder"):
+        make_folder(tmp_path / "file")
+    assert make_folder(tmp_path / "a" / "b").is_dir()

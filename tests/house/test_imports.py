@@ -63,24 +63,28 @@ def test_estimator_needs_numpy_and_scipy_only() -> None:
         assert roots(imported_modules(path)) <= allowed | more, module
 
 
-def walk_without(package: str, unwanted: set[str]) -> None:
-    """Import all of a package in a process of its own, and see what came along."""
+UNWANTED = {
+    "estimator": SIMULATOR | {"numba", "mocobot_logs"},
+    "mocobot_logs": SIMULATOR | {"numba", "discrepancy", "mocobot"},
+    "mocobot_inspect": SIMULATOR | {"numba", "discrepancy", "mocobot"},
+    "discrepancy.engine": SIMULATOR | {"discrepancy.team", "discrepancy.emps"},
+    "discrepancy.emps.causes": SIMULATOR,
+    "discrepancy.team.causes": SIMULATOR,
+}
+"""What must not come along with a package, nor with those before it."""
+
+
+def test_packages_run_without_the_simulator_and_what_is_above_them() -> None:
+    """Import all of one package after the other, in one process of their own, and see what came along."""
     code = (
-        f"import sys, pkgutil, importlib, {package}\n"
-        f"for m in pkgutil.walk_packages({package}.__path__, '{package}.'): importlib.import_module(m.name)\n"
-        f"assert sum(name.startswith('{package}.') for name in sys.modules) > 10\n"
-        f"assert not {unwanted!r} & set(sys.modules), {unwanted!r} & set(sys.modules)\n"
+        "import sys, pkgutil, importlib\n"
+        f"for package, unwanted in {UNWANTED!r}.items():\n"
+        "    path = importlib.import_module(package).__path__\n"
+        "    for m in pkgutil.walk_packages(path, f'{package}.'): importlib.import_module(m.name)\n"
+        "    assert sum(name.startswith(f'{package}.') for name in sys.modules) > 10, package\n"
+        "    assert not unwanted & set(sys.modules), (package, unwanted & set(sys.modules))\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
-
-
-def test_estimator_runs_without_mujoco() -> None:
-    walk_without("estimator", SIMULATOR | {"numba"})
-
-
-@pytest.mark.parametrize("package", ["mocobot_logs", "mocobot_inspect"])
-def test_logs_are_read_without_the_simulator(package: str) -> None:
-    walk_without(package, SIMULATOR | {"numba", "discrepancy", "mocobot"})
 
 
 @pytest.mark.parametrize("package", ["discrepancy.engine", "discrepancy.least_squares"])
@@ -96,10 +100,6 @@ def test_engine_of_the_diagnosis_knows_no_rig(package: str) -> None:
         )
 
 
-def test_engine_of_the_diagnosis_runs_without_the_simulator() -> None:
-    walk_without("discrepancy.engine", SIMULATOR | {"discrepancy.team", "discrepancy.emps"})
-
-
 @pytest.mark.parametrize(("rig", "least"), [("team", 20), ("emps", 15)])
 def test_causes_need_no_simulator(rig: str, least: int) -> None:
     """Traces of causes come from mechanics, not from the simulator that the diagnosis is tried on."""
@@ -107,7 +107,6 @@ def test_causes_need_no_simulator(rig: str, least: int) -> None:
     assert len(files) > least
     for module, path in files.items():
         assert not roots(imported_modules(path)) & SIMULATOR, module
-    walk_without(f"discrepancy.{rig}.causes", SIMULATOR)
 
 
 @pytest.mark.parametrize(("rig", "other"), [("team", "emps"), ("emps", "team")])

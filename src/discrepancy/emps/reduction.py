@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import oaconvolve
+from scipy.sparse import csr_array
 
 from discrepancy import rules
 from estimator.arrays import Array
@@ -47,5 +48,17 @@ class Reduction:
     def __call__(self, x: Array) -> list[Array]:
         """Filter samples, shape (Q, ...), and take the rows of every block, shape (n, ...)."""
         flat = x.reshape(len(x), -1)
-        smooth = oaconvolve(flat, self.kernel[:, None], mode="same", axes=0)
-        return [smooth[rows].reshape(len(rows), *x.shape[1:]) for rows in self.samples]
+        return [(f @ flat[: f.shape[1]]).reshape(-1, *x.shape[1:]) for f in self._filters]
+
+    @cached_property
+    def _filters(self) -> list[csr_array]:
+        """Weights of the samples in the rows of every block, shape (n, Q); nothing between the rows is computed."""
+        half = len(self.kernel) // 2
+        filters = []
+        for rows in self.samples:
+            columns = rows[:, None] + np.arange(-half, half + 1)
+            weights = np.tile(self.kernel[::-1], len(rows))
+            first = len(self.kernel) * np.arange(len(rows) + 1)
+            width = int(columns.max(initial=-1)) + 1
+            filters.append(csr_array((weights, columns.ravel(), first), shape=(len(rows), width)))
+        return filters

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2
 
 from discrepancy import rules
-from discrepancy.least_squares.evidence import Evidence, visible
+from discrepancy.least_squares.evidence import Evidence, log10_survival, visible
 from discrepancy.least_squares.gram import flat_inverse, gram_of, project
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate
@@ -135,7 +134,7 @@ class Fit:
         at = prior[self.used]
         value = float(np.sum(self.solution[at] ** 2))
         freedom = float(np.sum(1.0 - np.minimum(np.diag(self.covariance)[at], 1.0)))
-        return value, freedom, float(chi2.logsf(value, max(freedom, 1e-9)) / np.log(10.0))
+        return value, freedom, log10_survival(value, max(freedom, 1e-9))
 
     def held_out(self, trial: int) -> float:
         """Chi-square of one trial under this solution, without the priors' part."""

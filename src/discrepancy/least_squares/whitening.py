@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,7 +66,7 @@ class Whitening:
         chol_alone = _cholesky(draws[:, moving:])
         ar, innovation = np.zeros((channels, order)), np.ones(channels)
         if order and moving > rules.ROWS_PER_COEFFICIENT * order:
-            flat = _per_row(chol_moving, draws[:, :moving].reshape(-1, channels))
+            flat = _per_row(_inverse(chol_moving), draws[:, :moving].reshape(-1, channels))
             white = flat.reshape(len(draws), moving, channels)
             lag = np.array(
                 [
@@ -85,8 +86,8 @@ class Whitening:
     def __call__(self, x: Array) -> Array:
         """Whiten rows and channels, shape (n, C, ...) -> the same."""
         y = np.empty_like(x, dtype=float)
-        y[self.moving :] = _per_row(self.chol_alone, x[self.moving :])
-        z = _per_row(self.chol_moving, x[: self.moving])
+        y[self.moving :] = _per_row(self._whiten_alone, x[self.moving :])
+        z = _per_row(self._whiten_moving, x[: self.moving])
         shape = (1, -1) + (1,) * (x.ndim - 2)
         series, order = z.copy(), self.ar.shape[1]
         for k in range(order):
@@ -101,9 +102,17 @@ class Whitening:
     def rows_only(self, x: Array) -> Array:
         """Decorrelate the channels of every row, not the rows, shape (n, C) -> (n, C)."""
         y = np.empty_like(x)
-        y[self.moving :] = _per_row(self.chol_alone, x[self.moving :])
-        y[: self.moving] = _per_row(self.chol_moving, x[: self.moving])
+        y[self.moving :] = _per_row(self._whiten_alone, x[self.moving :])
+        y[: self.moving] = _per_row(self._whiten_moving, x[: self.moving])
         return y
+
+    @cached_property
+    def _whiten_moving(self) -> Array:
+        return _inverse(self.chol_moving)
+
+    @cached_property
+    def _whiten_alone(self) -> Array:
+        return _inverse(self.chol_alone)
 
 
 def _cholesky(draws: Array) -> Array:
@@ -118,10 +127,12 @@ def _cholesky(draws: Array) -> Array:
     return np.array(factor, dtype=np.float64)
 
 
-def _per_row(chol: Array, x: Array) -> Array:
-    """chol^-1 applied to the channels of every row, shape (n, C, ...)."""
+def _inverse(chol: Array) -> Array:
+    return np.array(solve_triangular(chol, np.eye(len(chol)), lower=True), dtype=np.float64)
+
+
+def _per_row(whiten: Array, x: Array) -> Array:
+    """A matrix (C, C) applied to the channels of every row, shape (n, C, ...)."""
     if not x.size:
         return np.array(x, dtype=np.float64)
-    by_channel = np.moveaxis(x, 1, 0)
-    solved = solve_triangular(chol, by_channel.reshape(len(chol), -1), lower=True).reshape(by_channel.shape)
-    return np.moveaxis(solved, 0, 1).astype(np.float64)
+    return (whiten @ x.reshape(*x.shape[:2], -1)).reshape(x.shape) if x.ndim > 2 else x @ whiten.T

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from estimator.arm.design import OmnidDesign
 from estimator.arrays import Array
 from estimator.errors import InputError
+from estimator.so3 import cross
 
 # Exact values: cos(2 pi / 3) in floating point is off by 2e-16, which would break the legs' symmetry.
 _HALF_SQRT_3 = np.sqrt(3.0) / 2.0
@@ -166,9 +167,9 @@ def _sphere_intersection(phi: Array, design: OmnidDesign) -> tuple[Array, Array,
     """Circumcentre of the sphere centres, upward unit normal of their plane, squared height over it."""
     centres = _sphere_centres(phi, design)
     a, b = centres[..., 1, :] - centres[..., 0, :], centres[..., 2, :] - centres[..., 0, :]
-    cross = np.cross(a, b)
-    cross_square = np.sum(cross**2, axis=-1, keepdims=True)
+    normal = cross(a, b)
+    normal_square = np.sum(normal**2, axis=-1, keepdims=True)
     a_square, b_square = np.sum(a**2, axis=-1, keepdims=True), np.sum(b**2, axis=-1, keepdims=True)
-    offset = np.cross(a_square * b - b_square * a, cross) / (2.0 * cross_square)
-    normal = cross / np.sqrt(cross_square) * np.where(cross[..., 2:] < 0, -1.0, 1.0)
-    return centres[..., 0, :] + offset, normal, design.rod_length_m**2 - np.sum(offset**2, axis=-1)
+    offset = cross(a_square * b - b_square * a, normal) / (2.0 * normal_square)
+    upward = normal / np.sqrt(normal_square) * np.where(normal[..., 2:] < 0, -1.0, 1.0)
+    return centres[..., 0, :] + offset, upward, design.rod_length_m**2 - np.sum(offset**2, axis=-1)

@@ -92,10 +92,13 @@ class InertiaEstimate:
 
 def momentum_regressor(w: Array) -> Array:
     """L(w) with L(w) I_reg = I w and I_reg as in (20), shapes (..., 3) -> (..., 3, 6); (21) is L(alpha)."""
-    x, y, z = np.moveaxis(np.asarray(w, dtype=float), -1, 0)
-    o = np.zeros_like(x)
-    rows = [[x, y, z, o, o, o], [o, x, o, y, z, o], [o, o, x, o, y, z]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    w = np.asarray(w, dtype=float)
+    x, y, z = w[..., 0], w[..., 1], w[..., 2]
+    L = np.zeros((*w.shape, 6))
+    L[..., 0, 0], L[..., 0, 1], L[..., 0, 2] = x, y, z
+    L[..., 1, 1], L[..., 1, 3], L[..., 1, 4] = x, y, z
+    L[..., 2, 2], L[..., 2, 4], L[..., 2, 5] = x, y, z
+    return L
 
 
 def inertia_regressor(omega: Array, alpha: Array) -> Array:

@@ -73,7 +73,7 @@ class Diagnosis(Diagnosed):
         Raises:
             InputError: the folder holds something else, or cannot be written.
         """
-        check_folder(Path(folder), [], is_diagnosis, "an earlier diagnosis")
+        check_folder(Path(folder), [], is_diagnosis, "an earlier diagnosis", force=True)
         with whole_folder(Path(folder)) as whole:
             self.write_into(whole)
 

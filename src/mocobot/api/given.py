@@ -4,15 +4,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from pathlib import Path
 
-import pyarrow as pa
-import pyarrow.parquet as pq
-
 from estimator.errors import InputError
 from estimator.recording.model import Recording
-from estimator.recording.parquet import METADATA_KEY, read_recording
+from mocobot.files.recordings import read
 from mocobot_logs.convert import Converted, Labels, convert
 from mocobot_logs.map.files import read_map
-from mocobot_logs.open_log import open_log
+from mocobot_logs.open_log import is_recording, log_kind, open_log
 
 Given = Recording | Path | str
 """A recording, or the path of its file, or of a log of any format that ``convert`` reads."""
@@ -58,8 +55,8 @@ class Logs:
         Raises:
             InputError: the file cannot be read, or is not a plausible recording.
         """
-        if not path.exists() or is_recording(path):
-            return read_recording(path)
+        if not _is_log(path):
+            return read(path)
         from mocobot_sim.scene.models import omnid_design  # needs MuJoCo; a recording does not
 
         source = open_log(path, self._map)
@@ -79,14 +76,9 @@ class Logs:
             )
 
 
-def is_recording(path: Path) -> bool:
-    """Whether a file is a recording, or a Parquet file too damaged to tell."""
+def _is_log(path: Path) -> bool:
+    """Whether a file or folder is a log of a known format, and no recording."""
     try:
-        with path.open("rb") as file:
-            if file.read(4) != b"PAR1":
-                return False
-        return METADATA_KEY in (pq.read_schema(path).metadata or {})
-    except pa.ArrowException:
-        return True
-    except OSError:
+        return log_kind(path) != "parquet" or not is_recording(path)
+    except InputError:
         return False

@@ -82,7 +82,7 @@ def simulate(
     if model is not None and payload is not None:
         raise InputError("payload and model are both given; the model has its own payload, so leave one out")
     scene = load_extended(Path(model)) if model is not None else None
-    label = str(payload or "a") if model is None else Path(model).resolve().name
+    label = str("a" if payload is None else payload) if model is None else Path(model).resolve().name
     sensors = sensor_preset(preset) if isinstance(preset, str) else preset
     given = {"vias": vias, "duration_s": duration_s}
     request = replace(

@@ -1,14 +1,13 @@
 """``mocobot convert``: read a log of any format, bring it onto one grid, write it as any format, say what was done."""
 
-import os
 import re
 from collections.abc import Sequence
 from pathlib import Path
 
 from estimator.arm.design import load_design
 from estimator.errors import InputError
-from estimator.files import check_target, write_json
-from mocobot.files.targets import map_file
+from estimator.files import check_place, write_json
+from mocobot.files.targets import check_no_input, check_output, map_file
 from mocobot.options import Convert
 from mocobot.progress import bar
 from mocobot_logs.convert import Converted, Labels, convert, convert_parts, output_kind, write_converted
@@ -94,12 +93,7 @@ def _check(options: Convert) -> None:
     """Everything that can be refused before the log is read."""
     _check_target(options, _targets(options.out, 1)[0] if options.split_at_gaps else options.out)
     if options.json is not None:
-        check_target(options.json)
-        real = os.path.realpath(options.json)
-        if real in map(os.path.realpath, [*_inputs(options), options.out]):
-            raise InputError(
-                f"{options.json}: is the log, a map, a design or the recording; name another file"
-            )
+        check_output(options.json, [*_inputs(options), options.out], force=options.force)
     for option, value, low, high in (
         ("--rate", options.rate, SLOWEST_HZ, FASTEST_HZ),
         ("--max-gap", options.max_gap, 0.0, LONGEST_GAP_S),
@@ -114,17 +108,10 @@ def _inputs(options: Convert) -> list[Path]:
 
 
 def _check_target(options: Convert, out: Path) -> None:
-    real = Path(os.path.realpath(out))
-    kind = output_kind(out)
-    for path in _inputs(options):
-        source = Path(os.path.realpath(path))
-        if real == source or (source.is_dir() and source in real.parents):
-            raise InputError(f"{out}: is {path} or lies in it; write the recording somewhere else")
-    if kind != "folder":
-        check_target(out)
-    elif not real.parent.is_dir():
-        raise InputError(f"{out.parent}: there is no such folder")
-    elif real.exists() and (not real.is_dir() or any(real.iterdir())):
+    if output_kind(out) != "folder":
+        check_output(out, _inputs(options), force=options.force)
+        return
+    check_no_input(out, _inputs(options))
+    check_place(out)
+    if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(f"{out}: exists; name a new folder for the bag, or a file with a suffix")
-    if not os.access(real.parent, os.W_OK):
-        raise InputError(f"{out}: cannot be written (its folder is read-only)")

@@ -24,6 +24,7 @@ from mocobot.files.provenance import file_facts, provenance
 from mocobot.files.targets import check_folder, check_recordings, map_file
 from mocobot.options import Diagnose
 from mocobot.progress import bar, stages
+from mocobot.strict import NotGood
 from mocobot_logs.convert_report import format_on_the_fly
 from mocobot_sim.trial.truth import truth_path
 
@@ -43,6 +44,7 @@ def run(options: Diagnose) -> None:
 
     Raises:
         InputError: recordings, tolerances or options that cannot be used, or an output that cannot be written.
+        NotGood: with ``strict``, the verdict is neither consistent nor explained.
     """
     rig = RIGS[options.rig]
     inputs = [*options.rec, *([options.tolerances] if options.tolerances else []), *map_file(options.map)]
@@ -69,13 +71,15 @@ def run(options: Diagnose) -> None:
     print(found)  # after the folder is in place: whoever reads may close the pipe
     if options.out:
         print(f"\nWritten to {options.out}.")
+    verdict = found.diagnosis.verdict
+    if options.strict and verdict not in ("consistent", "explained"):
+        raise NotGood(f"the verdict is {verdict.replace('_', ' ')}")
 
 
 def _check(options: Diagnose, causes: Collection[str], inputs: Sequence[Path]) -> None:
     """Everything that can be refused before a recording is read."""
-    if not options.rec:
-        hint = "; name them before --exclude" if options.exclude else "; name at least one file"
-        raise InputError(f"no recording given{hint}")
+    if not options.rec and options.exclude:
+        raise InputError("no recording given; name them before --exclude")
     if options.jobs < 1:
         raise InputError(f"jobs is {options.jobs}; it must be at least 1")
     check_recordings(options.rec)
@@ -85,10 +89,14 @@ def _check(options: Diagnose, causes: Collection[str], inputs: Sequence[Path]) -
     if set(causes) <= set(options.exclude):
         raise InputError("every cause is excluded; nothing is left to look for")
     if options.out:
-        check_folder(options.out, inputs, is_diagnosis, "an earlier diagnosis")
+        check_folder(options.out, inputs, is_diagnosis, "an earlier diagnosis", force=options.force)
     if options.rig == "emps" and options.map is not None:
         raise InputError("--map is for logs of a team; the emps rig reads its benchmark's MAT file")
-    if options.rig == "emps" and len(options.rec) > 1:
+    if options.rig == "team":
+        for path in options.rec:
+            if path.suffix == ".mat":
+                raise InputError(f"{path}: is a MAT file; --rig emps reads those of the EMPS benchmark")
+    elif len(options.rec) > 1:
         raise InputError(
             f"{len(options.rec)} recordings are given; the emps rig takes one and cuts it into blocks that validate "
             "each other"

@@ -3,15 +3,16 @@
 from collections.abc import Iterator
 from dataclasses import asdict
 
-from estimator.errors import InputError
+from estimator.estimate.result import PayloadEstimate
 from estimator.files import write_json
 from estimator.recording.model import Recording
 from mocobot.api.estimation import estimate
 from mocobot.api.given import Logs
 from mocobot.files.provenance import provenance
-from mocobot.files.targets import check_recordings, map_file
+from mocobot.files.targets import check_output, check_recordings, map_file
 from mocobot.options import Estimate
 from mocobot.progress import stages
+from mocobot.strict import NotGood
 from mocobot_logs.convert_report import format_on_the_fly
 
 
@@ -20,10 +21,11 @@ def run(options: Estimate) -> None:
 
     Raises:
         InputError: recordings that cannot be used, or an output that cannot be written.
+        NotGood: with ``strict``, the estimate is flagged, or says nothing.
     """
-    if not options.rec:
-        raise InputError("no recording given; name at least one file")
-    check_recordings(options.rec, options.out)
+    check_recordings(options.rec)
+    if options.out is not None:
+        check_output(options.out, [*options.rec, *map_file(options.map)], force=options.force)
     logs = Logs(options.map)
     with stages() as (say, _):
 
@@ -40,3 +42,12 @@ def run(options: Estimate) -> None:
     for path, converted in logs.converted.items():
         print(format_on_the_fly(converted, str(path)))
     print(found)
+    if options.strict:
+        _expect_good(found)
+
+
+def _expect_good(found: PayloadEstimate) -> None:
+    if found.flags:
+        raise NotGood(f"the estimate is flagged: {found.flags[0]}")
+    if found.mass is None and found.grasps is None:
+        raise NotGood("the recordings determine neither mass nor grasps")

@@ -3,28 +3,28 @@
 from pathlib import Path
 
 from estimator.arm.design import load_design
-from estimator.errors import InputError
-from estimator.files import check_target, write_json
+from estimator.files import write_json
+from mocobot.files.targets import check_output
 from mocobot.options import Inspect
 from mocobot.progress import bar
+from mocobot.strict import NotGood
 from mocobot_inspect.inspection import inspect_log
 from mocobot_inspect.json import inspection_dict
-from mocobot_inspect.text import format_inspection
+from mocobot_inspect.text import format_inspection, ready_line
 from mocobot_logs.map.files import read_map
 from mocobot_logs.open_log import open_log
 from mocobot_sim.scene.models import omnid_design
 
 
 def run(options: Inspect) -> None:
-    """Run the command; whatever is found, it ends well.
+    """Run the command; without ``strict`` it ends well whatever is found.
 
     Raises:
+        NotGood: with ``strict``, the log is ready for nothing.
         InputError: the log, map or design cannot be read, or the JSON cannot be written.
     """
     if options.json is not None:
-        check_target(options.json)
-        if options.json.exists() and options.json.samefile(options.rec):
-            raise InputError(f"{options.json}: is the log; write the report to another file")
+        check_output(options.json, [options.rec], force=options.force)
     log_map = read_map(options.map) if options.map is not None else None
     design = load_design(options.design) if options.design is not None else omnid_design()
     source = open_log(Path(options.rec), log_map, options.episode)
@@ -33,3 +33,6 @@ def run(options: Inspect) -> None:
     if options.json is not None:
         write_json(options.json, inspection_dict(found))
     print(format_inspection(found))
+    ready = ready_line(found)
+    if options.strict and (ready.startswith("ready for: nothing") or " yes" not in ready):
+        raise NotGood(ready)

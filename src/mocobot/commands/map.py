@@ -2,8 +2,8 @@
 
 import sys
 
-from estimator.errors import InputError
-from estimator.files import check_target, write_text
+from estimator.files import write_text
+from mocobot.files.targets import check_output
 from mocobot.options import Map
 from mocobot_logs.draft.draft import Draft
 from mocobot_logs.draft.of_log import draft_of
@@ -16,9 +16,7 @@ def run(options: Map) -> None:
         InputError: the log cannot be read, or the draft not be written.
     """
     if options.out is not None:
-        check_target(options.out)
-        if options.out.exists():
-            raise InputError(f"{options.out}: exists; name a new file, for a map may have been worked on")
+        check_output(options.out, [options.log], force=options.force)
     draft = draft_of(options.log, options.episode)
     if options.out is None:
         print(draft.text, end="")

@@ -8,7 +8,7 @@ from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.recording.parquet import write_recording
 from mocobot.files.provenance import NAME, folder_provenance, provenance
-from mocobot.files.targets import make_folder
+from mocobot.files.targets import check_folder
 from mocobot.options import Paper
 from mocobot.progress import bar
 from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
@@ -18,6 +18,8 @@ from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import sensor_preset
 from mocobot_sim.trial.simulate import draw_units
 from mocobot_sim.trial.truth import GroundTruth, truth_path, write_truth
+
+SCORES = "paper.json"
 
 
 def run(options: Paper) -> None:
@@ -33,7 +35,7 @@ def run(options: Paper) -> None:
     if options.jobs < 1:
         raise InputError(f"jobs is {options.jobs}; it must be at least 1")
     if options.out:
-        make_folder(options.out)
+        check_folder(options.out, [], _is_paper, "an earlier experiment", force=options.force)
     start, made_with = time.perf_counter(), provenance("paper", asdict(options))
     with bar(plan.steps, "paper", "step") as advance:
         result = run_paper(plan, options.jobs, advance)
@@ -43,9 +45,13 @@ def run(options: Paper) -> None:
     if options.out:
         written = _write(options.out, plan, result, tables)
         if options.recordings:
-            written += _write_recordings(make_folder(options.out / "recordings"), plan, result)
+            written += _write_recordings(options.out / "recordings", plan, result)
         write_json(options.out / NAME, folder_provenance(made_with, options.out, written))
         print(f"Written to {options.out}: paper.json, tables.txt, provenance.json, estimates and plots.")
+
+
+def _is_paper(folder: Path) -> bool:
+    return (folder / SCORES).is_file()
 
 
 def _summary(result: PaperResult) -> str:
@@ -61,12 +67,12 @@ def _summary(result: PaperResult) -> str:
 
 def _write(folder: Path, plan: PaperPlan, result: PaperResult, tables: str) -> list[Path]:
     """Write scores, tables, estimates and plots, and say where."""
-    scores, text, trials = (folder / name for name in ("paper.json", "tables.txt", "trials.json"))
+    scores, text, trials = (folder / name for name in (SCORES, "tables.txt", "trials.json"))
     write_json(scores, result.scores)
     write_text(text, tables + "\n")
     write_json(trials, {"trials": [asdict(trial) for trial in result.trials]})
     written = [scores, text, trials]
-    estimates = make_folder(folder / "estimates")
+    estimates = folder / "estimates"
     for preset in plan.presets:
         for payload in plan.payloads:
             written.append(estimates / f"{payload}_{preset}.json")

@@ -5,10 +5,9 @@ from pathlib import Path
 
 from discrepancy.result.read import read_diagnosis
 from estimator.errors import InputError
-from estimator.files import check_target
-from estimator.recording.parquet import read_recording
 from mocobot.api.replay import SUFFIX, check_rerun
-from mocobot.files.targets import check_recordings
+from mocobot.files.recordings import read
+from mocobot.files.targets import check_output, check_recordings
 from mocobot.options import Replay
 from mocobot.progress import bar
 from mocobot_view.facts.fact_files import read_estimate, read_truth
@@ -61,13 +60,12 @@ def run(options: Replay) -> None:
 
 def _check(options: Replay) -> None:
     """Everything that can be refused before a recording is read."""
-    if not options.rec:
-        raise InputError("no recording given; name at least one file")
     if options.save is not None and options.web:
         raise InputError("--save and --web are both given; choose a file or a browser")
     check_recordings(options.rec)
     if options.save is not None:
-        check_target(options.save, SUFFIX)
+        inputs = [*options.rec, *([options.estimate] if options.estimate else [])]
+        check_output(options.save, inputs, force=options.force, suffix=SUFFIX)
 
 
 def _trials(options: Replay) -> list[ReplayTrial]:
@@ -76,7 +74,7 @@ def _trials(options: Replay) -> list[ReplayTrial]:
     trials = []
     with bar(len(options.rec), "reading", "recording") as advance:
         for path, name in zip(options.rec, distinct_names(options.rec), strict=True):
-            recording = read_recording(path)
+            recording = read(path)
             truth = read_truth(path, recording.metadata.robots) if options.truth else None
             trials.append(
                 replay_trial(recording, name, estimate, truth, diagnosis, _payload(options.payload))

@@ -1,10 +1,13 @@
 """``mocobot simulate``: simulate one trial, write its recording and the truth beside it."""
 
+from pathlib import Path
+
 from estimator.errors import InputError
-from estimator.files import check_target
 from mocobot.api.simulation import check_fits, simulate
+from mocobot.files.targets import check_output
 from mocobot.options import Simulate
 from mocobot.progress import bar
+from mocobot_sim.trial.truth import truth_path
 
 
 def run(options: Simulate) -> None:
@@ -14,7 +17,10 @@ def run(options: Simulate) -> None:
         InputError: an option that cannot be met, or an output that cannot be written.
         TrialError: the physics of the trial cannot be trusted.
     """
-    check_target(options.out, ".parquet")
+    given = Path(options.payload or "")
+    inputs = [given] if given.is_file() else []
+    check_output(options.out, inputs, force=options.force, suffix=".parquet")
+    check_output(truth_path(options.out), inputs, force=options.force)
     check_fits("--vias", options.vias, "random", options.trajectory)
     check_fits("--duration", options.duration, "periodic", options.trajectory)
     if options.model is not None and options.payload is not None:

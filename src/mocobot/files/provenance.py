@@ -24,9 +24,9 @@ from estimator.files import file_facts
 
 PACKAGES = ("dm-control", "joblib", "mujoco", "numba", "numpy", "pyarrow", "scipy")
 """Libraries that a result's numbers pass through."""
-NO_MATTER = ("out", "jobs", "rec")
-"""Options that are not listed: results do not depend on where they go or on the number of processes, and recordings are
-listed as files."""
+NO_MATTER = ("out", "force", "strict", "jobs", "rec")
+"""Options that are not listed: results do not depend on where they go, on what they replace, on the exit code or on the
+number of processes, and recordings are listed as files."""
 FORMAT, VERSION, NAME = "mocobot-provenance", 1, "provenance.json"
 SOURCES = ("src", "models", "pyproject.toml")
 GIT_S = 20.0

@@ -1,55 +1,91 @@
-"""What a user names to be read and written, checked before any work is done."""
+"""What a user names to be read and written, checked before any work is done.
+
+One rule for every command: nothing that exists is overwritten unasked. ``--force`` replaces a file, and a folder that
+is an earlier result of the same command and nothing else; never an input.
+"""
 
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from estimator.errors import InputError
-from estimator.files import check_target, system_errors
+from estimator.files import check_place, check_target, system_errors
 
 
-def check_recordings(recordings: Sequence[Path], out: Path | None = None) -> None:
-    """Each recording once, and an output that overwrites none of them.
+def check_recordings(recordings: Sequence[Path]) -> None:
+    """At least one recording, each once.
 
     Raises:
-        InputError: one is given twice, or the output is one of them or cannot be written.
+        InputError: there is none, or one is given twice.
     """
+    if not recordings:
+        raise InputError("no recording given; name at least one file")
     seen: set[str] = set()
     for path in recordings:
         real = os.path.realpath(path)
         if real in seen:
             raise InputError(f"{path} is given twice, and would count twice")
         seen.add(real)
-    if out is not None:
-        if os.path.realpath(out) in seen:
-            raise InputError(f"{out}: is one of the recordings; write the estimate to another file")
-        check_target(out)
 
 
 def map_file(name: str | None) -> list[Path]:
     """The file that a map is read from, none for a built-in one."""
     from mocobot_logs.map.files import MAPS
 
-    return [] if name is None or name in MAPS else [Path(name)]
+    return [] if name is None or name in MAPS or not Path(name).is_file() else [Path(name)]
 
 
-def check_folder(path: Path, inputs: Sequence[Path], is_ours: Callable[[Path], bool], what: str) -> None:
-    """Find out that a folder cannot be written before the work is done whose result it would hold.
+def check_output(path: Path, inputs: Sequence[Path] = (), *, force: bool, suffix: str = "") -> None:
+    """Find out that a file may not be written, or cannot, before the work is done whose result it would hold.
+
+    Args:
+        path: the file.
+        inputs: files and folders that must not be lost.
+        force: whether an existing file may be replaced.
+        suffix: how its name must end; any name will do if empty.
+
+    Raises:
+        InputError: it is an input or lies in one, it exists without ``force``, or see ``check_target``.
+    """
+    check_no_input(path, inputs)
+    check_target(path, suffix)
+    if path.exists() and not force:
+        raise InputError(f"{path}: exists; give --force to replace it, or name another file")
+
+
+def check_no_input(path: Path, inputs: Sequence[Path]) -> None:
+    """Find out that an output is an input, or lies in one.
+
+    Raises:
+        InputError: it is, or does.
+    """
+    with system_errors(path):
+        real = Path(os.path.realpath(path))
+        for given in inputs:
+            source = Path(os.path.realpath(given))
+            if real == source or (source in real.parents and source.is_dir()):
+                where = "is an input" if real == source else f"lies in the input {given}"
+                raise InputError(f"{path}: {where}; write somewhere else")
+
+
+def check_folder(
+    path: Path, inputs: Sequence[Path], is_ours: Callable[[Path], bool], what: str, *, force: bool
+) -> None:
+    """Find out that a folder may not be written, or cannot, before the work is done whose result it would hold.
 
     Args:
         path: folder to be created or replaced.
         inputs: files that must not be lost.
         is_ours: whether an existing folder is an earlier result and nothing else.
         what: the kind of result, for messages.
+        force: whether such a folder may be replaced; an empty one always may.
 
     Raises:
-        InputError: it is a file, or not empty and no such result, or holds an input, or is the current folder, or its
-            parent does not exist.
+        InputError: it is a file, or holds an input or something that is no such result, or such a result without
+            ``force``, or is the current folder, or nothing can be put there.
     """
     real = Path(os.path.realpath(path))
     with system_errors(path):
-        if not real.parent.is_dir():
-            raise InputError(f"{path.parent}: there is no such folder")
         if real.exists() and not real.is_dir():
             raise InputError(f"{path}: is a file; name a folder to write")
         if real in (here := Path.cwd(), *here.parents):
@@ -57,16 +93,9 @@ def check_folder(path: Path, inputs: Sequence[Path], is_ours: Callable[[Path], b
         for entry in inputs:
             if real in Path(os.path.realpath(entry)).parents:
                 raise InputError(f"{path}: holds {entry}, which would be lost; name another folder")
-        if real.exists() and any(real.iterdir()) and not is_ours(real):
-            raise InputError(f"{path}: exists and is not {what}; name a new folder")
-
-
-def make_folder(path: Path) -> Path:
-    """Create a folder and its parents.
-
-    Raises:
-        InputError: it cannot be created.
-    """
-    with system_errors(path, "created"):
-        path.mkdir(parents=True, exist_ok=True)
-    return path
+        if real.exists() and any(real.iterdir()):
+            if not is_ours(real):
+                raise InputError(f"{path}: exists and is not {what}; name a new folder")
+            if not force:
+                raise InputError(f"{path}: is {what}; give --force to replace it, or name a new folder")
+    check_place(path)

@@ -21,9 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from estimator.arrays import Array
+from estimator.so3 import cross
 from estimator.statistics import rms
 from mocobot_inspect.wiring.motion import Fault, Grasp
-from mocobot_inspect.wiring.rigid_body import FARTHEST_M, Body, cross, rigid_body
+from mocobot_inspect.wiring.rigid_body import FARTHEST_M, Body, rigid_body
 
 TOLERANCES = {
     "rotation": 0.01,

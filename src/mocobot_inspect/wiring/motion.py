@@ -17,6 +17,7 @@ from estimator.arm.dynamics import arm_torque
 from estimator.arm.gimbal import angular_motion, rotation
 from estimator.arm.wrist_level import driven_motion
 from estimator.arrays import Array
+from estimator.errors import InputError
 from estimator.recording.checks import TORQUE_FACTOR
 from estimator.statistics import rms
 from mocobot_inspect.signals import Signals, noise_gains
@@ -114,7 +115,7 @@ def arm_motion(signals: Signals, robot: int, design: OmnidDesign) -> Arm | Fault
     if folded > WRONG_SHARE:
         faults = (*faults, Fault(folded, f"omnid{robot + 1}: a leg is past its stretched position"))
     h_dot, h_ddot = (position[1], position[2]) if wrist else wrist_motion(legs, phi[1], phi[2])
-    return Arm(legs, h_dot, h_ddot, arm_torque(phi[0], phi[1], phi[2], design), faults)
+    return Arm(legs, h_dot, h_ddot, arm_torque(phi[0], phi[1], phi[2], design, legs), faults)
 
 
 def gimbal_motion(signals: Signals, robot: int, design: OmnidDesign) -> Gimbal:
@@ -179,11 +180,14 @@ def grasp_motion(
 def _posture(position: Array, design: OmnidDesign, *, wrist: bool) -> tuple[Array, Array, LegGeometry] | None:
     """Driven angles with rates and accelerations, and the positions themselves, both (3, Q, 3) and without the few
     instants that no arm can be in; and the geometry at the angles."""
-    if wrist:
+    if not wrist:
+        try:
+            return position, position, leg_geometry(position[0], design)
+        except InputError:  # some instants are impossible
+            possible = is_reachable(position[0], design)
+    else:
         possible = np.all(is_in_reach(position[0], design), axis=-1)
         possible[possible] = is_reachable(inverse_kinematics(position[0][possible], design), design)
-    else:
-        possible = is_reachable(position[0], design)
     if np.mean(~possible) > WRONG_SHARE:
         return None
     if not possible.all():

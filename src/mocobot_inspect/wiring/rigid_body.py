@@ -9,7 +9,7 @@ import numpy as np
 from estimator.arrays import Array
 from estimator.estimate.identifiability import FACTOR, cross_information
 from estimator.estimate.joint import newton_euler_regressor
-from estimator.so3 import chordal_mean
+from estimator.so3 import chordal_mean, cross
 from estimator.statistics import rms
 from mocobot_inspect.wiring.motion import Grasp
 
@@ -110,13 +110,6 @@ def rigid_body(told: Sequence[Grasp], most_noise: Array | None = None) -> Body |
 def rotation_onto(a: Array, b: Array) -> Array:
     """The rotation R that brings the vectors b nearest to a in the mean, shapes (Q, 3)."""
     return chordal_mean((a.T @ b)[None])
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Cross products along the last axis; ``np.cross`` takes longer than all else together."""
-    x, y, z = a[..., 0], a[..., 1], a[..., 2]
-    u, v, w = b[..., 0], b[..., 1], b[..., 2]
-    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=-1)
 
 
 def _position(w: Array, difference: Array) -> Array:

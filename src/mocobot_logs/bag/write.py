@@ -37,7 +37,7 @@ from rosbags.typesys.store import Typestore
 
 from estimator.arm.wrist_level import wrist_of
 from estimator.errors import InputError
-from estimator.files import whole_file, whole_folder
+from estimator.files import check_place, whole_file, whole_folder
 from estimator.recording.model import Recording
 from mocobot_logs.bag.mcap_writer import ChecksummedMcap
 from mocobot_logs.bag.messages import Topic
@@ -136,8 +136,7 @@ def _check_target(path: Path, storage: Storage) -> bool:
         if not single and path.exists() and not (path.is_dir() and not any(path.iterdir())):
             what = "is a folder that holds something" if path.is_dir() else "is a file"
             raise InputError(f"{path}: {what}; name a new folder for the bag, or a {SUFFIXES[storage]} file")
-        if not path.parent.is_dir():
-            raise InputError(f"{path.parent}: there is no such folder")
+        check_place(path)
     except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL in it
         if isinstance(error, InputError):
             raise

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from mocobot_logs.cut.choice import Choice, Span
 from mocobot_logs.cut.extent import Extent
 
-SHORTEST_NS = 8_000_000_000
-"""Shortest part that becomes a trial [ns]: ``estimate`` and ``diagnose`` leave out 2 s at either end, for their
-filters; as much again must be left."""
+SHORTEST_NS = 9_500_000_000
+"""Shortest part that becomes a trial [ns]: of what resampling leaves (it may take 0.1 s at either end), ``estimate``
+and ``diagnose`` leave out 2 s at either end for their filters, and a diagnosis needs 5 s of the rest."""
 
 UNEVEN_NS = 100_000_000
 """Robots that begin or end so much apart are told of [ns]."""

@@ -7,7 +7,7 @@ from mocobot_logs.draft.channels import find_channels
 from mocobot_logs.draft.draft import Draft, put_together
 from mocobot_logs.draft.time import time_lines
 from mocobot_logs.map.log_map import CsvMap
-from mocobot_logs.open_log import kind_of, open_table
+from mocobot_logs.open_log import log_kind, open_table
 
 
 def draft_of(path: Path, episode: int | None = None) -> Draft:
@@ -20,7 +20,7 @@ def draft_of(path: Path, episode: int | None = None) -> Draft:
     Raises:
         InputError: there is no such log, or it is damaged.
     """
-    kind = kind_of(path)
+    kind = log_kind(path)
     if kind == "bag":
         from mocobot_logs.draft.bag_candidates import of_bag
 

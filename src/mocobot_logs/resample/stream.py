@@ -18,6 +18,8 @@ from mocobot_logs.resample.tally import Tally
 
 SLOWEST, FASTEST_HZ = 0.25, 20e3
 """Slowest native rate over the output rate: signals up to 5 Hz need 25 Hz; and the fastest [Hz]."""
+PLAUSIBLE_HZ = 5.0
+"""Slowest log whose stamps are believed: the rate asked for is blamed, not their unit."""
 _TOLERANCE = 0.01  # of the slowest rate, for clocks and jitter
 _SAME_RATE = 1e-3
 _LOOK = 1024  # rows from which the native rate is found
@@ -139,9 +141,15 @@ class RobotStream:
         period_ns = float(np.median(np.diff(time_ns)))
         native_hz, slowest_hz = 1.0 / (period_ns * NS), SLOWEST * self._rate_hz
         if not slowest_hz * (1.0 - _TOLERANCE) <= native_hz <= FASTEST_HZ:
+            asked = PLAUSIBLE_HZ <= native_hz < slowest_hz
+            hint = (
+                f"; for a recording of {self._rate_hz:g} Hz {slowest_hz:g} to {FASTEST_HZ:g} Hz are needed, "
+                f"so this log allows a rate of at most {native_hz / SLOWEST:.4g} Hz"
+                if asked
+                else f"; {slowest_hz:g} to {FASTEST_HZ:g} Hz are allowed (is the unit of time right?)"
+            )
             raise InputError(
-                f"{self._where}: samples come {period_ns * NS:.6g} s apart, at {native_hz:.6g} Hz; "
-                f"{slowest_hz:g} to {FASTEST_HZ:g} Hz are allowed (is the unit of time right?)"
+                f"{self._where}: samples come {period_ns * NS:.6g} s apart, at {native_hz:.6g} Hz{hint}"
             )
         k = max(1, round(native_hz / self._rate_hz))
         spacing_ns = 1.0 / (k * self._rate_hz) / NS

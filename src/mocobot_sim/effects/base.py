@@ -68,6 +68,8 @@ class Effect(ABC):
     def apply(self, scene: TeamScene) -> TeamScene:
         """Put the effect into a scene and return it; the scene's PyMJCF tree is edited in place.
 
+        Soft rows are not set: ``TeamScene.tuned`` does that for the inertias that all effects leave.
+
         Raises:
             InputError: the scene has no such robot, or cannot be edited.
         """
@@ -76,7 +78,7 @@ class Effect(ABC):
         robot = getattr(self, "robot", 1)
         if robot > scene.robots:
             raise InputError(f"{self.cause}: robot is {robot}; the team has robots 1 .. {scene.robots}")
-        return self._edit(scene).tuned()
+        return self._edit(scene)
 
     def carried(self) -> Array:
         """Inertial parameters (m, m c, J about {1}) that it adds to the payload's in an estimate, shape (10,)."""

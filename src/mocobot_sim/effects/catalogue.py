@@ -125,4 +125,5 @@ def apply_effects(scene: TeamScene, effects: Sequence[Effect]) -> TeamScene:
             )
         places.append(place)
         scene = effect.apply(scene)
-    return replace(scene, effects=(*scene.effects, *effects))
+    # Once for all of them: it compiles the model.
+    return replace(scene, effects=(*scene.effects, *effects)).tuned()

@@ -62,8 +62,10 @@ class PaperPlan:
         for preset in self.presets:
             sensor_preset(preset)
         for name, values in (("payload", self.payloads), ("preset", self.presets)):
-            if not values or len(set(values)) != len(values):
-                raise InputError(f"{name} is {' '.join(values) or 'empty'!r}; give at least one, each once")
+            if not values:
+                raise InputError(f"no {name} given; name at least one")
+            if len(set(values)) != len(values):
+                raise InputError(f"{name} is {' '.join(values)!r}; give each once")
         for name, value, least in (("seed", self.seed, 0), ("trials", self.trials, 1)):
             if value < least:
                 raise InputError(f"{name} is {value}; it must be at least {least}")

@@ -31,7 +31,9 @@ def load_payload(payload: str | Path) -> mjcf.RootElement:
     try:
         root = mjcf.from_path(str(path))
     except (OSError, ValueError, AttributeError, KeyError, SyntaxError) as error:
-        raise InputError(f"{path}: not a readable MJCF ({error})") from error
+        raise InputError(
+            f"{path}: not a readable MJCF ({getattr(error, 'strerror', None) or error})"
+        ) from error
     if root.compiler.angle != "radian":
         # The composed scene has one compiler setting for all parts; degrees here would be read as radians.
         raise InputError(f'{path}: compiler angle is {root.compiler.angle or "degree"}; it must be "radian"')

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.arrays import Array
-from estimator.errors import InputError
 from mocobot_view.pictures.camera import Camera, pixels
 from mocobot_view.pictures.labels import with_labels
 from mocobot_view.pictures.marks import Marks
@@ -146,17 +145,3 @@ def _run(folder: Path) -> NDArray[np.uint8] | str:
     remedy = "unset MUJOCO_GL to have EGL and OSMesa tried" if chosen else REMEDY
     reasons = "; ".join(failed)
     return f"pictures are skipped: MuJoCo cannot render without a screen here ({reasons}); {remedy}"
-
-
-def make_folder(folder: Path) -> None:
-    """Make a folder for pictures, before any work is done for them.
-
-    Raises:
-        InputError: it cannot be made.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(
-            f"{folder}: cannot be made a folder for pictures ({error.strerror or error})"
-        ) from error

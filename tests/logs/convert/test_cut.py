@@ -200,7 +200,7 @@ REFUSED = {
     "a long drop": (["--drop", "robot=2:20-21"], "robot 2: no samples for 1.02 s"),
     "split, too short": (
         ["--crop", "0:9", "--drop", "robot=1:3-4", "--split-at-gaps"],
-        "for 8 s without a gap of more than 0.05 s; the longest goes from 4.01 to 9 s",
+        "for 9.5 s without a gap of more than 0.05 s; the longest goes from 4.01 to 9 s",
     ),
 }
 
@@ -252,7 +252,7 @@ def test_a_trial_of_every_part_between_gaps(
     left_out = text.split("[[Left out of the log]]\n")[1]
     assert [line.strip() for line in left_out.splitlines()] == [
         "9.99 to 11 s: robot 2 has no samples",
-        "11 to 14.99 s: shorter than 8 s",
+        "11 to 14.99 s: shorter than 9.5 s",
         "14.99 to 17.01 s: robot 3 has no samples",
         "15 to 17 s of robot 3: 201 samples, dropped",
         f"{tmp_path / 'out-7.parquet'} is of an earlier conversion, and was left as it is",
@@ -295,7 +295,7 @@ def test_a_part_must_not_overwrite_the_log(tmp_path: Path, capsys: pytest.Captur
     log = written(holed({1: slice(1500, 1600)}), tmp_path / "out-2.parquet")
     before = log.read_bytes()
     message = command.refused(capsys, "convert", log, tmp_path / "out.parquet", "--split-at-gaps")
-    assert "write the recording somewhere else" in message
+    assert "is an input; write somewhere else" in message
     assert log.read_bytes() == before
     assert [path.name for path in tmp_path.iterdir()] == ["out-2.parquet"]
 

@@ -106,8 +106,8 @@ def test_an_old_model_is_replaced_and_anything_else_is_not(folder):
     assert (other / "thesis.txt").is_file()
     with pytest.raises(InputError, match="cannot be written as JSON"):
         write_extended(build_team("b"), [], folder, {"x": float("nan")})
-    with pytest.raises(InputError, match="nowhere/model: cannot be written"):
-        write_extended(build_team("b"), [], folder.parent / "nowhere" / "model", {})
+    with pytest.raises(InputError, match=r"thesis.txt/model: cannot be written"):
+        write_extended(build_team("b"), [], other / "thesis.txt" / "model", {})
 
 
 def _change(folder, change):
