@@ -40,7 +40,7 @@ class Conversion:
     @classmethod
     def of(cls, sampling: Sampling, rate_hz: float, samples: int, rng: np.random.Generator) -> Conversion:
         """Draw one; the recording has ``samples`` at ``rate_hz`` [Hz]."""
-        fits = sampling.method != "interpolated"
+        fits = sampling.method in ("untouched", "filtered")
         k = max(1, round(sampling.native_hz / rate_hz)) if fits else fineness(sampling.native_hz, rate_hz)
         spacing_s = 1.0 / (k * rate_hz)
         period_s = spacing_s if fits else 1.0 / sampling.native_hz
@@ -51,7 +51,7 @@ class Conversion:
             at = np.sort(at + sampling.jitter_s * rng.standard_normal(count))
         kept = rng.uniform(size=count) >= sampling.missing
         kept[[0, -1]] = True
-        grid = Grid(spacing_s / NS, period_s / NS, fits)
+        grid = Grid(spacing_s / NS, period_s / NS, fits, uneven=sampling.method == "fitted")
         return cls(np.rint(at[kept] / NS).astype(np.int64), grid, k, rate_hz, samples)
 
     @property
@@ -62,7 +62,7 @@ class Conversion:
     def __call__(self, values: Array) -> Array:
         """Samples of the recording from readings at ``instants``, shape (q, C) -> (Q, C)."""
         time_ns = self.instants_ns - self.instants_ns[0]
-        if not self.grid.fits:
+        if not (self.grid.fits or self.grid.uneven):
             merger = Merger(self.grid.period_ns)
             parts = merger.push(time_ns, values), merger.finish()
             time_ns, values = (np.concatenate(part) for part in zip(*parts, strict=True))

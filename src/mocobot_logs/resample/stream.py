@@ -79,9 +79,10 @@ class RobotStream:
         """
         self._flush()
         screen = self.screen
-        rows = screen.rows - screen.duplicates
+        rows = screen.rows - screen.duplicates - screen.blank
         if screen.first_ns is None or screen.last_ns is None or rows < MIN_SAMPLES:
-            raise InputError(f"{self._where} has {rows} samples; at least {MIN_SAMPLES} are needed")
+            blank = f" ({screen.blank} rows lack a value)" if screen.blank else ""
+            raise InputError(f"{self._where} has {rows} samples{blank}; at least {MIN_SAMPLES} are needed")
         pipe = self._pipe or self._begin()
         values = pipe.finish(rows)
         span_s = (screen.last_ns - screen.first_ns) * NS
@@ -102,6 +103,8 @@ class RobotStream:
             gaps=tally.gaps,
             longest_gap_s=tally.longest_gap_s,
             filled=tally.filled,
+            blank=screen.blank,
+            blank_channels=dict(screen.blank_channels),
             duplicates=screen.duplicates,
             merged=pipe.merged,
             method=pipe.method,
@@ -156,7 +159,9 @@ class RobotStream:
             return fitting, k
         interval = np.diff(time_ns)
         jitter_ns = interval - np.maximum(np.rint(interval / period_ns), 1.0) * period_ns
-        uneven = native_hz >= MANY * self._rate_hz and float(np.sqrt(np.mean(jitter_ns**2))) > UNEVEN * period_ns
+        uneven = (
+            native_hz >= MANY * self._rate_hz and float(np.sqrt(np.mean(jitter_ns**2))) > UNEVEN * period_ns
+        )
         if uneven:  # most intervals are shorter than the mean one, and none is told from a gap
             period_ns = float(np.mean(interval))
         k = fineness(1.0 / (period_ns * NS), self._rate_hz)
