@@ -31,6 +31,8 @@ _DONE = {
     ("filtered", False): f"low-passed, thinned and {_ONTO}",
     ("interpolated", True): "interpolated, low-passed and thinned",
     ("interpolated", False): f"interpolated, low-passed, thinned and {_ONTO}",
+    ("fitted", True): "fitted by polynomials, as they are many and uneven, low-passed and thinned",
+    ("fitted", False): f"fitted by polynomials, as they are many and uneven, low-passed, thinned and {_ONTO}",
 }
 """What was done to a robot's samples, by method and by whether its grid is the recording's."""
 
