@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from mocobot import trajectories as trajectories
     from mocobot.api.conversion import Conversion as Conversion
     from mocobot.api.conversion import convert as convert
+    from mocobot.api.conversion import convert_parts as convert_parts
     from mocobot.api.diagnosis import Cause as Cause
     from mocobot.api.diagnosis import Diagnosis as Diagnosis
     from mocobot.api.diagnosis import diagnose as diagnose
@@ -56,7 +57,7 @@ _NAMES = {
     "estimator.recording.model": "Recording",
     "estimator.recording.parquet": "read_recording write_recording",
     "mocobot": "bases emps guiding pictures robots trajectories",
-    "mocobot.api.conversion": "Conversion convert",
+    "mocobot.api.conversion": "Conversion convert convert_parts",
     "mocobot.api.diagnosis": "Cause Diagnosis diagnose",
     "mocobot.api.estimation": "Estimate estimate read_estimate",
     "mocobot.api.inspection": "Inspection inspect",

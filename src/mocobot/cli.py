@@ -18,6 +18,7 @@ COMMANDS = {
     "estimate": options.Estimate,
     "diagnose": options.Diagnose,
     "convert": options.Convert,
+    "map": options.Map,
     "replay": options.Replay,
     "inspect": options.Inspect,
     "report": options.Report,

@@ -36,7 +36,9 @@ class Estimate:
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload."""
 
     rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
-    """Recordings (Parquet), all of one payload."""
+    """Recordings (Parquet), or logs of any format that ``convert`` reads, all of one payload."""
+    map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
+    """Map of the logs that are no recordings; found out if not given."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
     """Write the estimate as JSON, too."""
     force: Force = False
@@ -53,8 +55,10 @@ class Diagnose:
     """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth."""
 
     rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
-    """Recordings (Parquet), all of one payload; several, so that what is named can be validated. One MAT file with
-    --rig emps."""
+    """Recordings (Parquet), or logs of any format that ``convert`` reads, all of one payload; several, so that what is
+    named can be validated. One MAT file with --rig emps."""
+    map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
+    """Map of the logs that are no recordings; found out if not given."""
     rig: Literal["team", "emps"] = "team"
     """What was recorded: a team of mocobots, or the EMPS benchmark's axis (docs/emps.md)."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
@@ -97,6 +101,27 @@ class Convert:
     """Rate of the recording [Hz]."""
     max_gap: Annotated[float, tyro.conf.arg(metavar="S")] = 0.05
     """Longest time without samples that is filled in [s]."""
+    crop: Annotated[str | None, tyro.conf.arg(metavar="FROM:TO")] = None
+    """Keep a part of the log only, in seconds from its start: 12:95, 12: or :95."""
+    drop: Annotated[tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="robot=N:FROM-TO")] = ()
+    """Leave out samples of one robot, in seconds from the log's start: robot=2:30-31. May be given several times."""
+    split_at_gaps: Flag = False
+    """Make a recording of every part between gaps too long to be filled: OUT-1, OUT-2, ..."""
+    json: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
+    """Write the report as JSON, too."""
+    episode: int | None = None
+    """Episode of a LeRobot dataset that holds several."""
+
+
+@dataclass(frozen=True)
+class Map:
+    """Draft the map of a log, for `convert --map`: what is which channel, by names, the units in them, and values."""
+
+    log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
+    """Log of any format that ``convert`` reads."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="MAP.toml")] = None
+    """Write the draft to a file instead of the terminal."""
+    force: Force = False
     episode: int | None = None
     """Episode of a LeRobot dataset that holds several."""
 

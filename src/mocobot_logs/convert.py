@@ -12,7 +12,11 @@ from estimator.recording.checks import check_recording
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
 from mocobot_logs.bag.write import write_bag
-from mocobot_logs.log import Level, LogSource
+from mocobot_logs.cut.choice import WHOLE, Choice, Span, seconds
+from mocobot_logs.cut.extent import extent_of
+from mocobot_logs.cut.piece import Piece
+from mocobot_logs.cut.split import SHORTEST_NS, Omission, omissions, split
+from mocobot_logs.log import NS, Level, LogSource
 from mocobot_logs.one_clock import ClockReport, to_recording
 from mocobot_logs.resample.log import MAX_GAP_S, RATE_HZ, resample
 from mocobot_logs.resample.report import StreamReport
@@ -30,6 +34,8 @@ SUFFIXES: dict[str, Kind] = {
 """What is written, by the target's suffix; a bag's folder has none."""
 UNKNOWN_TRIAL = "random"
 """Kind of trial where nothing says which; it labels reports only."""
+PERIOD_DOUBT = 0.05
+"""So much of a period may the median of jittering intervals be off: 1.25 / sqrt(1024) of what they scatter by."""
 
 
 @dataclass(frozen=True)
@@ -58,12 +64,16 @@ class Converted:
         level: of the log.
         streams: what was found in each robot's stream, and done to it.
         clocks: how the robots' clocks differ, and whether that was corrected.
+        span: which part of the log it is, after the log's start, or None for all of it.
+        left_out: what was left out of the log on purpose, or because it is of no use.
     """
 
     recording: Recording
     level: Level
     streams: tuple[StreamReport, ...]
     clocks: ClockReport
+    span: Span | None
+    left_out: tuple[Omission, ...]
 
 
 def convert(
@@ -71,6 +81,7 @@ def convert(
     labels: Labels,
     standard: OmnidDesign,
     *,
+    choice: Choice = WHOLE,
     rate_hz: float = RATE_HZ,
     max_gap_s: float = MAX_GAP_S,
     correct: bool = False,
@@ -82,29 +93,107 @@ def convert(
         source: the log.
         labels: what the user says of it; what the log says of itself comes second.
         standard: design where neither says one.
+        choice: what of the log is wanted.
         rate_hz: sampling rate of the recording [Hz].
         max_gap_s: longest gap that is filled [s].
         correct: whether the robots' clocks are brought to that of robot 1.
         advance: takes the progress made, in the source's units.
 
     Raises:
-        InputError: the log is damaged, cannot be resampled, or is not plausible (see ``check_recording``).
+        InputError: the log is damaged, cannot be resampled, is not plausible (see ``check_recording``), or does not
+            have what is chosen.
     """
-    resampled = resample(source, rate_hz, max_gap_s, advance)
+    how = _How(labels, standard, rate_hz, max_gap_s, correct)
+    if not choice:
+        return _convert(source, how, advance)
+    extent = extent_of(source, choice, max_gap_s, advance)
+    span = extent.chosen if choice.crop is not None else None
+    converted = _convert(Piece(source, extent.origin_ns, span, choice.drops), how)
+    return replace(converted, span=span, left_out=tuple(omissions(extent, choice)))
+
+
+def convert_parts(
+    source: LogSource,
+    labels: Labels,
+    standard: OmnidDesign,
+    *,
+    choice: Choice = WHOLE,
+    rate_hz: float = RATE_HZ,
+    max_gap_s: float = MAX_GAP_S,
+    correct: bool = False,
+    advance: Callable[[int], object] = lambda _: None,
+) -> tuple[list[Converted], list[Omission]]:
+    """Make a recording of every part of a log between gaps too long to be filled, see ``split``.
+
+    Args:
+        source, labels, standard, choice, rate_hz, max_gap_s, correct, advance: as in ``convert``.
+
+    Returns:
+        The recordings, at least one; and what is in none of them: what is not chosen, gaps, and parts that are too
+        short or cannot be used, with the reason.
+
+    Raises:
+        InputError: the log is damaged, does not have what is chosen, or no part of it can be used.
+    """
+    how = _How(labels, standard, rate_hz, max_gap_s, correct)
+    extent = extent_of(source, choice, max_gap_s, advance)
+    spans, out = split(extent)
+    out += omissions(extent, choice)
+    longest = max(spans, key=lambda span: span.length_ns, default=None)
+    if longest is None or longest.length_ns < SHORTEST_NS:
+        found = "" if longest is None else f"; the longest goes from {longest}"
+        raise InputError(
+            f"{source.name}: no part of it has all robots' samples for {seconds(SHORTEST_NS)} s without a gap of more "
+            f"than {max_gap_s:g} s{found}"
+        )
+    # A part's own period may differ from the log's by what jitter does to a median.
+    how = replace(how, max_gap_s=max_gap_s + PERIOD_DOUBT * extent.period_ns * NS)
+    done, errors = [], []
+    for span in spans:
+        if span.length_ns < SHORTEST_NS:
+            out.append(Omission(span, None, None, f"shorter than {seconds(SHORTEST_NS)} s"))
+            continue
+        try:
+            converted = _convert(Piece(source, extent.origin_ns, span, choice.drops), how)
+        except InputError as error:
+            errors.append(error)
+            out.append(Omission(span, None, None, str(error).removeprefix(f"{source.name} ({span}): ")))
+        else:
+            done.append(replace(converted, span=span))
+    if not done:
+        raise errors[0]
+    return done, sorted(out, key=lambda each: each.span.first_ns)
+
+
+@dataclass(frozen=True)
+class _How:
+    """Options of a conversion, as in ``convert``."""
+
+    labels: Labels
+    standard: OmnidDesign
+    rate_hz: float
+    max_gap_s: float
+    correct: bool
+
+
+def _convert(source: LogSource, how: _How, advance: Callable[[int], object] = lambda _: None) -> Converted:
+    labels = how.labels
+    resampled = resample(source, how.rate_hz, how.max_gap_s, advance)
     silent = source.metadata is None
     recording, clocks = to_recording(
         resampled,
-        design=labels.design or (standard if silent else None),
+        design=labels.design or (how.standard if silent else None),
         trial=labels.trial or (UNKNOWN_TRIAL if silent else None),
         payload=labels.payload,
         source=f"log {os.path.basename(source.name)}" if silent else None,
-        correct=correct,
+        correct=how.correct,
+        cut=isinstance(source, Piece) and source.span is not None,
     )
     recording = replace(recording, metadata=replace(recording.metadata, level=labels.level or source.level))
     streams = resampled.reports
     del resampled  # as large as the recording
     check_recording(recording)
-    return Converted(recording, source.level, streams, clocks)
+    return Converted(recording, source.level, streams, clocks, None, ())
 
 
 def output_kind(path: Path) -> Kind:

@@ -7,6 +7,7 @@ import numpy as np
 
 from estimator.clocks.offsets import ClockEstimate
 from mocobot_logs.convert import Converted
+from mocobot_logs.cut.split import Omission
 from mocobot_logs.resample.report import StreamReport
 
 SURE = 4.0
@@ -22,15 +23,22 @@ _COLUMNS = (
     ("doubles", ""),
 )
 _WIDTHS = (9, 9, 15, 13, 7, 8)
+_ONTO = "interpolated onto the grid of robot 1"
 _DONE = {
-    "untouched": "taken as they are",
-    "filtered": "low-passed and thinned",
-    "interpolated": "interpolated, low-passed and thinned",
+    ("untouched", True): "taken as they are",
+    ("untouched", False): _ONTO,
+    ("filtered", True): "low-passed and thinned",
+    ("filtered", False): f"low-passed, thinned and {_ONTO}",
+    ("interpolated", True): "interpolated, low-passed and thinned",
+    ("interpolated", False): f"interpolated, low-passed, thinned and {_ONTO}",
+    ("fitted", True): "fitted by polynomials, as they are many and uneven, low-passed and thinned",
+    ("fitted", False): f"fitted by polynomials, as they are many and uneven, low-passed, thinned and {_ONTO}",
 }
+"""What was done to a robot's samples, by method and by whether its grid is the recording's."""
 
 
 def format_conversion(converted: Converted, name: str, out: Path) -> str:
-    """Readable report: what was found in each stream, the clocks, and where the recording is.
+    """Readable report: what was found in each stream, the clocks, where the recording is, and what was left out.
 
     Args:
         converted: the result.
@@ -38,13 +46,15 @@ def format_conversion(converted: Converted, name: str, out: Path) -> str:
         out: where the recording was written.
     """
     recording, streams = converted.recording, converted.streams
+    if converted.span is not None:
+        name = f"{name} ({converted.span})"
     metadata = recording.metadata
     robots = f"{metadata.robots} robot{'s' * (metadata.robots > 1)}"
     lines = [f"[[Log {name}]]  {robots}, {converted.level} level"]
     titles, units = zip(*_COLUMNS, strict=True)
     lines += [_row("robot", titles), _row("", units)]
     lines += [_stream(stream) for stream in streams]
-    lines += _methods(streams)
+    lines += _methods(converted) + _blank(streams)
     lines += ["[[Clocks against that of robot 1]]", *_clocks(converted)]
     duration_s = (len(recording.time) - 1) / metadata.rate_hz
     payload = "" if metadata.payload is None else f", payload {metadata.payload}"
@@ -58,6 +68,31 @@ def format_conversion(converted: Converted, name: str, out: Path) -> str:
         lines.append(
             f"    up to {lost_s:.3g} s of a robot's samples lie outside what all robots have in common"
         )
+    if converted.left_out:
+        lines.append(format_omissions(converted.left_out))
+    return "\n".join(lines)
+
+
+def format_on_the_fly(converted: Converted, name: str) -> str:
+    """One line about a log that was converted in passing, with what may be wrong with that."""
+    metadata, streams = converted.recording.metadata, converted.streams
+    duration_s = (len(converted.recording.time) - 1) / metadata.rate_hz
+    robots = f"{metadata.robots} robot{'s' * (metadata.robots > 1)}"
+    text = f"{name}: read as {robots}, {converted.level} level, {duration_s:.2f} s"
+    if filled := sum(stream.filled for stream in streams):
+        text += f"; {filled} missing samples filled in"
+    if _differ(converted.clocks.estimate):
+        text += "; the robots' clocks differ (see mocobot convert)"
+    return text
+
+
+def format_omissions(left_out: Sequence[Omission]) -> str:
+    """What of a log is in no recording, one line each."""
+    lines = ["[[Left out of the log]]"]
+    for each in left_out:
+        whose = "" if each.robot is None else f" of robot {each.robot}"
+        count = "" if each.samples is None else f": {each.samples} sample{'s' * (each.samples > 1)}"
+        lines.append(f"    {each.span}{whose}{count}{',' if count else ':'} {each.why}")
     return "\n".join(lines)
 
 
@@ -78,17 +113,33 @@ def _row(first: str, cells: Sequence[str]) -> str:
     return f"    {first:<5}{row}".rstrip()
 
 
-def _methods(streams: tuple[StreamReport, ...]) -> list[str]:
-    lines = []
-    for method, words in _DONE.items():
-        robots = [str(stream.robot) for stream in streams if stream.method == method]
+def _methods(converted: Converted) -> list[str]:
+    streams, lines = converted.streams, []
+    for done, words in _DONE.items():
+        robots = [
+            stream
+            for stream, same in zip(streams, converted.clocks.untouched, strict=True)
+            if (stream.method, same) == done
+        ]
         if robots:
-            whose = (
-                "all robots"
-                if len(robots) == len(streams)
-                else f"robot{'s' * (len(robots) > 1)} {', '.join(robots)}"
-            )
-            lines.append(f"    samples of {whose}: {words}")
+            filled = ", missing ones filled in" if any(stream.filled for stream in robots) else ""
+            lines.append(f"    samples of {_whose(robots, len(streams))}: {words}{filled}")
+    return lines
+
+
+def _whose(robots: Sequence[StreamReport], of: int) -> str:
+    if len(robots) == of:
+        return "all robots"
+    return f"robot{'s' * (len(robots) > 1)} {', '.join(str(stream.robot) for stream in robots)}"
+
+
+def _blank(streams: Sequence[StreamReport]) -> list[str]:
+    lines = []
+    for stream in streams:
+        if stream.blank:
+            rows = f"{stream.blank} row{'s' * (stream.blank > 1)} of robot {stream.robot}"
+            which = ", ".join(f"{name} {count}" for name, count in stream.blank_channels.items())
+            lines.append(f"    {rows} without all values (NaN: {which}) count as missing")
     return lines
 
 

@@ -2,7 +2,7 @@
 
 Readers are sources: they hand out a log in chunks, so that an hour of ten robots at 1 kHz never has to be in memory.
 What they hand out is in SI units and in mocobot's channels already; what is wrong with the samples (gaps, NaN, time
-running backwards) is still in it, for ``inspect`` to see and for the resampler to refuse.
+running backwards) is still in it, for ``inspect`` to see and for the resampler to fill or refuse.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -122,3 +122,9 @@ def joined(parts: Sequence[Samples], channels: int) -> Samples:
         np.concatenate([part.values for part in parts]),
         np.concatenate(logs) if len(logs) == len(parts) else None,
     )
+
+
+def rows_of(samples: Samples, keep: NDArray[np.bool_] | NDArray[np.intp]) -> Samples:
+    """Some of the rows, by a mask or by their numbers."""
+    log_ns = None if samples.log_ns is None else samples.log_ns[keep]
+    return Samples(samples.stamp_ns[keep], samples.values[keep], log_ns)

@@ -57,6 +57,7 @@ def to_recording(
     payload: str | None = None,
     source: str | None = None,
     correct: bool = False,
+    cut: bool = False,
 ) -> tuple[Recording, ClockReport]:
     """Put all robots on one clock.
 
@@ -70,6 +71,8 @@ def to_recording(
         source: what produced the samples; by default the log's name.
         correct: whether to take out the offset and the drift of every clock against that of robot 1. Otherwise
             stamps are believed.
+        cut: whether the log is a part of another, cut out by stamps: robots whose stamps end together do not break
+            off then, whatever their clocks.
 
     Returns:
         The recording, joint level in memory whatever the log's level, and what was found.
@@ -91,7 +94,8 @@ def to_recording(
         estimate.middle_s + (stamp - estimate.middle_s - offset_s) / (1.0 + drift)
         for stamp in (resampled.start_s, ends_s)
     )
-    _check_ends(resampled.name, to_s, estimate, correct=correct)
+    if not (cut and np.ptp(ends_s) <= EARLY_S):
+        _check_ends(resampled.name, to_s, estimate, correct=correct)
     first = math.ceil((from_s.max() - resampled.start_s[0] - _SAME_S) * rate_hz)
     last = math.floor((to_s.min() - resampled.start_s[0] + _SAME_S) * rate_hz)
     if last - first + 1 < MIN_SAMPLES:
@@ -115,7 +119,9 @@ def to_recording(
             ref[:, i] = values[:, 9:]
     read_s = np.array([(report.first_ns - resampled.origin_ns) * NS for report in resampled.reports])
     read_s = estimate.middle_s + (read_s - estimate.middle_s - offset_s) / (1.0 + drift) - time_s[0]
-    metadata = replace(metadata, sampling=_sampling(resampled, read_s, 1.0 + drift, untouched))
+    metadata = replace(
+        metadata, sampling=_sampling(resampled, float(time_s[0]), read_s, 1.0 + drift, untouched)
+    )
     if resampled.level == "wrist":
         _to_joints(arrays["position"], arrays["effort"], metadata.design, resampled.name, rate_hz)
     recording = Recording(
@@ -159,19 +165,21 @@ def _metadata(
 
 
 def _sampling(
-    resampled: Resampled, first_s: Array, speed: Array, untouched: Sequence[bool]
+    resampled: Resampled, start_s: float, first_s: Array, speed: Array, untouched: Sequence[bool]
 ) -> tuple[Sampling, ...] | None:
     """How the sensors were read, or None where the samples are as they were read.
 
     Args:
         resampled: the log.
+        start_s: the recording's beginning after the log's origin [s].
         first_s: when each robot's first sample was taken, in the recording's time [s], shape (N,).
         speed: how fast each robot's clock runs by that of robot 1, shape (N,).
         untouched: whether each robot kept its samples as they were on its own grid.
     """
     known = None if resampled.metadata is None else resampled.metadata.sampling
     if known is not None:  # what was converted before: the errors are still those of the first reading
-        return tuple(sampling.later(-first_s[0]) for sampling in known)
+        # Stamps of what was written as a recording are its time; this one may begin in the middle of it.
+        return tuple(sampling.later(resampled.origin_ns * NS + start_s) for sampling in known)
     reports = resampled.reports
     if all(untouched) and all(report.method == "untouched" and not report.filled for report in reports):
         return None
@@ -213,7 +221,7 @@ def _check_ends(name: str, ends_s: Array, estimate: ClockEstimate, *, correct: b
         )
     raise InputError(
         f"{name}: the log of robot {early + 1} ends {short_s:.4g} s before that of robot {late + 1}; "
-        f"at most {EARLY_S:g} s is allowed{hint}"
+        f"at most {EARLY_S:g} s is allowed{hint or ' (convert --crop keeps what all have)'}"
     )
 
 

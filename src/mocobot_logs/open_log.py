@@ -1,14 +1,18 @@
 """Any log by its path: what it is shows in its first bytes, or in what its folder holds."""
 
+import shlex
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Literal
 
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.parquet import METADATA_KEY
 from mocobot_logs.faults import detail_of
 from mocobot_logs.log import LogSource
-from mocobot_logs.map.files import LogMap, builtin_map
+from mocobot_logs.map.files import CsvMap, LogMap, builtin_map
 from mocobot_logs.map.parse import MAX_ROBOTS
 from mocobot_logs.table.csv import CsvTable
 from mocobot_logs.table.lerobot import LeRobotTable, dataset_root
@@ -16,6 +20,7 @@ from mocobot_logs.table.npz import NpzTable
 from mocobot_logs.table.parquet import ParquetTable, opened
 from mocobot_logs.table.table import Table, TableSource
 
+Kind = Literal["bag", "csv", "npz", "parquet", "lerobot"]
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt")
 FORMATS = (
     "a rosbag2 folder, .mcap or .db3, a CSV file (.csv, .tsv, .txt), an .npz archive, a .parquet file or a LeRobot "
@@ -41,16 +46,36 @@ def open_log(path: Path | str, log_map: LogMap | None = None, episode: int | Non
     if kind == "bag":
         from mocobot_logs.bag.read import open_bag
 
-        return open_bag(path, log_map)
-    table = _table(path, kind, log_map, episode)
-    return TableSource(table, log_map or _default_map(table))
+        if log_map is not None:
+            return open_bag(path, log_map)
+        with draft_suggested(path):
+            return open_bag(path)
+    table = open_table(path, kind, (log_map or builtin_map("mocobot")).csv, episode)
+    if log_map is not None or table.metadata is not None:
+        return TableSource(table, log_map or _default_map(table))
+    with draft_suggested(path):
+        return TableSource(table, _default_map(table))
 
 
-def log_kind(path: Path) -> str:
-    """``bag``, ``csv``, ``npz``, ``parquet`` or ``lerobot``.
+@contextmanager
+def draft_suggested(path: Path) -> Iterator[None]:
+    """A block in which a log is read without a map, and what is said if it cannot be.
 
     Raises:
-        InputError: it is none of these, or cannot be read.
+        InputError: it cannot be.
+    """
+    try:
+        yield
+    except InputError as error:
+        said = f"No map was given (--map): `mocobot map {shlex.quote(str(path))}` drafts one"
+        raise InputError(f"{error}. {said}") from error
+
+
+def log_kind(path: Path) -> Kind:
+    """What a log is, by its first bytes or by what its folder holds.
+
+    Raises:
+        InputError: there is no such log, or its format is not known.
     """
     try:
         if not path.exists():
@@ -108,10 +133,20 @@ def is_recording(path: Path) -> bool:
         return METADATA_KEY in (file.schema_arrow.metadata or {})
 
 
-def _table(path: Path, kind: str, log_map: LogMap | None, episode: int | None) -> Table:
+def open_table(path: Path, kind: Kind, options: CsvMap, episode: int | None = None) -> Table:
+    """Open a table of any format.
+
+    Args:
+        path: a file, or the folder of a dataset.
+        kind: what it is, see ``log_kind``; no bag.
+        options: how a text table is written.
+        episode: as in ``open_log``.
+
+    Raises:
+        InputError: it is damaged, or the episode must be named.
+    """
     name = str(path)
     if kind == "csv":
-        options = (log_map or builtin_map("mocobot")).csv
         return CsvTable(path, options, name)
     if kind == "npz":
         return NpzTable(path, name)

@@ -89,7 +89,10 @@ TAU = [f"omnid{i}.tau{k}" for i in (1, 2, 3) for k in (1, 2, 3)]
         (columns(THETA, lambda v: 10.0 * np.rad2deg(v)), ["omnid", "theta", "range"]),
         (lambda t: t.slice(0, 0), ["no rows"]),
         (lambda t: t.slice(0, 100), ["samples", "too few"]),
-        (lambda t: t.replace_schema_metadata({}), ["mocobot", "not a recording"]),
+        (
+            lambda t: t.replace_schema_metadata({}).rename_columns([f"my {n}" for n in t.column_names]),
+            ["missing column 'omnid1.phi1'", "No map was given", "`mocobot map "],
+        ),
         (
             exchange([(f"omnid1.{c}", f"omnid2.{c}") for c in ("phi1", "phi2", "phi3")]),
             ["robots 1 and 2", "rigid body"],

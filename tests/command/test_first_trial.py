@@ -110,6 +110,20 @@ OPTIONS = {
         "needed, so this log allows a rate of at most 400 Hz",
     "convert log.csv new.parquet --max-gap 50ms": "--max-gap is '50ms'; it must be a number",
     "convert log.csv new.parquet --clock fix": "--clock is 'fix'; it must be one of keep, correct",
+    "convert log.csv new.parquet --crop 1-2":
+        "--crop is '1-2'; it must be FROM:TO in seconds from the log's start, such as 12:95, 12: or :95",
+    "convert log.csv new.parquet --crop": "--crop FROM:TO needs a value; see mocobot convert --help",
+    "convert log.csv new.parquet --drop 2:1-2":
+        "--drop is '2:1-2'; it must be robot=N:FROM-TO in seconds from the log's start, such as robot=2:30-31",
+    "convert log.csv new.parquet --drop robot=4:1-2":
+        "log.csv: --drop robot=4:1-2: there is no robot 4; robots are counted from 1 to 3",
+    "convert log.csv new.parquet --split-at-gaps":
+        "log.csv: no part of it has all robots' samples for 9.5 s without a gap of more than 0.05 s; ...",
+    "convert log.csv rec.parquet --crop 1:2": f"rec.parquet: {FORCE}",
+    "estimate rec.parquet --map mocobot": "map mocobot: all files are recordings, which need none; leave the map out",
+    "map": "LOG must be given; see mocobot map --help",
+    "map log.csv --out page.html": f"page.html: {FORCE}",
+    "map log.h5": f"log.h5: is of no known format; a log is {LOGS}",
     "convert log.csv new.parquet --trial walk": "--trial is 'walk'; it must be one of random, periodic, static",
     "convert log.csv new.parquet --episode one": "--episode is 'one'; it must be a whole number",
     "convert log.csv new.parquet --map none.toml":
@@ -195,6 +209,15 @@ FILES = {
     "cut.parquet": "cut.parquet: not a readable Parquet file, or a damaged one (...)",
     "text.parquet": "text.parquet: not a readable Parquet file, or a damaged one (...)",
     "folder": "folder: is a directory; it must be a recording file",
+    "'my log.txt'": "my log.txt: missing column 'omnid1.phi1' for phi1 of robot 1 by map mocobot; the columns are "
+    "t, q. No map was given (--map): `mocobot map 'my log.txt'` drafts one",
+    "table.parquet": "table.parquet: missing column 'omnid1.phi1' for phi1 of robot 1 by map mocobot; the columns "
+    "are a. No map was given (--map): `mocobot map table.parquet` drafts one",
+    "log.h5": f"log.h5: {UNREAD}",
+}
+"""Files that are neither recordings nor logs that can be read as they are."""
+
+LOGS_ONLY = {
     "log.csv": "log.csv: is a table of text, not a recording of mocobot; use mocobot convert log.csv log.parquet",
     "'my log.txt'": "my log.txt: is a table of text, not a recording of mocobot; use mocobot convert 'my log.txt' "
     "'my log.parquet'",
@@ -203,9 +226,8 @@ FILES = {
     "bag": "bag: is a ROS 2 bag, not a recording of mocobot; use mocobot convert bag bag.parquet",
     "table.parquet": "table.parquet: is a Parquet file, not a recording of mocobot; use mocobot convert "
     "table.parquet table_recording.parquet",
-    "log.h5": f"log.h5: {UNREAD}",
 }
-"""Files that are no recordings."""
+"""Logs, where only recordings are taken."""
 
 INSPECTED = {
     "none.parquet": "none.parquet: there is no such file",
@@ -278,15 +300,8 @@ LINES = {
     **OUTPUTS,
     **{f"estimate {file} --out new.json": sentence for file, sentence in FILES.items()},
     **{f"inspect {file} --json new.json": sentence for file, sentence in INSPECTED.items()},
-    **{
-        f"{command}": FILES["log.csv"]
-        for command in (
-            "diagnose log.csv --out new",
-            "replay log.csv --save new.rrd",
-            "report log.csv --out new.html",
-            "estimate rec.parquet log.csv",
-        )
-    },
+    **{f"replay {file} --save new.rrd": sentence for file, sentence in LOGS_ONLY.items()},
+    "report log.csv --out new.html": LOGS_ONLY["log.csv"],
     "diagnose data.mat": "data.mat: is a MAT file; --rig emps reads those of the EMPS benchmark",
 }
 

@@ -92,9 +92,18 @@ def test_keys_and_plain_values(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_unreadable_files_are_refused(tmp_path: Path) -> None:
-    for path, why in ((tmp_path / "none.parquet", "No such file"), (tmp_path, "directory")):
-        with pytest.raises(InputError, match=f"cannot be read.*{why}"):
-            provenance("estimate", {}, [path])
+    with pytest.raises(InputError, match=r"cannot be read.*No such file"):
+        provenance("estimate", {}, [tmp_path / "none.parquet"])
+
+
+def test_a_folder_is_all_its_files(tmp_path: Path) -> None:
+    """Such as a bag."""
+    (tmp_path / "bag" / "deep").mkdir(parents=True)
+    paths = [tmp_path / "bag" / "a.mcap", tmp_path / "bag" / "deep" / "b.yaml"]
+    for path in paths:
+        path.write_text(path.name)
+    said = provenance("estimate", {}, [tmp_path / "bag"])
+    assert said["files"] == [file_facts(path) for path in paths]
 
 
 def test_commit_is_gits_and_changes_of_sources_show(checkout: Path) -> None:
@@ -146,6 +155,6 @@ def test_estimate_carries_it_and_is_the_same_bytes_again(
     values = json.loads(out[0].read_text())
     assert list(values["provenance"]) == KEYS
     assert values["provenance"]["command"] == "estimate"
-    assert values["provenance"]["options"] == {"method": "auto", "cutoff_hz": 4.0}
+    assert values["provenance"]["options"] == {"map": None, "method": "auto", "cutoff_hz": 4.0}
     assert [entry["path"] for entry in values["provenance"]["files"]] == [str(biased_trials[0])]
     read_estimate(out[0])  # as replay reads it

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import solve_toeplitz, solve_triangular
 
 from discrepancy import rules
@@ -42,68 +41,51 @@ class Whitening:
             moving: number of leading rows that follow each other.
             order: of the autoregression.
             uneven: whether some moving rows may be louder than the others, as where a motion begins and encoders
-                repeat a rounding error that the filter averages out later. They are found in the draws, left out of
-                what the other rows are whitened by, and given less weight.
+                repeat a rounding error that the filter averages out later. They are found in the draws and divided by
+                their own standard deviation first.
         """
-        white = cls._even(draws, moving, order, np.ones(moving, dtype=bool))
-        if not (uneven and moving):
-            return white
-        power = white._power(draws)
-        quiet = ~np.any(power > rules.LOUD_POWER * np.median(power, axis=0), axis=1)
-        white = cls._even(draws, moving, order, quiet)
-        power = white._power(draws)
-        return replace(white, loudness=np.where(power > rules.LOUD_POWER, np.sqrt(power), 1.0))
-
-    def _power(self, draws: Array) -> Array:
-        """Mean square of every moving row of draws once whitened, shape (moving, C)."""
-        return np.mean(self(np.moveaxis(draws, 0, 2))[: self.moving] ** 2, axis=2)
-
-    @classmethod
-    def _even(cls, draws: Array, moving: int, order: int, quiet: NDArray[np.bool_]) -> Whitening:
-        """The same for every row, from the moving rows that are quiet, shape (moving,)."""
         channels = draws.shape[2]
-        chol_moving = _cholesky(draws[:, :moving][:, quiet])
-        chol_alone = _cholesky(draws[:, moving:])
+        loudness = np.ones((1, channels))
+        if uneven and moving:
+            power = np.mean(draws[:, :moving] ** 2, axis=0)
+            power /= np.maximum(np.median(power, axis=0), 1e-300)
+            loudness = np.where(power > rules.LOUD_POWER, np.sqrt(power), 1.0)
+        even = draws[:, :moving] / loudness
+        chol_moving, chol_alone = _cholesky(even), _cholesky(draws[:, moving:])
         ar, innovation = np.zeros((channels, order)), np.ones(channels)
         if order and moving > rules.ROWS_PER_COEFFICIENT * order:
-            flat = _per_row(_inverse(chol_moving), draws[:, :moving].reshape(-1, channels))
+            flat = _per_row(_inverse(chol_moving), even.reshape(-1, channels))
             white = flat.reshape(len(draws), moving, channels)
             lag = np.array(
-                [
-                    np.mean(
-                        (white[:, k:] * white[:, : moving - k])[:, quiet[k:] & quiet[: moving - k]], (0, 1)
-                    )
-                    for k in range(order + 1)
-                ]
+                [np.mean(white[:, k:] * white[:, : moving - k], axis=(0, 1)) for k in range(order + 1)]
             )
             for c in range(channels):
                 if lag[0, c] < 1e-12:  # a channel without noise
                     continue
                 ar[c] = solve_toeplitz(lag[:order, c], lag[1:, c])  # Yule and Walker
                 innovation[c] = np.sqrt(max(lag[0, c] - ar[c] @ lag[1:, c], 1e-6))
-        return cls(moving, chol_moving, chol_alone, ar, innovation, np.ones((1, channels)))
+        return cls(moving, chol_moving, chol_alone, ar, innovation, loudness)
 
     def __call__(self, x: Array) -> Array:
         """Whiten rows and channels, shape (n, C, ...) -> the same."""
-        y = np.empty_like(x, dtype=float)
-        y[self.moving :] = _per_row(self._whiten_alone, x[self.moving :])
-        z = _per_row(self._whiten_moving, x[: self.moving])
+        y = self.rows_only(x)
+        z = y[: self.moving]
         shape = (1, -1) + (1,) * (x.ndim - 2)
         series, order = z.copy(), self.ar.shape[1]
         for k in range(order):
             series[k + 1 :] -= self.ar[:, k].reshape(shape) * z[: len(z) - k - 1]
-        scale = self.innovation.reshape(shape)
         # The first rows have no past to predict them from; they keep their own variance of one.
-        series[order:] /= scale
         series[:order] = z[:order]
-        y[: self.moving] = series / self.loudness.reshape(*self.loudness.shape, *shape[2:])
+        series[order:] /= self.innovation.reshape(shape)
+        y[: self.moving] = series
         return y
 
     def rows_only(self, x: Array) -> Array:
-        """Decorrelate the channels of every row, not the rows, shape (n, C) -> (n, C)."""
-        y = np.empty_like(x)
+        """Decorrelate the channels of every row, not the rows, shape (n, C, ...) -> the same."""
+        y = np.empty_like(x, dtype=float)
+        even = x[: self.moving] / self.loudness.reshape(*self.loudness.shape, *(1,) * (x.ndim - 2))
+        y[: self.moving] = _per_row(self._whiten_moving, even)
         y[self.moving :] = _per_row(self._whiten_alone, x[self.moving :])
-        y[: self.moving] = _per_row(self._whiten_moving, x[: self.moving])
         return y
 
     @cached_property

@@ -55,7 +55,8 @@ def _dots(
     for y, entry in zip(at, strongest, strict=True):
         _, colour, mark = RELATIONS[relation(entry, causes)]
         axis.plot(entry["gain"], y, mark, color=colour, markersize=7)
-        axis.annotate(f"{entry['gain']:.3g}", (entry["gain"], y), (8, 0), textcoords="offset points", va="center",
+        gain = f"{entry['gain']:.0f}" if entry["gain"] >= 100 else f"{entry['gain']:.3g}"
+        axis.annotate(gain, (entry["gain"], y), (8, 0), textcoords="offset points", va="center",
                       fontsize=8)  # fmt: skip
     axis.set_yticks(at, [label(entry) for entry in strongest], fontsize=9)
     axis.set_ylim(-0.7, max(len(strongest), 1) - 0.3)

@@ -17,7 +17,7 @@ def traces(rig: TeamRig, explanation: Explanation) -> list[Trace]:
     for t, (linear, white) in enumerate(zip(rig.linear, rig.whitening, strict=True)):
         before, after = nominal.remaining(t), explanation.fit.remaining(t)
         sigma = np.empty_like(before)
-        sigma[: white.moving] = np.sqrt(white.loudness**2 @ (white.chol_moving**2).T)
+        sigma[: white.moving] = white.loudness * np.linalg.norm(white.chol_moving, axis=1)
         sigma[white.moving :] = np.linalg.norm(white.chol_alone, axis=1)
         out.append(
             Trace(
@@ -39,7 +39,7 @@ def traces(rig: TeamRig, explanation: Explanation) -> list[Trace]:
 def unwhitened(white: Whitening, y: Array) -> Array:
     """The residual whose whitening is y, shape (n, C) -> (n, C)."""
     order, moving = white.ar.shape[1], white.moving
-    z = y[:moving] * white.loudness
+    z = y[:moving].copy()
     for c in range(y.shape[1] if moving > order else 0):
         a = np.concatenate([[1.0], -white.ar[c]])
         # The first rows are as they were; they are the past of the first that was predicted.
@@ -48,4 +48,4 @@ def unwhitened(white: Whitening, y: Array) -> Array:
             for k in range(order)
         ]
         z[order:, c], _ = lfilter([1.0], a, white.innovation[c] * z[order:, c], zi=np.array(past))
-    return np.concatenate([z @ white.chol_moving.T, y[moving:] @ white.chol_alone.T])
+    return np.concatenate([white.loudness * (z @ white.chol_moving.T), y[moving:] @ white.chol_alone.T])

@@ -10,7 +10,7 @@ CONTRADICTS = 3.0
 _WORDS = {
     "flange_position": ("flanges miss their grasps by", 1e3, "mm"),
     "flange_rotation": ("are turned off them by", 1e3, "mrad"),
-    "force": ("forces miss their sum by", 1.0, "N"),
+    "force": ("forces do not add up by", 1.0, "N"),
     "moment": ("moments by", 1.0, "N m"),
 }
 """What is said of each quantity, and the unit it is said in."""
@@ -45,4 +45,4 @@ def contradiction(found: Sequence[tuple[str, Sequence[Leftover]]]) -> str | None
 
 def _words(one: Leftover) -> str:
     what, scale, unit = _WORDS[one.name]
-    return f"{what} {scale * one.left:.2g} {unit} rms ({one.ratio:.2g} times what noise leaves)"
+    return f"{what} {scale * one.left:.2g} {unit} rms ({one.ratio:.2g} times noise)"

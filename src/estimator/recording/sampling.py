@@ -10,9 +10,9 @@ from estimator.strict import Fields, is_number
 
 SENSORS = 9
 """Channels of one robot before its commands."""
-Method = Literal["untouched", "filtered", "interpolated"]
-"""Samples as they came; low-passed and thinned; interpolated, then low-passed and thinned."""
-METHODS: tuple[Method, ...] = ("untouched", "filtered", "interpolated")
+Method = Literal["untouched", "filtered", "interpolated", "fitted"]
+"""Samples as they came; low-passed and thinned; interpolated, or polynomials fitted, then low-passed and thinned."""
+METHODS: tuple[Method, ...] = ("untouched", "filtered", "interpolated", "fitted")
 _KEYS = ("native_hz", "first_s", "jitter_s", "missing", "method", "level", "steps")
 
 

@@ -81,6 +81,7 @@ class Diagnosis(Diagnosed):
 def diagnose(
     recordings: Given | Iterable[Given],
     *,
+    map: Path | str | None = None,
     truth: GroundTruth | None = None,
     tolerances: Path | str | None = None,
     exclude: Iterable[str] = (),
@@ -92,7 +93,9 @@ def diagnose(
     """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth.
 
     Args:
-        recordings: of one payload, or paths of their files; several, so that what is named can be validated.
+        recordings: of one payload, or paths of their files, or of logs that ``convert`` reads as they are; several, so
+            that what is named can be validated.
+        map: map of those logs, by file or built-in name (docs/measured-data.md); found out if not given.
         truth: of the payload, for the errors of the estimates; it is not looked at before the verdict.
         tolerances: TOML file: how far a healthy robot may be off (docs/diagnosis/guide.md); None for the defaults.
         exclude: causes not to consider.
@@ -106,7 +109,7 @@ def diagnose(
     """
     known = read_tolerances(Path(tolerances) if tolerances is not None else None)
     found = diagnose_team(
-        list(recordings_of(recordings)), known, tuple(exclude),
+        list(recordings_of(recordings, map)), known, tuple(exclude),
         closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated,
     )  # fmt: skip
     if truth is not None:

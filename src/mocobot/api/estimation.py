@@ -46,6 +46,7 @@ class Estimate(PayloadEstimate):
 def estimate(
     recordings: Given | Iterable[Given],
     *,
+    map: Path | str | None = None,
     method: Method = "auto",
     cutoff_hz: float = 5.0,
     say: Callable[[str], object] = lambda _: None,
@@ -53,7 +54,8 @@ def estimate(
     """Estimate grasps, mass, centre of mass and inertia from recordings of one payload.
 
     Args:
-        recordings: one or several, or paths of their files.
+        recordings: one or several, or paths of their files, or of logs that ``convert`` reads as they are.
+        map: map of those logs, by file or built-in name (docs/measured-data.md); found out if not given.
         method: ``"staged"``, the paper's sequence; ``"joint"``, one least squares; ``"auto"``, staged where static
             holds determine the centre of mass.
         cutoff_hz: cut-off of the low-pass filter [Hz].
@@ -62,7 +64,7 @@ def estimate(
     Raises:
         InputError: a recording cannot be used, they contradict each other, or nothing can be estimated.
     """
-    return public(Estimate, estimate_payload(recordings_of(recordings), method, cutoff_hz, say=say))
+    return public(Estimate, estimate_payload(recordings_of(recordings, map), method, cutoff_hz, say=say))
 
 
 def read_estimate(path: Path | str) -> Estimate:

@@ -1,22 +1,84 @@
-"""Recordings as a caller may give them."""
+"""Recordings as a caller may give them: in memory, as files, or as logs that are converted when their turn comes."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from pathlib import Path
 
+from estimator.errors import InputError
 from estimator.recording.model import Recording
 from mocobot.files.recordings import read
+from mocobot_logs.convert import Converted, Labels, convert
+from mocobot_logs.map.files import read_map
+from mocobot_logs.open_log import is_recording, log_kind, open_log
 
 Given = Recording | Path | str
-"""A recording, or the path of its file."""
+"""A recording, or the path of its file, or of a log of any format that ``convert`` reads."""
 
 
-def recordings_of(given: Given | Iterable[Given]) -> Iterator[Recording]:
+def recordings_of(given: Given | Iterable[Given], map: Path | str | None = None) -> Iterator[Recording]:
     """One or several recordings, read when their turn comes; what a simulation adds to one is left behind.
 
+    Args:
+        given: recordings, files of recordings, or logs.
+        map: map of the logs, by file or built-in name; found out if not given.
+
     Raises:
-        InputError: a file cannot be read, or is not a plausible recording.
+        InputError: a file cannot be read, or is not a plausible recording, or no log needs the map.
     """
+    logs = Logs(map)
     for each in [given] if isinstance(given, Recording | Path | str) else given:
-        recording = each if isinstance(each, Recording) else read(Path(each))
+        recording = each if isinstance(each, Recording) else logs.read(Path(each))
         yield Recording(**{field.name: getattr(recording, field.name) for field in fields(Recording)})
+    logs.check_map()
+
+
+class Logs:
+    """Reads recordings, and converts what is none in memory: nothing is written anywhere.
+
+    Attributes:
+        converted: by path, the logs that were.
+    """
+
+    def __init__(self, map: Path | str | None = None) -> None:
+        """Read the map, if there is one.
+
+        Raises:
+            InputError: it cannot be read.
+        """
+        self.converted: dict[Path, Converted] = {}
+        self._name = map
+        self._map = None if map is None else read_map(map)
+
+    def read(self, path: Path) -> Recording:
+        """A recording, as it is or of a log; messages name the user's file.
+
+        Raises:
+            InputError: the file cannot be read, or is not a plausible recording.
+        """
+        if not _is_log(path):
+            return read(path)
+        from mocobot_sim.scene.models import omnid_design  # needs MuJoCo; a recording does not
+
+        source = open_log(path, self._map)
+        trial = None if self._map is None else self._map.trial
+        self.converted[path] = done = convert(source, Labels(trial=trial), omnid_design())
+        return done.recording
+
+    def check_map(self) -> None:
+        """Whether the map was of use, once all is read.
+
+        Raises:
+            InputError: it was given, and all files are recordings.
+        """
+        if self._map is not None and not self.converted:
+            raise InputError(
+                f"map {self._name}: all files are recordings, which need none; leave the map out"
+            )
+
+
+def _is_log(path: Path) -> bool:
+    """Whether a file or folder is a log of a known format, and no recording."""
+    try:
+        return log_kind(path) != "parquet" or not is_recording(path)
+    except InputError:
+        return False

@@ -12,6 +12,7 @@ from mocobot_report.blocks.numbers import percent, plain
 from mocobot_report.blocks.payload import distance, mass, moment, place
 from mocobot_report.blocks.prose import bullets, tidy
 from mocobot_report.blocks.tables import Entry, Num, measurement, quantity, table
+from mocobot_report.diagnosis.keys import cause_name
 
 Values = Mapping[str, Any]
 STYLE = (
@@ -43,7 +44,11 @@ def diagnosis_html(values: Values) -> str:
     for cause in values["causes"]:
         for k, (name, entry) in enumerate(cause["parameters"].items()):
             rows.append(
-                [tidy(name_of(cause)) if k == 0 else "", name, measurement(entry["value"], entry["se"])]
+                [
+                    cause_name(name_of(cause), cause["cause"]) if k == 0 else "",
+                    name,
+                    measurement(entry["value"], entry["se"]),
+                ]
             )
     residual = values["residual"]
     misfit: list[list[Entry]] = [["chi²/n as simulated", Num(plain(residual["nominal"]["chi2_per_n"]))]]

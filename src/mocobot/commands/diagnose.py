@@ -19,12 +19,13 @@ from discrepancy.team.tolerances import default_tolerances
 from estimator.errors import InputError
 from estimator.files import whole_folder
 from estimator.recording.model import Recording
+from mocobot.api.given import Logs
 from mocobot.files.provenance import file_facts, provenance
-from mocobot.files.recordings import read
-from mocobot.files.targets import check_folder, check_recordings
+from mocobot.files.targets import check_folder, check_recordings, map_file
 from mocobot.options import Diagnose
 from mocobot.progress import bar, stages
 from mocobot.strict import NotGood
+from mocobot_logs.convert_report import format_on_the_fly
 from mocobot_sim.trial.truth import truth_path
 
 
@@ -34,7 +35,7 @@ class _Rig:
 
     causes: Collection[str]
     tolerances: Callable[[], Mapping[str, Mapping[str, float]]]
-    read: Callable[[Sequence[Path]], Any]
+    read: Callable[[Sequence[Path], Logs], Any]
     diagnose: Callable[..., Diagnosed]
 
 
@@ -46,11 +47,12 @@ def run(options: Diagnose) -> None:
         NotGood: with ``strict``, the verdict is neither consistent nor explained.
     """
     rig = RIGS[options.rig]
-    inputs = [*options.rec, *([options.tolerances] if options.tolerances else [])]
+    inputs = [*options.rec, *([options.tolerances] if options.tolerances else []), *map_file(options.map)]
     _check(options, rig.causes, inputs)
+    logs = Logs(options.map)
     tolerances = read_tolerances(options.tolerances, rig.tolerances())
     with whole_folder(options.out) if options.out else nullcontext() as folder:
-        data = rig.read(options.rec)
+        data = rig.read(options.rec, logs)
         made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
         with stages() as (say, simulated):
             found = rig.diagnose(
@@ -64,6 +66,8 @@ def run(options: Diagnose) -> None:
                 if found.estimates and "errors" in found.estimates:
                     made_with["files"] += [file_facts(truth_path(path)) for path in options.rec]
                 found.write_into(folder, provenance=made_with)
+    for path, converted in logs.converted.items():
+        print(format_on_the_fly(converted, str(path)))
     print(found)  # after the folder is in place: whoever reads may close the pipe
     if options.out:
         print(f"\nWritten to {options.out}.")
@@ -86,6 +90,8 @@ def _check(options: Diagnose, causes: Collection[str], inputs: Sequence[Path]) -
         raise InputError("every cause is excluded; nothing is left to look for")
     if options.out:
         check_folder(options.out, inputs, is_diagnosis, "an earlier diagnosis", force=options.force)
+    if options.rig == "emps" and options.map is not None:
+        raise InputError("--map is for logs of a team; the emps rig reads its benchmark's MAT file")
     if options.rig == "team":
         for path in options.rec:
             if path.suffix == ".mat":
@@ -97,12 +103,13 @@ def _check(options: Diagnose, causes: Collection[str], inputs: Sequence[Path]) -
         )
 
 
-def _read(paths: Sequence[Path]) -> list[Recording]:
+def _read(paths: Sequence[Path], logs: Logs) -> list[Recording]:
     recordings = []
     with bar(len(paths), "reading", "file") as advance:
         for path in paths:
-            recordings.append(read(path))
+            recordings.append(logs.read(path))
             advance(1)
+    logs.check_map()
     return recordings
 
 
@@ -124,7 +131,7 @@ RIGS = {
     "emps": _Rig(
         emps_causes.CAUSES,
         emps_catalogue.default_tolerances,
-        lambda paths: read_emps(paths[0]),
+        lambda paths, _: read_emps(paths[0]),
         diagnose_emps,
     ),
 }

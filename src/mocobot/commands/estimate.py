@@ -7,12 +7,13 @@ from estimator.estimate.result import PayloadEstimate
 from estimator.files import write_json
 from estimator.recording.model import Recording
 from mocobot.api.estimation import estimate
+from mocobot.api.given import Logs
 from mocobot.files.provenance import provenance
-from mocobot.files.recordings import read
-from mocobot.files.targets import check_output, check_recordings
+from mocobot.files.targets import check_output, check_recordings, map_file
 from mocobot.options import Estimate
 from mocobot.progress import stages
 from mocobot.strict import NotGood
+from mocobot_logs.convert_report import format_on_the_fly
 
 
 def run(options: Estimate) -> None:
@@ -24,18 +25,22 @@ def run(options: Estimate) -> None:
     """
     check_recordings(options.rec)
     if options.out is not None:
-        check_output(options.out, options.rec, force=options.force)
+        check_output(options.out, [*options.rec, *map_file(options.map)], force=options.force)
+    logs = Logs(options.map)
     with stages() as (say, _):
 
         def each() -> Iterator[Recording]:
             for path in options.rec:
                 say(f"reading {path.name}")
-                yield read(path)
+                yield logs.read(path)
+            logs.check_map()
 
         found = estimate(each(), method=options.method, cutoff_hz=options.cutoff_hz, say=say)
     if options.out:
-        made = provenance("estimate", asdict(options), options.rec)
+        made = provenance("estimate", asdict(options), [*options.rec, *map_file(options.map)])
         write_json(options.out, found.to_dict() | {"provenance": made})
+    for path, converted in logs.converted.items():
+        print(format_on_the_fly(converted, str(path)))
     print(found)
     if options.strict:
         _expect_good(found)

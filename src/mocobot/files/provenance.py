@@ -38,7 +38,7 @@ def provenance(command: str, options: Mapping[str, Any], inputs: Sequence[Path] 
     Args:
         command: name of the command.
         options: by name; paths and tuples become strings and lists.
-        inputs: files the result was made from.
+        inputs: files the result was made from, or folders of such files.
 
     Raises:
         InputError: an input cannot be read.
@@ -53,7 +53,7 @@ def provenance(command: str, options: Mapping[str, Any], inputs: Sequence[Path] 
         "packages": {name: found for name in PACKAGES if (found := _version(name)) is not None},
         "command": command,
         "options": {name: _plain(value) for name, value in options.items() if name not in NO_MATTER},
-        "files": [file_facts(path) for path in inputs],
+        "files": [file_facts(file) for path in inputs for file in _files(path)],
     }
 
 
@@ -76,6 +76,11 @@ def folder_provenance(made_with: Mapping[str, Any], folder: Path, written: Itera
         **made_with,
         "written": sorted(listed, key=lambda f: f["path"]),
     }
+
+
+def _files(path: Path) -> list[Path]:
+    """A file, or all files of a folder."""
+    return sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
 
 
 def _version(package: str) -> str | None:

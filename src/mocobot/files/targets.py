@@ -28,6 +28,13 @@ def check_recordings(recordings: Sequence[Path]) -> None:
         seen.add(real)
 
 
+def map_file(name: str | None) -> list[Path]:
+    """The file that a map is read from, none for a built-in one."""
+    from mocobot_logs.map.files import MAPS
+
+    return [] if name is None or name in MAPS or not Path(name).is_file() else [Path(name)]
+
+
 def check_output(path: Path, inputs: Sequence[Path] = (), *, force: bool, suffix: str = "") -> None:
     """Find out that a file may not be written, or cannot, before the work is done whose result it would hold.
 

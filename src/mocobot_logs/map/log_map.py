@@ -12,8 +12,8 @@ from mocobot_logs.map.units import TIME_UNITS
 
 GAP_OF_ROBOTS = 20
 """So far beyond the last robot found another one is looked for, which would mean that one is missing."""
-PLACEHOLDERS = ("robot", "robot0", "channel")
-"""Number of the robot from 1, number of the robot from 0, name of the channel."""
+PLACEHOLDERS = ("robot", "robot0", "name", "channel")
+"""Number of the robot from 1, number of the robot from 0, what it is called, name of the channel."""
 
 
 @dataclass(frozen=True)
@@ -53,9 +53,9 @@ class TimeMap:
     """Where a log's time is.
 
     Attributes:
-        column: column of a table, which may hold ``{robot}``; None stands for ``time``, and for ``timestamp`` in a
-            LeRobot dataset.
-        unit: ``s``, ``ms``, ``us`` or ``ns``.
+        column: column of a table, which may hold ``{robot}`` or ``{name}``; None stands for ``time``, and for
+            ``timestamp`` in a LeRobot dataset.
+        unit: ``s``, ``ms``, ``us`` or ``ns``; ``iso`` for dates of ISO 8601.
         clock: stamp of a bag's messages: ``header`` (when the robot took the sample) or ``log`` (when it was written).
     """
 
@@ -64,13 +64,9 @@ class TimeMap:
     clock: Literal["header", "log"] = "header"
 
     @property
-    def unit_ns(self) -> int:
-        """Nanoseconds in one unit."""
-        return TIME_UNITS[self.unit]
-
-    def column_of(self, robot: int) -> str | None:
-        """The time column of one robot, counted from 1."""
-        return None if self.column is None else fill(self.column, robot)
+    def unit_ns(self) -> int | None:
+        """Nanoseconds in one unit, None for dates."""
+        return TIME_UNITS.get(self.unit)
 
 
 @dataclass(frozen=True)
@@ -99,6 +95,7 @@ class LogMap:
         csv: how a text table is written.
         common: every mapped channel, with placeholders.
         own: by robot (from 1), the channels that differ.
+        called: what the robots are called, in order, or nothing.
     """
 
     name: str
@@ -109,6 +106,7 @@ class LogMap:
     csv: CsvMap
     common: Mapping[str, ChannelMap]
     own: Mapping[int, Mapping[str, ChannelMap]] = field(default_factory=dict)
+    called: tuple[str, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -117,8 +115,24 @@ class LogMap:
 
     def channels(self, robot: int) -> dict[str, ChannelMap]:
         """Every mapped channel of one robot, counted from 1, placeholders filled, in the order of ``names``."""
-        own = self.own.get(robot, {})
-        return {name: _filled(own.get(name, self.common[name]), robot, name) for name in self.names}
+        own, channels = self.own.get(robot, {}), {}
+        for name in self.names:
+            channel = own.get(name, self.common[name])
+            texts = {key: getattr(channel, key) for key in ("topic", "joint", "field", "column")}
+            filled = {key: text and self._fill(text, robot, name) for key, text in texts.items()}
+            channels[name] = replace(channel, **filled)
+        return channels
+
+    def time_column(self, robot: int) -> str | None:
+        """The time column of one robot, counted from 1."""
+        return None if self.time.column is None else self._fill(self.time.column, robot)
+
+    def _fill(self, text: str, robot: int, channel: str = "") -> str:
+        """Put numbers and names in the place of placeholders."""
+        values = {"robot": str(robot), "robot0": str(robot - 1), "channel": channel}
+        if robot <= len(self.called):
+            values["name"] = self.called[robot - 1]
+        return re.sub(r"\{(\w+)\}", lambda found: values[found.group(1)], text)
 
     def require(self, key: Literal["topic", "field", "column"], kind: str) -> None:
         """Check that the map locates every channel in a kind of log.
@@ -178,17 +192,6 @@ class LogMap:
     def one_robot_only(self, key: Literal["topic", "column"]) -> bool:
         """Whether every robot would be read from the same place, so that a log can hold just one."""
         return not self.own and not any(
-            "{robot" in (getattr(channel, key) or "") + (channel.joint or "")
+            re.search(r"\{(robot0?|name)\}", (getattr(channel, key) or "") + (channel.joint or ""))
             for channel in self.common.values()
         )
-
-
-def fill(text: str, robot: int, channel: str = "") -> str:
-    """Put numbers and names in the place of ``{robot}``, ``{robot0}`` and ``{channel}``."""
-    values = {"robot": str(robot), "robot0": str(robot - 1), "channel": channel}
-    return re.sub(r"\{(\w+)\}", lambda found: values[found.group(1)], text)
-
-
-def _filled(channel: ChannelMap, robot: int, name: str) -> ChannelMap:
-    texts = {key: getattr(channel, key) for key in ("topic", "joint", "field", "column")}
-    return replace(channel, **{key: text and fill(text, robot, name) for key, text in texts.items()})

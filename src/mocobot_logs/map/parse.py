@@ -9,12 +9,12 @@ from estimator.recording.metadata import TRIALS
 from estimator.strict import Fields, check_known
 from mocobot_logs.log import CHANNELS, REF, Level
 from mocobot_logs.map.log_map import PLACEHOLDERS, ChannelMap, CsvMap, LogMap, TimeMap
-from mocobot_logs.map.units import COUNTS, TIME_UNITS, si_factor, units_of
+from mocobot_logs.map.units import COUNTS, DATES, TIME_UNITS, si_factor, units_of
 
 VERSION = 1
 MAX_ROBOTS = 1000
 _REQUIRED = ("version", "level", "channels")
-_OPTIONAL = ("robots", "trial", "time", "csv", "defaults", "robot")
+_OPTIONAL = ("robots", "names", "trial", "time", "csv", "defaults", "robot")
 _TIME = ("column", "unit", "clock")
 _CSV = ("delimiter", "decimal")
 _CHANNEL = ("topic", "joint", "field", "column", "unit", "sign", "offset", "counts_per_turn", "optional")
@@ -44,11 +44,13 @@ def parse_map(values: Values, name: str) -> LogMap:
     robots = values.get("robots")
     if robots is not None and (type(robots) is not int or not 1 <= robots <= MAX_ROBOTS):
         top.refuse("robots", f"a whole number from 1 to {MAX_ROBOTS}")
+    called = _names(top, values, robots)
+    robots = len(called) or robots
     trial = top.one_of("trial", TRIALS) if "trial" in top else None
     defaults = _table(values, "defaults", where)
     check_known(defaults, _CHANNEL, f"{where}: defaults")
-    common, own = _channels(values, level, defaults, where), _overrides(values, robots, where)
-    return LogMap(
+    common, own = _channels(values, level, defaults, where), _overrides(values, robots, called, where)
+    found = LogMap(
         name=name,
         level=level,
         robots=robots,
@@ -68,7 +70,42 @@ def parse_map(values: Values, name: str) -> LogMap:
             }
             for robot, channels in own.items()
         },
+        called=called,
     )
+    _check_names(found, where)
+    return found
+
+
+def _names(top: Fields, values: Values, robots: int | None) -> tuple[str, ...]:
+    """What the robots are called, nothing if the map does not say."""
+    if "names" not in values:
+        return ()
+    names = values["names"]
+    if (
+        not isinstance(names, list)
+        or not 1 <= len(names) <= MAX_ROBOTS
+        or not all(isinstance(name, str) and name for name in names)
+        or len(set(names)) < len(names)
+    ):
+        top.refuse("names", 'a list of distinct names, one for each robot, such as ["left", "right"]')
+    if robots is not None and robots != len(names):
+        raise InputError(f"{top.where}: robots is {robots}, but names has {len(names)}; leave robots out")
+    return tuple(names)
+
+
+def _check_names(found: LogMap, where: str) -> None:
+    """Whether names and what holds ``{name}`` go together."""
+    channels = [*found.common.values(), *(c for own in found.own.values() for c in own.values())]
+    texts = [found.time.column, *(t for c in channels for t in (c.topic, c.joint, c.field, c.column))]
+    holds = any("{name}" in text for text in texts if text is not None)
+    if holds and not found.called:
+        raise InputError(
+            f"{where}: missing key 'names', which goes with the placeholder '{{name}}': names = [\"left\", ...]"
+        )
+    if found.called and not holds:
+        raise InputError(
+            f"{where}: names is given, but neither a channel nor time holds the placeholder '{{name}}'"
+        )
 
 
 def _channels(values: Values, level: Level, defaults: Values, where: str) -> dict[str, dict[str, Any]]:
@@ -84,19 +121,25 @@ def _channels(values: Values, level: Level, defaults: Values, where: str) -> dic
     return found
 
 
-def _overrides(values: Values, robots: int | None, where: str) -> dict[int, dict[str, Values]]:
+def _overrides(
+    values: Values, robots: int | None, called: tuple[str, ...], where: str
+) -> dict[int, dict[str, Values]]:
     own: dict[int, dict[str, Values]] = {}
     for key, table in _table(values, "robot", where).items():
         inside = f"{where}: robot.{key}"
         last = MAX_ROBOTS if robots is None else robots
-        if not re.fullmatch(r"[1-9][0-9]{0,3}", key) or int(key) > last:
-            raise InputError(f"{inside}: there is no such robot; robots are counted from 1 to {last}")
+        number = str(called.index(key) + 1) if key in called else key
+        if not re.fullmatch(r"[1-9][0-9]{0,3}", number) or int(number) > last:
+            named = f", or called {', '.join(called)}" if called else ""
+            raise InputError(f"{inside}: there is no such robot; robots are counted from 1 to {last}{named}")
+        if int(number) in own:
+            raise InputError(f"{inside}: robot {number} has a table already")
         if not isinstance(table, dict):
             raise InputError(f"{inside} is {table!r:.40}; it must be a table with the key channels")
         check_known(table, ("channels",), inside)
         channels = _table(table, "channels", inside)
-        own[int(key)] = {name: _table(channels, name, f"{inside}.channels") for name in channels}
-        for name, entry in own[int(key)].items():
+        own[int(number)] = {name: _table(channels, name, f"{inside}.channels") for name in channels}
+        for name, entry in own[int(number)].items():
             check_known(entry, _CHANNEL, f"{inside}.channels.{name}")
     return own
 
@@ -154,7 +197,7 @@ def _time(values: Values, where: str) -> TimeMap:
     fields = Fields(values, ("unit",) if "column" in values else (), where, _TIME)
     return TimeMap(
         column=_text(fields, "column"),
-        unit=fields.one_of("unit", TIME_UNITS) if "unit" in fields else "s",
+        unit=fields.one_of("unit", (*TIME_UNITS, DATES)) if "unit" in fields else "s",
         clock=fields.one_of("clock", ("header", "log")) if "clock" in fields else "header",
     )
 

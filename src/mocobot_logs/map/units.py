@@ -18,6 +18,8 @@ _KINDS = {"phi": ANGLE, "theta": ANGLE, "tau": TORQUE, "h": LENGTH, "force": FOR
 
 TIME_UNITS: dict[str, int] = {"s": 1_000_000_000, "ms": 1_000_000, "us": 1_000, "ns": 1}
 """Nanoseconds in one unit of time."""
+DATES = "iso"
+"""Dates and times of ISO 8601 in the place of numbers, or a column of time stamps."""
 
 
 def kind_of(channel: str) -> str:

@@ -40,7 +40,7 @@ class Conversion:
     @classmethod
     def of(cls, sampling: Sampling, rate_hz: float, samples: int, rng: np.random.Generator) -> Conversion:
         """Draw one; the recording has ``samples`` at ``rate_hz`` [Hz]."""
-        fits = sampling.method != "interpolated"
+        fits = sampling.method in ("untouched", "filtered")
         k = max(1, round(sampling.native_hz / rate_hz)) if fits else fineness(sampling.native_hz, rate_hz)
         spacing_s = 1.0 / (k * rate_hz)
         period_s = spacing_s if fits else 1.0 / sampling.native_hz
@@ -48,10 +48,10 @@ class Conversion:
         count = int(np.ceil((samples / rate_hz + 2 * _MARGIN_S) / period_s)) + 2
         at = sampling.first_s + (np.arange(count) - before) * period_s
         if not fits:
-            at = np.sort(at + sampling.jitter_s * rng.standard_normal(count))
+            at = _jittered(at, sampling.jitter_s, rng)
         kept = rng.uniform(size=count) >= sampling.missing
         kept[[0, -1]] = True
-        grid = Grid(spacing_s / NS, period_s / NS, fits)
+        grid = Grid(spacing_s / NS, period_s / NS, fits, uneven=sampling.method == "fitted")
         return cls(np.rint(at[kept] / NS).astype(np.int64), grid, k, rate_hz, samples)
 
     @property
@@ -62,7 +62,7 @@ class Conversion:
     def __call__(self, values: Array) -> Array:
         """Samples of the recording from readings at ``instants``, shape (q, C) -> (Q, C)."""
         time_ns = self.instants_ns - self.instants_ns[0]
-        if not self.grid.fits:
+        if not (self.grid.fits or self.grid.uneven):
             merger = Merger(self.grid.period_ns)
             parts = merger.push(time_ns, values), merger.finish()
             time_ns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
@@ -76,3 +76,19 @@ class Conversion:
         if np.all(np.abs(at - whole) <= TOLERANCE_NS * NS * self.rate_hz):
             return own[whole]
         return make_interp_spline(np.arange(len(own)), own, k=5)(at)
+
+
+def _jittered(at: Array, jitter_s: float, rng: np.random.Generator) -> Array:
+    """Instants off their even places, still in order, whose intervals scatter by sqrt(2) times ``jitter_s`` [s].
+
+    Where jitter is as large as a period, putting them in order leaves less of it: more is drawn.
+    """
+    draw = rng.standard_normal(len(at))
+    drawn_s, wanted_s = jitter_s, np.sqrt(2.0) * jitter_s
+    for _ in range(8):
+        out = np.sort(at + drawn_s * draw)
+        left_s = float(np.std(np.diff(out)))
+        if left_s > 0.98 * wanted_s:
+            break
+        drawn_s *= wanted_s / left_s
+    return out

@@ -47,7 +47,7 @@ def fill_gaps(time: Array, values: Array, missing: NDArray[np.int64]) -> tuple[A
         nodes = time[rows]
         step = (time[where + 1] - time[where]) / (count + 1)
         targets = time[where, None] + step[:, None] * np.arange(1, count + 1)
-        weights = _weights(nodes, targets)
+        weights = polynomial_weights(nodes, targets, _DEGREE)
         at.append(targets.ravel())
         filled.append((weights @ values[rows]).reshape(-1, values.shape[1]))
     time = np.concatenate([time, *at])
@@ -55,10 +55,13 @@ def fill_gaps(time: Array, values: Array, missing: NDArray[np.int64]) -> tuple[A
     return time[order], np.concatenate([values, *filled])[order]
 
 
-def _weights(nodes: Array, targets: Array) -> Array:
-    """Weights of the samples at ``nodes`` (g, w) for each of ``targets`` (g, m), shape (g, m, w)."""
+def polynomial_weights(nodes: Array, targets: Array, degree: int) -> Array:
+    """Weights of the samples at ``nodes`` (g, w) for the value at each of ``targets`` (g, m), shape (g, m, w).
+
+    That of the polynomial of ``degree``, or what the nodes allow, that is nearest to the samples (least squares).
+    """
     centre, half = (nodes[:, :1] + nodes[:, -1:]) / 2, (nodes[:, -1:] - nodes[:, :1]) / 2
-    degree = min(_DEGREE, nodes.shape[1] - 1)
+    degree = min(degree, nodes.shape[1] - 1)
     V = legvander((nodes - centre) / half, degree)  # (g, w, K), well conditioned
     P = legvander((targets - centre) / half, degree)  # (g, m, K)
     Q, R = np.linalg.qr(V)

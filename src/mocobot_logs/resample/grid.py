@@ -6,14 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.interpolate import make_interp_spline
 
+from estimator.recording.sampling import Method
 from mocobot_logs.log import NS, Array, Stamps
-from mocobot_logs.resample.fill import fill_gaps, side
+from mocobot_logs.resample.fill import fill_gaps, polynomial_weights, side
 
 BLOCK = 4096
 _DECAY = 48  # rows; in a quintic spline a sample's weight falls by 0.43 per row, to 1e-18 here
 TOLERANCE_NS = 1000
 """Stamps this close to the grid are on it: time that is read from decimals or floats is no more exact."""
 _DEGREE = 5
+_FITTED_ROWS = 12
+"""Nearest rows, to which a polynomial of degree 5 is fitted: flat to a tenth of their rate, as they are many."""
 
 
 @dataclass(frozen=True)
@@ -24,11 +27,19 @@ class Grid:
         spacing_ns: of the instants [ns].
         period_ns: of the robot's samples [ns].
         fits: whether the samples lie on the grid, with ``period_ns`` equal to ``spacing_ns``.
+        uneven: whether samples are so many and so uneven that polynomials are fitted to them. A spline through
+            them would swing with their noise, because some are a moment apart.
     """
 
     spacing_ns: float
     period_ns: float
-    fits: bool
+    fits: bool = False
+    uneven: bool = False
+
+    @property
+    def method(self) -> Method:
+        """What is done to samples that do not fit."""
+        return "fitted" if self.uneven else "interpolated"
 
     def holds(self, time_ns: Stamps) -> bool:
         """Whether all times [ns] are within ``TOLERANCE_NS`` of instants of the grid, no two at the same."""
@@ -93,10 +104,12 @@ class Interpolator:
             filled = fill_gaps(index.astype(float), values, np.diff(index) - 1)[1]
             return filled[instants - index[0]]
         time = (time_ns - time_ns[0]) / grid.period_ns
+        at = (instants * grid.spacing_ns - time_ns[0]) / grid.period_ns
+        if grid.uneven:
+            return _fitted(time, values, np.clip(at, time[0], time[-1]))
         missing = np.maximum(np.rint(np.diff(time)).astype(np.int64) - 1, 0)
         knots, filled = fill_gaps(time, values, missing)
         spline = make_interp_spline(knots, filled, k=_DEGREE)
-        at = (instants * grid.spacing_ns - time_ns[0]) / grid.period_ns
         return spline(np.clip(at, knots[0], knots[-1]))
 
     def _before(self, end: int) -> int:
@@ -107,3 +120,12 @@ class Interpolator:
             return 1 + (round(at) if self._grid.fits else math.floor(at + 1e-6))
         at = time_ns[end] / self._grid.spacing_ns
         return round(at) if self._grid.fits else math.ceil(at)
+
+
+def _fitted(time: Array, values: Array, at: Array) -> Array:
+    """Values at instants, shape (n, C), of polynomials through the nearest ``_FITTED_ROWS``."""
+    width = min(_FITTED_ROWS, len(time))
+    first = np.clip(np.searchsorted(time, at) - width // 2, 0, len(time) - width)
+    rows = first[:, None] + np.arange(width)
+    weights = polynomial_weights(time[rows], at[:, None], _DEGREE)[:, 0]
+    return np.einsum("nw,nwc->nc", weights, values[rows])

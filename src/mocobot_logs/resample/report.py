@@ -19,6 +19,8 @@ class StreamReport:
         gaps: intervals in which samples are missing.
         longest_gap_s: the longest time without samples beyond one period [s].
         filled: samples that are missing and were interpolated, at the native rate.
+        blank: rows in which a channel is NaN: dropped, so that they are among the missing samples.
+        blank_channels: the channels that are NaN there, by the number of rows.
         duplicates: rows that repeat the row before, stamp and values; dropped.
         merged: rows closer than a quarter of a period to the row before; averaged with it.
         method: what was done.
@@ -35,6 +37,8 @@ class StreamReport:
     gaps: int
     longest_gap_s: float
     filled: int
+    blank: int
+    blank_channels: dict[str, int]
     duplicates: int
     merged: int
     method: Method
@@ -43,7 +47,7 @@ class StreamReport:
     @property
     def filled_share(self) -> float:
         """Missing samples over all that there should be."""
-        return self.filled / max(1, self.filled + self.samples - self.duplicates)
+        return self.filled / max(1, self.filled + self.samples - self.blank - self.duplicates)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values by name."""

@@ -22,6 +22,8 @@ PLAUSIBLE_HZ = 5.0
 """Slowest log whose stamps are believed: the rate asked for is blamed, not their unit."""
 _TOLERANCE = 0.01  # of the slowest rate, for clocks and jitter
 _SAME_RATE = 1e-3
+MANY, UNEVEN = 3.0, 0.15
+"""Samples that make one of the output, and jitter of intervals over their mean, from which polynomials are fitted."""
 _LOOK = 1024  # rows from which the native rate is found
 
 
@@ -77,9 +79,10 @@ class RobotStream:
         """
         self._flush()
         screen = self.screen
-        rows = screen.rows - screen.duplicates
+        rows = screen.rows - screen.duplicates - screen.blank
         if screen.first_ns is None or screen.last_ns is None or rows < MIN_SAMPLES:
-            raise InputError(f"{self._where} has {rows} samples; at least {MIN_SAMPLES} are needed")
+            blank = f" ({screen.blank} rows lack a value)" if screen.blank else ""
+            raise InputError(f"{self._where} has {rows} samples{blank}; at least {MIN_SAMPLES} are needed")
         pipe = self._pipe or self._begin()
         values = pipe.finish(rows)
         span_s = (screen.last_ns - screen.first_ns) * NS
@@ -100,6 +103,8 @@ class RobotStream:
             gaps=tally.gaps,
             longest_gap_s=tally.longest_gap_s,
             filled=tally.filled,
+            blank=screen.blank,
+            blank_channels=dict(screen.blank_channels),
             duplicates=screen.duplicates,
             merged=pipe.merged,
             method=pipe.method,
@@ -127,8 +132,7 @@ class RobotStream:
         time_ns, values = (np.concatenate(parts) for parts in zip(*self._head, strict=True))
         self._head = []
         grid, k = self._plan(time_ns[:_LOOK])  # the same rows whatever the chunks
-        native_hz = 1.0 / (grid.period_ns * NS)
-        tally = Tally(self._where, grid.period_ns, self._max_gap_s, native_hz / self._rate_hz)
+        tally = Tally(self._where, grid, self._max_gap_s)
         self._pipe = _Pipe(grid, k, tally, self._max_gap_s)
         self._pipe.push(time_ns, values)
         return self._pipe
@@ -153,8 +157,15 @@ class RobotStream:
         fitting = Grid(spacing_ns, spacing_ns, fits=True)
         if self._may_fit and abs(period_ns / spacing_ns - 1.0) < _SAME_RATE and fitting.holds(time_ns):
             return fitting, k
-        k = fineness(native_hz, self._rate_hz)
-        return Grid(1.0 / (k * self._rate_hz) / NS, period_ns, fits=False), k
+        interval = np.diff(time_ns)
+        jitter_ns = interval - np.maximum(np.rint(interval / period_ns), 1.0) * period_ns
+        uneven = (
+            native_hz >= MANY * self._rate_hz and float(np.sqrt(np.mean(jitter_ns**2))) > UNEVEN * period_ns
+        )
+        if uneven:  # most intervals are shorter than the mean one, and none is told from a gap
+            period_ns = float(np.mean(interval))
+        k = fineness(1.0 / (period_ns * NS), self._rate_hz)
+        return Grid(1.0 / (k * self._rate_hz) / NS, period_ns, uneven=uneven), k
 
 
 class _Pipe:
@@ -169,7 +180,7 @@ class _Pipe:
         self.tally = tally
         self.left_grid = False
         self._grid, self._k = grid, k
-        self._merger = None if grid.fits else Merger(grid.period_ns)
+        self._merger = None if grid.fits or grid.uneven else Merger(grid.period_ns)
         self._interpolator = Interpolator(grid, max_gap_s)
         self._decimator = Decimator(k)
         self._last: Stamps = np.empty(0, np.int64)
@@ -187,7 +198,7 @@ class _Pipe:
     @property
     def method(self) -> Method:
         if not self._grid.fits:
-            return "interpolated"
+            return self._grid.method
         return "untouched" if self._k == 1 else "filtered"
 
     def push(self, time_ns: Stamps, values: Array) -> None:

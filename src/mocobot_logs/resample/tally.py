@@ -1,14 +1,25 @@
 """Gaps and jitter of a robot's stamps."""
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.errors import InputError
-from mocobot_logs.log import NS, Stamps
+from mocobot_logs.log import NS, Array, Stamps
+from mocobot_logs.resample.grid import Grid
 
-MOST_MISSING, MOST_MISSING_OF_MANY, MANY = 0.1, 0.5, 3
-"""Largest share of samples that may be missing, and the same where at least ``MANY`` make one sample of the output:
-half of them are still more than enough. The same for samples that crowd."""
+MOST_MISSING = 0.1
+"""Largest share of samples that may be missing; the same for samples that crowd."""
 _STAMP_S = 1e-6  # gaps are measured no finer
+
+
+def beyond_s(interval_ns: Stamps, period_ns: float) -> Array:
+    """How much longer than one period the intervals are in which samples are missing [s], 0 for the others."""
+    return np.where(np.rint(interval_ns / period_ns) > 1, (interval_ns - period_ns) * NS, 0.0)
+
+
+def is_hole(interval_ns: Stamps, period_ns: float, max_gap_s: float) -> NDArray[np.bool_]:
+    """Whether intervals between stamps are too long to be filled."""
+    return beyond_s(interval_ns, period_ns) > max_gap_s + _STAMP_S
 
 
 class Tally:
@@ -18,15 +29,15 @@ class Tally:
         gaps, filled, longest_gap_s, jitter_max_s: as in ``StreamReport``.
     """
 
-    def __init__(self, where: str, period_ns: float, max_gap_s: float, thinned: float) -> None:
-        """``where`` names file and robot in messages; periods and gaps as in ``resample``.
+    def __init__(self, where: str, grid: Grid, max_gap_s: float) -> None:
+        """``where`` names file and robot in messages; grid and gaps as in ``resample``.
 
-        ``thinned`` samples make one of the output.
+        Where samples are many and uneven, no interval tells how many are missing, and none counts as missing.
         """
-        self._most = MOST_MISSING if thinned < MANY else MOST_MISSING_OF_MANY
+        self._uneven = grid.uneven
         self.gaps = self.filled = 0
         self.longest_gap_s = self.jitter_max_s = 0.0
-        self._where, self._period_ns, self._max_gap_s = where, period_ns, max_gap_s
+        self._where, self._period_ns, self._max_gap_s = where, grid.period_ns, max_gap_s
         self._intervals, self._squares = 0, 0.0
 
     @property
@@ -44,19 +55,24 @@ class Tally:
         if not len(interval):
             return
         periods = np.maximum(np.rint(interval / self._period_ns), 1.0)
-        beyond_s = np.where(periods > 1, (interval - self._period_ns) * NS, 0.0)
-        bad = np.flatnonzero(beyond_s > self._max_gap_s + _STAMP_S)
+        if self._uneven:
+            periods[:] = 1.0
+        bad = np.flatnonzero(is_hole(interval, self._period_ns, self._max_gap_s))
         if len(bad):
             raise InputError(
                 f"{self._where}: no samples for {interval[bad[0]] * NS:.6g} s, from "
                 f"{time_ns[bad[0]] * NS:.9g} s after its first sample on; they usually come "
-                f"{self._period_ns * NS:.6g} s apart, and at most {self._max_gap_s:g} s more may pass"
+                f"{self._period_ns * NS:.6g} s apart, and at most {self._max_gap_s:g} s more may pass; "
+                "rows with NaN count as missing (convert --split-at-gaps makes trials of the parts between gaps, "
+                "--crop keeps one part)"
             )
         jitter_s = (interval - periods * self._period_ns) * NS
         self._intervals += len(interval)
         self.filled += int(np.sum(periods - 1))
         self.gaps += int(np.sum(periods > 1))
-        self.longest_gap_s = max(self.longest_gap_s, float(np.max(beyond_s)))
+        self.longest_gap_s = max(
+            self.longest_gap_s, float(np.max(np.where(periods > 1, beyond_s(interval, self._period_ns), 0.0)))
+        )
         self._squares += float(np.sum(jitter_s**2))
         self.jitter_max_s = max(self.jitter_max_s, float(np.max(np.abs(jitter_s))))
 
@@ -67,14 +83,15 @@ class Tally:
             InputError: too many are missing, or crowd.
         """
         expected = rows + self.filled
-        if self.filled > self._most * expected:
+        if self.filled > MOST_MISSING * expected:
             raise InputError(
                 f"{self._where}: {self.filled} of {expected} samples are missing "
-                f"({100 * self.filled / expected:.3g} %); at most {100 * self._most:g} % may be"
+                f"({100 * self.filled / expected:.3g} %); at most {100 * MOST_MISSING:g} % may be "
+                "(convert --crop keeps a part of the log)"
             )
-        if merged > self._most * rows:
+        if merged > MOST_MISSING * rows:
             raise InputError(
                 f"{self._where}: {merged} of {rows} samples come within a quarter of the usual "
-                f"{self._period_ns * NS:.6g} s of the one before; at most {100 * self._most:g} % may "
+                f"{self._period_ns * NS:.6g} s of the one before; at most {100 * MOST_MISSING:g} % may "
                 "(does the rate change, or do stamps tell when messages arrived?)"
             )

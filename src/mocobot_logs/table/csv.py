@@ -1,4 +1,4 @@
-"""Text tables: one header line, then one row per sample, cells of numbers."""
+"""Text tables: one header line, then one row per sample, cells of numbers; time may be dates."""
 
 import contextlib
 import csv
@@ -13,7 +13,8 @@ import pyarrow.csv as pcsv
 from estimator.errors import InputError
 from mocobot_logs.faults import detail_of, readable
 from mocobot_logs.map.log_map import CsvMap
-from mocobot_logs.table.stamps import from_text
+from mocobot_logs.table.comments import WithoutComments
+from mocobot_logs.table.dates import TextClock, is_date
 from mocobot_logs.table.table import Block, Table, Wanted
 
 BLOCK_BYTES = 4 << 20
@@ -28,9 +29,10 @@ _NUMBER = re.compile(
 
 
 class CsvTable(Table):
-    """A CSV file as a ``Table``: UTF-8, a header line, any of ``DELIMITERS``; blank lines are skipped.
+    """A CSV file as a ``Table``: UTF-8, a header line, any of ``DELIMITERS``.
 
-    A leading ``#`` before the header, as numpy writes it, is dropped.
+    Blank lines, and lines that begin with ``#``, are skipped. The header is the first line that is left, or, where
+    that is a row of samples, the last one with ``#`` before it, as numpy writes it.
     """
 
     def __init__(self, path: Path, options: CsvMap, name: str) -> None:
@@ -40,7 +42,7 @@ class CsvTable(Table):
             InputError: the file cannot be read, is not text, or has no header.
         """
         self.name, self._path, self._decimal = name, path, options.decimal
-        header, first_row, self._lines_before = _first_lines(path, name)
+        header, first_row, self._lines_before, self._start = _first_lines(path, name, options.decimal)
         self._delimiter = options.delimiter or _find_delimiter(header, first_row, options.decimal)
         self._names = _cut(header, self._delimiter)
         if not self._names:
@@ -68,6 +70,7 @@ class CsvTable(Table):
             raise InputError(f"{self.name}: column {clash.pop()!r} is both time and a channel")
         if self._empty:
             return
+        read = {name: TextClock(wanted.unit_ns, f"{self.name}: column {name!r}") for name in clocks}
         row = before = 0
         for batch, end in self._batches(types):
             yield Block(
@@ -78,15 +81,7 @@ class CsvTable(Table):
                     )
                     for name in columns
                 },
-                {
-                    name: from_text(
-                        self._point(batch.column(f"{index[name]}")),
-                        wanted.unit_ns,
-                        f"{self.name}: column {name!r}",
-                        row,
-                    )
-                    for name in clocks
-                },
+                {name: read[name].read(self._point(batch.column(f"{index[name]}")), row) for name in clocks},
             )
             row += batch.num_rows
             advance(end - before)
@@ -96,13 +91,13 @@ class CsvTable(Table):
         """Rows of some columns, and how far in the file they end."""
         rows = 0
         try:
-            with pa.OSFile(str(self._path), "rb") as source:
+            with self._path.open("rb") as source:
+                source.seek(self._start)
                 for batch in pcsv.open_csv(
-                    source,
+                    pa.PythonFile(WithoutComments(source), mode="r"),
                     read_options=pcsv.ReadOptions(
                         use_threads=False,
                         block_size=BLOCK_BYTES,
-                        skip_rows=self._lines_before,
                         column_names=[f"{k}" for k in range(len(self._names))],
                     ),
                     parse_options=pcsv.ParseOptions(delimiter=self._delimiter),
@@ -128,7 +123,7 @@ class CsvTable(Table):
                 if len(content) > BLOCK_BYTES:
                     return f"a row is longer than {BLOCK_BYTES >> 20} MiB; this is no table of samples"
                 text = content.decode(errors="replace").strip("\r\n")
-                if line <= self._lines_before or not text:
+                if line <= self._lines_before or not text or text.lstrip().startswith("#"):
                     continue
                 good -= 1
                 cells = _cut(text, self._delimiter, strict=False) if good < 0 else self._names
@@ -154,9 +149,10 @@ class CsvTable(Table):
         return pc.call_function("replace_substring", [text], pc.ReplaceSubstringOptions(self._decimal, "."))
 
 
-def _first_lines(path: Path, name: str) -> tuple[str, str, int]:
-    """The header line, the first row (empty if there is none), and the number of lines up to and with the header."""
-    header, before = "", 0
+def _first_lines(path: Path, name: str, decimal: str) -> tuple[str, str, int, int]:
+    """The header line, the first row (empty if there is none), and the lines and bytes up to and with the header."""
+    header, lines, size = None, 0, 0
+    comment, at = None, 0
     try:
         with readable(name), path.open("rb") as file:
             for count, line in enumerate(iter(lambda: file.readline(MAX_LINE_BYTES + 1), b""), 1):
@@ -166,17 +162,36 @@ def _first_lines(path: Path, name: str) -> tuple[str, str, int]:
                     )
                 if b"\0" in line:
                     raise InputError(f"{name}: holds binary data; a CSV file is text in UTF-8")
+                at += len(line)
                 text = line.decode("utf-8-sig" if count == 1 else "utf-8").strip("\r\n")
-                if not text.strip():
+                if text.lstrip().startswith("#"):
+                    if header is None:
+                        comment = text.lstrip().removeprefix("#").lstrip(), count, at
+                elif not text.strip():
                     continue
-                if header:
-                    return header, text, before
-                header, before = text.removeprefix("#").lstrip(), count
+                elif header is not None:
+                    return header, text, lines, size
+                elif comment is not None and _is_row(text, decimal):
+                    header, lines, size = comment
+                    return header, text, lines, size
+                else:
+                    header, lines, size = text, count, at
     except UnicodeDecodeError as error:
         raise InputError(f"{name}: is not text in UTF-8 ({error.reason})") from error
-    if not header:
+    if header is None and comment is not None:
+        header, lines, size = comment
+    if header is None or not header:
         raise InputError(f"{name}: has no header; the first line must name the columns")
-    return header, "", before
+    return header, "", lines, size
+
+
+def _is_row(text: str, decimal: str) -> bool:
+    """Whether a line holds samples, and no names."""
+    for delimiter in DELIMITERS:
+        cells = _cut(text, delimiter) if delimiter != decimal else []
+        if cells and all(_is_cell(cell, decimal) for cell in cells):
+            return True
+    return False
 
 
 def _find_delimiter(header: str, row: str, decimal: str) -> str:
@@ -187,7 +202,7 @@ def _find_delimiter(header: str, row: str, decimal: str) -> str:
     best, most = "", 1
     for delimiter in DELIMITERS:
         cells = _cut(row, delimiter) if delimiter != decimal else []
-        if len(cells) > most and all(cell in EMPTY or _is_number(cell, decimal) for cell in cells):
+        if len(cells) > most and all(_is_cell(cell, decimal) for cell in cells):
             best, most = delimiter, len(cells)
     return best or next((d for d in DELIMITERS if d != decimal and len(_cut(header, d)) > 1), ",")
 
@@ -197,6 +212,10 @@ def _cut(line: str, delimiter: str, *, strict: bool = True) -> list[str]:
         return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, strict=strict), [])]
     except csv.Error:  # such as an unmatched quotation mark
         return []
+
+
+def _is_cell(cell: str, decimal: str) -> bool:
+    return cell in EMPTY or _is_number(cell, decimal) or is_date(cell)
 
 
 def _is_number(cell: str, decimal: str) -> bool:

@@ -155,7 +155,7 @@ def numbers(column: pa.Array, shape: tuple[int, ...], where: str) -> NDArray:
     return whole
 
 
-def _clock(column: pa.Array, shape: tuple[int, ...], unit_ns: int, where: str, row: int) -> Clock:
+def _clock(column: pa.Array, shape: tuple[int, ...], unit_ns: int | None, where: str, row: int) -> Clock:
     if pa.types.is_timestamp(column.type):
         given = column.is_valid().to_numpy(zero_copy_only=False)
         ns = column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64()).fill_null(0)

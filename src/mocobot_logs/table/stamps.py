@@ -1,4 +1,4 @@
-"""Time of a table in whole nanoseconds: exact for whole numbers and decimal text, rounded for floats."""
+"""Time of a table in whole nanoseconds: exact for whole numbers, decimal text and dates, rounded for floats."""
 
 from bisect import bisect_left
 
@@ -16,12 +16,12 @@ _DIGITS = {10**exponent: exponent for exponent in range(10)}
 Given = NDArray[np.bool_]
 
 
-def from_numbers(values: NDArray, unit_ns: int, where: str, row: int = 0) -> tuple[Stamps, Given]:
+def from_numbers(values: NDArray, unit_ns: int | None, where: str, row: int = 0) -> tuple[Stamps, Given]:
     """Stamps from numbers.
 
     Args:
         values: times in any unit, whole numbers or floats, NaN where there is none, shape (q,).
-        unit_ns: nanoseconds in one unit.
+        unit_ns: nanoseconds in one unit; None where the map's unit is "iso".
         where: file and column, for messages.
         row: row of the first one, for messages.
 
@@ -29,8 +29,9 @@ def from_numbers(values: NDArray, unit_ns: int, where: str, row: int = 0) -> tup
         Stamps [ns], 0 where there is none, and where there is one; each of shape (q,).
 
     Raises:
-        InputError: a time is infinite or beyond 292 years.
+        InputError: a time is infinite or beyond 292 years, or there is no unit.
     """
+    unit_ns = _unit(unit_ns, where)
     if values.dtype.kind in "iu":
         limit = LARGEST_NS // unit_ns
         beyond = (values > limit) | (values < -limit)
@@ -44,12 +45,12 @@ def from_numbers(values: NDArray, unit_ns: int, where: str, row: int = 0) -> tup
     return np.rint(scaled).astype(np.int64), given
 
 
-def from_text(values: pa.Array, unit_ns: int, where: str, row: int = 0) -> tuple[Stamps, Given]:
+def from_text(values: pa.Array, unit_ns: int | None, where: str, row: int = 0) -> tuple[Stamps, Given]:
     """Stamps from decimal text, to the nanosecond: a float of the Unix time resolves 0.24 us only.
 
     Args:
         values: decimal numbers, null where there is none, shape (q,).
-        unit_ns: nanoseconds in one unit, a power of ten.
+        unit_ns: nanoseconds in one unit, a power of ten; None where the map's unit is "iso".
         where: file and column, for messages.
         row: row of the first one, for messages.
 
@@ -57,9 +58,9 @@ def from_text(values: pa.Array, unit_ns: int, where: str, row: int = 0) -> tuple
         As ``from_numbers``.
 
     Raises:
-        InputError: a time is not a number, or is beyond 292 years.
+        InputError: a time is not a number, or is beyond 292 years, or there is no unit.
     """
-    exact = pa.decimal128(38, _DIGITS[unit_ns])
+    exact = pa.decimal128(38, _DIGITS[_unit(unit_ns, where)])
     try:
         decimals = pc.cast(values, exact, safe=False)
     except pa.ArrowInvalid:
@@ -73,6 +74,12 @@ def from_text(values: pa.Array, unit_ns: int, where: str, row: int = 0) -> tuple
     _refuse(values, beyond.to_numpy(zero_copy_only=False), where, row)
     given = ns.is_valid().to_numpy(zero_copy_only=False)
     return pc.fill_null(ns, 0).cast(pa.int64()).to_numpy(zero_copy_only=False), given
+
+
+def _unit(unit_ns: int | None, where: str) -> int:
+    if unit_ns is None:
+        raise InputError(f"{where} holds numbers, but the map's unit of time is 'iso', which is for dates")
+    return unit_ns
 
 
 def _casts(values: pa.Array, kind: pa.DataType) -> bool:

@@ -41,12 +41,12 @@ class Wanted:
     Attributes:
         columns: names to read as numbers.
         clocks: names to read as time.
-        unit_ns: nanoseconds in one unit of time.
+        unit_ns: nanoseconds in one unit of time, None for dates.
     """
 
     columns: tuple[str, ...]
     clocks: tuple[str, ...]
-    unit_ns: int
+    unit_ns: int | None
 
 
 class Table(ABC):
@@ -154,7 +154,7 @@ class TableSource:
         return places
 
     def _clock_of(self, robot: int) -> str:
-        name = self._map.time.column_of(robot) or self._table.time_column
+        name = self._map.time_column(robot) or self._table.time_column
         shape = self._table.shapes.get(name)
         if shape is None:
             raise InputError(self._missing(name, "time"))

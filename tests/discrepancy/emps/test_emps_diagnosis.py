@@ -50,7 +50,8 @@ def test_every_cause_has_a_sentence() -> None:
 def test_friction_is_named_with_its_size(rubbing: tuple[EmpsRig, Diagnosis]) -> None:
     rig, diagnosis = rubbing
     found = named(diagnosis)
-    assert diagnosis.verdict == "explained"
+    # Rest at the turns is modelled up to chi2/n 2.6 of 3740, which is more than noise.
+    assert diagnosis.verdict == "partly_explained"
     assert set(found) == {"coulomb_friction", "viscous_friction", "asymmetric_viscous", "mass"}
     assert found["coulomb_friction"][0] == pytest.approx(20.0, abs=0.3)
     assert found["viscous_friction"][0] == pytest.approx(200.0, abs=3.0)
@@ -138,7 +139,8 @@ def test_command_shows_names_extends_and_measures(tmp_path: Path, capsys: pytest
     values = json.loads((out / "diagnosis.json").read_text())
     words = " ".join(text.split())
     assert code == 0
-    assert text.startswith("EXPLAINED. Axis: rubs with ")
+    assert text.startswith("PARTLY EXPLAINED. Axis: rubs with ")
+    assert "remains of 3.74e+03, where up to 1.15 is clean" in words
     assert "the drive's gain (force per volt) against the mass" in words
     assert "a known weight on the carriage" in words
     assert "kp = 160.1" in words

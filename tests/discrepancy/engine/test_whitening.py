@@ -156,3 +156,14 @@ def test_even_noise_has_no_loud_rows(rng):
     x = rng.standard_normal((330, 3))
     quiet = np.all(white.loudness == 1.0, axis=1)
     np.testing.assert_allclose(white(x)[:300][quiet], even(x)[:300][quiet], rtol=0.1, atol=0.1)
+
+
+def test_where_most_rows_are_loud_somewhere_all_are_whitened_alike(rng):
+    """Every row but a few is loud in one channel of twelve: hardly any would be left to measure by."""
+    draws = rng.standard_normal((24, 48, 12))
+    for row in range(44):
+        draws[:, row, row % 12] *= 6.0
+    even, white = Whitening.of(draws, 48), Whitening.of(draws, 48, uneven=True)
+    x = rng.standard_normal((48, 12))
+    np.testing.assert_array_equal(white(x), even(x))
+    assert np.all(np.isfinite(white(x)))

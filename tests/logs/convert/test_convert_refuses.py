@@ -67,7 +67,7 @@ def rows(keep: np.ndarray) -> Callable[[Columns], Columns]:
     return lambda table: {name: values[keep] for name, values in table.items()}
 
 
-def put(row: int, value: float) -> Callable[[np.ndarray], np.ndarray]:
+def put(row: int | slice, value: float) -> Callable[[np.ndarray], np.ndarray]:
     def edit(values: np.ndarray) -> np.ndarray:
         values[row] = value
         return values
@@ -87,14 +87,20 @@ def kept_at_random(share: float) -> np.ndarray:
 SAMPLES: dict[str, tuple[Callable[[Columns], Columns], list[str]]] = {
     "zero rows": (rows(np.arange(0)), ["robot 1 has 0 samples; at least 16"]),
     "a few rows": (rows(np.arange(9)), ["robot 1 has 9 samples; at least 16"]),
-    "NaN": (change("omnid2.tau1", put(77, np.nan)), ["robot 2", "tau1", "nan"]),
-    "infinity": (change("omnid3.phi2", put(77, np.inf)), ["robot 3", "phi2", "inf"]),
+    "NaN for too long": (
+        change("omnid2.tau1", put(slice(77, 90), np.nan)),
+        ["robot 2: no samples for 0.14 s", "NaN count as missing", "--split-at-gaps", "--crop"],
+    ),
+    "infinity": (change("omnid3.phi2", put(77, np.inf)), ["robot 3", "phi2", "inf", "--drop"]),
     "time runs back": (change("time", put(100, 0.2)), ["robot 1", "time"]),
     "a stamp twice": (change("time", put(100, 0.99)), ["robot 1", "0.99"]),
-    "a robot ends early": (change("omnid2", ends_early), ["robot 2 ends 1.5 s before"]),
+    "a robot ends early": (change("omnid2", ends_early), ["robot 2 ends 1.5 s before", "--crop"]),
     "a robot is missing": (change("omnid2", lambda v: np.full_like(v, np.nan)), ["robot 2 has 0 samples"]),
     "30 % dropped": (rows(kept_at_random(0.7)), ["samples are missing", "at most 10 %"]),
-    "a long gap": (rows(np.r_[0:100, 130:400]), ["no samples for 0.31 s", "at most 0.05 s"]),
+    "a long gap": (
+        rows(np.r_[0:100, 130:400]),
+        ["no samples for 0.31 s", "at most 0.05 s", "--split-at-gaps"],
+    ),
     "time in ms": (change("time", lambda t: 1e3 * t), ["10 s apart", "is the unit of time right?"]),
     "degrees": (
         change("omnid1.theta", np.rad2deg),

@@ -39,18 +39,30 @@ def retimed(row: int, time_s: float) -> Samples:
 
 
 @pytest.mark.parametrize("rows", [1, 700, 3000])
-@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e300])
+@pytest.mark.parametrize("value", [np.inf, -np.inf, 1e300])
 def test_a_value_that_is_no_number(value, rows):
     message = refusal(GOOD, changed(1234, 5, value), rows=rows)
     assert f"robot 2: theta_x is {value} in row 1234, 12.34 s after its first sample" in message
     assert "finite" in message
 
 
+@pytest.mark.parametrize("rows", [1, 700, 3000])
+def test_rows_are_counted_with_those_that_lack_a_value(rows):
+    bad = changed(1234, 5, np.inf)
+    bad.values[[3, 800, 801, 1235], 2] = np.nan
+    assert "theta_x is inf in row 1234, 12.34 s after its first sample" in refusal(GOOD, bad, rows=rows)
+
+
+def test_nothing_but_rows_that_lack_a_value():
+    bad = stream(TIME, np.where(np.arange(9) == 4, np.nan, VALUES))
+    assert "robot 2 has 0 samples (3000 rows lack a value); at least 16" in refusal(GOOD, bad)
+
+
 def test_the_first_of_several_faults_is_named():
-    bad = changed(2000, 0, np.nan)
+    bad = changed(2000, 0, np.inf)
     bad.stamp_ns[1999] -= 10**9
     assert "runs back by 0.99 s in row 1999" in refusal(bad)
-    bad = changed(1500, 0, np.nan)
+    bad = changed(1500, 0, np.inf)
     bad.stamp_ns[1999] -= 10**9
     assert "row 1500" in refusal(bad)
 

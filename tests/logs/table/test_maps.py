@@ -121,7 +121,7 @@ def test_defaults_placeholders_and_overrides() -> None:
     one, two = log_map.channels(1), log_map.channels(2)
     assert tuple(one) == CHANNELS["joint"] == log_map.names
     assert (log_map.robots, log_map.trial, log_map.time.unit_ns) == (2, "static", 1_000_000)
-    assert (log_map.time.column_of(1), log_map.time.column_of(2)) == ("stamp1", "stamp2")
+    assert (log_map.time_column(1), log_map.time_column(2)) == ("stamp1", "stamp2")
     assert (one["phi1"].column, two["phi1"].column) == ("phi1_of_1_0", "phi1_of_2_1")
     assert (one["phi3"].column, two["phi3"].column) == ("third[0, 2]", "other")
     assert one["phi3"].scale == two["phi3"].scale == -2 * math.pi / 1000  # an override keeps the rest
@@ -230,7 +230,7 @@ SLIPS: list[tuple[dict[str, Any], list[str]]] = [
     (with_channel(column=""), ["column is ''"]),
     (with_channel(column="a\nb"), ["column is 'a\\nb'", "printable"]),
     (with_channel(column=["a"]), ["column is ['a']"]),
-    (with_channel(column="r{i}.phi1"), ["placeholder '{i}'", "{robot}, {robot0}, {channel}"]),
+    (with_channel(column="r{i}.phi1"), ["placeholder '{i}'", "{robot}, {robot0}, {name}, {channel}"]),
     (with_channel(column="r{}.phi1"), ["placeholder '{}'"]),
     (with_channel(column="r{robot.__class__}"), ["placeholder '{robot.__class__}'"]),
 ]

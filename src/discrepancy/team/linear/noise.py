@@ -17,8 +17,6 @@ from estimator.quantisation import rounding_step
 from estimator.recording.sampling import SENSORS
 from mocobot_logs.resample.errors import Conversion
 
-_BATCH = 8  # draws that are converted at a time
-
 
 @dataclass(frozen=True, eq=False)
 class Noise:
@@ -49,8 +47,9 @@ class Noise:
         """
         smooth = _unrounded(signals, np.moveaxis(self.step, 0, 1).reshape(-1, SENSORS))
         ways = [_Way(smooth[:, i], signals, i, rng) for i in range(smooth.shape[1])]
-        for first in range(0, count, _BATCH):
-            size = min(_BATCH, count - first)
+        at_a_time = 8  # for the sake of memory
+        for first in range(0, count, at_a_time):
+            size = min(at_a_time, count - first)
             parts = [
                 way.converted([self._errors(way.x, i, rng) for _ in range(size)])
                 for i, way in enumerate(ways)

@@ -1,0 +1,34 @@
+"""``mocobot map``: draft the map of a log."""
+
+import sys
+
+from estimator.files import write_text
+from mocobot.files.targets import check_output
+from mocobot.options import Map
+from mocobot_logs.draft.draft import Draft
+from mocobot_logs.draft.of_log import draft_of
+
+
+def run(options: Map) -> None:
+    """Run the command; doubts are in the draft, and counted on standard error.
+
+    Raises:
+        InputError: the log cannot be read, or the draft not be written.
+    """
+    if options.out is not None:
+        check_output(options.out, [options.log], force=options.force)
+    draft = draft_of(options.log, options.episode)
+    if options.out is None:
+        print(draft.text, end="")
+    else:
+        write_text(options.out, draft.text)
+    print(f"mocobot: {_summary(draft)}", file=sys.stderr)
+
+
+def _summary(draft: Draft) -> str:
+    robots = f"{draft.robots} robot{'s' * (draft.robots > 1)}"
+    if draft.missing:
+        return f"{robots}; the draft is not complete: {', '.join(draft.missing)} must be filled in"
+    if draft.doubtful:
+        return f"{robots}; {draft.doubtful} doubtful line{'s' * (draft.doubtful > 1)} must be looked at"
+    return f"{robots}; nothing is doubtful"

@@ -1,0 +1,1 @@
+"""Parts of a log: crop, drop, split at gaps."""

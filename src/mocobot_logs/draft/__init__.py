@@ -1,0 +1,1 @@
+"""Drafts of maps, from what a log's columns and topics are called and hold."""
