@@ -64,8 +64,8 @@ class Conversion:
         time_ns = self.instants_ns - self.instants_ns[0]
         if not (self.grid.fits or self.grid.uneven):
             merger = Merger(self.grid.period_ns)
-            parts = merger.push(time_ns, values), merger.finish()
-            time_ns, values = (np.concatenate(part) for part in zip(*parts, strict=True))
+            (time_ns, values), (last_ns, last) = merger.push(time_ns, values), merger.finish()
+            time_ns, values = np.concatenate([time_ns, last_ns]), np.concatenate([values, last])
         interpolator = Interpolator(self.grid, float(np.max(np.diff(time_ns))) * NS)
         fine = [*interpolator.push(time_ns, values), interpolator.finish()]
         decimator = Decimator(self.thinned)
@@ -86,9 +86,8 @@ def _jittered(at: Array, jitter_s: float, rng: np.random.Generator) -> Array:
     draw = rng.standard_normal(len(at))
     drawn_s, wanted_s = jitter_s, np.sqrt(2.0) * jitter_s
     for _ in range(8):
-        out = np.sort(at + drawn_s * draw)
-        left_s = float(np.std(np.diff(out)))
+        left_s = float(np.std(np.diff(np.sort(at + drawn_s * draw))))
         if left_s > 0.98 * wanted_s:
             break
         drawn_s *= wanted_s / left_s
-    return out
+    return np.sort(at + drawn_s * draw)
