@@ -120,7 +120,8 @@ def to_recording(
     read_s = np.array([(report.first_ns - resampled.origin_ns) * NS for report in resampled.reports])
     read_s = estimate.middle_s + (read_s - estimate.middle_s - offset_s) / (1.0 + drift) - time_s[0]
     metadata = replace(
-        metadata, sampling=_sampling(resampled, float(time_s[0]), read_s, 1.0 + drift, untouched)
+        metadata,
+        sampling=_sampling(resampled, float(time_s[0]), read_s, 1.0 + drift, untouched, aligned=correct),
     )
     if resampled.level == "wrist":
         _to_joints(arrays["position"], arrays["effort"], metadata.design, resampled.name, rate_hz)
@@ -165,7 +166,13 @@ def _metadata(
 
 
 def _sampling(
-    resampled: Resampled, start_s: float, first_s: Array, speed: Array, untouched: Sequence[bool]
+    resampled: Resampled,
+    start_s: float,
+    first_s: Array,
+    speed: Array,
+    untouched: Sequence[bool],
+    *,
+    aligned: bool,
 ) -> tuple[Sampling, ...] | None:
     """How the sensors were read, or None where the samples are as they were read.
 
@@ -175,11 +182,13 @@ def _sampling(
         first_s: when each robot's first sample was taken, in the recording's time [s], shape (N,).
         speed: how fast each robot's clock runs by that of robot 1, shape (N,).
         untouched: whether each robot kept its samples as they were on its own grid.
+        aligned: whether clocks were brought to that of robot 1 by the motion.
     """
     known = None if resampled.metadata is None else resampled.metadata.sampling
     if known is not None:  # what was converted before: the errors are still those of the first reading
         # Stamps of what was written as a recording are its time; this one may begin in the middle of it.
-        return tuple(sampling.later(resampled.origin_ns * NS + start_s) for sampling in known)
+        later = [sampling.later(resampled.origin_ns * NS + start_s) for sampling in known]
+        return tuple(replace(s, aligned=s.aligned or (aligned and i > 0)) for i, s in enumerate(later))
     reports = resampled.reports
     if all(untouched) and all(report.method == "untouched" and not report.filled for report in reports):
         return None
@@ -190,6 +199,7 @@ def _sampling(
             # An interval has the errors of both of its ends.
             jitter_s=report.jitter_rms_s / math.sqrt(2.0),
             missing=report.filled_share,
+            aligned=aligned and i > 0,
             method=report.method,
             level=resampled.level,
             steps=report.steps,

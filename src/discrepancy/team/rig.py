@@ -186,7 +186,7 @@ class TeamRig(Rig):
             Rows(
                 self.recordings[t].name,
                 self.whitening[t](linear.residual),
-                self.whitening[t](linear.by_bases),
+                self.whitening[t](np.concatenate([linear.by_bases, linear.by_clocks], axis=2)),
                 self.whitening[t](linear.by_shared),
                 [self._columns(t, candidate) for candidate in candidates],
                 linear.reduction.time,

@@ -13,7 +13,7 @@ SENSORS = 9
 Method = Literal["untouched", "filtered", "interpolated", "fitted"]
 """Samples as they came; low-passed and thinned; interpolated, or polynomials fitted, then low-passed and thinned."""
 METHODS: tuple[Method, ...] = ("untouched", "filtered", "interpolated", "fitted")
-_KEYS = ("native_hz", "first_s", "jitter_s", "missing", "method", "level", "steps")
+_KEYS = ("native_hz", "first_s", "jitter_s", "missing", "aligned", "method", "level", "steps")
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,7 @@ class Sampling:
         first_s: when the first was taken, in the recording's time [s].
         jitter_s: standard deviation of the instants from evenly spaced ones [s].
         missing: share of samples that the log lacked.
+        aligned: whether its clock was set by the motion, so that the motion tells nothing of it any more.
         method: what was done to them before the robots were brought together.
         level: channels of the log, and so of ``steps``: "joint" or "wrist".
         steps: rounding step of every channel of the log [rad, rad, N m] or [m, rad, N], 0 for none.
@@ -37,6 +38,7 @@ class Sampling:
     first_s: float
     jitter_s: float
     missing: float
+    aligned: bool
     method: Method
     level: Literal["joint", "wrist"]
     steps: tuple[float, ...]
@@ -68,7 +70,7 @@ class Sampling:
             if not good:
                 fields.refuse(key, allowed)
 
-        native, first, jitter, missing, method, level, steps = (values[key] for key in _KEYS)
+        native, first, jitter, missing, aligned, method, level, steps = (values[key] for key in _KEYS)
         require("native_hz", "a number of hertz, greater than 0 and less than 1e9",
                 good=is_number(native) and 0 < native < 1e9)  # fmt: skip
         require(
@@ -80,6 +82,7 @@ class Sampling:
         require(
             "missing", "a share, at least 0 and less than 1", good=is_number(missing) and 0 <= missing < 1
         )
+        require("aligned", "true or false", good=isinstance(aligned, bool))
         require("method", f"one of {', '.join(METHODS)}", good=method in METHODS)
         require("level", "one of joint, wrist", good=level in ("joint", "wrist"))
         good = (
@@ -87,4 +90,4 @@ class Sampling:
         )
         require("steps", f"{SENSORS} numbers, none negative", good=good)
         numbers = float(native), float(first), float(jitter), float(missing)
-        return cls(*numbers, method, level, tuple(float(step) for step in steps))
+        return cls(*numbers, aligned, method, level, tuple(float(step) for step in steps))

@@ -36,9 +36,7 @@ class Noise:
         # Trial by trial: the grid may lie differently in each.
         step = np.median([_steps(trial) for trial in trials], axis=0)
         white = np.sqrt(np.mean([_white(trial) ** 2 for trial in trials], axis=0))
-        angle, torque = rules.ANGLE_FLOOR_RAD, rules.TORQUE_FLOOR_NM
-        floor = np.array([angle, angle, torque])[:, None, None]
-        return cls(step, np.sqrt(np.maximum(np.maximum(white, floor) ** 2 - step**2 / 12.0, 0.0)))
+        return cls(step, np.sqrt(np.maximum(white**2 - step**2 / 12.0, 0.0)))
 
     def draws(self, signals: Signals, rng: np.random.Generator, count: int) -> Iterator[Signals]:
         """Realisations of the sensors' errors on a trial: what they add to its smooth signals.
@@ -46,26 +44,21 @@ class Noise:
         Where its samples are not as they were read, errors are drawn at the readings and sent through the conversion.
         """
         smooth = _unrounded(signals, np.moveaxis(self.step, 0, 1).reshape(-1, SENSORS))
-        ways = [_Way(smooth[:, i], signals, i, rng) for i in range(smooth.shape[1])]
         at_a_time = 8  # for the sake of memory
         for first in range(0, count, at_a_time):
             size = min(at_a_time, count - first)
+            ways = [_Way(smooth[:, i], signals, i, rng) for i in range(smooth.shape[1])]
             parts = [
                 way.converted([self._errors(way.x, i, rng) for _ in range(size)])
                 for i, way in enumerate(ways)
             ]
             for draw in np.moveaxis(np.array(parts), 0, 2):  # (Q, N, 9)
-                phi, theta, tau = np.split(draw, 3, axis=2)
+                phi, theta, tau = np.split(draw + _model_errors(smooth, signals.rate_hz, rng), 3, axis=2)
                 yield Signals(signals.time, phi, theta, tau, signals.rate_hz)
 
     def _errors(self, x: Array, robot: int, rng: np.random.Generator) -> Array:
         """Errors of one robot's readings, whose true values are ``x``, shape (q, 9)."""
-        step, sigma = self.step[:, robot].ravel(), self.sigma[:, robot].ravel()
-        rounds = step > 0
-        step = np.where(rounds, step, 1.0)
-        x = x + step * _phase(x / step, rng)
-        read = x + sigma * rng.standard_normal(x.shape)
-        return np.where(rounds, np.round(read / step) * step, read) - x
+        return _read(x, self.step[:, robot].ravel(), self.sigma[:, robot].ravel(), rng)
 
 
 class _Way:
@@ -77,7 +70,7 @@ class _Way:
 
     def __init__(self, smooth: Array, signals: Signals, robot: int, rng: np.random.Generator) -> None:
         self._conversion: Conversion | None = None
-        self.x = smooth
+        self.x = self._smooth = smooth
         if signals.sampling is not None:
             sampling, start_s = signals.sampling[robot], float(signals.time[0])
             self._conversion = Conversion.of(sampling.later(start_s), signals.rate_hz, len(smooth), rng)
@@ -86,16 +79,46 @@ class _Way:
             self.x = CubicSpline(time, smooth)(at)
 
     def converted(self, errors: list[Array]) -> Array:
-        """Errors of the recording's samples, shape (D, Q, 9), from those of the readings, (q, 9) each."""
+        """Errors of the recording's samples, shape (D, Q, 9), from those of the readings, (q, 9) each.
+
+        What the conversion itself misses of the signals, where samples lack, is among them.
+        """
         if self._conversion is None:
             return np.array(errors)
-        made = self._conversion(np.concatenate(errors, axis=1))
-        return np.moveaxis(made.reshape(len(made), len(errors), SENSORS), 1, 0)
+        made = self._conversion(np.concatenate([self.x, *errors], axis=1))
+        made = np.moveaxis(made.reshape(len(made), -1, SENSORS), 1, 0)
+        return made[1:] + (made[0] - self._smooth)
+
+
+def _native_hz(signals: Signals) -> Array:
+    """Rate of every robot's readings [Hz], shape (N,)."""
+    if signals.sampling is None:
+        return np.full(signals.phi.shape[1], signals.rate_hz)
+    return np.array([sampling.native_hz for sampling in signals.sampling])
 
 
 def _columns(signals: Signals) -> Array:
     """The sensors' channels of all robots, shape (Q, N, 9)."""
     return np.concatenate([signals.phi, signals.theta, signals.tau], axis=2)
+
+
+def _read(x: Array, step: Array, sigma: Array, rng: np.random.Generator) -> Array:
+    """Errors of readings of ``x`` with white noise and then rounding, for every channel in the last axis."""
+    rounds = step > 0
+    step = np.where(rounds, step, 1.0)
+    x = x + step * _phase(x / step, rng)
+    read = x + sigma * rng.standard_normal(x.shape)
+    return np.where(rounds, np.round(read / step) * step, read) - x
+
+
+def _model_errors(x: Array, rate_hz: float, rng: np.random.Generator) -> Array:
+    """What the model itself leaves, shape (Q, N, 9): nearly white in motion, and the same while all rests.
+
+    Rounding does so, too, and is drawn for it: to a step that scatters by the floor.
+    """
+    floor = np.repeat([rules.ANGLE_FLOOR_RAD, rules.ANGLE_FLOOR_RAD, rules.TORQUE_FLOOR_NM], 3)
+    step = floor * np.sqrt(12.0 * rate_hz / rules.FLOOR_HZ)
+    return _read(x, step, np.zeros_like(step), rng)
 
 
 def _phase(x: Array, rng: np.random.Generator) -> Array:
@@ -150,8 +173,7 @@ def _white(signals: Signals) -> Array:
     A conversion leaves less of it there; how much, it shows on noise of one.
     """
     rate_hz, x = signals.rate_hz, _columns(signals)
-    native_hz = [s.native_hz for s in signals.sampling or ()]
-    high = min(rules.NOISE_ABOVE_HZ, 0.4 * min([rate_hz, *native_hz]))
+    high = min(rules.NOISE_ABOVE_HZ, 0.4 * min(rate_hz, *_native_hz(signals)))
     band = butter(4, high, btype="high", fs=rate_hz, output="sos")
     white = _spread(sosfiltfilt(band, x, axis=0))
     if signals.sampling is None:

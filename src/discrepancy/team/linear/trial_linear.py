@@ -134,6 +134,25 @@ class TrialLinear:
         return np.asarray((self._by_wrist[robot] @ rates[..., None])[..., 0])
 
     @cached_property
+    def by_clocks(self) -> Array:
+        """Derivative by offset [s] and drift of every clock that was set by the motion, shape (n, C, 2 k).
+
+        How well that was done depends on the motion, and so it is left open: the k robots' readings may be those of a
+        moment ago.
+        """
+        signals, columns = self.signals, []
+        middle = signals.time - signals.time.mean()
+        for i, sampling in enumerate(signals.sampling or ()):
+            if sampling.aligned:
+                rates = [
+                    -with_rates(x[:, i], signals.rate_hz)[1]
+                    for x in (signals.phi, signals.theta, signals.tau)
+                ]
+                columns.append(self.of_signals(i, *rates))
+                columns.append(self.of_signals(i, *(rate * middle[:, None] for rate in rates)))
+        return np.stack(columns, axis=2) if columns else np.zeros((*self.residual.shape, 0))
+
+    @cached_property
     def _by_wrist(self) -> Array:
         """Derivative of the balance by velocity and acceleration of a wrist in {b_i}, shape (N, Q, 6, 6).
 
