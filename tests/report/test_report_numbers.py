@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from discrepancy.causes.units import fitting, one_each, parameter
@@ -104,6 +104,7 @@ def test_trials_have_short_and_distinct_names() -> None:
     assert short_names(given_names) == ["trial1", "trial1 (2)", "trial1 (3)", "trial", "EMPS 0.2-6 s"]
 
 
+@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 3), st.integers(1, 5000), st.integers(10, 400))
 def test_thinning_loses_no_spike(seed: int, columns: int, rows: int, most: int) -> None:
     rng = np.random.default_rng(seed)

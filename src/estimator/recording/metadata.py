@@ -110,7 +110,7 @@ def _check_format(values: dict[str, Any], where: str) -> None:
         raise InputError(f"{where}: format is {values['format']!r}; it must be {FORMAT!r}")
     version = values.get("version", VERSIONS[0])
     if type(version) is not int or version not in VERSIONS:
-        known = " and ".join(str(known) for known in VERSIONS)
+        known = f"{', '.join(map(str, VERSIONS[:-1]))} and {VERSIONS[-1]}"
         raise InputError(f"{where}: version is {version!r:.60}; this program reads versions {known}")
 
 

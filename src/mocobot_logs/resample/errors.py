@@ -11,7 +11,7 @@ from estimator.recording.sampling import Sampling
 from mocobot_logs.log import NS, Array, Stamps
 from mocobot_logs.resample.fill import Merger
 from mocobot_logs.resample.filter import Decimator, fineness
-from mocobot_logs.resample.grid import TOLERANCE_NS, Grid, Interpolator
+from mocobot_logs.resample.grid import TOLERANCE_NS, Grid, Interpolator, fitted_rows
 
 _MARGIN_S = 0.3
 """Read before and after the recording, so that the low-pass is filled [s]."""
@@ -41,9 +41,10 @@ class Conversion:
     def of(cls, sampling: Sampling, rate_hz: float, samples: int, rng: np.random.Generator) -> Conversion:
         """Draw one; the recording has ``samples`` at ``rate_hz`` [Hz]."""
         fits = sampling.method in ("untouched", "filtered")
-        k = max(1, round(sampling.native_hz / rate_hz)) if fits else fineness(sampling.native_hz, rate_hz)
+        native_hz, fitted = sampling.native_hz, sampling.method == "fitted"
+        k = max(1, round(native_hz / rate_hz)) if fits else fineness(native_hz, rate_hz, fitted=fitted)
         spacing_s = 1.0 / (k * rate_hz)
-        period_s = spacing_s if fits else 1.0 / sampling.native_hz
+        period_s = spacing_s if fits else 1.0 / native_hz
         before = np.ceil((sampling.first_s + _MARGIN_S) / period_s)
         count = int(np.ceil((samples / rate_hz + 2 * _MARGIN_S) / period_s)) + 2
         at = sampling.first_s + (np.arange(count) - before) * period_s
@@ -51,7 +52,7 @@ class Conversion:
             at = _jittered(at, sampling.jitter_s, rng)
         kept = rng.uniform(size=count) >= sampling.missing
         kept[[0, -1]] = True
-        grid = Grid(spacing_s / NS, period_s / NS, fits, uneven=sampling.method == "fitted")
+        grid = Grid(spacing_s / NS, period_s / NS, fits, fitted_rows(native_hz, rate_hz) if fitted else 0)
         return cls(np.rint(at[kept] / NS).astype(np.int64), grid, k, rate_hz, samples)
 
     @property
@@ -62,7 +63,7 @@ class Conversion:
     def __call__(self, values: Array) -> Array:
         """Samples of the recording from readings at ``instants``, shape (q, C) -> (Q, C)."""
         time_ns = self.instants_ns - self.instants_ns[0]
-        if not (self.grid.fits or self.grid.uneven):
+        if not (self.grid.fits or self.grid.fitted_rows):
             merger = Merger(self.grid.period_ns)
             (time_ns, values), (last_ns, last) = merger.push(time_ns, values), merger.finish()
             time_ns, values = np.concatenate([time_ns, last_ns]), np.concatenate([values, last])

@@ -25,13 +25,15 @@ from mocobot_logs.log import Array
 PASS, STOP = 0.2, 0.5
 """Edges of the transition band over the output rate: 20 and 50 Hz at 100 Hz."""
 RIPPLE_DB = 110.0
-OVERSAMPLING, PLENTY = 3.0, 5.0
+OVERSAMPLING, PLENTY, FITTED = 3.0, 5.0, 10.0
 _ROUND = 0.01  # a clock that runs fast by this share asks for no finer grid
 
 
-def fineness(native_hz: float, rate_hz: float) -> int:
-    """k of the grid k ``rate_hz`` onto which a stream of ``native_hz`` is interpolated."""
+def fineness(native_hz: float, rate_hz: float, *, fitted: bool = False) -> int:
+    """k of the grid k ``rate_hz`` onto which a stream of ``native_hz`` is interpolated or ``fitted``."""
     ratio = native_hz / rate_hz
+    if fitted:  # smooth already
+        ratio = min(ratio, FITTED)
     return max(1, math.ceil((ratio if ratio >= PLENTY else OVERSAMPLING * ratio) * (1 - _ROUND)))
 
 

@@ -15,8 +15,6 @@ _DECAY = 48  # rows; in a quintic spline a sample's weight falls by 0.43 per row
 TOLERANCE_NS = 1000
 """Stamps this close to the grid are on it: time that is read from decimals or floats is no more exact."""
 _DEGREE = 5
-_FITTED_ROWS = 12
-"""Nearest rows, to which a polynomial of degree 5 is fitted: flat to a tenth of their rate, as they are many."""
 
 
 @dataclass(frozen=True)
@@ -27,19 +25,19 @@ class Grid:
         spacing_ns: of the instants [ns].
         period_ns: of the robot's samples [ns].
         fits: whether the samples lie on the grid, with ``period_ns`` equal to ``spacing_ns``.
-        uneven: whether samples are so many and so uneven that polynomials are fitted to them. A spline through
-            them would swing with their noise, because some are a moment apart.
+        fitted_rows: so many nearest samples, to which a polynomial is fitted at every instant; 0 for a spline through
+            all samples. A spline through samples of which some are a moment apart would swing with their noise.
     """
 
     spacing_ns: float
     period_ns: float
     fits: bool = False
-    uneven: bool = False
+    fitted_rows: int = 0
 
     @property
     def method(self) -> Method:
         """What is done to samples that do not fit."""
-        return "fitted" if self.uneven else "interpolated"
+        return "fitted" if self.fitted_rows else "interpolated"
 
     def holds(self, time_ns: Stamps) -> bool:
         """Whether all times [ns] are within ``TOLERANCE_NS`` of instants of the grid, no two at the same."""
@@ -63,7 +61,7 @@ class Interpolator:
     def __init__(self, grid: Grid, max_gap_s: float) -> None:
         """Gaps are at most ``max_gap_s`` beyond one period [s]."""
         self._grid = grid
-        self._around = _DECAY + 2 * side(math.ceil(max_gap_s / NS / grid.period_ns))
+        self._around = _DECAY + grid.fitted_rows + 2 * side(math.ceil(max_gap_s / NS / grid.period_ns))
         self._time: list[Stamps] = []
         self._values: list[Array] = []
         self._rows = 0
@@ -105,8 +103,8 @@ class Interpolator:
             return filled[instants - index[0]]
         time = (time_ns - time_ns[0]) / grid.period_ns
         at = (instants * grid.spacing_ns - time_ns[0]) / grid.period_ns
-        if grid.uneven:
-            return _fitted(time, values, np.clip(at, time[0], time[-1]))
+        if grid.fitted_rows:
+            return _fitted(time, values, np.clip(at, time[0], time[-1]), grid.fitted_rows)
         missing = np.maximum(np.rint(np.diff(time)).astype(np.int64) - 1, 0)
         knots, filled = fill_gaps(time, values, missing)
         spline = make_interp_spline(knots, filled, k=_DEGREE)
@@ -122,10 +120,19 @@ class Interpolator:
         return round(at) if self._grid.fits else math.ceil(at)
 
 
-def _fitted(time: Array, values: Array, at: Array) -> Array:
-    """Values at instants, shape (n, C), of polynomials through the nearest ``_FITTED_ROWS``."""
-    width = min(_FITTED_ROWS, len(time))
+def fitted_rows(native_hz: float, rate_hz: float) -> int:
+    """How many uneven samples of ``native_hz`` a polynomial is fitted to: those of three output periods.
+
+    That is flat below a fifth of the output rate. Fewer would count each sample by the time around it, and leave twice
+    the noise of even samples.
+    """
+    return max(12, round(3.0 * native_hz / rate_hz))
+
+
+def _fitted(time: Array, values: Array, at: Array, width: int) -> Array:
+    """Values at instants, shape (n, C), of polynomials of degree 5 through the ``width`` nearest rows."""
+    width = min(width, len(time))
     first = np.clip(np.searchsorted(time, at) - width // 2, 0, len(time) - width)
     rows = first[:, None] + np.arange(width)
     weights = polynomial_weights(time[rows], at[:, None], _DEGREE)[:, 0]
-    return np.einsum("nw,nwc->nc", weights, values[rows])
+    return np.einsum("nw,nwc->nc", weights, values[rows], optimize=True)

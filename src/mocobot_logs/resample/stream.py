@@ -10,7 +10,7 @@ from estimator.recording.sampling import Method
 from mocobot_logs.log import NS, Array, Samples, Stamps, joined
 from mocobot_logs.resample.fill import Merger
 from mocobot_logs.resample.filter import Decimator, fineness
-from mocobot_logs.resample.grid import Grid, Interpolator
+from mocobot_logs.resample.grid import Grid, Interpolator, fitted_rows
 from mocobot_logs.resample.report import StreamReport
 from mocobot_logs.resample.screen import Screen
 from mocobot_logs.resample.steps import StepFinder
@@ -164,8 +164,10 @@ class RobotStream:
         )
         if uneven:  # most intervals are shorter than the mean one, and none is told from a gap
             period_ns = float(np.mean(interval))
-        k = fineness(1.0 / (period_ns * NS), self._rate_hz)
-        return Grid(1.0 / (k * self._rate_hz) / NS, period_ns, uneven=uneven), k
+        native_hz = 1.0 / (period_ns * NS)
+        k = fineness(native_hz, self._rate_hz, fitted=uneven)
+        rows = fitted_rows(native_hz, self._rate_hz) if uneven else 0
+        return Grid(1.0 / (k * self._rate_hz) / NS, period_ns, fitted_rows=rows), k
 
 
 class _Pipe:
@@ -180,7 +182,7 @@ class _Pipe:
         self.tally = tally
         self.left_grid = False
         self._grid, self._k = grid, k
-        self._merger = None if grid.fits or grid.uneven else Merger(grid.period_ns)
+        self._merger = None if grid.fits or grid.fitted_rows else Merger(grid.period_ns)
         self._interpolator = Interpolator(grid, max_gap_s)
         self._decimator = Decimator(k)
         self._last: Stamps = np.empty(0, np.int64)

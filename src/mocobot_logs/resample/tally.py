@@ -34,7 +34,7 @@ class Tally:
 
         Where samples are many and uneven, no interval tells how many are missing, and none counts as missing.
         """
-        self._uneven = grid.uneven
+        self._uneven = grid.fitted_rows > 0
         self.gaps = self.filled = 0
         self.longest_gap_s = self.jitter_max_s = 0.0
         self._where, self._period_ns, self._max_gap_s = where, grid.period_ns, max_gap_s
