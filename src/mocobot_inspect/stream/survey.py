@@ -1,7 +1,7 @@
 """One pass over a log of any length: counts of everything, and an excerpt for what needs many samples at once."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,7 +52,7 @@ def survey(source: LogSource, advance: Callable[[int], object] = lambda _: None)
     for robot, samples in source.chunks(advance):
         robots[robot].push(samples, rows)
     timing = tuple(robot.finish() for robot in robots)
-    channels = tuple(robot.channels.finish() for robot in robots)
+    channels = tuple(_as_read(robot.channels.finish(), source, i) for i, robot in enumerate(robots))
     if all(robot.complete for robot in robots):
         return Survey(timing, channels, tuple(robot.excerpt() for robot in robots), None)
     for robot in robots:
@@ -66,6 +66,18 @@ def survey(source: LogSource, advance: Callable[[int], object] = lambda _: None)
     origin = min(robot.first_ns for robot in robots if robot.first_ns is not None)
     bounds = float(seconds(np.array(start_ns), origin)), float(seconds(np.array(stop_ns), origin))
     return Survey(timing, channels, tuple(joined(p, len(source.channels)) for p in parts), bounds)
+
+
+def _as_read(channels: tuple[Channel, ...], source: LogSource, robot: int) -> tuple[Channel, ...]:
+    """Channels with the steps that a converted recording tells of, as its samples show none any more."""
+    told = None if source.metadata is None else source.metadata.sampling
+    if told is None or told[robot].level != source.level:
+        return channels
+    steps = told[robot].steps
+    return tuple(
+        replace(channel, step=step) if step > 0 else channel
+        for channel, step in zip(channels, (*steps, *[0.0] * (len(channels) - len(steps))), strict=True)
+    )
 
 
 class _Robot:

@@ -8,8 +8,10 @@ from scipy.signal import butter, freqz_sos, sosfiltfilt
 
 from array_log import ArrayLog, stream
 from estimator.errors import InputError
+from estimator.leftover.steps import steps_of
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.sampling import Sampling
+from mocobot_inspect.stream.survey import survey
 from mocobot_logs.one_clock import to_recording
 from mocobot_logs.resample.errors import Conversion
 from mocobot_logs.resample.log import resample
@@ -133,3 +135,17 @@ def test_signals_pass_unchanged(rng):
         way = Conversion.of(sampling, 100.0, 800, rng)
         made = way(np.sin(2 * np.pi * 2.0 * way.instants)[:, None])[:, 0]
         np.testing.assert_allclose(made, np.sin(2 * np.pi * 2.0 * np.arange(800) / 100.0), atol=1e-6)
+
+
+def test_steps_of_a_converted_recording_are_those_of_its_sensors():
+    """What looks at the recording afterwards finds no step in the samples, and is told."""
+    time = np.arange(3000) / 100.0
+    recording = converted([time, time + 0.0037])
+    steps = steps_of(recording, 5.0)
+    assert steps.phi_rad == pytest.approx(STEP, rel=1e-6)
+    assert steps.theta_rad == pytest.approx(STEP, rel=1e-6)
+    values = np.concatenate([recording.phi, recording.theta, recording.tau], axis=2)
+    streams = [stream(recording.time, values[:, i]) for i in range(2)]
+    log = ArrayLog(streams, metadata=recording.metadata)
+    for channels in survey(log).channels:
+        assert [channel.step for channel in channels[:6]] == pytest.approx([STEP] * 6, rel=1e-6)
