@@ -22,7 +22,7 @@ PLAUSIBLE_HZ = 5.0
 """Slowest log whose stamps are believed: the rate asked for is blamed, not their unit."""
 _TOLERANCE = 0.01  # of the slowest rate, for clocks and jitter
 _SAME_RATE = 1e-3
-MANY, UNEVEN = 3.0, 0.15
+MANY, UNEVEN = 2.0, 0.15
 """Samples that make one of the output, and jitter of intervals over their mean, from which polynomials are fitted."""
 _LOOK = 1024  # rows from which the native rate is found
 
