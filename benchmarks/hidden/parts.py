@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -83,4 +83,7 @@ def _logged(kind: Kind, seed: int, causes: tuple[str, ...]) -> HiddenSet:
     """A set from a logger of its own; payloads and kinds of trials take turns."""
     rng = np.random.default_rng([seed, *b"logger"])
     payload, schedule = PAYLOADS[seed % len(PAYLOADS)], SHORT[seed // len(PAYLOADS) % len(SHORT)]
-    return HiddenSet(kind, seed, causes, payload=payload, schedule=schedule, logger=Logger.draw(rng))
+    logger = Logger.draw(rng)
+    if any(CAUSES[cause].by_clocks for cause in causes):  # the conversion would take it out
+        logger = replace(logger, offset_s=0.0, drift=0.0)
+    return HiddenSet(kind, seed, causes, payload=payload, schedule=schedule, logger=logger)

@@ -111,7 +111,13 @@ class TeamRig(Rig):
 
     def candidates(self) -> list[Candidate]:
         """Every cause of the catalogue at every place; transients come from ``transients``."""
-        return every_candidate(self.robots, self.tolerances, self.excluded)
+        found = every_candidate(self.robots, self.tolerances, self.excluded)
+        return [candidate for candidate in found if not (self.aligned and CAUSES[candidate.cause].by_clocks)]
+
+    @property
+    def aligned(self) -> bool:
+        """Whether the motion has set the robots' clocks in every trial."""
+        return all(any(s.aligned for s in linear.signals.sampling or ()) for linear in self.linear)
 
     def columns(self, candidate: Candidate) -> list[Array]:
         return [self._columns(t, candidate) for t in range(len(self.linear))]
@@ -270,4 +276,4 @@ class TeamRig(Rig):
 
     def undecidable(self) -> list[dict[str, Any]]:
         """What recordings of a parked team with a rigid payload cannot decide."""
-        return statements(self.robots)
+        return statements(self.robots, aligned=self.aligned)

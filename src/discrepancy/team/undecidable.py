@@ -26,9 +26,14 @@ UNDECIDABLE = (
 )
 
 
-def statements(robots: int) -> list[dict[str, Any]]:
-    """What, why, and what would decide it, for a team of N robots."""
+def statements(robots: int, *, aligned: bool) -> list[dict[str, Any]]:
+    """What, why, and what would decide it, for a team of N robots whose clocks the motion may have set (aligned)."""
     said = [{"what": what, "why": why, "remedy": remedy} for what, why, remedy in UNDECIDABLE]
+    if aligned:
+        why = "the conversion has taken out what the motion tells of the clocks"
+        said.append(
+            {"what": "the robots' clocks", "why": why, "remedy": "one clock for all, and no --clock correct"}
+        )
     if robots == 1:
         what = "every error of angles, lengths, bases and grasps of a single robot"
         said.append(

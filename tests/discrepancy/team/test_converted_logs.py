@@ -7,6 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from discrepancy.team.linear.start import linearised_trials
+from discrepancy.team.rig import TeamRig
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.sampling import Sampling
 from hidden.logger import Logger
@@ -58,3 +59,16 @@ def test_a_clock_set_by_the_motion_is_left_open():
         expected = linear.by_clocks[..., column] * (late_s if column == 0 else drift)
         inner = slice(10, linear.reduction.moving - 10)  # late readings end before the signals do
         np.testing.assert_allclose(moved[inner], expected[inner], atol=0.02 * np.abs(expected).max())
+
+
+@pytest.mark.slow
+def test_clocks_that_the_motion_set_are_no_candidates(random_a):
+    """What was taken out of the stamps cannot be found in them, and a candidate would fit anything else by it."""
+    recording = LOGGERS["jitter, clocks"].recorded(random_a, np.random.default_rng(7))
+    assert [s.aligned for s in recording.metadata.sampling] == [False, True, True]
+    rig = TeamRig.of([recording], estimate_payload([recording], "joint"), {})
+    assert "clock_delay" not in {candidate.cause for candidate in rig.candidates()}
+    assert "the robots' clocks" in {entry["what"] for entry in rig.undecidable()}
+    believed = replace(recording, metadata=replace(recording.metadata, sampling=None))
+    rig = TeamRig.of([believed], estimate_payload([believed], "joint"), {})
+    assert "clock_delay" in {candidate.cause for candidate in rig.candidates()}

@@ -49,6 +49,7 @@ class Cause(base.Cause):
         shapes: alternatives of what changes the columns themselves; the first is the catalogue's.
         determined: numbers of the shape that the data determine, with the share by which to change them for slopes.
         clipped: the effect's parameters that are zero where the fit has them below.
+        by_clocks: whether it shows in the robots' clocks alone, and so not where the motion set them.
     """
 
     at: ClassVar[At] = "driven joint"
@@ -56,6 +57,7 @@ class Cause(base.Cause):
     shapes: ClassVar[tuple[Shape, ...]] = ({},)
     determined: ClassVar[Mapping[str, float]] = {}
     clipped: ClassVar[tuple[str, ...]] = ()
+    by_clocks: ClassVar[bool] = False
 
     @property
     def per(self) -> Literal["joint", "robot", "payload"]:

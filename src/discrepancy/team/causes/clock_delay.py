@@ -10,6 +10,7 @@ class ClockDelay(Late):
     family = "clock"
     tolerances = (1e-5,)
     readings = ("phi", "theta", "tau")
+    by_clocks = True
     separate = "Fast motion of all robots at once."
 
     def sentence(self, n):
