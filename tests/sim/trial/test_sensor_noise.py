@@ -53,7 +53,7 @@ def test_step_and_noise_of_rounded_angles(rng, bits, sigma_steps):
     np.testing.assert_allclose(noise.step[:2], step, rtol=1e-6)
     # White noise above 25 Hz tells noise and rounding errors together; the latter are taken off again.
     total = np.sqrt(noise.sigma[:2] ** 2 + step**2 / 12)
-    expected = max(np.hypot(sigma_steps * step, step / np.sqrt(12)), ANGLE_FLOOR_RAD)
+    expected = np.hypot(sigma_steps * step, step / np.sqrt(12))
     np.testing.assert_allclose(total, expected, rtol=0.3)
     np.testing.assert_array_equal(noise.step[2], 0.0)
 
@@ -73,7 +73,7 @@ def test_grid_finer_than_motion_shows_at_rest_only(rng):
     moving = trial(rng, (step, 0.0))
     noise = Noise.of([moving])
     np.testing.assert_array_equal(noise.step[:2], 0.0)
-    np.testing.assert_allclose(noise.sigma[:2], ANGLE_FLOOR_RAD)
+    np.testing.assert_allclose(noise.sigma[:2], step / np.sqrt(12), rtol=0.1)
     phi, theta = moving.phi.copy(), moving.theta.copy()
     for x in (phi, theta):
         x[1000:2500] = x[1000]
@@ -82,10 +82,24 @@ def test_grid_finer_than_motion_shows_at_rest_only(rng):
     )
 
 
-def test_exact_sensors_get_the_floor(rng):
-    noise = Noise.of([trial(rng)])
-    np.testing.assert_allclose(noise.sigma[:2], ANGLE_FLOOR_RAD, rtol=1e-9)
-    np.testing.assert_allclose(noise.sigma[2], TORQUE_FLOOR_NM, rtol=1e-9)
+def test_exact_sensors_leave_what_the_model_leaves(rng):
+    """The model's own errors are drawn besides; at rest they stay what they are."""
+    exact = trial(rng)
+    noise = Noise.of([exact])
+    np.testing.assert_allclose(noise.sigma, 0.0, atol=1e-9)
+    errors = next(noise.draws(exact, rng, 1))
+    for found, floor in (
+        (errors.phi, ANGLE_FLOOR_RAD),
+        (errors.theta, ANGLE_FLOOR_RAD),
+        (errors.tau, TORQUE_FLOOR_NM),
+    ):
+        assert np.std(found) == pytest.approx(floor, rel=0.05)
+    still = Signals(
+        TIME, *(np.tile(x[:1], (SAMPLES, 1, 1)) for x in (exact.phi, exact.theta, exact.tau)), RATE
+    )
+    errors = next(noise.draws(still, rng, 1))
+    np.testing.assert_array_less(np.std(errors.phi, axis=0), 0.01 * ANGLE_FLOOR_RAD)
+    assert np.any(np.abs(errors.phi) > 0.2 * ANGLE_FLOOR_RAD)
 
 
 def test_torques_may_be_rounded_too(rng):
@@ -117,7 +131,7 @@ def test_draws_have_the_variance_of_real_rounding_in_motion(rng, sigma_steps):
         recorded = read(true, step, sigma_steps * step, rng, rng.uniform(0, step, (2, 3)))
         real.append(recorded - true)
         errors = next(noise.draws(Signals(TIME, recorded, recorded, recorded, RATE), rng, 1))
-        drawn += [errors.phi, errors.tau]
+        drawn += [errors.phi, errors.theta]
     for part in (lambda x: x, smoothed):
         a, b = (np.std([part(x)[200:-200] for x in group]) for group in (real, drawn))
         assert b == pytest.approx(a, rel=0.1)
@@ -165,7 +179,7 @@ def test_channels_have_resolutions_of_their_own(rng):
     expected[1, 2] = step
     np.testing.assert_allclose(noise.step[0], expected, rtol=1e-6)
     assert noise.sigma[0, 0, 0] == pytest.approx(1e-3, rel=0.1)
-    assert noise.sigma[0, 0, 1] == pytest.approx(ANGLE_FLOOR_RAD)
+    assert noise.sigma[0, 0, 1] == pytest.approx(0.0, abs=1e-9)
     errors = next(noise.draws(Signals(TIME, phi, x.theta, x.tau, RATE), rng, 1))
     assert np.std(errors.phi[:, 0, 0]) == pytest.approx(1e-3, rel=0.1)
     assert np.std(errors.phi[:, 0, 1]) == pytest.approx(ANGLE_FLOOR_RAD, rel=0.1)
