@@ -21,6 +21,7 @@ from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trajectories import Trajectory
 from mocobot_sim.trial.trial import run_trial
+from mocobot_sim.trial.truth import GroundTruth
 
 PAYLOADS = "abcd"
 TIMESTEP_S = 5e-4
@@ -93,6 +94,7 @@ def generate(request: HiddenSet) -> tuple[list[Recording], Sealed]:
     recordings = _recorded(request, payload, trajectories, [*hidden, *background])
     truth = {
         "payload": payload,
+        "mass_kg": GroundTruth.of(team).mass_kg,
         "effects": [effect_to_dict(effect) for effect in hidden],
         "background": [effect_to_dict(effect) for effect in background],
         "gimbal_axes_1": _gimbal_axes(team),

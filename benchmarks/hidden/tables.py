@@ -60,7 +60,14 @@ def _alarms(parts: Mapping[str, Sequence[Result]]) -> str:
         low, high = interval(alarms, len(runs))
         left = np.sort([r["verdict"]["after"] for r in runs])
         causes = Counter(item["cause"] for found in named for item in found)
-        what = f"{_counts(causes)}; chi2/n {left[0]:.2f} .. {left[-1]:.2f}"
+        estimates = [(r["verdict"]["estimate"], r["truth"]["mass_kg"]) for r in runs]
+        off = [(e["mass_kg"][0] - mass) / e["mass_kg"][1] for e, mass in estimates if e["mass_kg"]]
+        contradicting = sum(bool(e["contradicts"]) for e, _ in estimates)
+        rms = np.sqrt(np.mean(np.square(off)))
+        what = (
+            f"{_counts(causes)}; chi2/n {left[0]:.2f} .. {left[-1]:.2f}; mass off by {rms:.2f} "
+            f"standard errors rms in {len(off)}, {contradicting} said to contradict themselves"
+        )
         rows.append(["converted logs", len(runs), alarms, f"{100 * low:.0f} .. {100 * high:.0f} %", what])
     return _markdown("False alarms", ["sets", "number", "something named", "95 % interval", "what"], rows)
 

@@ -43,8 +43,16 @@ def verdict_on(
         "explained": explanation.explained,
         "closed_loop": diagnosis.gain is not None,
         "notes": list(diagnosis.notes),
+        "estimate": _estimate(recordings),
         "seconds": time.perf_counter() - start,
     }
+
+
+def _estimate(recordings: Sequence[Recording]) -> dict[str, Any]:
+    """What a user gets besides: the joint estimate's mass [kg], and whether the robots contradict each other."""
+    joint = estimate_payload(recordings, "joint")
+    mass = None if joint.mass is None else [joint.mass.mass, joint.mass.se]
+    return {"mass_kg": mass, "contradicts": joint.contradicts}
 
 
 def _undecided(diagnosis: Diagnosis) -> bool:

@@ -123,8 +123,8 @@ class Interpolator:
 def fitted_rows(native_hz: float, rate_hz: float) -> int:
     """How many uneven samples of ``native_hz`` a polynomial is fitted to: those of three output periods.
 
-    That is flat below a fifth of the output rate. Fewer would count each sample by the time around it, and leave twice
-    the noise of even samples.
+    That is flat below a fifth of the output rate. Fewer would count each sample by the time around it: twelve leave
+    twice the noise of even samples (a spline, with 0.7 ms of jitter at 1 kHz, seven times).
     """
     return max(12, round(3.0 * native_hz / rate_hz))
 

@@ -5,10 +5,12 @@ What is done to a stream, and its report, follow from its stamps:
 - *untouched*: every stamp within 1 us of the grid that begins at the robot's first stamp. Its samples are taken
   bit for bit; so a round trip of a recording changes nothing.
 - *filtered*: the same for a grid k times as fine: an FIR low-pass and every k-th sample.
+- *fitted*: many samples at uneven instants: polynomials through the nearest of them (``grid``), the low-pass, every
+  k-th sample.
 - *interpolated*: any other stream: a quintic spline onto a finer grid, the low-pass, every k-th sample.
 
-Missing samples are filled in first (``fill``). The anti-alias rule and its numbers are those of
-``filter``. What the low-pass needs, a tenth of a second, is lost at either end.
+Missing samples are filled in first (``fill``), but where samples are fitted. The anti-alias rule and its numbers are
+those of ``filter``. What the low-pass needs, a tenth of a second, is lost at either end.
 """
 
 from collections.abc import Callable

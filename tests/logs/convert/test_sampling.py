@@ -13,8 +13,8 @@ from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.sampling import Sampling
 from mocobot_inspect.stream.survey import survey
 from mocobot_logs.one_clock import to_recording
-from mocobot_logs.resample.errors import Conversion
 from mocobot_logs.resample.log import resample
+from mocobot_logs.resample.resampling import Resampling
 from omnid_design import DESIGN
 
 STEP = 2 * np.pi / 2**14
@@ -116,7 +116,7 @@ def test_noise_of_readings_has_its_density_below_5_hz(rng, native_hz, jitter_s, 
     sampling = replace(
         KNOWN, native_hz=native_hz, jitter_s=jitter_s, missing=missing, method=method, first_s=-0.0137
     )
-    way = Conversion.of(sampling, 100.0, 6000, rng)
+    way = Resampling.of(sampling, 100.0, 6000, rng)
     made = way(rng.standard_normal((len(way.instants), 40)))
     assert made.shape == (6000, 40)
     band = butter(3, 5.0, fs=100.0, output="sos")
@@ -132,7 +132,7 @@ def test_signals_pass_unchanged(rng):
         sampling = replace(
             KNOWN, native_hz=100.0 if method == "untouched" else 400.0, method=method, missing=0.0
         )
-        way = Conversion.of(sampling, 100.0, 800, rng)
+        way = Resampling.of(sampling, 100.0, 800, rng)
         made = way(np.sin(2 * np.pi * 2.0 * way.instants)[:, None])[:, 0]
         np.testing.assert_allclose(made, np.sin(2 * np.pi * 2.0 * np.arange(800) / 100.0), atol=1e-6)
 

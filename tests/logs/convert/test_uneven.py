@@ -52,15 +52,14 @@ def test_tones_of_the_payload_pass(rng):
     np.testing.assert_allclose(result.values[0], tones(at, (0.7, 3.0, 5.0)), rtol=0, atol=2e-5)
 
 
-def test_noise_is_averaged_as_over_even_samples(rng):
-    """A spline through them would leave three times as much and more."""
+def test_noise_is_averaged_nearly_as_over_even_samples(rng):
+    """A quarter more at instants that know nothing of each other; polynomials through 12 samples leave twice as much."""
     time = poisson(rng, 60.0)
     noise = rng.standard_normal((len(time), 9))
     low = resample(ArrayLog([stream(time, noise)])).values[0]
-    spectrum = (
-        np.mean(np.abs(np.fft.rfft(low, axis=0)[1:300]) ** 2) / len(low) / 100.0
-    )  # below 5 Hz, one-sided halves
-    assert spectrum * RATE_HZ == pytest.approx(1.0, abs=0.35)
+    below_5_hz = np.abs(np.fft.rfft(low, axis=0)[1:300]) ** 2
+    spectrum = np.mean(below_5_hz) / len(low) / 100.0
+    assert 0.9 < spectrum * RATE_HZ < 1.35
 
 
 def test_a_hole_is_still_refused(rng):

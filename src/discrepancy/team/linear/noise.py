@@ -15,7 +15,7 @@ from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
 from estimator.quantisation import rounding_step
 from estimator.recording.sampling import SENSORS
-from mocobot_logs.resample.errors import Conversion
+from mocobot_logs.resample.resampling import Resampling
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,11 +69,11 @@ class _Way:
     """
 
     def __init__(self, smooth: Array, signals: Signals, robot: int, rng: np.random.Generator) -> None:
-        self._conversion: Conversion | None = None
+        self._conversion: Resampling | None = None
         self.x = self._smooth = smooth
         if signals.sampling is not None:
             sampling, start_s = signals.sampling[robot], float(signals.time[0])
-            self._conversion = Conversion.of(sampling.later(start_s), signals.rate_hz, len(smooth), rng)
+            self._conversion = Resampling.of(sampling.later(start_s), signals.rate_hz, len(smooth), rng)
             time = signals.time - start_s
             at = np.clip(self._conversion.instants, 0.0, time[-1])
             self.x = CubicSpline(time, smooth)(at)
@@ -181,7 +181,7 @@ def _white(signals: Signals) -> Array:
     else:
         rng = np.random.default_rng(rules.NOISE_SEED)
         for i, sampling in enumerate(signals.sampling):
-            way = Conversion.of(sampling.later(float(signals.time[0])), rate_hz, len(x), rng)
+            way = Resampling.of(sampling.later(float(signals.time[0])), rate_hz, len(x), rng)
             left = way(rng.standard_normal((len(way.instants), SENSORS)))
             white[i] /= np.median(_spread(sosfiltfilt(band, left, axis=0)))
     return np.moveaxis(white.reshape(len(white), 3, 3), 1, 0)

@@ -18,7 +18,7 @@ _MARGIN_S = 0.3
 
 
 @dataclass(frozen=True, eq=False)
-class Conversion:
+class Resampling:
     """The way from one robot's readings to its samples in a recording, as far as ``Sampling`` tells it.
 
     Jitter and gaps are drawn; the way itself is that of ``resample`` and ``one_clock``.
@@ -38,7 +38,7 @@ class Conversion:
     samples: int
 
     @classmethod
-    def of(cls, sampling: Sampling, rate_hz: float, samples: int, rng: np.random.Generator) -> Conversion:
+    def of(cls, sampling: Sampling, rate_hz: float, samples: int, rng: np.random.Generator) -> Resampling:
         """Draw one; the recording has ``samples`` at ``rate_hz`` [Hz]."""
         fits = sampling.method in ("untouched", "filtered")
         native_hz, fitted = sampling.native_hz, sampling.method == "fitted"
