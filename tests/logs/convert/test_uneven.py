@@ -53,7 +53,7 @@ def test_tones_of_the_payload_pass(rng):
 
 
 def test_noise_is_averaged_nearly_as_over_even_samples(rng):
-    """A quarter more at instants that know nothing of each other; polynomials through 12 samples leave twice as much."""
+    """A quarter more at instants that know nothing of each other; polynomials through 12 leave twice as much."""
     time = poisson(rng, 60.0)
     noise = rng.standard_normal((len(time), 9))
     low = resample(ArrayLog([stream(time, noise)])).values[0]
