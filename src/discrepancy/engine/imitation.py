@@ -1,4 +1,4 @@
-"""Is it what it seems, or something simpler that leaves nearly the same, such as one sensor that was wrong for a while?"""
+"""Is it what it seems, or something simpler, such as one sensor that was wrong for as long?"""
 
 from collections.abc import Sequence
 
@@ -14,7 +14,7 @@ def imitated(rig: Rig, leader: Leader, free: Sequence[int]) -> bool:
 
     A lasting cause that shows at rare loads only, such as the hardening of one spring, looks like a push at that
     time; but then its torque alone accounts for it, and a push has six numbers for the same. Friction where an axis
-    turns round looks like pulses of force that come about as often; but then pulses that come with the motion tell more.
+    turns round looks like pulses of force that come about as often; but then pulses in step with the motion tell more.
     """
     candidate, problem = leader.candidate, leader.problem
     without = Fit.of(problem, free, fixed=(leader.evidence.index, np.zeros(len(candidate.parameters))))
