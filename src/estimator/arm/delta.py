@@ -96,6 +96,25 @@ def jacobian_of(legs: LegGeometry) -> Array:
     return _solve(legs.rod, legs.leverage[..., None] * np.eye(3))
 
 
+def length_jacobians(legs: LegGeometry, phi: ArrayLike, design: Arm) -> tuple[Array, Array, Array]:
+    """Derivatives of h by every leg's radius, proximal length and rod length, shape (..., 3, 3) each.
+
+    From rod_k . (dh - dc_k) = rod_length_k d(rod_length_k): rows x, y, z of {b}, columns legs.
+
+    Args:
+        legs: geometry at the driven angles.
+        phi: driven angles [rad], shape (..., 3).
+        design: the robot's numbers.
+    """
+    phi = np.asarray(phi, dtype=float)
+    along = np.cos(phi)[..., None] * LEG_DIRECTIONS + np.sin(phi)[..., None] * _Z
+    inverse = np.linalg.inv(legs.rod)
+    length = np.broadcast_to(np.asarray(design.rod_length_m, dtype=float), phi.shape)
+    parts = np.sum(legs.rod * LEG_DIRECTIONS, axis=-1), np.sum(legs.rod * along, axis=-1), length
+    by_radius, by_proximal, by_rod = (inverse * part[..., None, :] for part in parts)
+    return by_radius, by_proximal, by_rod
+
+
 def wrist_motion(legs: LegGeometry, phi_dot: ArrayLike, phi_ddot: ArrayLike) -> tuple[Array, Array]:
     """Velocity [m/s] and acceleration [m/s^2] of the wrist in {b}, each of shape (..., 3).
 
