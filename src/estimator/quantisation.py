@@ -6,10 +6,8 @@ from estimator.arrays import Array
 
 _LARGEST_RATIO = 1000.0  # of a difference to the step: rounding spoils larger ones
 _OFF = 0.05  # of a step
-_ONE_VALUE = (
-    1e-12,
-    1e-9,
-)  # of the largest value, by which one may come out as two: in rounding, in nine digits
+# Of the largest value, by which one may come out as two: in rounding, in a log of ten digits.
+_ONE_VALUE = (1e-12, 1e-9)
 
 
 def quantisation_step(values: Array, levels: int = 8) -> float | None:
