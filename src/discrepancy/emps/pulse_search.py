@@ -3,9 +3,9 @@
 A box is fitted to the residual folded at every period (box least squares: Kovacs, Zucker, Mazeh, "A box-fitting
 algorithm in the search for periodic transits", A&A 391, 2002), then its edges are read off the samples.
 
-A box and all that is not in it fit equally well, to the last bit of exact arithmetic, and so do boxes that differ by an
-empty bin. Their edges are not read off alike, so which of them is taken must not hang on rounding: of equals it is the
-one of the lowest frequency, then the narrowest, then the first.
+A box and all that is not in it fit equally well but for rounding, and so do boxes that differ by an empty bin. Their
+edges are not read off alike, so which of them is taken must not hang on rounding: of equals it is the one of the lowest
+frequency, then the narrowest, then the first.
 """
 
 from typing import NamedTuple
