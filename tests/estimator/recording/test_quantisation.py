@@ -22,8 +22,8 @@ def test_a_constant_has_no_step_however_few_levels_are_asked_for() -> None:
 @pytest.mark.parametrize("digits", [1e-15, 1e-13, 1e-12, 1e-11])
 def test_values_that_differ_in_rounding_are_one(digits: float) -> None:
     rng = np.random.default_rng(0)
-    values = np.asarray(2e-7 * rng.integers(0, 400000, 5000), dtype=np.float64)
-    disturbed = np.asarray(values * (1.0 + digits * rng.standard_normal(len(values))), dtype=np.float64)
+    values = 2e-7 * rng.integers(0, 400000, 5000)
+    disturbed = values * (1.0 + digits * rng.standard_normal(len(values)))
     assert quantisation_step(disturbed) == pytest.approx(2e-7, rel=1e-5)
 
 
