@@ -96,7 +96,7 @@ def _checked(found: Inspection) -> list[str]:
         lines.append(f"    still {s.still_s:.1f} s, moving {s.moving_s:.1f} s{rests}")
     if found.free:
         lines.append(
-            "    the robots hold nothing: clocks, wiring and excitation, which show in a payload that all of them move, "
+            "    the robots hold nothing: clocks, wiring and excitation, which need a payload that all of them move, "
             "are left out"
         )
     lines += _clocks(found)

@@ -43,8 +43,11 @@ def write_extended(scene: TeamScene, effects: Sequence[Effect], folder: Path, ex
         extra: plain JSON values to keep with it.
 
     Raises:
-        InputError: the folder is something else, or cannot be written, or ``extra`` is not plain JSON.
+        InputError: the folder is something else, or cannot be written, ``extra`` is not plain JSON, or the robots hold
+            nothing.
     """
+    if not scene.carries:
+        raise InputError(f"{folder}: the robots hold nothing; an extended model carries a payload")
     values: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
