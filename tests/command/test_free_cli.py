@@ -79,7 +79,7 @@ def test_inspect_still_looks_at_every_channel(free: Path, tmp_path: Path) -> Non
     phi[900:1000, 0, 1] = phi[900, 0, 1]  # in the midst of the haste
     write_recording(replace(recording, phi=phi), tmp_path / "stuck.parquet")
     found = mocobot.inspect(tmp_path / "stuck.parquet")
-    assert ["omnid1.phi2 stands" in finding.sentence for finding in found.findings] == [True]
+    assert ["omnid1.phi2 is stuck from 9.00 s" in f.sentence for f in found.findings] == [True]
     assert found.ready_for == (
         f"ready for: nothing as it is; with the 1 s left out in which omnid1.phi2 stands still: {READY}"
     )
