@@ -11,6 +11,8 @@ import pytest
 from effect_cases import example
 from estimator.arm.design import OmnidDesign
 from estimator.arm.dynamics import arm_torque
+from estimator.arm.numbers import Arm
+from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.errors import InputError
 from mocobot_sim.control.control import home_phi
 from mocobot_sim.effects import EFFECTS, apply_effects
@@ -54,7 +56,7 @@ def design_of(proximal: float, rod: float, wrist: float) -> OmnidDesign:
     )
 
 
-def residual(log: TrialLog, design: OmnidDesign) -> np.ndarray:
+def residual(log: TrialLog, design: Arm) -> np.ndarray:
     """Spring torques less inverse dynamics, at the control rate, once the arm has left home [N m], (T, N, 3)."""
     rate, phi = log.sensed.rate_hz, log.sensed.phi
     phi_dot = (phi[2:] - phi[:-2]) * rate / 2.0
@@ -78,7 +80,7 @@ def test_springs_carry_the_arm_and_nothing_else(trials: dict[str, TrialLog]) -> 
     error = residual(trials["design"], DESIGN)
     inertial = trials["design"].tau - arm_torque(trials["design"].phi, *[np.zeros(3)] * 2, DESIGN)
     assert np.abs(inertial).max() > 0.3, "the motion is fast enough to show inertia"
-    # Measured: 1.4e-5 rms, 1.0e-4 at most (1.9e-4 in a default trial of 108 s).
+    # Measured: 1.4e-5 rms, 1.0e-4 at most (2.3e-4 in a default trial of 109 s).
     assert np.sqrt(np.mean(error**2)) < 3e-5
     assert np.abs(error).max() < 3e-4
 
@@ -90,6 +92,20 @@ def test_other_masses_show_in_the_springs_as_they_should(trials: dict[str, Trial
     for part in HEAVIER:  # each of the three is needed
         partly = design_of(**(HEAVIER | {part: 0.0}))
         assert np.sqrt(np.mean(residual(trials["heavier"], partly) ** 2)) > 0.01, part
+
+
+def test_masses_and_springs_of_every_leg_show_as_an_arm_as_it_is_has_them() -> None:
+    built = CalibrationSpread(stiffness_ratio=0.02, arm_mass_ratio=0.05).draw(1, np.random.default_rng(3))[0]
+    x = np.zeros(COUNT)
+    for name in ("stiffness_ratio", "proximal_mass_ratio", "rod_mass_ratio", "wrist_mass_ratio"):
+        x[AT[name]] = getattr(built, name)
+    arm = ArmUnit(DESIGN, x)
+    log = run_trial(build_free_team(1, [built]), free_motion(HOME, np.random.default_rng(4), vias=2))
+    # A reading is the design's stiffness times the deflection.
+    error = residual(replace(log, sensed=replace(log.sensed, tau=arm.true_tau(log.sensed.tau))), arm)
+    assert np.sqrt(np.mean(error**2)) < 3e-5
+    assert np.abs(error).max() < 3e-4
+    assert np.sqrt(np.mean(residual(log, DESIGN) ** 2)) > 0.01
 
 
 def test_weight_of_every_part_by_virtual_work() -> None:
