@@ -120,6 +120,7 @@ def test_a_map_may_say_that_the_robots_hold_nothing(
     log_map.write_text(log_map.read_text().replace("version = 1", 'version = 1\ntrial = "free"', 1))
     assert mocobot.inspect(log, map=log_map).free
     assert not mocobot.inspect(log).free
+    assert command.run(capsys, "inspect", log, "--map", log_map)[1].rstrip().endswith(f"ready for: {READY}")
     assert "the robots hold nothing" in command.refused(capsys, "estimate", log, "--map", log_map)
 
 
