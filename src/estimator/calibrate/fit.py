@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, null_space
+from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from estimator.arm.unit import AT
 from estimator.arrays import Array
@@ -55,7 +55,12 @@ class Fit:
     converged: bool
 
 
-def fit(trials: Sequence[Trial], start: Unknowns, prior: Prior, known_mass: Sequence[tuple[int, float, float]] = ()) -> Fit:
+def fit(
+    trials: Sequence[Trial],
+    start: Unknowns,
+    prior: Prior,
+    known_mass: Sequence[tuple[int, float, float]] = (),
+) -> Fit:
     """Calibrate.
 
     Args:
@@ -66,9 +71,15 @@ def fit(trials: Sequence[Trial], start: Unknowns, prior: Prior, known_mass: Sequ
             scale is free.
     """
     layout = Layout(start.bases[0].R.shape[0], len(start.carried), len(trials))
-    basis, information = _free(layout, prior, scale_is_free=bool(known_mass))
-    at, adjustments = start, [None] * len(trials)
-    for step in range(1, rules.MAX_STEPS + 1):
+    of_units = prior.factor(layout.robots, hold_scale=not known_mass)
+    basis = np.asarray(block_diag(of_units, np.eye(layout.size - len(of_units))))
+    # In these coordinates the robots' prior is standard normal.
+    z, information = np.zeros(basis.shape[1]), np.zeros(basis.shape[1])
+    information[: of_units.shape[1]] = 1.0
+    at, step = start, 0
+    adjustments: list[Array | None] = [None] * len(trials)
+    while step < rules.MAX_STEPS:
+        step += 1
         H, g = np.zeros((layout.size, layout.size)), np.zeros(layout.size)
         chi2, count = np.zeros((len(trials), 2)), np.zeros((len(trials), 2), dtype=np.intp)
         for k, trial in enumerate(trials):
@@ -82,13 +93,11 @@ def fit(trials: Sequence[Trial], start: Unknowns, prior: Prior, known_mass: Sequ
             place = layout.of_inertia(payload).start
             H[place, place] += 1.0 / se**2
             g[place] += (at.carried[payload].pi[0] - mass) / se**2
-        x = np.zeros(layout.size)
-        x[layout.of_units] = at.units.x.ravel()
-        full = H + np.diag(information)
-        reduced = basis.T @ full @ basis
+        reduced = basis.T @ H @ basis + np.diag(information)
         scale = 1.0 / np.sqrt(np.diag(reduced))
         factor = cho_factor(reduced * np.outer(scale, scale))
-        dz = -scale * cho_solve(factor, scale * (basis.T @ (g + information * x)))
+        dz = -scale * cho_solve(factor, scale * (basis.T @ g + information * z))
+        z += dz
         covariance_z = scale[:, None] * cho_solve(factor, np.diag(scale))
         at = layout.moved(at, basis @ dz)
         size = np.abs(dz) / np.sqrt(np.diag(covariance_z))
@@ -97,28 +106,10 @@ def fit(trials: Sequence[Trial], start: Unknowns, prior: Prior, known_mass: Sequ
     covariance = basis @ covariance_z @ basis.T
     common = np.zeros(layout.size)
     common[layout.unit_indices(np.r_[AT["stiffness_ratio"]])] = 1.0
-    by_scale = common - basis @ (covariance_z @ (basis.T @ (full @ common)))
+    by_scale = common - basis @ (covariance_z @ (basis.T @ (H @ common)))
     if known_mass:
         by_scale = np.zeros(layout.size)
     return Fit(at, layout, covariance, by_scale, chi2, count, step, bool(np.max(size) < rules.CONVERGED))
-
-
-def _free(layout: Layout, prior: Prior, *, scale_is_free: bool) -> tuple[Array, Array]:
-    """Basis of all unknowns that may move, shape (K, k), and the prior's information, shape (K,)."""
-    sd = np.tile(prior.sd(), layout.robots)
-    information = np.zeros(layout.size)
-    held = sd == 0.0
-    information[layout.of_units][~held] = 1.0 / sd[~held] ** 2
-    springs = layout.unit_indices(np.r_[AT["stiffness_ratio"]])
-    columns = np.eye(layout.size)
-    keep = np.ones(layout.size, dtype=bool)
-    keep[layout.of_units] = ~held
-    if not scale_is_free and prior.stiffness_ratio > 0:
-        keep[springs] = False
-        apart = np.zeros((layout.size, len(springs) - 1))
-        apart[springs] = null_space(np.ones((1, len(springs))))
-        return np.hstack([columns[:, keep], apart]), information
-    return columns[:, keep], information
 
 
 def _normal(rowed: Rowed) -> tuple[Array, Array, Array, Array]:

@@ -5,9 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 
 import numpy as np
+from scipy.linalg import null_space
 
 from estimator.arm.unit import AT, COUNT
 from estimator.arrays import Array
+
+_MASSES = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]
 
 
 @dataclass(frozen=True)
@@ -20,10 +23,11 @@ class Prior:
     Attributes:
         encoder_zero_rad: of phi, theta_z and theta_y zeros [rad]; theta_x zeros only turn the grasp frames.
         geometry_m: of base radius, platform radius, proximal and rod length, each [m].
-        stiffness_ratio: of each spring's relative stiffness [-]; their mean is held, see ``common_stiffness_ratio``.
+        stiffness_ratio: of each spring's relative stiffness [-]; their mean is held unless a weight is known.
         tau_zero_Nm: of each torque zero [N m].
         tilt_rad: of a base about x and y [rad].
         arm_mass_ratio: of the mass of each proximal link and rod and of all at the wrist, relative [-].
+        arm_weight_ratio: of all arms' masses together, relative [-].
     """
 
     encoder_zero_rad: float = float(np.deg2rad(1.0))
@@ -32,8 +36,30 @@ class Prior:
     tau_zero_Nm: float = 0.02
     tilt_rad: float = 0.0
     arm_mass_ratio: float = 0.0
+    arm_weight_ratio: float = 0.05
 
-    def sd(self) -> Array:
+    def factor(self, robots: int, *, hold_scale: bool) -> Array:
+        """A matrix B, shape (N ``COUNT``, k): the robots' deviations are B z, z standard normal and independent.
+
+        Args:
+            robots: number of robots N.
+            hold_scale: whether the mean of all springs' ratios is 0.
+        """
+        columns = np.diag(np.tile(self._sd(), robots))
+        springs = (np.arange(robots)[:, None] * COUNT + np.r_[AT["stiffness_ratio"]]).ravel()
+        masses = (np.arange(robots)[:, None] * COUNT + _MASSES).ravel()
+        parts = [columns]
+        if hold_scale:
+            columns[:, springs] = 0.0
+            apart = np.zeros((len(columns), len(springs) - 1))
+            apart[springs] = self.stiffness_ratio * null_space(np.ones((1, len(springs))))
+            parts.append(apart)
+        together = np.zeros((len(columns), 1))
+        together[masses] = self.arm_weight_ratio
+        factor = np.hstack([*parts, together])
+        return factor[:, factor.any(axis=0)]
+
+    def _sd(self) -> Array:
         """Standard deviations in the order of ``ArmUnit.x``, shape (``COUNT``,)."""
         out = np.zeros(COUNT)
         out[AT["phi_zero"]] = out[AT["theta_zero"]] = self.encoder_zero_rad
@@ -43,8 +69,7 @@ class Prior:
         out[AT["stiffness_ratio"]] = self.stiffness_ratio
         out[AT["tau_zero"]] = self.tau_zero_Nm
         out[AT["tilt"]] = self.tilt_rad
-        for name in ("proximal_mass_ratio", "rod_mass_ratio", "wrist_mass_ratio"):
-            out[AT[name]] = self.arm_mass_ratio
+        out[_MASSES] = self.arm_mass_ratio
         return out
 
     def scaled(self, factor: float) -> Prior:

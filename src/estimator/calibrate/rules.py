@@ -6,8 +6,10 @@ harmonics of micrometres and millinewtons, which moved spring scales by two to f
 SAMPLE_HZ = 33.0
 """Instants at which loops and balance are evaluated, before the residual is averaged into rows."""
 ROW_S = 0.25
-"""Time between rows; each averages over twice that. Noise of accelerations grows with frequency, and biases scales
+"""Time between rows. Noise of accelerations grows with frequency, and biases scales
 where rows are shorter (one standard error at 0.12 s)."""
+LOBES = 3
+"""Of the sinc that rows are weighed with, to either side."""
 TRIM_S = 2.0
 """Dropped at both ends against the filters' transients, as in the paper."""
 STILL_RADPS = 1.5e-3

@@ -75,4 +75,7 @@ def _white(recording: Recording) -> Array:
     high = min(rules.NOISE_ABOVE_HZ, 0.4 * rate)
     band = butter(4, high, btype="high", fs=rate, output="sos")
     left = sosfiltfilt(band, _columns(recording), axis=0)
-    return 1.4826 * np.median(np.abs(left), axis=0) / np.sqrt(1.0 - high / (rate / 2.0))
+    impulse = np.zeros(2 * round(2.0 * rate) + 1)
+    impulse[len(impulse) // 2] = 1.0
+    kept = np.sum(sosfiltfilt(band, impulse) ** 2)
+    return 1.4826 * np.median(np.abs(left), axis=0) / np.sqrt(kept)
