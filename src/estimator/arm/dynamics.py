@@ -59,9 +59,7 @@ def arm_torque(
     )
 
 
-def gimbal_torque(
-    theta: ArrayLike, theta_dot: ArrayLike, theta_ddot: ArrayLike, design: Arm
-) -> Array:
+def gimbal_torque(theta: ArrayLike, theta_dot: ArrayLike, theta_ddot: ArrayLike, design: Arm) -> Array:
     """Torques about the gimbal's axes that move its own bodies [N m], order (z, y, x), shape (..., 3).
 
     Args:

@@ -174,9 +174,7 @@ def _balance(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
     return np.concatenate([force, moment], axis=1) - needed
 
 
-def _derivatives(
-    s: Array, units: ArmUnit, shared: Shared, bases: Bases
-) -> tuple[Array, Array, Array, Array]:
+def _derivatives(s: Array, units: ArmUnit, shared: Shared, bases: Bases) -> tuple[Array, Array, Array, Array]:
     """By signals (n, C, N, ``SLOTS``), units (n, C, N, ``COUNT``), ``Shared.moved`` and ``Bases.moved``."""
     n, N = s.shape[:2]
     C = 6 * N

@@ -19,9 +19,7 @@ _POSE = np.r_[
 _AXES = np.eye(3)[:, :2]
 
 
-def pose_derivatives(
-    rows: Rows, units: ArmUnit, shared: Shared, bases: Bases
-) -> tuple[Array, Array, Array]:
+def pose_derivatives(rows: Rows, units: ArmUnit, shared: Shared, bases: Bases) -> tuple[Array, Array, Array]:
     """Of the loops' 6 (N - 1) channels; n rows.
 
     Returns:

@@ -59,6 +59,10 @@ def deviate_geometry(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
         rod = omnid.find("body", f"rod{k + 1}")
         rod.pos = rod.pos + np.array([unit.proximal_length_m[k], 0.0, 0.0])
         tip = omnid.find("site", f"rod{k + 1}_tip")
+        if unit.rod_length_m[k]:  # a longer rod has its mass along all of it
+            grown = 1.0 + unit.rod_length_m[k] / tip.pos[0]
+            rod.inertial.pos = rod.inertial.pos * grown
+            rod.inertial.diaginertia = rod.inertial.diaginertia * np.array([1.0, grown**2, grown**2])
         tip.pos = tip.pos + np.array([unit.rod_length_m[k], 0.0, 0.0])
         platform = omnid.find("site", f"platform{k + 1}")
         platform.pos = platform.pos + unit.platform_radius_m[k] * u
