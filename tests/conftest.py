@@ -66,8 +66,8 @@ def biased_trials(tmp_path_factory: pytest.TempPathFactory) -> list[Path]:
     folder, rng = tmp_path_factory.mktemp("hidden"), np.random.default_rng(5)
     plain = build_team("b")
     motions = [
-        random_vias(plain.wrist_home_b, rng, vias=14),
-        sphere_motion(plain.wrist_home_b, plain.X_1i, duration_s=18.0, rng=rng),
+        random_vias(plain.wrist_home_b, rng, vias=9),
+        sphere_motion(plain.wrist_home_b, plain.X_1i, duration_s=12.0, rng=rng),
     ]
     paths = []
     for k, motion in enumerate(motions):
