@@ -87,8 +87,8 @@ class Convert:
     force: Force = False
     map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
     """Where the log has which channel, by file or built-in name (docs/measured-data.md); found out if not given."""
-    trial: Literal["random", "periodic", "static"] | None = None
-    """Kind of trial, if neither log nor map says; "random" else."""
+    trial: Literal["random", "periodic", "static", "free"] | None = None
+    """Kind of trial, if neither log nor map says; "random" else. "free": robots that hold nothing."""
     payload: str | None = None
     """Name of the payload."""
     design: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
@@ -189,10 +189,10 @@ class Simulate:
     this nor a model is given."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Extended model to simulate in place of a payload on robots as designed."""
-    trajectory: Literal["random", "periodic", "static"] = "random"
-    """Kind of motion."""
+    trajectory: Literal["random", "periodic", "static", "free"] = "random"
+    """Kind of motion; free: every arm alone, holding nothing."""
     vias: int | None = None
-    """Vias of a random trial; 80 if not given."""
+    """Vias of a random trial, or of a free one's fast part; 80 if not given."""
     duration: float | None = None
     """Length of a periodic motion [s]; 60 if not given."""
     preset: str = "nominal"
@@ -201,3 +201,5 @@ class Simulate:
     """Seed of trajectory, noise and calibration errors."""
     level: Literal["joint", "wrist"] = "joint"
     """What the file holds: driven angles and spring torques, or wrist positions and forces."""
+    robots: int | None = None
+    """Robots of a free trial; as many as the payload has grasps if not given."""

@@ -3,9 +3,10 @@
 from mocobot_sim.trial.trajectories import (
     RATE_HZ,
     Trajectory,
+    free_motion,
     random_vias,
     sphere_motion,
     static_orientations,
 )
 
-__all__ = ["RATE_HZ", "Trajectory", "random_vias", "sphere_motion", "static_orientations"]
+__all__ = ["RATE_HZ", "Trajectory", "free_motion", "random_vias", "sphere_motion", "static_orientations"]

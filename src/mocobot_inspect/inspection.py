@@ -8,6 +8,7 @@ import numpy as np
 from estimator.arm.design import OmnidDesign
 from estimator.arrays import Array
 from estimator.clocks.offsets import ClockEstimate, estimate_clocks
+from estimator.recording.metadata import FREE
 from mocobot_inspect.excerpt import SHORTEST_S, clean_stream, stretches
 from mocobot_inspect.readiness import Readiness, readiness
 from mocobot_inspect.segments import Segments, segments
@@ -16,7 +17,7 @@ from mocobot_inspect.stream.channels import Channel
 from mocobot_inspect.stream.survey import Survey, survey
 from mocobot_inspect.stream.timing import Timing
 from mocobot_inspect.wiring.check import Wiring, check_wiring
-from mocobot_logs.log import NS, Level, LogSource
+from mocobot_logs.log import NS, THETA, Level, LogSource
 
 SLOWEST_HZ, FASTEST_HZ = 10.0, 20_000.0
 """Rates within which samples are taken for those of a robot."""
@@ -59,6 +60,7 @@ class Inspection:
         wiring: suspected mistakes, or None.
         ready: what the log is good for as it is, or None.
         ready_undone: the same with all mistakes found undone, or None where there is none.
+        free: whether the robots hold nothing: there are neither ``clocks`` nor ``wiring`` nor ``ready`` then.
     """
 
     name: str
@@ -76,6 +78,7 @@ class Inspection:
     wiring: Wiring | None = None
     ready: Readiness | None = None
     ready_undone: Readiness | None = None
+    free: bool = False
 
     @property
     def standing(self) -> tuple[Standing, ...]:
@@ -100,6 +103,7 @@ def inspect_log(
     design: OmnidDesign,
     advance: Callable[[int], object] = lambda _: None,
     try_advance: Callable[[int], object] = lambda _: None,
+    trial: str | None = None,
 ) -> Inspection:
     """Look at a log; whatever is wrong with its samples is reported and not refused.
 
@@ -108,12 +112,16 @@ def inspect_log(
         design: the robots' numbers, where the log does not say.
         advance: takes the progress made in reading, in the source's units.
         try_advance: takes the number of wiring mistakes tried.
+        trial: kind of trial, where the log does not say.
 
     Raises:
         InputError: the log cannot be read.
     """
     known = source.metadata.design if source.metadata is not None else None
+    free = (source.metadata.trial if source.metadata is not None else trial) == FREE
     seen = survey(source, advance)
+    if free:
+        seen = _with_idle_gimbals(seen)
     result = Inspection(
         name=source.name,
         level=source.level,
@@ -124,6 +132,7 @@ def inspect_log(
         survey=seen,
         checked=(),
         unchecked=None,
+        free=free,
     )
     rates = [timing.rate_hz for timing in seen.timing]
     for robot, rate in enumerate(rates):
@@ -136,6 +145,15 @@ def inspect_log(
         for samples, channels, timing in zip(seen.excerpt, seen.channels, seen.timing, strict=True)
     ]
     return _motion(result, streams, try_advance)
+
+
+def _with_idle_gimbals(seen: Survey) -> Survey:
+    """The same without a word on gimbals that stand while the arms move: nothing turns what holds nothing."""
+    channels = tuple(
+        tuple(replace(c, stuck=(), stuck_count=0) if c.name in THETA else c for c in of_robot)
+        for of_robot in seen.channels
+    )
+    return replace(seen, channels=channels)
 
 
 def _faulty(channels: tuple[Channel, ...], timing: Timing) -> list[tuple[int, int]]:
@@ -154,7 +172,7 @@ def _motion(
     result: Inspection, streams: list[tuple[Array, Array]], advance: Callable[[int], object]
 ) -> Inspection:
     parts = stretches(streams)
-    clocks = _clocks(parts)
+    clocks = None if result.free else _clocks(parts)
     skewed = clocks is not None and any(differs(clocks, robot) for robot in range(1, result.robots))
     if skewed and clocks is not None:
         parts = stretches(streams, _moved(clocks, parts)) or parts
@@ -162,6 +180,12 @@ def _motion(
         return replace(
             result,
             unchecked=f"the robots share no {SHORTEST_S:g} s of samples that can be used, without a gap",
+        )
+    if result.free:
+        return replace(
+            result,
+            checked=tuple((start, len(part) / RATE_HZ) for start, part in parts),
+            segments=segments(result.level, parts, result.design),
         )
     noise = np.array([[c.white_noise for c in of_robot[:9]] for of_robot in result.survey.channels])
     samples = [part for _, part in parts]

@@ -94,6 +94,11 @@ def _checked(found: Inspection) -> list[str]:
         s = found.segments
         rests = f", {len(s.rests)} rests of 6 s and more" if s.rests else ""
         lines.append(f"    still {s.still_s:.1f} s, moving {s.moving_s:.1f} s{rests}")
+    if found.free:
+        lines.append(
+            "    the robots hold nothing: clocks, wiring and excitation, which need a payload that all of them move, "
+            "are left out"
+        )
     lines += _clocks(found)
     if found.wiring is not None:
         lines += _wiring(found)
@@ -165,7 +170,7 @@ def hidden_words(mistakes: tuple[Mistake, ...]) -> list[str]:
 
 def ready_line(found: Inspection) -> str:
     """The verdict; an estimate takes all of a log, so stretches in which a channel stands spoil it."""
-    if found.unchecked is not None or found.ready is None or found.wiring is None:
+    if found.unchecked is not None or not (found.free or (found.ready and found.wiring)):
         return f"ready for: nothing ({found.unchecked})"
     clocks = "; clocks to be corrected" if found.skewed else ""
     standing = found.standing
@@ -177,6 +182,9 @@ def ready_line(found: Inspection) -> str:
         worst = max(standing, key=lambda stands: stands.seconds)
         who = f"{worst.channel} stands" if len(standing) == 1 else f"{worst.channel} and others stand"
         out = f"the {worst.seconds:.2g} s left out in which {who} still"
+    if found.free or found.ready is None or found.wiring is None:
+        good = "mocobot calibrate --free yes, an estimate no (the robots hold nothing)"
+        return f"ready for: nothing as it is; with {out}: {good}" if out else f"ready for: {good}"
     if found.ready_undone is not None:
         count = len(found.wiring.found)
         what = "the mistake above" if count == 1 else f"the {count} mistakes above"

@@ -43,7 +43,7 @@ class Labels:
     """What a log may not say about itself; None leaves it to the log.
 
     Attributes:
-        trial: "random", "periodic" or "static".
+        trial: "random", "periodic", "static" or "free".
         payload: name of the payload.
         design: numbers of the robots.
         level: how the output tells the samples, "joint" or "wrist".

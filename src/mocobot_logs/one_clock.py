@@ -15,10 +15,10 @@ from scipy.interpolate import make_interp_spline
 
 from estimator.arm.design import OmnidDesign
 from estimator.arm.wrist_level import joints_of, wrist_fault
-from estimator.clocks.offsets import ClockEstimate, estimate_clocks
+from estimator.clocks.offsets import ClockEstimate, estimate_clocks, unknown_clocks
 from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES
-from estimator.recording.metadata import RecordingMetadata
+from estimator.recording.metadata import FREE, RecordingMetadata
 from estimator.recording.model import Recording
 from estimator.recording.sampling import Sampling
 from mocobot_logs.log import CHANNELS, NS, REF, THETA, Array
@@ -80,10 +80,14 @@ def to_recording(
     Raises:
         InputError: clocks shall be corrected and the motion does not tell how, one robot's log ends more than a
             second before another's, they have less than 16 samples in common, a wrist position cannot be
-            reached, or design or trial is missing.
+            reached, design or trial is missing, or a payload is named where the robots hold nothing.
     """
     metadata = _metadata(resampled, design, trial, payload, source)
-    estimate = log_clocks(resampled)
+    if metadata.trial == FREE:
+        why = "the robots hold nothing, so they do not move together"
+        estimate = unknown_clocks(resampled.robots, float(resampled.start_s[0]), why)
+    else:
+        estimate = log_clocks(resampled)
     if correct:
         _check_determined(resampled.name, estimate)
     N, rate_hz = resampled.robots, resampled.rate_hz
@@ -146,6 +150,22 @@ def log_clocks(resampled: Resampled) -> ClockEstimate:
 
 
 def _metadata(
+    resampled: Resampled,
+    design: OmnidDesign | None,
+    trial: str | None,
+    payload: str | None,
+    source: str | None,
+) -> RecordingMetadata:
+    found = _said(resampled, design, trial, payload, source)
+    if found.trial == FREE and found.payload is not None:
+        raise InputError(
+            f"{resampled.name}: payload is {found.payload!r:.60}, but in a free trial the robots hold nothing; leave "
+            "the payload out, or give another trial"
+        )
+    return found
+
+
+def _said(
     resampled: Resampled,
     design: OmnidDesign | None,
     trial: str | None,

@@ -186,8 +186,10 @@ def test_effects_act_on_robots_as_they_were_built() -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        ({"vias": 3, "trajectory": "static"}, "vias is for a random trajectory; this one is static"),
+        ({"vias": 3, "trajectory": "static"}, "vias is for a random or free trajectory; this one is static"),
         ({"duration_s": 9.0}, "duration_s is for a periodic trajectory; this one is random"),
+        ({"robots": 3}, "robots is for a free trajectory; this one is random"),
+        ({"robots": 3, "payload": "a", "trajectory": "free"}, "payload and robots are both given"),
         ({"payload": "a", "model": "folder"}, "payload and model are both given"),
         ({"preset": "best"}, "preset 'best' does not exist"),
     ],

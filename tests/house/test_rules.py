@@ -13,7 +13,7 @@ FREE = {
     "discrepancy.result.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
     "discrepancy.result.text": {"WIDTH"},
     "discrepancy.result.traces_file": {"VERSION"},
-    "discrepancy.team.linear.slots": {
+    "estimator.rigid_team.slots": {
         "COUNT",
         "STEPS",
     },  # a layout, with the steps of its numerical derivatives

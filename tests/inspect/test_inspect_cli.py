@@ -220,6 +220,7 @@ def test_a_stuck_channel_is_not_ready_and_a_dead_one_never(
         "grasps yes, mass yes, centre of mass yes, inertia yes"
     )
     dead: Any = SimpleNamespace(
+        free=False,
         unchecked=None,
         ready=1,
         wiring=1,

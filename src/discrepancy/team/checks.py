@@ -6,6 +6,7 @@ from discrepancy import rules
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import CONTRADICTION
+from estimator.recording.checks import check_carries
 from estimator.recording.model import Recording
 
 
@@ -13,10 +14,13 @@ def check_recordings(recordings: Sequence[Recording]) -> None:
     """Enough of them, and all of one team.
 
     Raises:
-        InputError: there is none, they have one robot or differ in robots or design, or they are too short.
+        InputError: there is none, one is of robots that hold nothing, they have one robot or differ in robots or
+            design, or they are too short.
     """
     if not recordings:
         raise InputError("no recording given; name at least one file")
+    for recording in recordings:
+        check_carries(recording, "diagnosed")
     first = recordings[0]
     if first.metadata.robots < 2:
         raise InputError(

@@ -11,12 +11,12 @@ from discrepancy.rig import Candidate
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.linear.noise import Noise
-from discrepancy.team.linear.residual import Bases, Shared
 from discrepancy.team.linear.signals import Signals
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.principal import inertia_matrix
 from estimator.recording.model import Recording
+from estimator.rigid_team.residual import Bases, Shared
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.catalogue import apply_effects, make_effect
 from mocobot_sim.errors import TrialError

@@ -3,9 +3,9 @@
 import numpy as np
 
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.team.linear.slots import PHI, TAU, THETA
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
+from estimator.rigid_team.slots import PHI, TAU, THETA
 
 
 def quantities_of(linear: TrialLinear) -> dict[str, Array]:

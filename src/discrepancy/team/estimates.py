@@ -8,10 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.fit import Fit
-from discrepancy.team.linear.residual import Shared
 from discrepancy.team.rig import TeamRig
 from estimator.arrays import Array
 from estimator.estimate.principal import inertia_matrix
+from estimator.rigid_team.residual import Shared
 
 Estimate = dict[str, Any]
 

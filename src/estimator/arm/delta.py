@@ -3,7 +3,7 @@
 Leg k lies at azimuth 0, 120, 240 deg. With u_k the horizontal unit vector of the leg and z up, shifting
 every platform joint onto the wrist (the platform only translates) turns the rods into three spheres:
 |h - c_k(phi_k)| = rod_length about c_k = (base_radius - platform_radius + L1 cos phi_k) u_k + L1 sin phi_k z.
-Everything here follows from that constraint; docs/method-arm.md has the derivation.
+Everything here follows from that constraint; docs/method-arm.md has the derivation. Lengths may differ from leg to leg.
 """
 
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from estimator.arm.design import OmnidDesign
+from estimator.arm.numbers import Arm
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.so3 import cross
@@ -42,7 +42,7 @@ class LegGeometry:
     leverage: Array
 
 
-def forward_kinematics(phi: ArrayLike, design: OmnidDesign) -> Array:
+def forward_kinematics(phi: ArrayLike, design: Arm) -> Array:
     """Wrist position h(phi) in {b} [m], shape (..., 3): equation (28); the higher of the two solutions.
 
     Args:
@@ -61,12 +61,12 @@ def forward_kinematics(phi: ArrayLike, design: OmnidDesign) -> Array:
     return foot + np.sqrt(square)[..., None] * normal
 
 
-def is_reachable(phi: ArrayLike, design: OmnidDesign) -> NDArray[np.bool_]:
+def is_reachable(phi: ArrayLike, design: Arm) -> NDArray[np.bool_]:
     """Whether a wrist position exists for driven angles ``phi`` [rad], shape (..., 3) -> (...)."""
     return _sphere_intersection(np.asarray(phi, dtype=float), design)[2] > 0
 
 
-def leg_geometry(phi: ArrayLike, design: OmnidDesign) -> LegGeometry:
+def leg_geometry(phi: ArrayLike, design: Arm) -> LegGeometry:
     """Wrist, rods and knee derivatives at driven angles ``phi`` [rad], shape (..., 3).
 
     Raises:
@@ -76,12 +76,13 @@ def leg_geometry(phi: ArrayLike, design: OmnidDesign) -> LegGeometry:
     h = forward_kinematics(phi, design)
     cos, sin = np.cos(phi)[..., None], np.sin(phi)[..., None]
     rod = h[..., None, :] - _sphere_centres(phi, design)
-    knee_d1 = design.proximal_length_m * (cos * _Z - sin * LEG_DIRECTIONS)
-    knee_d2 = -design.proximal_length_m * (cos * LEG_DIRECTIONS + sin * _Z)
+    proximal = np.asarray(design.proximal_length_m)[..., None]
+    knee_d1 = proximal * (cos * _Z - sin * LEG_DIRECTIONS)
+    knee_d2 = -proximal * (cos * LEG_DIRECTIONS + sin * _Z)
     return LegGeometry(h, rod, knee_d1, knee_d2, np.sum(rod * knee_d1, axis=-1))
 
 
-def jacobian(phi: ArrayLike, design: OmnidDesign) -> Array:
+def jacobian(phi: ArrayLike, design: Arm) -> Array:
     """dh/dphi [m/rad], shape (..., 3, 3): rows x, y, z of {b}, columns phi_1..3.
 
     Raises:
@@ -93,6 +94,25 @@ def jacobian(phi: ArrayLike, design: OmnidDesign) -> Array:
 def jacobian_of(legs: LegGeometry) -> Array:
     """dh/dphi [m/rad], shape (..., 3, 3), from rod_k . dh = leverage_k dphi_k."""
     return _solve(legs.rod, legs.leverage[..., None] * np.eye(3))
+
+
+def length_jacobians(legs: LegGeometry, phi: ArrayLike, design: Arm) -> tuple[Array, Array, Array]:
+    """Derivatives of h by every leg's radius, proximal length and rod length, shape (..., 3, 3) each.
+
+    From rod_k . (dh - dc_k) = rod_length_k d(rod_length_k): rows x, y, z of {b}, columns legs.
+
+    Args:
+        legs: geometry at the driven angles.
+        phi: driven angles [rad], shape (..., 3).
+        design: the robot's numbers.
+    """
+    phi = np.asarray(phi, dtype=float)
+    along = np.cos(phi)[..., None] * LEG_DIRECTIONS + np.sin(phi)[..., None] * _Z
+    inverse = np.linalg.inv(legs.rod)
+    length = np.broadcast_to(np.asarray(design.rod_length_m, dtype=float), phi.shape)
+    parts = np.sum(legs.rod * LEG_DIRECTIONS, axis=-1), np.sum(legs.rod * along, axis=-1), length
+    by_radius, by_proximal, by_rod = (inverse * part[..., None, :] for part in parts)
+    return by_radius, by_proximal, by_rod
 
 
 def wrist_motion(legs: LegGeometry, phi_dot: ArrayLike, phi_ddot: ArrayLike) -> tuple[Array, Array]:
@@ -114,7 +134,7 @@ def wrist_motion(legs: LegGeometry, phi_dot: ArrayLike, phi_ddot: ArrayLike) -> 
     return h_dot, h_ddot
 
 
-def inverse_kinematics(h: ArrayLike, design: OmnidDesign) -> Array:
+def inverse_kinematics(h: ArrayLike, design: Arm) -> Array:
     """Driven angles phi(h) [rad], shape (..., 3), with every knee pointing outward.
 
     Args:
@@ -135,19 +155,19 @@ def inverse_kinematics(h: ArrayLike, design: OmnidDesign) -> Array:
     return np.arctan2(up, outward) - np.copysign(np.arccos(cosine), up)
 
 
-def is_in_reach(h: ArrayLike, design: OmnidDesign) -> NDArray[np.bool_]:
+def is_in_reach(h: ArrayLike, design: Arm) -> NDArray[np.bool_]:
     """Whether each leg reaches the wrist position ``h`` in {b} [m], shape (..., 3) -> (..., 3)."""
     return np.abs(_leg_triangles(np.asarray(h, dtype=float), design)[2]) <= 1.0
 
 
-def _leg_triangles(h: Array, design: OmnidDesign) -> tuple[Array, Array, Array]:
+def _leg_triangles(h: Array, design: Arm) -> tuple[Array, Array, Array]:
     """Wrist from each driven axis, outward and up [m], and the cosine of the angle there; each (..., 3)."""
     l1, l2 = design.proximal_length_m, design.rod_length_m
     with np.errstate(
         all="ignore"
     ):  # on the driven axis itself, or infinitely far: no cosine, so out of reach
         # Once the platform joint is shifted onto the wrist.
-        reach = h[..., None, :] - (design.base_radius_m - design.platform_radius_m) * LEG_DIRECTIONS
+        reach = h[..., None, :] - np.asarray(design.radius_m)[..., None] * LEG_DIRECTIONS
         outward, up = np.sum(reach * LEG_DIRECTIONS, axis=-1), reach[..., 2]
         distance = np.hypot(outward, up)
         return outward, up, (l1**2 + np.sum(reach**2, axis=-1) - l2**2) / (2.0 * l1 * distance)
@@ -157,19 +177,24 @@ def _solve(matrix: Array, right: Array) -> Array:
     return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
 
 
-def _sphere_centres(phi: Array, design: OmnidDesign) -> Array:
-    radius = design.base_radius_m - design.platform_radius_m + design.proximal_length_m * np.cos(phi)
+def _sphere_centres(phi: Array, design: Arm) -> Array:
+    radius = design.radius_m + design.proximal_length_m * np.cos(phi)
     height = design.proximal_length_m * np.sin(phi)
     return radius[..., None] * LEG_DIRECTIONS + height[..., None] * _Z
 
 
-def _sphere_intersection(phi: Array, design: OmnidDesign) -> tuple[Array, Array, Array]:
-    """Circumcentre of the sphere centres, upward unit normal of their plane, squared height over it."""
+def _sphere_intersection(phi: Array, design: Arm) -> tuple[Array, Array, Array]:
+    """Point of the sphere centres' plane nearest the wrist, upward unit normal, squared height over it."""
     centres = _sphere_centres(phi, design)
+    rod = np.asarray(design.rod_length_m)
     a, b = centres[..., 1, :] - centres[..., 0, :], centres[..., 2, :] - centres[..., 0, :]
     normal = cross(a, b)
     normal_square = np.sum(normal**2, axis=-1, keepdims=True)
     a_square, b_square = np.sum(a**2, axis=-1, keepdims=True), np.sum(b**2, axis=-1, keepdims=True)
+    if rod.ndim:  # the difference of two spheres is a plane, off the middle where radii differ
+        a_square = a_square + (rod[..., :1] ** 2 - rod[..., 1:2] ** 2)
+        b_square = b_square + (rod[..., :1] ** 2 - rod[..., 2:] ** 2)
+        rod = rod[..., 0]
     offset = cross(a_square * b - b_square * a, normal) / (2.0 * normal_square)
     upward = normal / np.sqrt(normal_square) * np.where(normal[..., 2:] < 0, -1.0, 1.0)
-    return centres[..., 0, :] + offset, upward, design.rod_length_m**2 - np.sum(offset**2, axis=-1)
+    return centres[..., 0, :] + offset, upward, rod**2 - np.sum(offset**2, axis=-1)

@@ -8,10 +8,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.strict import Fields, is_number, read_toml
 
 Triple = tuple[float, float, float]
+_UP: Array = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
@@ -45,6 +49,16 @@ class OmnidDesign:
     flange_mass_kg: float
     flange_inertia_kgm2: Triple
     gravity_mps2: float
+
+    @property
+    def radius_m(self) -> float:
+        """Base radius minus platform radius: all that kinematics sees of the two [m]."""
+        return self.base_radius_m - self.platform_radius_m
+
+    @property
+    def up(self) -> Array:
+        """Unit vector against gravity in {b}, which is level, shape (3,)."""
+        return _UP
 
     @property
     def wrist_mass_kg(self) -> float:

@@ -8,9 +8,10 @@ f_i = (dh/dphi)^-T tau_i for a massless arm; the motor's rotor lies before the s
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.arm.delta import LegGeometry, jacobian_of, leg_geometry, wrist_motion
-from estimator.arm.design import OmnidDesign, Triple
+from estimator.arm.delta import LEG_DIRECTIONS, LegGeometry, jacobian_of, leg_geometry, wrist_motion
+from estimator.arm.design import Triple
 from estimator.arm.gimbal import angular_motion, rate_matrix, rotation
+from estimator.arm.numbers import Arm
 from estimator.arrays import Array
 
 
@@ -18,7 +19,7 @@ def arm_torque(
     phi: ArrayLike,
     phi_dot: ArrayLike,
     phi_ddot: ArrayLike,
-    design: OmnidDesign,
+    design: Arm,
     legs: LegGeometry | None = None,
 ) -> Array:
     """Spring torques that move the unloaded arm [N m], positive raising the link, shape (..., 3).
@@ -38,15 +39,18 @@ def arm_torque(
     """
     phi, phi_dot, phi_ddot = (np.asarray(a, dtype=float) for a in (phi, phi_dot, phi_ddot))
     legs = leg_geometry(phi, design) if legs is None else legs
-    g = np.array([0.0, 0.0, design.gravity_mps2])
+    g = design.gravity_mps2 * np.asarray(design.up)
     _, h_ddot = wrist_motion(legs, phi_dot, phi_ddot)
     knee_ddot = legs.knee_d1 * phi_ddot[..., None] + legs.knee_d2 * (phi_dot**2)[..., None]
     # Consistent mass of a slender rod: T = m/6 (va.va + va.vb + vb.vb), half of the weight at each end.
     wrist_ddot = h_ddot[..., None, :]
-    at_knee = design.rod_mass_kg * ((2.0 * knee_ddot + wrist_ddot) / 6.0 + g / 2.0)
-    at_wrist = design.rod_mass_kg * ((knee_ddot + 2.0 * wrist_ddot) / 6.0 + g / 2.0)
+    rod_mass = np.asarray(design.rod_mass_kg)[..., None]
+    at_knee = rod_mass * ((2.0 * knee_ddot + wrist_ddot) / 6.0 + g[..., None, :] / 2.0)
+    at_wrist = rod_mass * ((knee_ddot + 2.0 * wrist_ddot) / 6.0 + g[..., None, :] / 2.0)
     wrist_force = at_wrist.sum(axis=-2) + design.wrist_mass_kg * (h_ddot + g)
-    link_weight = design.proximal_mass_kg * design.gravity_mps2 * design.proximal_com_m * np.cos(phi)
+    link = design.proximal_mass_kg * design.gravity_mps2 * design.proximal_com_m
+    aslant = np.asarray(design.up) @ LEG_DIRECTIONS.T
+    link_weight = link * np.cos(phi) * np.asarray(design.up)[..., 2:] - link * np.sin(phi) * aslant
     return (
         design.proximal_inertia_kgm2 * phi_ddot
         + link_weight
@@ -55,9 +59,7 @@ def arm_torque(
     )
 
 
-def gimbal_torque(
-    theta: ArrayLike, theta_dot: ArrayLike, theta_ddot: ArrayLike, design: OmnidDesign
-) -> Array:
+def gimbal_torque(theta: ArrayLike, theta_dot: ArrayLike, theta_ddot: ArrayLike, design: Arm) -> Array:
     """Torques about the gimbal's axes that move its own bodies [N m], order (z, y, x), shape (..., 3).
 
     Args:
@@ -78,7 +80,9 @@ def wrench_on_payload(
     phi: tuple[ArrayLike, ArrayLike, ArrayLike],
     theta: tuple[ArrayLike, ArrayLike, ArrayLike],
     tau: ArrayLike,
-    design: OmnidDesign,
+    design: Arm,
+    legs: LegGeometry | None = None,
+    R_bi: Array | None = None,
 ) -> Array:
     """Wrench (m_i [N m], f_i [N]) of the robot ON the payload at the origin of {i}, in {i}, shape (..., 6).
 
@@ -89,14 +93,16 @@ def wrench_on_payload(
         theta: gimbal angles (theta_z, theta_y, theta_x) [rad], rates and accelerations, each (..., 3).
         tau: spring torques [N m], shape (..., 3).
         design: the robot's numbers.
+        legs, R_bi: geometry at ``phi`` and orientation at ``theta``, if they are known.
 
     Raises:
         InputError: no wrist position exists at some configuration.
     """
-    legs = leg_geometry(phi[0], design)
+    legs = leg_geometry(phi[0], design) if legs is None else legs
+    R_bi = rotation(theta[0]) if R_bi is None else R_bi
     jacobian_T = np.swapaxes(jacobian_of(legs), -1, -2)
     f_b = np.linalg.solve(jacobian_T, (np.asarray(tau) - arm_torque(*phi, design, legs))[..., None])[..., 0]
-    f_i = np.einsum("...ji,...j->...i", rotation(theta[0]), f_b)
+    f_i = np.einsum("...ji,...j->...i", R_bi, f_b)
     axes_T = np.swapaxes(rate_matrix(theta[0]), -1, -2)
     m_i = -np.linalg.solve(axes_T, gimbal_torque(*theta, design)[..., None])[..., 0]
     return np.concatenate([m_i, f_i], axis=-1, dtype=np.float64)

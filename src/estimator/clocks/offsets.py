@@ -120,6 +120,19 @@ def estimate_clocks(
     )
 
 
+def unknown_clocks(robots: int, middle_s: float, why: str) -> ClockEstimate:
+    """What is known of clocks where nothing can be compared.
+
+    Args:
+        robots: number of robots N.
+        middle_s: an instant of robot 1, after the origin of the stamps [s].
+        why: the reason, for all robots but the first.
+    """
+    results = [_Clock(0.0, 0.0, np.zeros((2, 2)), 0.0, np.nan, None, None), *[_unknown(why)] * (robots - 1)]
+    numbers = {name: np.array([getattr(r, name) for r in results]) for name in NUMBERS}
+    return ClockEstimate(middle_s, **numbers, reports=(), why_not=tuple(r.why_not for r in results))
+
+
 def recorded_clocks(recording: Recording, max_offset_s: float = MAX_OFFSET_S) -> ClockEstimate:
     """The same of a recording, whose robots share one column of time; see ``estimate_clocks``."""
     theta = [recording.theta[:, i] for i in range(recording.metadata.robots)]

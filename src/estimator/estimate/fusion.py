@@ -62,9 +62,14 @@ def fusion_matrix(grasps: GraspEstimate) -> Array:
     pair = float(np.mean(grasps.linear_residual_rms[off] ** 2))
     linear = max(pair - angular / N * float(np.mean(distance**2)) * 2 / 3, 0.1 * pair) / 2
     ratio = np.sqrt(angular / linear) if angular > 0 and linear > 0 else 1.0
+    return fusion_with(grasps, ratio)
+
+
+def fusion_with(grasps: GraspEstimate, ratio: float) -> Array:
+    """The same with linear residuals weighted by ``ratio`` [rad/m], angular ones by 1."""
     weights = np.array([1.0, 1.0, 1.0, ratio, ratio, ratio])
-    H = np.concatenate([weights[:, None] * np.linalg.inv(_adjoint(grasps, i)) for i in range(N)])
-    return np.asarray(np.linalg.pinv(H) * np.tile(weights, N), dtype=float)
+    H = np.concatenate([weights[:, None] * np.linalg.inv(_adjoint(grasps, i)) for i in range(grasps.robots)])
+    return np.asarray(np.linalg.pinv(H) * np.tile(weights, grasps.robots), dtype=float)
 
 
 def total_wrench(wrench: Array, grasps: GraspEstimate) -> tuple[Array, Array]:

@@ -29,6 +29,7 @@ from estimator.estimate.withheld import withheld
 from estimator.leftover.contradiction import contradiction
 from estimator.leftover.leftover import left_over
 from estimator.leftover.steps import steps_of
+from estimator.recording.checks import check_carries
 from estimator.recording.model import Recording
 from estimator.signals.holds import Hold, find_holds
 from estimator.signals.process import process_recording
@@ -87,6 +88,7 @@ def estimate_payload(
 
 
 def _trial(recording: Recording, cutoff_hz: float, trim_s: float) -> Trial:
+    check_carries(recording, "estimated")
     labels = recording.metadata
     return Trial(
         recording.name,

@@ -9,6 +9,7 @@ from estimator.arm.delta import is_reachable, leg_geometry
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES, trim_slice
+from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 
 SPACING_TOLERANCE = 0.5  # of one sample period: a time stamp may jitter by so much
@@ -33,6 +34,23 @@ def check_recording(recording: Recording) -> None:
     _check_range(recording, ("theta_z", "theta_y", "theta_x"), -limit, limit)
     _check_torques(recording)
     _check_legs(recording)
+
+
+def check_carries(recording: Recording, done: str) -> None:
+    """Check that the robots carried something.
+
+    Args:
+        recording: any.
+        done: what is done with a payload, such as ``"estimated"``.
+
+    Raises:
+        InputError: it is a free trial.
+    """
+    if recording.metadata.trial == FREE:
+        raise InputError(
+            f"{recording.name}: trial is {FREE!r}: the robots hold nothing, so nothing can be {done}; "
+            "mocobot calibrate --free takes it"
+        )
 
 
 def check_duration(recording: Recording, trim_s: float) -> None:

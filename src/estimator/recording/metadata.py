@@ -12,9 +12,12 @@ from estimator.recording.sampling import Sampling
 from estimator.strict import Fields, parse_json
 
 FORMAT = "mocobot-recording"
-VERSIONS = (1, 2, 3)
-"""Version 2 has the key ``level``, version 3 ``sampling`` besides; each is written only where it is needed."""
-TRIALS = ("random", "periodic", "static")
+VERSIONS = (1, 2, 3, 4)
+"""Version 2 has the key ``level``, version 3 ``sampling`` besides, version 4 free trials, with or without ``sampling``;
+each is written only where it is needed."""
+FREE = "free"
+"""Kind of trial in which the robots hold nothing."""
+TRIALS = ("random", "periodic", "static", FREE)
 Level = Literal["joint", "wrist"]
 LEVELS: tuple[Level, ...] = ("joint", "wrist")
 _REQUIRED = ("format", "version", "robots", "rate_hz", "trial", "source", "payload", "seed", "design")
@@ -28,9 +31,9 @@ class RecordingMetadata:
     Attributes:
         robots: number of robots N, at least 1.
         rate_hz: sampling rate [Hz].
-        trial: "random", "periodic" or "static".
+        trial: "random", "periodic" or "static"; "free" where the robots hold nothing.
         source: what produced the samples, free text.
-        payload: name of the payload, or None where unknown.
+        payload: name of the payload, or None where unknown, and where there is none.
         seed: seed of a simulated trial, or None.
         design: numbers of the robots (all alike).
         control: gains, feed-forward and inner loop as plain JSON values, or None.
@@ -63,7 +66,7 @@ class RecordingMetadata:
         """
         values: dict[str, Any] = {
             "format": FORMAT,
-            "version": 3 if self.sampling else 2 if self.level != "joint" else 1,
+            "version": 4 if self.trial == FREE else 3 if self.sampling else 2 if self.level != "joint" else 1,
             **{key: getattr(self, key) for key in _REQUIRED[2:]},
             "design": self.design.to_dict(),
         }
@@ -94,8 +97,10 @@ class RecordingMetadata:
         """
         values = parse_json(text, where)
         _check_format(values, where)
-        required = _REQUIRED + ("level", "sampling")[: values.get("version", 1) - 1]
-        _check_values(Fields(values, required, where, _OPTIONAL))
+        version = values.get("version", 1)
+        required = _REQUIRED + ((), ("level",), ("level", "sampling"), ("level",))[version - 1]
+        optional = _OPTIONAL if version < 4 else ("sampling", *_OPTIONAL)
+        _check_values(Fields(values, required, where, optional))
         kept = {key: value for key, value in values.items() if key not in ("format", "version")}
         design = OmnidDesign.from_dict(values["design"], where=f"{where}: design")
         if "sampling" in values:
@@ -125,11 +130,19 @@ def _check_values(fields: Fields) -> None:
     # A bound instead of isfinite, which overflows on whole numbers beyond the range of a float.
     is_rate = type(rate) in (int, float) and 0 < rate < 1e9
     require("rate_hz", "a number of hertz, greater than 0 and less than 1e9", good=is_rate)
-    require("trial", f"one of {', '.join(TRIALS)}", good=values["trial"] in TRIALS)
+    trials = TRIALS if values["version"] >= 4 else TRIALS[:-1]
+    newer = (
+        ""
+        if FREE in trials or values["trial"] != FREE
+        else f" in version {values['version']} (4 has free trials)"
+    )
+    require("trial", f"one of {', '.join(trials)}{newer}", good=values["trial"] in trials)
     require("source", "text", good=isinstance(values["source"], str))
     # It is printed; control characters and half surrogates are not for terminals.
     is_label = payload is None or (isinstance(payload, str) and payload.isprintable())
     require("payload", "text or null, all of it printable", good=is_label)
+    empty = payload is None or values["trial"] != FREE
+    require("payload", "null in a free trial, whose robots hold nothing", good=empty)
     require("seed", "a whole number or null", good=seed is None or type(seed) is int)
     fields.object("design")
     if "level" in fields:

@@ -2,15 +2,13 @@
 
 import numpy as np
 
-from estimator.arm.delta import leg_geometry, wrist_motion
 from estimator.arm.design import OmnidDesign
-from estimator.arm.dynamics import wrench_on_payload
-from estimator.arm.gimbal import angular_motion, rotation
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.filtering import differentiate, low_pass, trim_slice
 from estimator.recording.checks import check_duration, check_recording
 from estimator.recording.model import Recording
+from estimator.signals.arm_data import arm_data
 from estimator.signals.grasp_data import GraspData
 
 BLOCK = 16_384
@@ -82,14 +80,7 @@ def _fill(
     design: OmnidDesign,
 ) -> None:
     """Data points of one robot from its angles with their derivatives, (3, q, 3), and its torques, (q, 3)."""
-    legs = leg_geometry(phi[0], design)
-    h_dot, h_ddot = wrist_motion(legs, phi[1], phi[2])
-    R_bi = rotation(theta[0])
-    omega, omega_dot = angular_motion(theta[0], theta[1], theta[2])
-    v = np.einsum("...ji,...j->...i", R_bi, h_dot)
-    v_dot = np.einsum("...ji,...j->...i", R_bi, h_ddot) - np.cross(omega, v)
-    data.R_bi[block, robot], data.p_bi[block, robot] = R_bi, legs.h
-    data.twist[block, robot] = np.concatenate([omega, v], axis=-1)
-    data.twist_dot[block, robot] = np.concatenate([omega_dot, v_dot], axis=-1)
-    wrench = wrench_on_payload((phi[0], phi[1], phi[2]), (theta[0], theta[1], theta[2]), tau, design)
-    data.wrench[block, robot] = wrench
+    found = arm_data((phi[0], phi[1], phi[2]), (theta[0], theta[1], theta[2]), tau, design)
+    data.R_bi[block, robot], data.p_bi[block, robot] = found.R_bi, found.h
+    data.twist[block, robot], data.twist_dot[block, robot] = found.twist, found.twist_dot
+    data.wrench[block, robot] = found.wrench

@@ -77,7 +77,8 @@ def convert(
     Args:
         log: a rosbag2 folder, .mcap, .db3, .csv, .npz or .parquet file, or a LeRobot dataset.
         map: map file, or name of a built-in map (docs/measured-data.md); found out if not given.
-        trial: ``"random"``, ``"periodic"`` or ``"static"``, if neither log nor map says; ``"random"`` else.
+        trial: ``"random"``, ``"periodic"``, ``"static"`` or ``"free"`` (robots that hold nothing), if neither log nor
+            map says; ``"random"`` else.
         payload: its name.
         design: numbers of the robots, or a TOML file of them, if not the log's own or those of the Omnid.
         level: how a file of the recording tells the samples; that of the log if not given.

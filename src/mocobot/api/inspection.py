@@ -83,4 +83,5 @@ def inspect(
     log_map = read_map(str(map)) if map is not None else None
     standard = load_design(Path(design)) if isinstance(design, Path | str) else design or omnid_design()
     source = open_log(Path(log), log_map, episode)
-    return public(Inspection, inspection.inspect_log(source, standard, advance))
+    trial = log_map.trial if log_map is not None else None
+    return public(Inspection, inspection.inspect_log(source, standard, advance, trial=trial))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from estimator.errors import InputError
-from estimator.recording.metadata import Level
+from estimator.recording.metadata import FREE, Level
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
 from mocobot.api.public import public
@@ -24,7 +24,7 @@ class SimulatedRecording(Recording):
     """A recording with what is known because it was simulated; nothing that estimates or diagnoses looks at it.
 
     Attributes:
-        truth: the payload and the robots.
+        truth: the payload, if there is one, and the robots.
         log: what truly happened, before any sensor.
     """
 
@@ -53,6 +53,7 @@ def simulate(
     effects: Sequence[Effect] = (),
     model: Path | str | None = None,
     level: Level = "joint",
+    robots: int | None = None,
     gains: ControlGains | None = None,
     progress: Callable[[int, int], object] | None = None,
 ) -> SimulatedRecording:
@@ -60,9 +61,10 @@ def simulate(
 
     Args:
         payload: name of a shipped payload, or path of a payload MJCF (body ``payload``, sites ``grasp1`` ..
-            ``graspN``); ``"a"`` if neither this nor a model is given.
-        trajectory: ``"random"``, ``"periodic"`` or ``"static"``.
-        vias: vias of a random trial; 80 if not given.
+            ``graspN``); ``"a"`` if neither this nor a model is given. Of a free trial: the one that the robots have put
+            down, which says how many they are.
+        trajectory: ``"random"``, ``"periodic"``, ``"static"``, or ``"free"``: every arm moves alone and holds nothing.
+        vias: vias of a random trial, or of a free one's fast part; 80 if not given.
         duration_s: length of a periodic motion [s]; 60 if not given.
         preset: sensors, or their name: ``"ideal"``, ``"nominal"`` or ``"uncalibrated"``.
         seed: of trajectory, noise and calibration errors, at least 0.
@@ -70,6 +72,7 @@ def simulate(
         effects: what is hidden in the team (``make_effect``).
         model: folder of an extended model, as a diagnosis writes it, in place of a payload.
         level: what the recording's file will hold: ``"joint"``, driven angles and spring torques, or ``"wrist"``.
+        robots: number of robots of a free trial, in place of a payload; a seed's robots are the same in all its trials.
         gains: of the arms' control; None for the defaults.
         progress: called with the number of samples done and that of all, every second of the trial.
 
@@ -77,14 +80,19 @@ def simulate(
         InputError: an argument that cannot be met.
         TrialError: the physics of the trial cannot be trusted.
     """
-    check_fits("vias", vias, "random", trajectory)
-    check_fits("duration_s", duration_s, "periodic", trajectory)
+    check_fits("vias", vias, ("random", "free"), trajectory)
+    check_fits("duration_s", duration_s, ("periodic",), trajectory)
+    check_fits("robots", robots, ("free",), trajectory)
+    if payload is not None and robots is not None:
+        raise InputError("payload and robots are both given; a payload says how many robots there are")
+    if model is not None and trajectory == FREE:
+        raise InputError(f"model {model} carries a payload; robots of a free trial hold nothing")
     if model is not None and payload is not None:
         raise InputError("payload and model are both given; the model has its own payload, so leave one out")
     scene = load_extended(Path(model)) if model is not None else None
     label = str("a" if payload is None else payload) if model is None else Path(model).resolve().name
     sensors = sensor_preset(preset) if isinstance(preset, str) else preset
-    given = {"vias": vias, "duration_s": duration_s}
+    given = {"vias": vias, "duration_s": duration_s, "robots": robots}
     request = replace(
         TrialRequest(label, trajectory, seed, number),
         **{name: value for name, value in given.items() if value is not None},
@@ -95,11 +103,11 @@ def simulate(
     return public(SimulatedRecording, recording, metadata=metadata, truth=done.truth, log=done.log)
 
 
-def check_fits(name: str, value: float | None, needed: str, trajectory: str) -> None:
+def check_fits(name: str, value: float | None, needed: tuple[str, ...], trajectory: str) -> None:
     """Refuse a number that says nothing about a kind of motion.
 
     Raises:
-        InputError: it is given, and the trajectory is not the one that needs it.
+        InputError: it is given, and the trajectory is none of those that need it.
     """
-    if value is not None and trajectory != needed:
-        raise InputError(f"{name} is for a {needed} trajectory; this one is {trajectory}")
+    if value is not None and trajectory not in needed:
+        raise InputError(f"{name} is for a {' or '.join(needed)} trajectory; this one is {trajectory}")

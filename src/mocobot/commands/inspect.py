@@ -29,7 +29,8 @@ def run(options: Inspect) -> None:
     design = load_design(options.design) if options.design is not None else omnid_design()
     source = open_log(Path(options.rec), log_map, options.episode)
     with bar(source.size, "reading", "") as advance, bar(None, "checking", "mistake") as try_advance:
-        found = inspect_log(source, design, advance, try_advance)
+        trial = log_map.trial if log_map is not None else None
+        found = inspect_log(source, design, advance, try_advance, trial)
     if options.json is not None:
         write_json(options.json, inspection_dict(found))
     print(format_inspection(found))

@@ -5,6 +5,7 @@ from pathlib import Path
 
 from discrepancy.result.read import read_diagnosis
 from estimator.errors import InputError
+from estimator.recording.metadata import FREE
 from mocobot.api.replay import SUFFIX, check_rerun
 from mocobot.files.recordings import read
 from mocobot.files.targets import check_output, check_recordings
@@ -75,7 +76,8 @@ def _trials(options: Replay) -> list[ReplayTrial]:
     with bar(len(options.rec), "reading", "recording") as advance:
         for path, name in zip(options.rec, distinct_names(options.rec), strict=True):
             recording = read(path)
-            truth = read_truth(path, recording.metadata.robots) if options.truth else None
+            held = recording.metadata.trial != FREE
+            truth = read_truth(path, recording.metadata.robots) if options.truth and held else None
             trials.append(
                 replay_trial(recording, name, estimate, truth, diagnosis, _payload(options.payload))
             )

@@ -22,8 +22,11 @@ def run(options: Simulate) -> None:
     inputs = [given] if given.is_file() else []
     check_output(options.out, inputs, force=options.force, suffix=".parquet")
     check_output(truth_path(options.out), inputs, force=options.force)
-    check_fits("--vias", options.vias, "random", options.trajectory)
-    check_fits("--duration", options.duration, "periodic", options.trajectory)
+    check_fits("--vias", options.vias, ("random", "free"), options.trajectory)
+    check_fits("--duration", options.duration, ("periodic",), options.trajectory)
+    check_fits("--robots", options.robots, ("free",), options.trajectory)
+    if options.payload is not None and options.robots is not None:
+        raise InputError("--payload and --robots are both given; a payload says how many robots there are")
     if options.model is not None and options.payload is not None:
         raise InputError(
             "--payload and --model are both given; the model has its own payload, so leave one out"
@@ -36,7 +39,7 @@ def run(options: Simulate) -> None:
         done = simulate(
             options.payload, options.trajectory,
             vias=options.vias, duration_s=options.duration, preset=options.preset, seed=options.seed,
-            model=options.model, level=options.level, progress=advance,
+            model=options.model, level=options.level, robots=options.robots, progress=advance,
         )  # fmt: skip
     done.write(options.out)
     print(f"{options.out}: {done.time[-1]:.1f} s of {options.trajectory} motion, {options.preset} sensors")

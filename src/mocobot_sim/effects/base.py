@@ -25,11 +25,13 @@ class Effect(ABC):
         cause: name of the cause: that of the class, in lower case with underscores.
         ranges: allowed range (low, high) of the parameters that may not be any finite number, both ends included.
         repeats: whether one place takes several.
+        on_payload: whether it needs a payload, or a grasp of one.
     """
 
     cause: ClassVar[str]
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
     repeats: ClassVar[bool] = False
+    on_payload: ClassVar[bool] = False
 
     def __init_subclass__(cls) -> None:
         cls.cause = re.sub(r"\B(?=[A-Z])", "_", cls.__name__).lower()
@@ -75,6 +77,8 @@ class Effect(ABC):
         """
         if scene.root is None:
             raise InputError(f"{self.cause}: a scene read from an extended model takes no further effects")
+        if self.on_payload and not scene.carries:
+            raise InputError(f"{self.cause}: acts on a payload; robots of a free trial hold nothing")
         robot = getattr(self, "robot", 1)
         if robot > scene.robots:
             raise InputError(f"{self.cause}: robot is {robot}; the team has robots 1 .. {scene.robots}")

@@ -17,6 +17,7 @@ class Drag(Effect):
     use for their control.
     """
 
+    on_payload = True
     ranges: ClassVar = {"coefficient_Ns_per_m": (0.0, 1e3)}
     coefficient_Ns_per_m: float
 

@@ -20,6 +20,7 @@ class GraspFlex(Effect):
     equalities (see ``mocobot_sim.scene.soft``), critically damped. The grasp cannot turn.
     """
 
+    on_payload = True
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-3)}
     robot: int
     compliance_m_per_N: float

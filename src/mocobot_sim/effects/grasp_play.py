@@ -19,6 +19,7 @@ class GraspPlay(Effect):
     Three slides with stiff ``range`` limits, on the payload (robot 1) or on a pad between flange and weld (the others).
     """
 
+    on_payload = True
     ranges: ClassVar = {"play_m": (0.0, 5e-3)}
     robot: int
     play_m: float

@@ -18,6 +18,7 @@ class Push(Effect):
     any tilt [N], the point where it acts is fixed to the payload and given in {1} [m].
     """
 
+    on_payload = True
     repeats = True
     ranges: ClassVar = {"start_s": (0.0, 1e9), "duration_s": (0.0, 1e9)}
     trial: int

@@ -20,6 +20,7 @@ class Slosh(Effect):
     small swings.
     """
 
+    on_payload = True
     ranges: ClassVar = {"mass_kg": (0.0, 100.0), "length_m": (0.005, 10.0), "damping_ratio": (0.0, 10.0)}
     mass_kg: float
     length_m: float

@@ -15,6 +15,7 @@ class Tether(Effect):
     world. The anchor is given in the robot's {b} as its floor mount has it, without any tilt [m].
     """
 
+    on_payload = True
     ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4)}
     robot: int
     stiffness_N_per_m: float

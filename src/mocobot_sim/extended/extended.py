@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, fields
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +24,8 @@ FORMAT = "mocobot-extended-model"
 VERSION = 1
 SCENE, NUMBERS, README = "team.xml", "effects.json", "README.md"
 AS_BUILT, SENSORS = (tuple(entry.name for entry in fields(kind)) for kind in (AsBuilt, SensorEffects))
+MASSES, WRIST_MASS = ("proximal_mass_ratio", "rod_mass_ratio"), "wrist_mass_ratio"
+"""What older folders do not say of a unit: that it has the masses of its design."""
 INITIAL = ("phi_rad", "theta_rad")
 KEYS = (
     "format", "version", "robots", "effects", "wrist_home_b_m", "theta_home_rad", "grasps", "mounts", "initial",
@@ -41,8 +43,11 @@ def write_extended(scene: TeamScene, effects: Sequence[Effect], folder: Path, ex
         extra: plain JSON values to keep with it.
 
     Raises:
-        InputError: the folder is something else, or cannot be written, or ``extra`` is not plain JSON.
+        InputError: the folder is something else, or cannot be written, ``extra`` is not plain JSON, or the robots hold
+            nothing.
     """
+    if not scene.carries:
+        raise InputError(f"{folder}: the robots hold nothing; an extended model carries a payload")
     values: dict[str, Any] = {
         "format": FORMAT,
         "version": VERSION,
@@ -57,7 +62,7 @@ def write_extended(scene: TeamScene, effects: Sequence[Effect], folder: Path, ex
             key: np.asarray(part, dtype=float).tolist()
             for key, part in zip(INITIAL, scene.initial, strict=True)
         },
-        "as_built": [{key: value.tolist() for key, value in asdict(unit).items()} for unit in scene.units],
+        "as_built": [unit.to_dict() for unit in scene.units],
         "sensors": {name: list(scene.sensors.of(name, scene.robots)) for name in SENSORS},
         "grasp_slack_m": list(scene.grasp_slack_m or (0.0,) * scene.robots),
         "extra": extra,
@@ -159,9 +164,17 @@ def _effects(entries: list[Any], where: str) -> list[Effect]:
 
 
 def _units(read: Fields, robots: int) -> tuple[AsBuilt, ...]:
+    newer = (*MASSES, WRIST_MASS)
+    required = [name for name in AS_BUILT if name not in newer]
     entries = enumerate(read.list("as_built", robots), start=1)
-    units = (Fields(entry, AS_BUILT, f"{read.where}: as_built[{i}]") for i, entry in entries)
-    return tuple(AsBuilt(**{name: unit.array(name, (3,)) for name in AS_BUILT}) for unit in units)
+    units = (Fields(entry, required, f"{read.where}: as_built[{i}]", newer) for i, entry in entries)
+    return tuple(_unit(unit) for unit in units)
+
+
+def _unit(read: Fields) -> AsBuilt:
+    given = [*read.required, *(name for name in MASSES if name in read)]
+    wrist = read.number(WRIST_MASS) if WRIST_MASS in read else 0.0
+    return AsBuilt(**{name: read.array(name, (3,)) for name in given}, wrist_mass_ratio=wrist)
 
 
 def _sensors(read: Fields, robots: int) -> SensorEffects:

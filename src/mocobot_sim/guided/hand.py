@@ -80,7 +80,13 @@ class _OnPayload:
             )
 
     def start(self, stage: Stage) -> None:
-        """Get ready."""
+        """Get ready.
+
+        Raises:
+            InputError: the robots hold nothing.
+        """
+        if stage.index.payload_body < 0:
+            raise InputError("the robots hold nothing; a hand needs a payload")
         self._stage, self._body = stage, stage.index.payload_body
         self._rows: list[tuple[Array, ...]] = []
         self._velocity = np.zeros(6)

@@ -1,7 +1,7 @@
-"""How one real unit differs from its design: geometry, springs and sensor zeros."""
+"""How one real unit differs from its design: geometry, springs, sensor zeros and masses."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
@@ -17,7 +17,7 @@ def _zeros() -> Array:
 class AsBuilt:
     """Deviations of one Omnid from its design, one entry per leg 1..3 (or gimbal axis z, y, x).
 
-    Geometry and stiffness change the simulated robot; zeros change what its sensors and its controller read.
+    Geometry, stiffness and masses change the simulated robot; zeros change what its sensors and its controller read.
     The estimator and the controller keep using the design.
 
     Attributes:
@@ -29,6 +29,10 @@ class AsBuilt:
         phi_zero_rad: reading minus true phi [rad], shape (3,).
         theta_zero_rad: reading minus true (theta_z, theta_y, theta_x) [rad], shape (3,).
         tau_zero_Nm: reading minus true spring torque [N m], shape (3,).
+        proximal_mass_ratio: mass and inertia of the driven link over design, minus 1, shape (3,).
+        rod_mass_ratio: mass and inertia of the rod over design, minus 1, shape (3,).
+        wrist_mass_ratio: mass and inertia of platform and gimbal, which translate with the wrist, over design,
+            minus 1.
     """
 
     base_radius_m: Array = field(default_factory=_zeros)
@@ -39,6 +43,13 @@ class AsBuilt:
     phi_zero_rad: Array = field(default_factory=_zeros)
     theta_zero_rad: Array = field(default_factory=_zeros)
     tau_zero_Nm: Array = field(default_factory=_zeros)
+    proximal_mass_ratio: Array = field(default_factory=_zeros)
+    rod_mass_ratio: Array = field(default_factory=_zeros)
+    wrist_mass_ratio: float = 0.0
+
+    def to_dict(self) -> dict[str, list[float] | float]:
+        """Plain JSON values by the names above."""
+        return {name: np.asarray(value).tolist() for name, value in asdict(self).items()}
 
 
 def units_of(as_built: Sequence[AsBuilt], robots: int) -> tuple[AsBuilt, ...]:
@@ -61,15 +72,32 @@ class CalibrationSpread:
         stiffness_ratio: of each spring's relative stiffness [-].
         geometry_m: of each base radius, platform radius, proximal and rod length [m].
         tau_zero_Nm: of each torque zero [N m].
+        arm_mass_ratio: of the relative mass of each driven link, each rod and each wrist [-].
     """
 
     encoder_zero_rad: float = 0.0
     stiffness_ratio: float = 0.0
     geometry_m: float = 0.0
     tau_zero_Nm: float = 0.0
+    arm_mass_ratio: float = 0.0
 
     def draw(self, robots: int, rng: np.random.Generator) -> tuple[AsBuilt, ...]:
         """Draw one team; robot i's unit does not depend on how many robots follow it."""
         zeros = (self.encoder_zero_rad, self.encoder_zero_rad, self.tau_zero_Nm)
         spreads = np.array([*[self.geometry_m] * 4, self.stiffness_ratio, *zeros])  # as the fields of AsBuilt
-        return tuple(AsBuilt(*(spreads[:, None] * rng.standard_normal((8, 3)))) for _ in range(robots))
+        units = tuple(AsBuilt(*(spreads[:, None] * rng.standard_normal((8, 3)))) for _ in range(robots))
+        if not self.arm_mass_ratio:
+            return units
+        # A stream of their own: the rest of a unit is the same with and without them, and whatever the team's size.
+        masses = rng.spawn(1)[0]
+        return tuple(_with_masses(unit, self.arm_mass_ratio * masses.standard_normal(7)) for unit in units)
+
+
+def _with_masses(unit: AsBuilt, ratios: Array) -> AsBuilt:
+    """A unit with deviations of its driven links, rods and wrist, shape (7,)."""
+    return replace(
+        unit,
+        proximal_mass_ratio=ratios[:3],
+        rod_mass_ratio=ratios[3:6],
+        wrist_mass_ratio=float(ratios[6]),
+    )

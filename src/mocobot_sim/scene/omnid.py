@@ -11,6 +11,9 @@ from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.models import models_dir, omnid_design
 from mocobot_sim.scene.pymjcf import mjcf
 
+WRIST_BODIES = ("platform", "yoke", "ring", "flange")
+"""What translates with the wrist."""
+
 
 def load_omnid(number: int) -> mjcf.RootElement:
     """The shipped model, its names prefixed with ``omnid{number}/`` when it is attached."""
@@ -38,8 +41,9 @@ def park(omnid: mjcf.RootElement) -> None:
 
 
 def deviate(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
-    """Move one unit's geometry and springs off their design values."""
+    """Move one unit's geometry, springs and masses off their design values."""
     deviate_geometry(omnid, unit)
+    _deviate_masses(omnid, unit)
     for k in range(3):
         spring = omnid.find("joint", f"spring{k + 1}")
         spring.stiffness = omnid_design().sea_stiffness_Nm_per_rad * (1.0 + unit.stiffness_ratio[k])
@@ -55,6 +59,22 @@ def deviate_geometry(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
         rod = omnid.find("body", f"rod{k + 1}")
         rod.pos = rod.pos + np.array([unit.proximal_length_m[k], 0.0, 0.0])
         tip = omnid.find("site", f"rod{k + 1}_tip")
+        if unit.rod_length_m[k]:  # a longer rod has its mass along all of it
+            grown = 1.0 + unit.rod_length_m[k] / tip.pos[0]
+            rod.inertial.pos = rod.inertial.pos * grown
+            rod.inertial.diaginertia = rod.inertial.diaginertia * np.array([1.0, grown**2, grown**2])
         tip.pos = tip.pos + np.array([unit.rod_length_m[k], 0.0, 0.0])
         platform = omnid.find("site", f"platform{k + 1}")
         platform.pos = platform.pos + unit.platform_radius_m[k] * u
+
+
+def _deviate_masses(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
+    """Scale mass and inertia of the arm's bodies together, as denser or thicker parts would."""
+    ratios = {f"proximal{k + 1}": unit.proximal_mass_ratio[k] for k in range(3)}
+    ratios |= {f"rod{k + 1}": unit.rod_mass_ratio[k] for k in range(3)}
+    ratios |= dict.fromkeys(WRIST_BODIES, unit.wrist_mass_ratio)
+    for body, ratio in ratios.items():
+        if ratio:  # a design's own numbers keep their bits
+            inertial = omnid.find("body", body).inertial
+            inertial.mass = inertial.mass * (1.0 + ratio)
+            inertial.diaginertia = inertial.diaginertia * (1.0 + ratio)

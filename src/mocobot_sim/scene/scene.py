@@ -37,7 +37,7 @@ class TeamScene:
         robots: number of robots N.
         wrist_home_b: wrist position of every robot in its own {b} at home [m], shape (N, 3).
         theta_home: gimbal angles (z, y, x) at home [rad], shape (N, 3).
-        X_1i: grasp frames in {1}, N transforms.
+        X_1i: grasp frames in {1}, N transforms; flanges without their gimbals' turn where nothing is held.
         units: how each robot deviates from the design, N entries.
         mounts: pose of every robot's place on the floor in the world, before any tilt; N transforms.
         initial: true (phi, theta) near which a trial starts [rad], two arrays (N, 3); None for home.
@@ -48,6 +48,7 @@ class TeamScene:
         effects: what was applied to the team.
         xml: the scene's MJCF if ``root`` is None.
         assets: files that ``xml`` refers to, by name.
+        carries: whether there is a payload; see ``free`` for teams without.
     """
 
     root: mjcf.RootElement | None
@@ -64,6 +65,7 @@ class TeamScene:
     effects: tuple[Applied, ...] = ()
     xml: str | None = None
     assets: Mapping[str, bytes] = field(default_factory=dict)
+    carries: bool = True
 
     @property
     def X_Wb(self) -> RigidTransform:

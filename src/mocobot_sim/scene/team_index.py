@@ -32,8 +32,8 @@ class TeamIndex:
         motor_dof, spring_dof, gimbal_dof, slide_dof, knee_dof: positions in ``qvel``; (N, 3), knees (N, 6).
         actuator: positions in ``ctrl``, shape (N, 3).
         grasp_site: the flange's site of every robot, shape (N,).
-        payload_site: the payload's grasp site of every robot, shape (N,).
-        payload_body: body id of the payload.
+        payload_site: the payload's grasp site of every robot, shape (N,); that of the flange where nothing is held.
+        payload_body: body id of the payload; -1 where nothing is held.
         yielding_dof: slides that effects have added: bases and grasps that yield, are loose or creep.
         hanging_dof: hinges that effects have added: what swings in the payload.
         base_dof: free chassis, wheels and rollers; none in a team that is parked.
@@ -62,8 +62,12 @@ class TeamIndex:
         return len(self.grasp_site)
 
     @classmethod
-    def of(cls, model: mujoco.MjModel) -> TeamIndex:
+    def of(cls, model: mujoco.MjModel, carries: bool = True) -> TeamIndex:
         """Look everything up by name.
+
+        Args:
+            model: the compiled scene.
+            carries: whether it has a payload.
 
         Raises:
             KeyError: the model is not a team scene (the message names what is missing).
@@ -78,14 +82,15 @@ class TeamIndex:
             if kind != "knee"
         }
         dof = {f"{kind}_dof": model.jnt_dofadr[joints[kind]].astype(np.intp) for kind in JOINTS}
-        grasps = [model.site(f"{PAYLOAD_PREFIX}grasp{i + 1}").id for i in range(robots)]
+        flanges = ids_of(model.site, robots, ("grasp",)).ravel()
+        grasps = [model.site(f"{PAYLOAD_PREFIX}grasp{i + 1}").id for i in range(robots if carries else 0)]
         return cls(
             **qpos,
             **dof,
             actuator=ids_of(model.actuator, robots, JOINTS["motor"]),
-            grasp_site=ids_of(model.site, robots, ("grasp",)).ravel(),
-            payload_site=np.array(grasps, dtype=np.intp),
-            payload_body=model.body(f"{PAYLOAD_PREFIX}payload").id,
+            grasp_site=flanges,
+            payload_site=np.array(grasps, dtype=np.intp) if carries else flanges,
+            payload_body=model.body(f"{PAYLOAD_PREFIX}payload").id if carries else -1,
             yielding_dof=_added(model, own, mujoco.mjtJoint.mjJNT_SLIDE),
             hanging_dof=_added(model, own, mujoco.mjtJoint.mjJNT_HINGE),
             base_dof=np.flatnonzero(np.isin(model.dof_jntid, base)).astype(np.intp),

@@ -8,18 +8,28 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from estimator.errors import InputError
+from estimator.recording.metadata import FREE, TRIALS
 from estimator.recording.model import Recording
 from mocobot_sim.control.control import ControlGains
 from mocobot_sim.effects import Effect, apply_effects
 from mocobot_sim.scene.as_built import AsBuilt
+from mocobot_sim.scene.free import build_free_team, check_robots
+from mocobot_sim.scene.payload import grasp_frames, load_payload
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset, measure
-from mocobot_sim.trial.trajectories import Trajectory, random_vias, sphere_motion, static_orientations
+from mocobot_sim.trial.trajectories import (
+    Trajectory,
+    free_motion,
+    random_vias,
+    sphere_motion,
+    static_orientations,
+)
 from mocobot_sim.trial.trial import run_trial
 from mocobot_sim.trial.trial_log import TrialLog
 from mocobot_sim.trial.truth import GroundTruth
 
-TRIALS = ("random", "periodic", "static")
+LEFT_RAD = 0.3
+"""How far from zero a gimbal that holds nothing may have been left."""
 
 
 @dataclass(frozen=True)
@@ -27,12 +37,14 @@ class TrialRequest:
     """One trial to simulate; equal requests give equal bits.
 
     Attributes:
-        payload: name of a shipped payload, or path of a payload MJCF.
-        trial: ``random``, ``periodic`` or ``static``.
+        payload: name of a shipped payload, or path of a payload MJCF; in a free trial the one that the robots have put
+            down.
+        trial: ``random``, ``periodic``, ``static`` or ``free``.
         seed: seed of everything random, at least 0.
         number: which of several trials of that kind, at least 0.
-        vias: number of vias of a random trial.
+        vias: number of vias of a random trial, and of a free one's fast part.
         duration_s: length of a periodic trial's motion [s].
+        robots: number of robots of a free trial; None for as many as the payload has grasps.
     """
 
     payload: str
@@ -41,6 +53,7 @@ class TrialRequest:
     number: int = 0
     vias: int = 80
     duration_s: float = 60.0
+    robots: int | None = None
 
     @property
     def label(self) -> str:
@@ -103,7 +116,14 @@ def simulate(
         raise InputError("presets of one trial must share their calibration spread")
     if request.seed < 0:
         raise InputError(f"seed is {request.seed}; it must be at least 0")
-    if scene is None:
+    free = request.trial == FREE
+    if free and scene is not None:
+        raise InputError("a model carries a payload; robots of a free trial hold nothing")
+    if request.robots is not None and not free:
+        raise InputError(f"robots is for a free trial; a {request.trial} one has a robot for each grasp")
+    if free:
+        scene = _free_team(request, presets[0])
+    elif scene is None:
         scene = build_team(request.payload, draw_units(request.payload, presets[0], request.seed))
     elif not presets[0].calibrated:
         raise InputError(
@@ -119,7 +139,7 @@ def simulate(
             log,
             preset,
             request.rng(f"sensors {preset.name}"),
-            payload=request.label,
+            payload=None if free else request.label,
             seed=request.seed,
             name=f"{request.label}_{request.trial}{request.number}_{preset.name}",
         )
@@ -130,9 +150,25 @@ def simulate(
 
 def draw_units(payload: str, preset: SensorPreset, seed: int) -> tuple[AsBuilt, ...]:
     """The robots that carry a payload: as designed (empty) if the preset is calibrated, else drawn from the seed."""
+    return _draw(len(_grasps(payload)), preset, seed)
+
+
+def _draw(robots: int, preset: SensorPreset, seed: int) -> tuple[AsBuilt, ...]:
     if preset.calibrated:
         return ()
-    return preset.spread.draw(build_team(payload).robots, np.random.default_rng([seed, *b"units"]))
+    return preset.spread.draw(robots, np.random.default_rng([seed, *b"units"]))
+
+
+def _grasps(payload: str) -> RigidTransform:
+    return grasp_frames(load_payload(payload), payload)
+
+
+def _free_team(request: TrialRequest, preset: SensorPreset) -> TeamScene:
+    """The seed's robots, which are those of its other trials, with their gimbals as somebody left them."""
+    robots = len(_grasps(request.payload)) if request.robots is None else request.robots
+    check_robots(robots)
+    theta = request.rng("gimbals").uniform(-LEFT_RAD, LEFT_RAD, (robots, 3))
+    return build_free_team(robots, _draw(robots, preset, request.seed), theta)
 
 
 def make_trajectory(
@@ -143,6 +179,8 @@ def make_trajectory(
     rng = request.rng("trajectory")
     if request.trial == "random":
         return random_vias(home, rng, vias=request.vias)
+    if request.trial == FREE:
+        return free_motion(home, rng, vias=request.vias)
     if request.trial == "periodic":
         return sphere_motion(home, X_1i, duration_s=request.duration_s, rng=rng)
     return static_orientations(home, X_1i)

@@ -1,4 +1,4 @@
-"""Commanded wrist positions: random vias, motion on a common sphere, static orientations.
+"""Commanded wrist positions: random vias, motion on a common sphere, static orientations, arms that hold nothing.
 
 Commands are sampled at the recording's rate; between them the controller follows the cubic spline through them, so
 a recording that carries its commands can be resimulated exactly.
@@ -23,7 +23,7 @@ class Trajectory:
     """Commands of one trial.
 
     Attributes:
-        trial: ``random``, ``periodic`` or ``static``.
+        trial: ``random``, ``periodic``, ``static`` or ``free``.
         ref_b: commanded wrist positions in every robot's {b} [m], shape (Q, N, 3), at ``RATE_HZ``.
     """
 
@@ -78,6 +78,49 @@ def random_vias(
     duration = 2.0 * SETTLE_S + max(transit.sum() + dwell[:-1].sum() for _, transit, dwell in paths)
     time = np.arange(round(duration * RATE_HZ) + 1) / RATE_HZ
     return Trajectory("random", np.stack([_via_path(time, *path, SETTLE_S) for path in paths], axis=1))
+
+
+def free_motion(
+    wrist_home_b: Array,
+    rng: np.random.Generator,
+    vias: int = 80,
+    radius_m: float = 0.12,
+    hold_s: float = 1.5,
+    slow_s: tuple[float, float] = (0.8, 1.2),
+    fast_s: tuple[float, float] = (0.5, 0.8),
+) -> Trajectory:
+    """Motion of arms that hold nothing: holds all over the workspace for their weight, then haste for their inertia.
+
+    Every wrist goes its own way between random points of a ball around home: first to a quarter as many holds as there
+    are vias, then through the vias without a rest, then home.
+
+    Args:
+        wrist_home_b: home wrist positions [m], shape (N, 3).
+        rng: source of points and times.
+        vias: number of vias per robot in the fast part.
+        radius_m: radius of the ball [m].
+        hold_s: rest at each hold [s].
+        slow_s, fast_s: uniform ranges of the time to a hold, and of the time to a via [s].
+
+    Raises:
+        InputError: fewer than one via, or so many that the motion would last over an hour.
+    """
+    if vias < 1:
+        raise InputError(f"vias is {vias}; it must be at least 1")
+    holds = -(-vias // 4)
+    if holds * (slow_s[1] + hold_s) + vias * fast_s[1] > LONGEST_S:
+        raise InputError(f"vias is {vias}; that many could last longer than {LONGEST_S:g} s")
+    paths = []
+    for home in np.asarray(wrist_home_b):
+        direction = rng.standard_normal((holds + vias, 3))
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        points = home + radius_m * np.cbrt(rng.uniform(size=(holds + vias, 1))) * direction
+        transit = np.concatenate([rng.uniform(*slow_s, holds), rng.uniform(*fast_s, vias), [slow_s[1]]])
+        dwell = np.where(np.arange(holds + vias + 1) < holds, hold_s, 0.0)
+        paths.append((np.vstack([home, points, home]), transit, dwell))
+    duration = 2.0 * SETTLE_S + max(transit.sum() + dwell.sum() for _, transit, dwell in paths)
+    time = np.arange(round(duration * RATE_HZ) + 1) / RATE_HZ
+    return Trajectory("free", np.stack([_via_path(time, *path, SETTLE_S) for path in paths], axis=1))
 
 
 def _via_path(time: Array, points: Array, transit: Array, dwell: Array, start: float) -> Array:

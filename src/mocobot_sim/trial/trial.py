@@ -40,7 +40,8 @@ def run_trial(
         progress: called with the number of samples done and that of all, at first with 0 and then every second of the
             trial.
         trial_number: which trial this is, from 1: the scene's pushes for other trials do not act; None lets all act.
-        feed_forward: F_ff of every robot in its {b} [N], shape (N, 3), held from the start; None to take it up.
+        feed_forward: F_ff of every robot in its {b} [N], shape (N, 3), held from the start; None to take it up, or
+            for none at all where nothing is held.
         timestep_s: integration step [s]; None for the scene's.
         actors: what else acts: bases that drive, a person's hand.
 
@@ -56,12 +57,14 @@ def run_trial(
     if timestep_s is not None:
         model.opt.timestep = timestep_s
     data = mujoco.MjData(model)
-    index = TeamIndex.of(model)
+    index = TeamIndex.of(model, scene.carries)
     design = omnid_design()
     assemble_at_home(scene, model, data, index)
     ticks = _whole("control rate over recording rate", gains.rate_hz / RATE_HZ)
     substeps = _whole("control period over time step", 1.0 / (gains.rate_hz * model.opt.timestep))
     ref, ref_dot = between_commands(trajectory.ref_b, ticks)
+    if feed_forward is None and not scene.carries:
+        feed_forward = np.zeros((index.robots, 3))
     sensed = np.empty((len(ref), index.robots, 3, 3))
     controller = TeamController(index, design, gains, data, scene.units, scene.sensors, feed_forward, sensed)
     log = Rows(model, data, index, len(trajectory.ref_b), scene.grasp_slack_m)
@@ -74,7 +77,7 @@ def run_trial(
         progress(0, last + 1)
     for sample in range(last + 1):
         for tick in range(sample * ticks, (sample + 1) * ticks):
-            if pushes or actors:
+            if scene.carries and (pushes or actors):
                 data.xfrc_applied[index.payload_body] = 0.0
             for actor in actors:
                 actor.act(tick)

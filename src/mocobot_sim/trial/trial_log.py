@@ -25,7 +25,7 @@ class TrialLog:
         tau: true torque of the springs on the proximal links, positive raising them [N m], shape (Q, N, 3).
         ref_b: commanded wrist positions in {b} [m], shape (Q, N, 3).
         p_W1: origin of {1} in the world [m], shape (Q, 3).
-        R_W1: orientation of {1} (the payload) in the world, shape (Q, 3, 3).
+        R_W1: orientation of {1} (the payload, or robot 1's flange that holds nothing) in the world, shape (Q, 3, 3).
         feed_forward: the controller's frozen load force in {b} [N], shape (N, 3).
         gains: control gains.
         units: how each robot deviates from the design, N entries.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,8 @@ class GroundTruth:
         principal_kgm2: principal moments of inertia, ascending, shape (3,).
         units: how each robot deviates from the design, N entries.
         effects: what else was hidden in the team.
+
+    Robots that hold nothing have no grasps (N = 0 above), and all of the payload is zero.
     """
 
     R_1i: Array
@@ -46,6 +48,9 @@ class GroundTruth:
     @classmethod
     def of(cls, scene: TeamScene) -> GroundTruth:
         """Read the truth from the compiled scene."""
+        if not scene.carries:
+            none, zero = np.zeros((0, 3)), np.zeros(3)
+            return cls(np.zeros((0, 3, 3)), none, 0.0, zero, np.eye(3), zero, scene.units, scene.effects)
         model = scene.compile()
         data = posed(model)
         index = TeamIndex.of(model)
@@ -69,8 +74,11 @@ class GroundTruth:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """JSON-able form, units in the keys; orientations as rotation vectors in degrees."""
-        return {
+        """JSON-able form, units in the keys; orientations as rotation vectors in degrees.
+
+        Of robots that hold nothing it has ``as_built`` and ``effects`` only.
+        """
+        payload = {
             "grasps": [
                 {"p_1i_m": p.tolist(), "R_1i_rotvec_deg": _rotvec_deg(R)}
                 for p, R in zip(self.p_1i, self.R_1i, strict=True)
@@ -79,9 +87,12 @@ class GroundTruth:
             "p_1c_m": self.p_1c.tolist(),
             "R_1c_rotvec_deg": _rotvec_deg(self.R_1c),
             "principal_inertia_kgm2": self.principal_kgm2.tolist(),
-            "as_built": [{key: value.tolist() for key, value in asdict(unit).items()} for unit in self.units],
+        }
+        robots = {
+            "as_built": [unit.to_dict() for unit in self.units],
             "effects": [effect_to_dict(effect) for effect in self.effects],
         }
+        return payload | robots if len(self.p_1i) else robots
 
 
 def truth_path(recording: Path) -> Path:

@@ -11,6 +11,7 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
+from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 from estimator.signals.grasp_data import GraspData
 from estimator.statistics import rms
@@ -92,7 +93,13 @@ def replay_trial(
     """
     meta = recording.metadata
     notes: list[str] = []
-    estimate = _given(estimate, recording, notes) if estimate else _estimated(recording, notes)
+    if meta.trial == FREE:
+        notes.append(
+            "The robots hold nothing: they are drawn in a row, without a payload, an estimate or forces on one."
+        )
+        estimate = truth = None
+    else:
+        estimate = _given(estimate, recording, notes) if estimate else _estimated(recording, notes)
     if diagnosis is not None:
         _check_diagnosis(diagnosis, recording, notes)
     bodies = body_motion(recording.phi, recording.theta, meta.design)
@@ -101,19 +108,19 @@ def replay_trial(
     facts = None if estimate is None else facts_of(estimate)
     grasps = held(facts, meta.robots)
     bases, motion = placed(R_bi, wrist, grasps, height)
-    if motion is None:
+    if motion is None and meta.trial != FREE:
         notes.append(
             "The grasps are not known, so neither is where the robots stand: they are drawn in a row, without a "
             "payload. Give an estimate from recordings with motion (--estimate)."
         )
-    else:
+    elif motion is not None:
         gap, turn = rms(motion.gap_position_m), rms(motion.gap_rotation_rad)
         if gap > MISFIT_M or turn > MISFIT_RAD:
             notes.append(
                 f"The grasps do not fit this recording: flanges and grasps are {1e3 * gap:.0f} mm and "
                 f"{1e3 * turn:.0f} mrad apart (rms)."
             )
-    data = filtered(recording, notes)
+    data = None if meta.trial == FREE else filtered(recording, notes)
     return ReplayTrial(
         name=name,
         recording=recording,

@@ -9,9 +9,9 @@ from discrepancy.least_squares.whitening import Whitening
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.adjust import TorqueNoise, with_adjusted_torques
 from discrepancy.team.linear.noise import Noise
-from discrepancy.team.linear.residual import balance, grasp_data
 from discrepancy.team.linear.signals import with_rates
 from discrepancy.team.linear.start import noise_rows
+from estimator.rigid_team.residual import balance, grasp_data
 from team_case import DESIGN, exact, residual_of
 
 DRAWS = 12

@@ -12,13 +12,13 @@ from discrepancy.rig import Transient
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.linear.reduction import Reduction
-from discrepancy.team.linear.residual import Bases, Shared
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import linearise
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances
 from estimator.arm.delta import LEG_DIRECTIONS, forward_kinematics, jacobian
 from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.rigid_team.residual import Bases, Shared
 from mocobot_sim.effects.catalogue import EFFECTS, make_effect
 from team_case import DESIGN, exact, residual_of
 

@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
-from discrepancy.team.linear.residual import balance
 from discrepancy.team.linear.trial_linear import linearise
 from estimator.arm.delta import forward_kinematics, inverse_kinematics, jacobian, leg_geometry
 from estimator.arm.dynamics import arm_torque
+from estimator.rigid_team.residual import balance
 from recorded_team import COM, GRASPS, HOME, STEP_S, as_matrix, derivatives
 from team_case import DESIGN, exact, residual_of
 from test_team_causes import assert_close, rate_of

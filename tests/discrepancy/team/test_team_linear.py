@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from discrepancy.team.linear.residual import balance, grasp_data, pose_error, pose_residual
 from discrepancy.team.linear.signals import with_rates
 from discrepancy.team.linear.start import start_bases
+from estimator.rigid_team.residual import balance, grasp_data, pose_error, pose_residual
 from recorded_team import GRASPS
 from team_case import DESIGN, exact, residual_of, true_bases, true_shared
 

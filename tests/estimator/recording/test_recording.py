@@ -198,15 +198,39 @@ def test_no_metadata(path, table):
     ("changes", "message"),
     [
         ({"format": "other"}, "format is 'other'; it must be 'mocobot-recording'"),
-        ({"version": 4}, "version is 4; this program reads versions 1, 2 and 3"),
-        ({"version": "1"}, "version is '1'; this program reads versions 1, 2 and 3"),
-        ({"version": True}, "version is True; this program reads versions 1, 2 and 3"),
-        ({"version": 4, "robots": ..., "units": 1}, "version is 4; this program reads versions 1, 2 and 3"),
+        ({"version": 5}, "version is 5; this program reads versions 1, 2, 3 and 4"),
+        ({"version": "1"}, "version is '1'; this program reads versions 1, 2, 3 and 4"),
+        ({"version": True}, "version is True; this program reads versions 1, 2, 3 and 4"),
+        (
+            {"version": 5, "robots": ..., "units": 1},
+            "version is 5; this program reads versions 1, 2, 3 and 4",
+        ),
         ({"version": 3}, "missing key 'level'; required are format, version"),
         ({"version": 3, "level": "joint"}, "missing key 'sampling'; required are format, version"),
         (
             {"version": 3, "level": "joint", "sampling": []},
             "sampling is []; it must be a list with one object",
+        ),
+        ({"version": 4, "trial": "free"}, "missing key 'level'; required are format, version"),
+        (
+            {"version": 4, "level": "joint", "sampling": []},
+            "sampling is []; it must be a list with one object for each robot",
+        ),
+        (
+            {"trial": "free"},
+            "trial is 'free'; it must be one of random, periodic, static in version 1 (4 has free trials)",
+        ),
+        (
+            {"version": 2, "level": "joint", "trial": "free"},
+            "trial is 'free'; it must be one of random, periodic, static in version 2 (4 has free trials)",
+        ),
+        (
+            {"version": 4, "level": "joint", "trial": "rest"},
+            "trial is 'rest'; it must be one of random, periodic, static, free",
+        ),
+        (
+            {"version": 4, "level": "joint", "trial": "free", "payload": "a"},
+            "payload is 'a'; it must be null in a free trial, whose robots hold nothing",
         ),
         ({"version": 2}, "missing key 'level'; required are format, version"),
         ({"level": "wrist"}, "unknown key 'level'; the keys are format, version, robots"),

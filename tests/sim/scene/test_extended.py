@@ -1,6 +1,7 @@
 """Extended models: what is written runs alike when it is read, in plain MuJoCo and in a trial."""
 
 import json
+from dataclasses import replace
 
 import mujoco
 import numpy as np
@@ -11,6 +12,8 @@ from estimator.errors import InputError
 from mocobot.cli import main
 from mocobot_sim.effects import EFFECTS
 from mocobot_sim.extended.extended import extra_of, load_extended, write_extended
+from mocobot_sim.scene.as_built import CalibrationSpread
+from mocobot_sim.scene.free import build_free_team
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.resimulate import predicted
 from mocobot_sim.trial.trajectories import random_vias
@@ -190,3 +193,22 @@ def test_command_line_refuses_what_contradicts_a_model(folder, tmp_path, capsys,
     assert caught.value.code == 2
     assert sentence in capsys.readouterr().err
     assert not (tmp_path / "rec.parquet").exists()
+
+
+def test_masses_of_the_arms_are_kept_and_may_be_missing(tmp_path):
+    units = CalibrationSpread(geometry_m=1e-3, arm_mass_ratio=0.05).draw(3, np.random.default_rng(2))
+    write_extended(build_team("a", units), [], tmp_path / "model", {})
+    loaded = load_extended(tmp_path / "model")
+    assert [unit.to_dict() for unit in loaded.units] == [unit.to_dict() for unit in units]
+    assert loaded.units[1].wrist_mass_ratio
+    masses = ("proximal_mass_ratio", "rod_mass_ratio", "wrist_mass_ratio")
+    _change(tmp_path / "model", lambda v: [unit.pop(name) for unit in v["as_built"] for name in masses])
+    older = load_extended(tmp_path / "model")
+    zero = dict(zip(masses, (np.zeros(3), np.zeros(3), 0.0), strict=True))
+    assert older.units[1].to_dict() == replace(units[1], **zero).to_dict()
+
+
+def test_robots_that_hold_nothing_are_no_extended_model(tmp_path):
+    with pytest.raises(InputError, match="the robots hold nothing; an extended model carries a payload"):
+        write_extended(build_free_team(2), [], tmp_path / "model", {})
+    assert not list(tmp_path.iterdir())

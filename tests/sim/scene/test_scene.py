@@ -13,7 +13,7 @@ import pytest
 from closed_loop import BASE_HEIGHT_M, ClosedLoop
 from estimator.errors import InputError
 from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread
-from mocobot_sim.scene.models import payload_names, payload_path
+from mocobot_sim.scene.models import omnid_design, payload_names, payload_path
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.scene.team_index import TeamIndex
 from payload_mjcf import FIVE, ONE, TEAMS, TWO, Grasp, Payload
@@ -158,16 +158,17 @@ def test_deviations_change_what_they_should_and_nothing_else(tmp_path):
     np.testing.assert_allclose(after["stiffness"], 100.0 * (1.0 + unit.stiffness_ratio), rtol=1e-14)
     for name, values in _lengths(nominal, 1).items():
         np.testing.assert_array_equal(values, _lengths(built, 1)[name])
-    for name in (
-        "body_mass",
-        "body_inertia",
-        "body_ipos",
-        "dof_armature",
-        "jnt_axis",
-        "eq_solref",
-        "body_quat",
-    ):
+    for name in ("body_mass", "dof_armature", "jnt_axis", "eq_solref", "body_quat"):
         np.testing.assert_array_equal(getattr(nominal, name), getattr(built, name), err_msg=name)
+    # Rods stay uniform: the centre in the middle, m l^2 / 12 about it.
+    rods = [built.body(f"omnid2/rod{k + 1}").id for k in range(3)]
+    others = np.setdiff1d(np.arange(built.nbody), rods)
+    for name in ("body_inertia", "body_ipos"):
+        np.testing.assert_array_equal(getattr(nominal, name)[others], getattr(built, name)[others], err_msg=name)
+    design, lengths = omnid_design(), after["rod_length_m"]
+    np.testing.assert_allclose(built.body_ipos[rods, 0], lengths / 2, rtol=1e-14)
+    across = np.sort(built.body_inertia[rods], axis=1)[:, 1:]
+    np.testing.assert_allclose(across, np.tile(design.rod_mass_kg * lengths[:, None] ** 2 / 12, 2), rtol=1e-12)
     # The legs stay in their planes: the deviations are along the links.
     data = _state(built)
     R_Wb = data.body("omnid2/base").xmat.reshape(3, 3)
@@ -185,7 +186,9 @@ def test_drawn_units_have_the_stated_spread_and_do_not_depend_on_the_teams_size(
         "base_radius_m": 0.3, "proximal_length_m": 0.3, "rod_length_m": 0.3, "platform_radius_m": 0.3,
         "stiffness_ratio": 0.2, "phi_zero_rad": 0.1, "theta_zero_rad": 0.1, "tau_zero_Nm": 0.4,
     }  # fmt: skip
-    assert set(expected) == {entry.name for entry in dataclasses.fields(AsBuilt)}
+    masses = {"proximal_mass_ratio", "rod_mass_ratio", "wrist_mass_ratio"}  # see test_free
+    assert set(expected) | masses == {entry.name for entry in dataclasses.fields(AsBuilt)}
+    assert not any(np.any(getattr(units[0], name)) for name in masses)
     drawn = {name: np.array([getattr(unit, name) for unit in units]) for name in expected}
     for name, sigma in expected.items():
         # 6000 draws: the standard deviation is good to 0.9 %, the mean to 1.3 % of it (4.5 sigma below).

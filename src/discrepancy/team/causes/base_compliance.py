@@ -3,8 +3,8 @@
 import numpy as np
 
 from discrepancy.team.causes.base import Cause, stack
-from discrepancy.team.linear.slots import PHI, PHI_DDOT, PHI_DOT
 from estimator.arm.delta import leg_geometry, wrist_motion
+from estimator.rigid_team.slots import PHI, PHI_DDOT, PHI_DOT
 
 
 class BaseCompliance(Cause):

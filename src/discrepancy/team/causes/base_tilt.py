@@ -3,8 +3,8 @@
 import numpy as np
 
 from discrepancy.team.causes.base import Cause, stack
-from discrepancy.team.linear.slots import PHI
 from estimator.arm.delta import jacobian_of, leg_geometry
+from estimator.rigid_team.slots import PHI
 
 
 class BaseTilt(Cause):

@@ -4,8 +4,8 @@ import numpy as np
 
 from discrepancy.team.causes.base import Cause
 from discrepancy.team.causes.sliding import Friction
-from discrepancy.team.linear.slots import THETA
 from estimator.arm.gimbal import rate_matrix
+from estimator.rigid_team.slots import THETA
 
 
 class GimbalFriction(Friction):

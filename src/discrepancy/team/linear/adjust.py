@@ -13,10 +13,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discrepancy.team.linear.residual import balance
-from discrepancy.team.linear.slots import TAU
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
+from estimator.rigid_team.residual import balance
+from estimator.rigid_team.slots import TAU
 
 
 @dataclass(frozen=True, eq=False)

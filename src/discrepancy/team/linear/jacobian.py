@@ -4,12 +4,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
-from discrepancy.team.linear.residual import Bases, Shared, robot_data
-from discrepancy.team.linear.slots import COUNT, STEPS
 from estimator.arm.design import OmnidDesign
 from estimator.arrays import Array
 from estimator.estimate.fusion import fuse, fusion_matrix
 from estimator.estimate.principal import inertia_matrix
+from estimator.rigid_team.residual import Bases, Shared, robot_data
+from estimator.rigid_team.slots import COUNT, STEPS
 from estimator.signals.grasp_data import GraspData
 
 

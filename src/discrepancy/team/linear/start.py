@@ -12,7 +12,6 @@ from discrepancy.least_squares.whitening import Whitening
 from discrepancy.team.linear.adjust import TorqueNoise, with_adjusted_torques
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
-from discrepancy.team.linear.residual import Bases, Shared, balance, grasp_data, pose_residual
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear, filtered, linearise
 from estimator import so3
@@ -24,6 +23,7 @@ from estimator.errors import InputError
 from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
+from estimator.rigid_team.residual import Bases, Shared, balance, grasp_data, pose_residual
 
 
 def start_shared(estimate: PayloadEstimate) -> Shared:

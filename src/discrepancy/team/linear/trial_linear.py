@@ -8,7 +8,11 @@ import numpy as np
 
 from discrepancy.team.linear.jacobian import by_signals, needed_wrench
 from discrepancy.team.linear.reduction import Reduction
-from discrepancy.team.linear.residual import (
+from discrepancy.team.linear.signals import Signals, with_rates
+from estimator.arm.design import OmnidDesign
+from estimator.arrays import Array
+from estimator.estimate.fusion import fusion_matrix
+from estimator.rigid_team.residual import (
     Bases,
     Shared,
     balance,
@@ -16,11 +20,7 @@ from discrepancy.team.linear.residual import (
     pose_error,
     pose_residual,
 )
-from discrepancy.team.linear.signals import Signals, with_rates
-from discrepancy.team.linear.slots import COUNT, PHI, TAU, THETA, with_its_rates
-from estimator.arm.design import OmnidDesign
-from estimator.arrays import Array
-from estimator.estimate.fusion import fusion_matrix
+from estimator.rigid_team.slots import COUNT, PHI, TAU, THETA, with_its_rates
 from estimator.signals.grasp_data import GraspData
 
 

@@ -15,14 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from estimator.arm.delta import forward_kinematics, leg_geometry, wrist_motion
+from estimator.arm.delta import forward_kinematics
 from estimator.arm.design import OmnidDesign
-from estimator.arm.dynamics import wrench_on_payload
-from estimator.arm.gimbal import angular_motion, rotation
+from estimator.arm.gimbal import rotation
 from estimator.arrays import Array
 from estimator.estimate.fusion import fuse
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.joint import newton_euler_regressor
+from estimator.signals.arm_data import ArmData, arm_data
 from estimator.signals.grasp_data import GraspData
 
 
@@ -82,21 +82,12 @@ def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:
     return np.concatenate(parts, axis=1) if parts else np.zeros((len(R), 0))
 
 
-def robot_data(s: Array, design: OmnidDesign) -> tuple[Array, Array, Array, Array, Array]:
+def robot_data(s: Array, design: OmnidDesign) -> ArmData:
     """R_bi, h, twist, twist_dot and wrench of robots whose signals are s (``slots``), shape (Q, ..., 21)."""
     phi, phi_dot, phi_ddot, theta, theta_dot, theta_ddot, tau = np.moveaxis(
         s.reshape(*s.shape[:-1], 7, 3), -2, 0
     )
-    legs = leg_geometry(phi, design)
-    h_dot, h_ddot = wrist_motion(legs, phi_dot, phi_ddot)
-    R = rotation(theta)
-    omega, omega_dot = angular_motion(theta, theta_dot, theta_ddot)
-    v = np.einsum("...ji,...j->...i", R, h_dot)
-    v_dot = np.einsum("...ji,...j->...i", R, h_ddot) - np.cross(omega, v)
-    wrench = wrench_on_payload((phi, phi_dot, phi_ddot), (theta, theta_dot, theta_ddot), tau, design)
-    return (
-        R, legs.h, np.concatenate([omega, v], axis=-1), np.concatenate([omega_dot, v_dot], axis=-1), wrench
-    )  # fmt: skip
+    return arm_data((phi, phi_dot, phi_ddot), (theta, theta_dot, theta_ddot), tau, design)
 
 
 def balance(data: GraspData, shared: Shared) -> tuple[Array, Array]:

@@ -1,0 +1,219 @@
+"""Calibrate a team from recordings of what it carries: from files' contents to a ``Calibration``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimator.arm.unit import COUNT, ArmUnit
+from estimator.arrays import Array
+from estimator.calibrate.alone import AloneEquations
+from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration
+from estimator.calibrate.equations import TrialEquations
+from estimator.calibrate.fit import Fit, KnownMass, Trial, fit
+from estimator.calibrate.held_out import held_out
+from estimator.calibrate.prior import Prior
+from estimator.calibrate.rows import Rows
+from estimator.calibrate.sensing import Sensing
+from estimator.calibrate.start import start_bases
+from estimator.calibrate.unknowns import Unknowns
+from estimator.errors import InputError
+from estimator.estimate.payload import estimate_payload
+from estimator.estimate.principal import inertia_parameters
+from estimator.estimate.result import PayloadEstimate
+from estimator.recording.checks import check_duration, check_recording
+from estimator.recording.model import Recording
+from estimator.rigid_team.residual import Shared
+
+
+def calibrate(
+    recordings: Sequence[Recording],
+    free: Sequence[Recording] = (),
+    prior: Prior | None = None,
+    known_mass: Mapping[str, tuple[float, float]] | None = None,
+    say: Callable[[str], object] = lambda _: None,
+) -> Calibration:
+    """Geometry, springs, zeros and, where asked, masses of every robot, with what they carry.
+
+    One nonlinear least squares over closed loops and balance of wrenches of all recordings. Recordings with the same
+    payload label are of one payload; without labels all are.
+
+    Args:
+        recordings: trials with a payload, of the same robots.
+        free: recordings of the same robots with nothing in their hands.
+        prior: how far the robots may be off; None for robots out of the box.
+        known_mass: weighed mass of payloads by label, with its standard error [kg]; "" for one without a label.
+        say: takes the name of the stage that begins.
+
+    Raises:
+        InputError: the recordings do not belong together, do not move enough, or cannot be solved.
+    """
+    prior = prior or Prior()
+    groups = _by_payload(recordings)
+    _check_together([*recordings, *free])
+    design, N = recordings[0].metadata.design, recordings[0].metadata.robots
+    if N < 2:
+        raise InputError(
+            f"{recordings[0].name}: one robot closes no loop; two or more that carry one payload are needed"
+        )
+    shared = []
+    for label, members in groups.items():
+        say(f"payload {label}" if label else "payload")
+        shared.append(_start(estimate_payload(members, "auto", withhold=False), members))
+    say("calibration")
+    units = ArmUnit(design, np.zeros((N, COUNT)))
+    sensing = Sensing.of([*recordings, *free])
+    labels = list(groups)
+    rows = [_rows(recording) for recording in recordings]
+    payload_of = [labels.index(recording.metadata.payload) for recording in recordings]
+    trials = [Trial(TrialEquations.of(r, sensing), k) for r, k in zip(rows, payload_of, strict=True)]
+    bases = [start_bases(r, units, shared[k]) for r, k in zip(rows, payload_of, strict=True)]
+    alone = [AloneEquations.of(_rows(recording), sensing) for recording in free]
+    found = fit(
+        trials,
+        Unknowns(units, tuple(shared), tuple(bases)),
+        prior,
+        alone,
+        _weights(known_mass or {}, labels),
+    )
+    return _result(found, recordings, free, labels, payload_of, prior, tuple(known_mass or ()))
+
+
+def _by_payload(recordings: Sequence[Recording]) -> dict[str | None, list[Recording]]:
+    if not recordings:
+        raise InputError("no recording with a payload was given")
+    groups: dict[str | None, list[Recording]] = {}
+    for recording in recordings:
+        groups.setdefault(recording.metadata.payload, []).append(recording)
+    if None in groups and len(groups) > 1:
+        raise InputError(
+            f"{groups[None][0].name} does not say which payload it is of, and others do; name it in every recording"
+        )
+    return groups
+
+
+def _check_together(recordings: Sequence[Recording]) -> None:
+    first = recordings[0]
+    for recording in recordings:
+        check_recording(recording)
+        check_duration(recording, 2.0)
+        if recording.metadata.robots != first.metadata.robots:
+            raise InputError(
+                f"{recording.name} has {recording.metadata.robots} robots and {first.name} has "
+                f"{first.metadata.robots}; a calibration is of the same robots"
+            )
+        if recording.metadata.design != first.metadata.design:
+            raise InputError(
+                f"{recording.name} and {first.name} differ in design; a calibration is of the same robots"
+            )
+
+
+def _start(estimate: PayloadEstimate, members: Sequence[Recording]) -> Shared:
+    grasps, mass, c = estimate.grasps, estimate.mass, estimate.p_1c
+    if grasps is None or mass is None or c is None:
+        missing = "grasps" if grasps is None else "mass" if mass is None else "centre of mass"
+        names = ", ".join(recording.name for recording in members)
+        raise InputError(
+            f"{names}: the motion does not determine the {missing}, so there is nothing to calibrate against; "
+            "add a trial in which the payload turns about all axes"
+        )
+    inertia = estimate.inertia.inertia if estimate.inertia else 0.01 * mass.mass * np.eye(3)
+    about_1 = inertia + mass.mass * (c @ c * np.eye(3) - np.outer(c, c))
+    return Shared(grasps, np.concatenate([[mass.mass], mass.mass * c, inertia_parameters(about_1)]))
+
+
+def _rows(recording: Recording) -> Rows:
+    rows = Rows.of(recording)
+    if len(rows.time) < 8:
+        raise InputError(f"{recording.name}: too short to calibrate; 10 s of motion are the least")
+    return rows
+
+
+def _weights(known: Mapping[str, tuple[float, float]], labels: Sequence[str | None]) -> list[KnownMass]:
+    names = [label or "" for label in labels]
+    for label, (mass, se) in known.items():
+        if label not in names:
+            raise InputError(
+                f"known mass of payload {label!r}: the recordings are of {', '.join(map(repr, names))}"
+            )
+        if not (np.isfinite(mass) and mass > 0 and np.isfinite(se) and se > 0):
+            raise InputError(
+                f"known mass of payload {label!r} is {mass} +- {se} kg; both must be greater than 0"
+            )
+    return [KnownMass(names.index(label), mass, se) for label, (mass, se) in known.items()]
+
+
+def _result(
+    found: Fit,
+    recordings: Sequence[Recording],
+    free: Sequence[Recording],
+    labels: Sequence[str | None],
+    payload_of: Sequence[int],
+    prior: Prior,
+    known_mass: tuple[str, ...],
+) -> Calibration:
+    layout, N = found.layout, found.layout.robots
+    payloads = []
+    for k, label in enumerate(labels):
+        at = layout.of_payload(k)
+        covariance, grasped = found.covariance[at, at], 6 * (N - 1)
+        shared = found.unknowns.carried[k]
+        grasps = replace(shared.grasps, covariance=covariance[:grasped, :grasped])
+        payloads.append(CalibratedPayload(label, grasps, shared.pi, covariance, found.by_scale[at]))
+    trials = []
+    for k, (recording, left) in enumerate(zip(recordings, held_out(found), strict=True)):
+        done = found.trials[k]
+        count = done.loops.count, done.balance.count
+        trials.append(
+            CalibratedTrial(
+                recording.name,
+                recording.metadata.trial,
+                payload_of[k],
+                _length(recording),
+                count,
+                _per(found.before[k], count),
+                _per((done.loops.c, done.balance.c), count),
+                left,
+                found.unknowns.bases[k],
+            )
+        )
+    for recording, one in zip(free, found.alone, strict=True):
+        count = 0, one.count
+        trials.append(
+            CalibratedTrial(
+                recording.name,
+                "free",
+                None,
+                _length(recording),
+                count,
+                None,
+                (0.0, one.c / one.count),
+                None,
+                None,
+            )
+        )
+    at = layout.of_units
+    calibration = Calibration(
+        units=found.unknowns.units,
+        covariance=found.covariance[at, at],
+        by_scale=found.by_scale[at].reshape(N, COUNT),
+        scale_sd=0.0 if known_mass else prior.stiffness_ratio / np.sqrt(3.0 * N),
+        prior=prior,
+        payloads=tuple(payloads),
+        trials=tuple(trials),
+        known_mass=known_mass,
+        steps=found.steps,
+        findings=(),
+        open=(),
+    )
+    return calibration
+
+
+def _length(recording: Recording) -> float:
+    return float(recording.time[-1] - recording.time[0])
+
+
+def _per(chi2: Array | tuple[float, float], count: tuple[int, int]) -> tuple[float, float]:
+    return float(chi2[0]) / max(1, count[0]), float(chi2[1]) / max(1, count[1])

@@ -1,0 +1,282 @@
+"""Loops and balance of one trial as rows, with their derivatives by the unknowns and the covariance of their noise.
+
+Residual and signs as in ``estimator.rigid_team.residual``, here of robots as they are. The residual is evaluated at the
+thinned instants and averaged into rows; derivatives are taken at the rows' mean signals, which vary slowly, after these
+were adjusted towards the model (W. E. Deming, Statistical Adjustment of Data, 1943; in geodesy the Gauss-Helmert
+model): of signals as measured, noise is in derivative and residual alike, and shrank the mass by 3.6 %.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.arm.unit import AT, COUNT, ArmUnit
+from estimator.arrays import Array
+from estimator.calibrate.level import corrected, level_data
+from estimator.calibrate.loops import pose_derivatives
+from estimator.calibrate.rows import Rows
+from estimator.calibrate.sensing import Sensing
+from estimator.estimate.fusion import fusion_with, total_wrench
+from estimator.estimate.joint import newton_euler_regressor
+from estimator.estimate.principal import inertia_matrix
+from estimator.rigid_team.residual import Bases, Shared, pose_error
+from estimator.rigid_team.slots import COUNT as SLOTS
+from estimator.rigid_team.slots import PHI, STEPS, TAU, THETA
+from estimator.signals.arm_data import ArmData
+
+_GEOMETRY = np.r_[AT["radius"], AT["proximal_length"], AT["rod_length"]]
+_MASSES = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]
+_TILT = np.r_[AT["tilt"]]
+_BY_UNIT: NDArray[np.intp] = np.concatenate([_GEOMETRY, _MASSES, _TILT])
+_UNIT_STEPS = np.concatenate([np.full(9, 1e-6), np.full(7, 1e-4), np.full(2, 1e-6)])
+
+
+class Rowed(NamedTuple):
+    """Rows of one trial; C = 6 N channels, the balance's force and moment last.
+
+    Attributes:
+        residual: shape (n, C).
+        by_units: derivative by every robot's deviations, shape (n, C, N, ``COUNT``).
+        by_carried: by ``Shared.moved``, shape (n, C, 6 (N - 1) + 10).
+        by_bases: by ``Bases.moved``, shape (n, C, 4 (N - 1)).
+        covariance: of the residual's noise, shape (n, C, C).
+        adjustment: what moves the rows' signals towards the model, shape (n, N, ``SLOTS``).
+    """
+
+    residual: Array
+    by_units: Array
+    by_carried: Array
+    by_bases: Array
+    covariance: Array
+    adjustment: Array
+
+
+@dataclass(frozen=True, eq=False)
+class TrialEquations:
+    """One trial's rows for any values of the unknowns.
+
+    Attributes:
+        rows: its signals, and how they are averaged.
+        variances: of one sample in motion and of a hold's mean, shape (n, N, 9) each.
+        mean: averaged readings, shape (n, N, ``SLOTS``).
+    """
+
+    rows: Rows
+    variances: tuple[Array, Array]
+    mean: Array
+
+    @classmethod
+    def of(cls, rows: Rows, sensing: Sensing) -> TrialEquations:
+        """Of a trial whose sensors are known."""
+        mean = rows(rows.s)
+        # A hold is at rest: what rates it shows are noise.
+        mean[rows.moving :, :, 3:9] = mean[rows.moving :, :, 12:18] = 0.0
+        return cls(rows, sensing.variances(rows), mean)
+
+    def residual(self, units: ArmUnit, shared: Shared, bases: Bases) -> Array:
+        """Rows of the residual, shape (n, C)."""
+        return self.rows(_residual(level_data(corrected(self.rows.s, units), units), units, shared, bases))
+
+    def at(self, units: ArmUnit, shared: Shared, bases: Bases, adjustment: Array | None = None) -> Rowed:
+        """Everything at some unknowns.
+
+        Args:
+            units, shared, bases: the unknowns.
+            adjustment: of the signals, as found at unknowns near these; None for none yet.
+        """
+        s = corrected(self.mean, units)
+        if adjustment is not None:
+            s = s + adjustment
+        residual = self.residual(units, shared, bases)
+        by_signals, by_units, by_carried, by_bases = _derivatives(s, units, shared, bases)
+        # Loops alone hardly tell a common scale of all lengths, and an error of a thousandth in one derivative would
+        # hide it: theirs are averaged exactly.
+        poses = pose_derivatives(self.rows, units, shared, bases)
+        loops = slice(0, residual.shape[1] - 6)
+        by_units[:, loops], by_carried[:, loops], by_bases[:, loops] = poses
+        covariance = self._covariance(by_signals)
+        return Rowed(
+            residual,
+            by_units,
+            by_carried,
+            by_bases,
+            covariance,
+            self._adjustment(by_signals, covariance, residual),
+        )
+
+    def _noise(self) -> Array:
+        """Covariance of every joint's (value, rate, acceleration) and of every torque in the rows: (n, N, 7, 3, 3)."""
+        moving, held = self.variances
+        n, N = moving.shape[:2]
+        out = np.zeros((n, N, 7, 3, 3))
+        at = slice(0, self.rows.moving)
+        out[at, :, :6] = moving[at, :, :6, None, None] * self.rows.gain
+        out[at, :, 6, range(3), range(3)] = moving[at, :, 6:] * self.rows.gain[0, 0]
+        at = slice(self.rows.moving, None)
+        out[at, :, :6, 0, 0] = held[at, :, :6]
+        out[at, :, 6, range(3), range(3)] = held[at, :, 6:]
+        return out
+
+    def _covariance(self, J: Array) -> Array:
+        noise = self._noise()
+        total = np.zeros((len(J), J.shape[1], J.shape[1]))
+        for robot in range(J.shape[2]):
+            for joint, at in enumerate(_CHAINS):
+                part = J[:, :, robot, at]
+                total += part @ noise[:, robot, joint] @ np.swapaxes(part, 1, 2)
+        return total
+
+    def _adjustment(self, J: Array, covariance: Array, residual: Array) -> Array:
+        noise = self._noise()
+        weighed = np.linalg.solve(covariance, residual[..., None])
+        out = np.zeros((len(J), J.shape[2], SLOTS))
+        for robot in range(J.shape[2]):
+            for joint, at in enumerate(_CHAINS):
+                moved = noise[:, robot, joint] @ (np.swapaxes(J[:, :, robot, at], 1, 2) @ weighed)
+                out[:, robot, at] -= moved[..., 0]
+        return out
+
+
+# Value, rate and acceleration of each joint; the three torques.
+_CHAINS = [np.array([first + k + 3 * order for order in range(3)]) for first in (0, 9) for k in range(3)] + [
+    np.arange(18, 21)
+]
+
+
+def _residual(data: ArmData, units: ArmUnit, shared: Shared, bases: Bases) -> Array:
+    pose = pose_error(data.R_bi, data.h, shared, bases)
+    return np.concatenate([pose, _balance(data, units, shared)], axis=1)
+
+
+def _fusion(units: ArmUnit, shared: Shared) -> Array:
+    """G with V_1 = G [V_1; ...; V_N], shape (6, 6 N).
+
+    Weighed as equal encoders would have it, which turn the driven links and so move the wrist.
+    """
+    ratio = 1.0 / units.design.proximal_length_m
+    return fusion_with(shared.grasps, ratio)
+
+
+def _balance(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
+    """(f, M) of the robots at the origin of {1}, in {1}, minus what moves the payload, shape (Q, 6)."""
+    grasps, Q = shared.grasps, len(data.h)
+    G = _fusion(units, shared)
+    motion, motion_dot = data.twist.reshape(Q, -1) @ G.T, data.twist_dot.reshape(Q, -1) @ G.T
+    up = np.einsum("iab,qib->qa", grasps.R_1i, data.R_bi[..., 2, :])
+    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    force, moment = total_wrench(data.wrench, grasps)
+    specific = motion_dot[:, 3:] + np.cross(motion[:, :3], motion[:, 3:]) + units.gravity_mps2 * up
+    needed = newton_euler_regressor(motion[:, :3], motion_dot[:, :3], specific) @ shared.pi
+    return np.concatenate([force, moment], axis=1) - needed
+
+
+def _derivatives(s: Array, units: ArmUnit, shared: Shared, bases: Bases) -> tuple[Array, Array, Array, Array]:
+    """By signals (n, C, N, ``SLOTS``), units (n, C, N, ``COUNT``), ``Shared.moved`` and ``Bases.moved``."""
+    n, N = s.shape[:2]
+    C = 6 * N
+    data = level_data(s, units)
+    G = _fusion(units, shared)
+    motion = data.twist.reshape(n, -1) @ G.T
+    motion_dot = data.twist_dot.reshape(n, -1) @ G.T
+    summed = np.einsum("iab,qib->qa", shared.grasps.R_1i, data.R_bi[..., 2, :])
+    length = np.linalg.norm(summed, axis=1, keepdims=True)
+    up = summed / length
+
+    by_signals = np.zeros((n, C, N, SLOTS))
+    by_units = np.zeros((n, C, N, COUNT))
+    for i in range(N):
+        base = ArmData(*(part[:, i] for part in data))
+        for slots, changed, steps in (
+            (np.arange(SLOTS), by_signals, STEPS),
+            (_BY_UNIT, by_units, _UNIT_STEPS),
+        ):
+            moved = _moved(s[:, i], ArmUnit(units.design, units.x[i]), slots, steps, changed is by_units)
+            d = ArmData(*(
+                (after - before) / steps.reshape(-1, *[1] * before.ndim)
+                for after, before in zip(moved, base, strict=True)
+            ))  # fmt: skip
+            part = _chain(i, d, base, data, motion, motion_dot, up, length, G, shared, bases, units)
+            changed[:, :, i, slots] = np.moveaxis(part, 0, -1)
+        by_units[:, :, i, AT["phi_zero"]] = -by_signals[:, :, i, PHI]
+        by_units[:, :, i, AT["theta_zero"]] = -by_signals[:, :, i, THETA]
+        of_tau, unit = by_signals[:, :, i, TAU], ArmUnit(units.design, units.x[i])
+        by_units[:, :, i, AT["tau_zero"]] = -of_tau * (1.0 + unit.of("stiffness_ratio"))
+        tau = s[:, i, TAU] / (1.0 + unit.of("stiffness_ratio"))
+        by_units[:, :, i, AT["stiffness_ratio"]] = of_tau * tau[:, None]
+    return by_signals, by_units, _by_carried(data, units, shared), np.zeros((n, C, 4 * (N - 1)))
+
+
+def _moved(s: Array, unit: ArmUnit, slots: NDArray[np.intp], steps: Array, of_unit: bool) -> ArmData:
+    """Data of one robot with each of some signals, or deviations, moved, shape (K, n, ...)."""
+    count = len(slots)
+    if of_unit:
+        x = np.tile(unit.x, (count, 1, 1))
+        x[np.arange(count), 0, slots] += steps
+        return level_data(np.broadcast_to(s, (count, *s.shape)), ArmUnit(unit.design, x))
+    s = np.tile(s, (count, 1, 1))
+    s[np.arange(count), :, slots] += steps[:, None]
+    return level_data(s, unit)
+
+
+def _chain(
+    i: int, d: ArmData, base: ArmData, data: ArmData, motion: Array, motion_dot: Array, up: Array, length: Array,
+    G: Array, shared: Shared, bases: Bases, units: ArmUnit,
+) -> Array:  # fmt: skip
+    """What changes of robot i's data, shape (K, n, ...), do to the residual, shape (K, n, C)."""
+    grasps, N = shared.grasps, shared.grasps.robots
+    K, n = d.h.shape[:2]
+    out = np.zeros((K, n, 6 * N))
+    turn = _vee(d.R_bi @ np.swapaxes(base.R_bi, -1, -2))
+    for j in range(1, N):
+        at = 6 * (j - 1)
+        if i == 0:
+            out[..., at : at + 3] = -turn
+            out[..., at + 3 : at + 6] = -d.h - d.R_bi @ grasps.p_1i[j]
+        elif i == j:
+            out[..., at : at + 3] = turn @ bases.R[j].T
+            out[..., at + 3 : at + 6] = d.h @ bases.R[j].T
+    own = G[:, 6 * i : 6 * i + 6]
+    d_up = d.R_bi[..., 2, :] @ grasps.R_1i[i].T
+    d_up = (d_up - np.sum(d_up * up, axis=-1, keepdims=True) * up) / length
+    needed = _needed(motion, d.twist @ own.T, d.twist_dot @ own.T, d_up * units.gravity_mps2, shared.pi)
+    d_force, d_moment = d.wrench[..., 3:] @ grasps.R_1i[i].T, d.wrench[..., :3] @ grasps.R_1i[i].T
+    d_moment = d_moment + np.cross(grasps.p_1i[i], d_force)
+    out[..., -6:] = np.concatenate([d_force, d_moment], axis=-1) - needed
+    return out
+
+
+def _needed(motion: Array, twist: Array, twist_dot: Array, gravity: Array, pi: Array) -> Array:
+    """Change of what moves the payload by changes of twist, its rate and gravity's opposite, shape (..., 6)."""
+    mass, mass_c, inertia = pi[0], pi[1:4], inertia_matrix(pi[4:])
+    omega, v = motion[:, :3], motion[:, 3:]
+    d_omega, d_alpha = twist[..., :3], twist_dot[..., :3]
+    accel = twist_dot[..., 3:] + np.cross(d_omega, v) + np.cross(omega, twist[..., 3:]) + gravity
+    force = mass * accel + np.cross(d_alpha, mass_c)
+    force += np.cross(d_omega, np.cross(omega, mass_c)) + np.cross(omega, np.cross(d_omega, mass_c))
+    moment = np.cross(mass_c, accel) + d_alpha @ inertia
+    moment += np.cross(d_omega, omega @ inertia) + np.cross(omega, d_omega @ inertia)
+    return np.concatenate([force, moment], axis=-1)
+
+
+def _by_carried(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
+    n, N = data.h.shape[:2]
+    grasped = 6 * (N - 1)
+    out = np.zeros((n, 6 * N, grasped + 10))
+    # The balance depends on grasps in many ways, and on inertia linearly: steps of any size there.
+    steps = np.concatenate([np.full(grasped, 1e-6), np.ones(10)])
+    for k, step in enumerate(steps):
+        dx = np.zeros(len(steps))
+        dx[k] = step
+        ends = [_balance(data, units, shared.moved(sign * dx)) for sign in (1.0, -1.0)]
+        out[:, -6:, k] = (ends[0] - ends[1]) / (2.0 * step)
+    return out
+
+
+def _vee(A: Array) -> Array:
+    """Vector of the skew part of matrices, shapes (..., 3, 3) -> (..., 3)."""
+    low, high = A[..., (2, 0, 1), (1, 2, 0)], A[..., (1, 2, 0), (2, 0, 1)]
+    return 0.5 * (low - high)

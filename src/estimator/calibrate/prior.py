@@ -1,0 +1,77 @@
+"""How far robots may be off their design: standard deviations of what a calibration looks for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from scipy.linalg import null_space
+
+from estimator.arm.unit import AT, COUNT
+from estimator.arrays import Array
+
+_MASSES = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Standard deviations of the deviations in ``estimator.arm.unit.GROUPS``; 0 holds a group as designed.
+
+    The defaults are the spread of robots out of the box that reproduces the errors of the paper's team. A wrong prior
+    hardly matters where the data tell: three times too narrow or too wide gives the same.
+
+    Attributes:
+        encoder_zero_rad: of phi, theta_z and theta_y zeros [rad]; theta_x zeros only turn the grasp frames.
+        geometry_m: of base radius, platform radius, proximal and rod length, each [m].
+        stiffness_ratio: of each spring's relative stiffness [-]; their mean is held unless a weight is known.
+        tau_zero_Nm: of each torque zero [N m].
+        tilt_rad: of a base about x and y [rad].
+        arm_mass_ratio: of the mass of each proximal link and rod and of all at the wrist, relative [-].
+        arm_weight_ratio: of all arms' masses together, relative [-].
+    """
+
+    encoder_zero_rad: float = float(np.deg2rad(1.0))
+    geometry_m: float = 1e-3
+    stiffness_ratio: float = 0.02
+    tau_zero_Nm: float = 0.02
+    tilt_rad: float = 0.0
+    arm_mass_ratio: float = 0.0
+    arm_weight_ratio: float = 0.05
+
+    def factor(self, robots: int, *, hold_scale: bool) -> Array:
+        """A matrix B, shape (N ``COUNT``, k): the robots' deviations are B z, z standard normal and independent.
+
+        Args:
+            robots: number of robots N.
+            hold_scale: whether the mean of all springs' ratios is 0.
+        """
+        columns = np.diag(np.tile(self._sd(), robots))
+        springs = (np.arange(robots)[:, None] * COUNT + np.r_[AT["stiffness_ratio"]]).ravel()
+        masses = (np.arange(robots)[:, None] * COUNT + _MASSES).ravel()
+        parts = [columns]
+        if hold_scale:
+            columns[:, springs] = 0.0
+            apart = np.zeros((len(columns), len(springs) - 1))
+            apart[springs] = self.stiffness_ratio * null_space(np.ones((1, len(springs))))
+            parts.append(apart)
+        together = np.zeros((len(columns), 1))
+        together[masses] = self.arm_weight_ratio
+        factor = np.hstack([*parts, together])
+        return factor[:, factor.any(axis=0)]
+
+    def _sd(self) -> Array:
+        """Standard deviations in the order of ``ArmUnit.x``, shape (``COUNT``,)."""
+        out = np.zeros(COUNT)
+        out[AT["phi_zero"]] = out[AT["theta_zero"]] = self.encoder_zero_rad
+        out[AT["theta_zero"].stop - 1] = 0.0
+        out[AT["radius"]] = np.sqrt(2.0) * self.geometry_m
+        out[AT["proximal_length"]] = out[AT["rod_length"]] = self.geometry_m
+        out[AT["stiffness_ratio"]] = self.stiffness_ratio
+        out[AT["tau_zero"]] = self.tau_zero_Nm
+        out[AT["tilt"]] = self.tilt_rad
+        out[_MASSES] = self.arm_mass_ratio
+        return out
+
+    def scaled(self, factor: float) -> Prior:
+        """All of them larger or smaller."""
+        return Prior(*(factor * getattr(self, field.name) for field in fields(self)))

@@ -1,0 +1,149 @@
+"""From the samples of a trial to nearly independent rows: averages in motion, one mean per hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from estimator.arrays import Array
+from estimator.calibrate import rules
+from estimator.filtering import MIN_SAMPLES, differentiate, low_pass
+from estimator.recording.model import Recording
+from estimator.rigid_team.slots import COUNT
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Signals of one trial, thinned, and the linear map from there to rows.
+
+    Attributes:
+        s: filtered readings with rates and accelerations (``slots``), shape (q, N, 21).
+        operator: rows from the q instants, shape (n, q); rows in motion first.
+        time: middle of every row [s], shape (n,).
+        moving: how many rows are in motion.
+        gain: of white noise of one sample of an angle: covariance of what it leaves in a row of angle, rate and
+            acceleration, in units of its variance, shape (3, 3); in motion.
+        length: samples that a row averages over in a hold, shape (n,); 0 in motion.
+        travel: way that each driven and gimbal joint goes while a row is averaged [rad], shape (n, N, 6).
+        rate_hz: of the samples.
+    """
+
+    s: Array
+    operator: csr_array
+    time: Array
+    moving: int
+    gain: Array
+    length: NDArray[np.intp]
+    travel: Array
+    rate_hz: float
+
+    def __call__(self, x: Array) -> Array:
+        """Rows of samples, shape (q, ...) -> (n, ...)."""
+        return np.asarray(self.operator @ x.reshape(len(x), -1)).reshape(-1, *x.shape[1:])
+
+    @classmethod
+    def of(cls, recording: Recording) -> Rows:
+        """Rows of one recording, from where its joints move and rest."""
+        rate = recording.metadata.rate_hz
+        cutoff = min(rules.PRE_HZ, 0.4 * rate)
+        angles = np.concatenate([recording.phi, recording.theta], axis=2)
+        s = np.empty((len(angles), recording.metadata.robots, COUNT))
+        for first, x in ((0, recording.phi), (9, recording.theta)):
+            value = low_pass(x, rate, cutoff)
+            speed = differentiate(value, rate)
+            for k, part in enumerate((value, speed, differentiate(speed, rate))):
+                s[..., first + 3 * k : first + 3 * k + 3] = part
+        s[..., 18:] = low_pass(recording.tau, rate, cutoff)
+
+        stride = max(1, round(rate / rules.SAMPLE_HZ))
+        kernel, spacing = _kernel(rate / stride)
+        half = len(kernel) // 2
+        trim = round(rules.TRIM_S * rate)
+        holds, still = _holds(angles, rate, trim)
+        at = np.arange(0, len(angles), stride)
+        first, last = max(-(-trim // stride), half), min((len(angles) - trim) // stride, len(at) - half)
+        rows: list[tuple[NDArray[np.intp], Array]] = []
+        centres, length = [], []
+        for centre in range(first, last, spacing):
+            if not still[at[centre]]:
+                rows.append((np.arange(centre - half, centre + half + 1), kernel))
+                centres.append(at[centre])
+                length.append(0)
+        moving = len(rows)
+        for start, stop in holds:
+            inside = np.arange(-(-start // stride), (stop - 1) // stride + 1)
+            rows.append((inside, np.full(len(inside), 1.0 / len(inside))))
+            centres.append((start + stop - 1) // 2)
+            length.append(stop - start)
+        operator = csr_array(
+            (
+                np.concatenate([weights for _, weights in rows]) if rows else np.zeros(0),
+                (
+                    np.repeat(np.arange(len(rows)), [len(columns) for columns, _ in rows]),
+                    np.concatenate([columns for columns, _ in rows]) if rows else np.zeros(0, dtype=int),
+                ),
+            ),
+            shape=(len(rows), len(at)),
+        )
+        thin = s[at]
+        speeds = np.abs(np.concatenate([thin[..., 3:6], thin[..., 12:15]], axis=2))
+        count = np.array([len(columns) for columns, _ in rows], dtype=float)
+        travel = (
+            np.abs(operator)
+            @ speeds.reshape(len(at), -1)
+            / np.maximum(np.abs(operator).sum(axis=1), 1e-300)[:, None]
+        )
+        travel = np.asarray(travel).reshape(len(rows), -1, 6)
+        span = np.where(np.array(length) > 0, count * stride / rate, rules.ROW_S)
+        return cls(
+            thin,
+            operator,
+            recording.time[np.array(centres, dtype=int)] if rows else np.zeros(0),
+            moving,
+            _gain(rate, cutoff, stride, kernel),
+            np.array(length, dtype=np.intp),
+            travel * span[:, None, None],
+            rate,
+        )
+
+
+def _kernel(rate_hz: float) -> tuple[Array, int]:
+    """Weights of a row in motion, their sum 1, and instants between rows.
+
+    A windowed sinc: white noise in neighbouring rows hardly correlates. Means over overlapping windows do, by a sixth,
+    and what varies slowly would seem known by a seventh too well.
+    """
+    spacing = max(1, round(rules.ROW_S * rate_hz))
+    half = rules.LOBES * spacing
+    at = np.arange(-half, half + 1)
+    weights = np.sinc(at / spacing) * np.hanning(2 * half + 3)[1:-1]
+    return weights / weights.sum(), spacing
+
+
+def _gain(rate_hz: float, cutoff_hz: float, stride: int, kernel: Array) -> Array:
+    """What a unit impulse in one sample leaves in a row, squared and summed over all samples, shape (3, 3)."""
+    half = max(round(1.5 * rate_hz), MIN_SAMPLES)
+    impulse = np.zeros(2 * half + 1)
+    impulse[half] = 1.0
+    value = low_pass(impulse, rate_hz, cutoff_hz)
+    speed = differentiate(value, rate_hz)
+    spread = np.zeros(stride * (len(kernel) - 1) + 1)
+    spread[::stride] = kernel
+    chains = np.array([np.convolve(x, spread) for x in (value, speed, differentiate(speed, rate_hz))])
+    # Even and odd parts: rates do not correlate with the others.
+    return chains @ chains.T
+
+
+def _holds(angles: Array, rate_hz: float, trim: int) -> tuple[list[tuple[int, int]], NDArray[np.bool_]]:
+    """Spans of samples in which no joint of any robot moves, and all samples at rest, shape (Q,)."""
+    flat = angles.reshape(len(angles), -1)
+    speed = np.abs(differentiate(low_pass(flat, rate_hz, rules.STILL_HZ), rate_hz)).max(axis=1)
+    still = speed < rules.STILL_RADPS
+    still[:trim] = still[len(still) - trim :] = False
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+    settle, shortest = round(rules.SETTLING_S * rate_hz), round(rules.SHORTEST_HOLD_S * rate_hz)
+    spans = [(start + settle, stop - settle) for start, stop in edges.reshape(-1, 2)]
+    return [(start, stop) for start, stop in spans if stop - start >= shortest], still

@@ -1,0 +1,81 @@
+"""How finely each joint reads: rounding step and white noise, from the recordings themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from estimator.arrays import Array
+from estimator.calibrate import rules
+from estimator.calibrate.rows import Rows
+from estimator.quantisation import rounding_step
+from estimator.recording.model import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Sensing:
+    """Resolution of every channel; arrays of shape (N, 9): phi, theta, tau.
+
+    Attributes:
+        step: rounding step, 0 for a continuous channel [rad, N m].
+        sigma: standard deviation of white noise of a reading before rounding [rad, N m].
+    """
+
+    step: Array
+    sigma: Array
+
+    @classmethod
+    def of(cls, recordings: Sequence[Recording]) -> Sensing:
+        """Resolution of the sensors behind some recordings of the same robots."""
+        step = np.median([_steps(recording) for recording in recordings], axis=0)
+        white = np.sqrt(np.mean([_white(recording) ** 2 for recording in recordings], axis=0))
+        return cls(step, np.sqrt(np.maximum(white**2 - step**2 / 12.0, 0.0)))
+
+    def variances(self, rows: Rows) -> tuple[Array, Array]:
+        """Variance of one sample in motion, and of a row's mean in a hold, shape (n, N, 9) each.
+
+        In motion a joint that makes few steps while a row is averaged has few independent rounding errors; at rest it
+        has one, unless noise moves the reading to and fro.
+        """
+        floor = np.repeat([rules.ANGLE_FLOOR_RAD, rules.ANGLE_FLOOR_RAD, rules.TORQUE_FLOOR_NM], 3)
+        floor = floor**2 * rows.rate_hz / rules.FLOOR_HZ
+        rounding, noise = self.step**2 / 12.0, self.sigma**2
+        step = np.maximum(self.step, 1e-300)
+        dithered = self.sigma > rules.DITHER * step
+        # Samples that count in a row in motion: those of a white signal.
+        samples = 1.0 / rows.gain[0, 0]
+        way = np.concatenate([rows.travel, np.full((*rows.travel.shape[:2], 3), np.inf)], axis=2)
+        independent = np.clip(1.0 + way / step, 1.0, samples)
+        repeats = np.where(dithered, 1.0, samples / independent)
+        moving = noise + rounding * repeats + floor
+        long = np.maximum(rows.length, 1)[:, None, None]
+        lasting = np.clip(1.0 + way / step, 1.0, long)
+        lasting[..., 6:] = 1.0
+        held = noise / long + rounding / np.where(dithered, long, lasting) + floor
+        return moving, np.broadcast_to(held, moving.shape)
+
+
+def _columns(recording: Recording) -> Array:
+    return np.concatenate([recording.phi, recording.theta, recording.tau], axis=2)
+
+
+def _steps(recording: Recording) -> Array:
+    told = recording.metadata.sampling
+    if told is not None:
+        return np.array([np.concatenate([one.steps_of(kind) for kind in range(3)]) for one in told])
+    return np.apply_along_axis(rounding_step, 0, _columns(recording))
+
+
+def _white(recording: Recording) -> Array:
+    """Standard deviation of all that is white in a reading, rounding included, shape (N, 9)."""
+    rate = recording.metadata.rate_hz
+    high = min(rules.NOISE_ABOVE_HZ, 0.4 * rate)
+    band = butter(4, high, btype="high", fs=rate, output="sos")
+    left = sosfiltfilt(band, _columns(recording), axis=0)
+    impulse = np.zeros(2 * round(2.0 * rate) + 1)
+    impulse[len(impulse) // 2] = 1.0
+    kept = np.sum(sosfiltfilt(band, impulse) ** 2)
+    return 1.4826 * np.median(np.abs(left), axis=0) / np.sqrt(kept)
