@@ -29,7 +29,7 @@ def transferred(calibration: Calibration, recordings: Sequence[Recording]) -> Ca
     sensing, units = Sensing.of(recordings), calibration.units
     shared = Shared(first.grasps, first.parameters)
     rows = [Rows.of(recording) for recording in recordings]
-    trials = [Trial(TrialEquations.of(one, sensing), 0) for one in rows]
+    trials = [Trial(one, 0, sensing) for one in rows]
     bases = tuple(start_bases(one, units, shared) for one in rows)
     found = fit(trials, Unknowns(units, (shared,), bases), HELD)
     at = found.layout.of_payload(0)

@@ -10,7 +10,9 @@ ROW_S = 0.25
 """Time between rows. Measured: noise of accelerations grows with frequency, and biases scales where rows are shorter (one
 standard error at 0.12 s)."""
 LOBES = 3
-"""Of the sinc that rows are weighed with, to either side. Chosen: neighbouring rows of white noise correlate by 0.1."""
+"""Half length, in rows, of the kernel that they are weighed with. Chosen: rows of white noise then correlate by 0.013."""
+ROLL_OFF = 0.5
+"""Of that kernel. Chosen: nothing passes above 3 Hz."""
 TRIM_S = 2.0
 """Dropped at both ends against the filters' transients. Chosen, as in the paper."""
 STILL_RADPS = 1.5e-3
