@@ -39,3 +39,6 @@ COARSE = 0.5
 """Largest step of any unknown, in posterior standard errors, that ends those on few rows. Chosen."""
 CONVERGED = 0.02
 """The same that ends all. Chosen."""
+MISFIT = 1.3
+"""chi2/n of loops or balance of a recording above which no calibration explains it. Measured: below 1.1 on uncalibrated
+teams with nothing else wrong; what noise adds to it is 0.03."""
