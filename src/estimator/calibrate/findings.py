@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.arm.unit import AT, COUNT
+from estimator.arrays import Array
 from estimator.calibrate import rules
 from estimator.calibrate.fit import Fit, Quadratic
 
@@ -26,13 +27,13 @@ class Change(NamedTuple):
         trial: which one, from 0.
         what: in words.
         drop: by which chi2 falls.
-        count: unknowns that it takes.
+        unknowns: how many it takes.
     """
 
     trial: int
     what: str
     drop: float
-    count: int
+    unknowns: int
 
 
 def findings(fit: Fit, names: Sequence[str]) -> list[str]:
@@ -62,14 +63,14 @@ def findings(fit: Fit, names: Sequence[str]) -> list[str]:
         rest = "the other recordings" if len(names) > 2 else "the other recording"
         out.append(f"{names[best.trial]} contradicts {rest}: {best.what}. Leave it out, or record it again.")
         return out
-    parts = [
-        f"{names[k]} ({_ratio(fit.trials[k].loops):.3g} in its loops, {_ratio(fit.trials[k].balance):.3g} in its balance)"
-        for k in odd
-    ]
+    parts = []
+    for k in odd:
+        loops, balance = _ratio(fit.trials[k].loops), _ratio(fit.trials[k].balance)
+        parts.append(f"{names[k]} ({loops:.3g} in its loops, {balance:.3g} in its balance)")
     out.append(
-        f"No calibration explains {'; '.join(parts)}: chi2/n is 1 where robots, payload and noise are all there is, and "
-        f"{rules.MISFIT} at most. Something else acts on these robots, most in {names[worst]}; the numbers are not to be "
-        "trusted before mocobot diagnose has named it."
+        f"No calibration explains {'; '.join(parts)}: chi2/n is 1 where robots, payload and noise are all there is, "
+        f"and {rules.MISFIT} at most. Something else acts on these robots, most in {names[worst]}; the numbers are not "
+        "to be trusted before mocobot diagnose has named it."
     )
     return out
 
@@ -80,7 +81,7 @@ def _ratio(part: Quadratic) -> float:
 
 def _worth(fit: Fit, change: Change) -> float:
     """Drop in chi2 beyond what as many free numbers buy (Schwarz)."""
-    return change.drop - change.count * np.log(fit.trials[change.trial].all.count)
+    return change.drop - change.unknowns * np.log(fit.trials[change.trial].all.count)
 
 
 def _changes(fit: Fit, names: Sequence[str]) -> list[Change]:
@@ -111,8 +112,8 @@ def _changes(fit: Fit, names: Sequence[str]) -> list[Change]:
     return out
 
 
-def _freed(fit: Fit, part: Quadratic, places: NDArray[np.intp]) -> tuple[float, np.ndarray]:
-    """Drop in chi2 if unknowns were others in one recording, everything else refitted, and by how much they would be."""
+def _freed(fit: Fit, part: Quadratic, places: NDArray[np.intp]) -> tuple[float, Array]:
+    """Drop in chi2 if unknowns were others in one recording and the rest refitted, and by how much they would be."""
     own = np.searchsorted(part.index, places)
     H_ee, H_ex, g_e = part.H[np.ix_(own, own)], part.H[own], part.g[own]
     C = fit.covariance[np.ix_(part.index, part.index)]

@@ -7,8 +7,8 @@ SAMPLE_HZ = 33.0
 """Instants at which loops and balance are evaluated, before the residual is averaged into rows. Derived: above twice
 ``PRE_HZ``."""
 ROW_S = 0.25
-"""Time between rows. Measured: noise of accelerations grows with frequency, and biases scales where rows are shorter (one
-standard error at 0.12 s)."""
+"""Time between rows. Measured: noise of accelerations grows with frequency, and biases scales where rows are shorter
+(one standard error at 0.12 s)."""
 LOBES = 3
 """Of the sinc that rows are weighed with, to either side. Chosen: neighbouring rows of white noise correlate by 0.1."""
 TRIM_S = 2.0
@@ -19,7 +19,7 @@ steps a second at this speed."""
 STILL_HZ = 2.0
 """Cut-off of the joint speeds that are held against it. Chosen: rounding at rest then stays below a twentieth."""
 SETTLING_S, SHORTEST_HOLD_S = 0.4, 1.0
-"""Left out at both ends of a hold, and the least that must be left of it. Chosen: twice the settling of ``STILL_HZ``."""
+"""Left out at both ends of a hold, and the least that must be left of it. Chosen: twice what ``STILL_HZ`` takes."""
 NOISE_ABOVE_HZ = 25.0
 """Above it a signal is noise. Measured: commanded motion ends at 5 Hz."""
 DITHER = 0.35

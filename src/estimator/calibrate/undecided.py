@@ -33,18 +33,19 @@ def undecided(
         masses.append(np.sqrt(fit.covariance[place, place]) / shared.pi[0])
     if scale_sd:
         out.append(
-            f"The common scale of all springs is held at its design value, for a carry tells it from the mass by the arms' "
-            f"own weight alone: all masses and inertias may be off together by {100 * scale_sd:.2g} % (one standard "
-            f"error). One weighed payload (--known-mass) brings that to {100 * min(masses):.1g} %."
+            "The common scale of all springs is held at its design value, for a carry tells it from the mass by the "
+            f"arms' own weight alone: all masses and inertias may be off together by {100 * scale_sd:.2g} % (one "
+            f"standard error). One weighed payload (--known-mass) brings that to {100 * min(masses):.1g} %."
         )
     if not parallel and prior.encoder_zero_rad:
         reach = max(float(np.max(np.linalg.norm(s.grasps.p_1i, axis=1))) for s in fit.unknowns.carried)
         degrees = np.rad2deg(prior.encoder_zero_rad)
         out.append(
-            "The zeros of the last gimbal axes (theta_x) only turn the grasp frames, so frames are those that the encoders "
-            f"define. Frames drawn at the flanges may be turned against them by {degrees:.2g} deg about their x axes "
-            f"(one standard error), which moves positions in {{1}} by up to {1e3 * reach * prior.encoder_zero_rad:.2g} mm. "
-            "Flanges known to be parallel (--parallel-flanges), or an index mark at each, decide them."
+            "The zeros of the last gimbal axes (theta_x) only turn the grasp frames, so frames are those that the "
+            f"encoders define. Frames drawn at the flanges may be turned against them by {degrees:.2g} deg about their "
+            "x axes (one standard error), which moves positions in {1} by up to "
+            f"{1e3 * reach * prior.encoder_zero_rad:.2g} mm. Flanges known to be parallel (--parallel-flanges), or an "
+            "index mark at each, decide them."
         )
     if not prior.arm_mass_ratio and not alone:
         share = max(_by_masses(fit, k) for k in range(layout.payloads))
@@ -55,8 +56,8 @@ def undecided(
         )
     for name in single:
         out.append(
-            f"{name}: with one recording none can be left out, so nothing shows how well the calibration foretells another; "
-            "record a second motion of the same payload."
+            f"{name}: with one recording none can be left out, so nothing shows how well the calibration foretells "
+            "another; record a second motion of the same payload."
         )
     return out
 
