@@ -7,8 +7,8 @@ SAMPLE_HZ = 33.0
 """Instants at which loops and balance are evaluated, before the residual is averaged into rows. Derived: above twice
 ``PRE_HZ``."""
 ROW_S = 0.25
-"""Time between rows. Measured: noise of accelerations grows with frequency, and biases scales where rows are shorter (one
-standard error at 0.12 s)."""
+"""Time between rows. Measured: noise of accelerations grows with frequency, and biases scales where rows are shorter
+(one standard error at 0.12 s)."""
 LOBES = 3
 """Half length, in rows, of the kernel that they are weighed with. Chosen: rows of white noise then correlate by 0.013."""
 ROLL_OFF = 0.5
@@ -21,7 +21,7 @@ steps a second at this speed."""
 STILL_HZ = 2.0
 """Cut-off of the joint speeds that are held against it. Chosen: rounding at rest then stays below a twentieth."""
 SETTLING_S, SHORTEST_HOLD_S = 0.4, 1.0
-"""Left out at both ends of a hold, and the least that must be left of it. Chosen: twice the settling of ``STILL_HZ``."""
+"""Left out at both ends of a hold, and the least that must be left of it. Chosen: twice what ``STILL_HZ`` takes."""
 NOISE_ABOVE_HZ = 25.0
 """Above it a signal is noise. Measured: commanded motion ends at 5 Hz."""
 DITHER = 0.35
@@ -41,3 +41,6 @@ COARSE = 0.5
 """Largest step of any unknown, in posterior standard errors, that ends those on few rows. Chosen."""
 CONVERGED = 0.02
 """The same that ends all. Chosen."""
+MISFIT = 1.3
+"""chi2/n of loops or balance of a recording above which no calibration explains it. Measured: below 1.1 on uncalibrated
+teams with nothing else wrong; what noise adds to it is 0.03."""
