@@ -53,7 +53,9 @@ def calibrate(
         InputError: the recordings do not belong together, do not move enough, or cannot be solved.
     """
     if robots is not None and (free or prior or known_mass):
-        raise InputError("robots are held as calibrated: unloaded arms, a prior or a known mass cannot change them")
+        raise InputError(
+            "robots are held as calibrated: unloaded arms, a prior or a known mass cannot change them"
+        )
     prior = prior or (Prior() if robots is None else robots.prior)
     groups = _by_payload(recordings)
     _check_together([*recordings, *free])

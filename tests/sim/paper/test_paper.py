@@ -13,7 +13,7 @@ import pytest
 from mocobot.cli import main
 from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
 from mocobot_sim.paper.published import published_errors
-from mocobot_sim.paper.tables import format_tables
+from mocobot_sim.paper.text import format_tables
 
 PAYLOADS = ("a", "b", "c", "d")
 PAIRS = ("12", "23", "31")
