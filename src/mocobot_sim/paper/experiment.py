@@ -198,6 +198,8 @@ def run_paper(plan: PaperPlan, jobs: int = 1, progress: Progress | None = None) 
             result.recordings.setdefault(preset, {})[payload] = recordings[payload, preset]
 
         for stage, tasks in (("calibrations", plan.fits()), ("transfer", plan.transfers())):
+            if not tasks:
+                continue
             fitted = [
                 (
                     three_trials(recordings[payload, preset]),

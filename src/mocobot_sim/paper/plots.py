@@ -19,7 +19,8 @@ MARKERS = {
     "paper": "D", "ideal": "v", "nominal": "o", ONE_FIT: "o", "uncalibrated": "s", SELF_CALIBRATED: "^", TRANSFER: "^",
 }  # fmt: skip
 HOLLOW = (ONE_FIT, TRANSFER)
-SHARE = "of it, the springs' common scale"
+SHARE = "springs' common scale"
+"""A line in the plots of mass and inertia: what no carry decides."""
 
 
 def save_plots(scores: AllScores, folder: Path) -> list[Path]:
@@ -106,9 +107,11 @@ def _dots(axis: Axes, columns: Sequence[str], rows: Sequence[Row], title: str) -
 
 
 def _save(figure: Figure, legend_of: Axes, path: Path) -> Path:
-    handles, labels = legend_of.get_legend_handles_labels()
+    named = dict(zip(*reversed(legend_of.get_legend_handles_labels()), strict=True))
+    labels = sorted(named, key=lambda name: name == SHARE)
     figure.legend(
-        handles, labels, loc="outside upper right", ncols=len(labels), frameon=False, fontsize=9,
+        [named[name] for name in labels], labels, loc="outside upper right",
+        ncols=len(labels) if len(labels) <= 6 else -(-len(labels) // 2), frameon=False, fontsize=9,
         columnspacing=1.2, handletextpad=0.2,
     )  # fmt: skip
     with whole_file(path) as temporary:
