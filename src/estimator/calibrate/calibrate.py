@@ -36,6 +36,7 @@ def calibrate(
     prior: Prior | None = None,
     known_mass: Mapping[str, tuple[float, float]] | None = None,
     say: Callable[[str], object] = lambda _: None,
+    robots: Calibration | None = None,
 ) -> Calibration:
     """Geometry, springs, zeros and, where asked, masses of every robot, with what they carry.
 
@@ -48,14 +49,25 @@ def calibrate(
         prior: how far the robots may be off; None for robots out of the box.
         known_mass: weighed mass of payloads by label, with its standard error [kg]; "" for one without a label.
         say: takes the name of the stage that begins.
+        robots: an earlier calibration of the same robots, which are held as it found them: the payloads alone are
+            estimated, and its covariance goes on to theirs. Excludes ``free``, ``prior`` and ``known_mass``.
 
     Raises:
         InputError: the recordings do not belong together, do not move enough, or cannot be solved.
     """
-    prior = prior or Prior()
+    if robots is not None and (free or prior or known_mass):
+        raise InputError(
+            "robots are held as calibrated: unloaded arms, a prior or a known mass cannot change them"
+        )
+    prior = prior or (Prior() if robots is None else robots.prior)
     groups = _by_payload(recordings)
     _check_together(recordings, free)
     design, N = recordings[0].metadata.design, recordings[0].metadata.robots
+    if robots is not None and (robots.design != design or robots.robots != N):
+        raise InputError(
+            f"{recordings[0].name}: the calibration is of {robots.robots} robots and the recording of {N}, or their "
+            "designs differ; it must be of the same robots"
+        )
     if N < 2:
         raise InputError(
             f"{recordings[0].name}: one robot closes no loop; two or more that carry one payload are needed"
@@ -65,7 +77,7 @@ def calibrate(
         say(f"payload {label}" if label else "payload")
         shared.append(_start(estimate_payload(members, "auto", compare_masses=True, withhold=False), members))
     say("calibration")
-    units = ArmUnit(design, np.zeros((N, COUNT)))
+    units = ArmUnit(design, np.zeros((N, COUNT))) if robots is None else robots.units
     sensing = Sensing.of([*recordings, *free])
     labels = list(groups)
     rows = [_rows(recording) for recording in recordings]
@@ -79,8 +91,10 @@ def calibrate(
         prior,
         alone,
         _weights(known_mass or {}, labels),
+        robots,
     )
-    return _result(found, recordings, free, labels, payload_of, prior, tuple(known_mass or ()))
+    known = tuple(known_mass or ()) if robots is None else robots.known_mass
+    return _result(found, recordings, free, labels, payload_of, prior, known)
 
 
 def _by_payload(recordings: Sequence[Recording]) -> dict[str | None, list[Recording]]:
