@@ -14,6 +14,7 @@ from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, 
 from estimator.calibrate.findings import findings
 from estimator.calibrate.fit import Fit, KnownMass, Trial, fit
 from estimator.calibrate.held_out import held_out
+from estimator.calibrate.outcome.shares import shares
 from estimator.calibrate.prior import Prior
 from estimator.calibrate.rows import Rows
 from estimator.calibrate.sensing import Sensing
@@ -187,7 +188,7 @@ def _result(
         shared = found.unknowns.carried[k]
         grasps = replace(shared.grasps, covariance=covariance[:grasped, :grasped])
         payloads.append(CalibratedPayload(label, grasps, shared.pi, covariance, found.by_scale[at]))
-    trials = []
+    trials, shared_out = [], shares(found)
     for k, (recording, left) in enumerate(zip(recordings, held_out(found), strict=True)):
         done = found.trials[k]
         count = done.loops.count, done.balance.count
@@ -202,9 +203,10 @@ def _result(
                 _per((done.loops.c, done.balance.c), count),
                 left,
                 found.unknowns.bases[k],
+                shared_out[k],
             )
         )
-    for recording, one in zip(free, found.alone, strict=True):
+    for recording, one, share in zip(free, found.alone, shared_out[len(found.trials) :], strict=True):
         count = 0, one.count
         trials.append(
             CalibratedTrial(
@@ -217,6 +219,7 @@ def _result(
                 (0.0, one.c / one.count),
                 None,
                 None,
+                share,
             )
         )
     at = layout.of_units
