@@ -2,7 +2,7 @@
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -228,8 +228,11 @@ class Rig(ABC):
         """Causes that act for a while in one trial only, where the whitened residuals (n, C) are worst."""
         return []
 
-    def imitators(self, candidate: Candidate) -> list[list[Array]]:
-        """Whitened columns of errors of single sensors that last as long as a transient, one array per trial each."""
+    def imitators(self, candidate: Candidate) -> Iterable[list[Array]]:
+        """Whitened columns of what a candidate must tell more than to be believed, one array per trial each.
+
+        Such as errors of single sensors that last as long as a transient.
+        """
         return []
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:

@@ -190,6 +190,8 @@ LEAST_MOTION_M = 1e-3
 """A recording that moves less is refused. Chosen."""
 STUCK_S, STUCK_WHILE_M = 0.05, 1e-3
 """A position that stays for so long while the reference moves so far is stuck. Chosen."""
+STUCK_SHARE = 1e-9
+"""Of the way, by which readings that are the same may differ. Derived: what rounding makes of one value."""
 LONGEST_STUCK_SHARE = 0.25
 """Of a recording, that may be left out. Chosen."""
 COARSE_M = 1e-6
@@ -244,6 +246,8 @@ PULSE_PERIODS_S = (0.2, 6.0)
 """Of trains of pulses searched. Chosen."""
 PULSE_BINS = 50
 """Of a folded series, so widths from 4 to 96 %. Chosen; edges are sharpened to the sample afterwards."""
+EQUAL_SHARE = 1e-9
+"""By which what is equal may differ. Derived: rounding is a thousandth of that."""
 PULSE_FOLD_HZ = 100.0
 """Rate of the folded series. Chosen: that of the rows."""
 SLOW_MPS = 1e-3

@@ -6,6 +6,8 @@ from estimator.arrays import Array
 
 _LARGEST_RATIO = 1000.0  # of a difference to the step: rounding spoils larger ones
 _OFF = 0.05  # of a step
+# Of the largest value, by which one may come out as two: in rounding, in a log of ten digits.
+_ONE_VALUE = (1e-12, 1e-9)
 
 
 def quantisation_step(values: Array, levels: int = 8) -> float | None:
@@ -20,9 +22,16 @@ def quantisation_step(values: Array, levels: int = 8) -> float | None:
     found = np.unique(values)
     if len(found) < levels:
         return None
-    gaps = np.diff(found)
-    # One value may come out as two that differ in rounding.
-    gaps = gaps[gaps > 1e-12 * max(abs(found[0]), abs(found[-1]))]
+    gaps, largest = np.diff(found), max(abs(found[0]), abs(found[-1]))
+    for share in _ONE_VALUE:
+        step = _step_of(gaps[gaps > share * largest], levels)
+        if step is not None:
+            return step
+    return None
+
+
+def _step_of(gaps: Array, levels: int) -> float | None:
+    """The same from the gaps between neighbouring values that differ."""
     if len(gaps) < max(1, levels - 1):
         return None
     step = float(gaps.min())

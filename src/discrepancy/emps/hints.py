@@ -12,8 +12,8 @@ from discrepancy.emps.reduction import Reduction
 from estimator.arrays import Array
 
 
-def hints_of(signals: Signals, reduction: Reduction) -> Hints:
-    """Hints from one recording."""
+def hints_of(signals: Signals, reduction: Reduction, period: int | None) -> Hints:
+    """Hints from one recording, whose reference repeats after ``period`` samples, or does not."""
     v = signals.v
     known = np.column_stack([signals.a, direction(signals, rules.SLOW_MPS), v, np.abs(v), np.ones(len(v))])
     rows = np.concatenate(reduction(np.column_stack([signals.residual[:, 0], known, signals.x, v])))
@@ -28,6 +28,7 @@ def hints_of(signals: Signals, reduction: Reduction) -> Hints:
         force_train,
         _spread(signals, reduction, 1, law, voltage_train),
         _spread(signals, reduction, 0, known, force_train),
+        None if period is None else period / signals.log.rate_hz,
     )
 
 

@@ -2,15 +2,21 @@
 
 A box is fitted to the residual folded at every period (box least squares: Kovacs, Zucker, Mazeh, "A box-fitting
 algorithm in the search for periodic transits", A&A 391, 2002), then its edges are read off the samples.
+
+A box and all that is not in it fit equally well but for rounding, and so do boxes that differ by an empty bin. Their
+edges are not read off alike, so which of them is taken must not hang on rounding: of equals it is the one of the lowest
+frequency, then the narrowest, then the first.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from discrepancy import rules
 from estimator.arrays import Array
+
+_SLACK = 1e-6  # what is that close to a whole number, or to an edge [s], is on it
 
 
 class Train(NamedTuple):
@@ -32,10 +38,10 @@ def pulse_train(residual: Array, rate_hz: float) -> Train:
     duration = count * step / rate_hz
     shortest, longest = rules.PULSE_PERIODS_S
     frequencies = np.arange(1.0 / min(longest, duration / 2.0), 1.0 / shortest, 0.1 / duration)
-    best = (-np.inf, 1.0, 0.0, 0.5)
+    best = (-1.0, 1.0, 0.0, 0.5)
     for frequency in frequencies:
         power, phase, width = _box(level, time * frequency % 1.0)
-        if power > best[0]:
+        if power > best[0] * (1.0 + rules.EQUAL_SHARE):
             best = (power, 1.0 / frequency, phase / frequency, width / frequency)
     _, period, start, width = best
     start %= period
@@ -48,7 +54,10 @@ def pulse_train(residual: Array, rate_hz: float) -> Train:
 def _from_zero(residual: Array, rate_hz: float, train: Train) -> Train:
     """The train, or what is between its pulses if that is further from zero."""
     on = rectangle(np.arange(len(residual)) / rate_hz, *train[:3]) > 0.5
-    if not on.any() or on.all() or abs(np.median(residual[on])) >= abs(np.median(residual[~on])):
+    if not on.any() or on.all():
+        return train
+    inside, between = abs(np.median(residual[on])), abs(np.median(residual[~on]))
+    if inside >= between * (1.0 - rules.EQUAL_SHARE):
         return train
     start, width = train.start_s + train.width_s, train.period_s - train.width_s
     if start > train.period_s or (start - train.period_s + width > 0.0 and start - train.period_s < 0.0):
@@ -60,13 +69,12 @@ def rectangle(time: Array, start_s: float, period_s: float, width_s: float) -> A
     """1 while a pulse is on, else 0, shape (Q,); nothing before the start."""
     since = time - start_s
     # Stamps are on a grid, and so are edges: what is a rounding error before an edge is on it.
-    slack = 1e-6
-    return ((since > -slack) & ((since + slack) % period_s < width_s)).astype(float)
+    return ((since > -_SLACK) & ((since + _SLACK) % period_s < width_s)).astype(float)
 
 
 def _box(level: Array, phase: Array) -> tuple[float, float, float]:
-    """The best box in a folded series: power, start and width in shares of the period."""
-    bins = np.minimum((phase * rules.PULSE_BINS).astype(int), rules.PULSE_BINS - 1)
+    """The best box in a folded series, of equals the narrowest: power, start and width in shares of the period."""
+    bins = _floor(phase * rules.PULSE_BINS) % rules.PULSE_BINS
     sums = np.bincount(bins, level, rules.PULSE_BINS)
     counts = np.bincount(bins, minlength=rules.PULSE_BINS)
     total, number = sums.sum(), counts.sum()
@@ -78,7 +86,8 @@ def _box(level: Array, phase: Array) -> tuple[float, float, float]:
     inside, n = doubled[stop] - doubled[start], many[stop] - many[start]
     spread = np.maximum(n * (number - n) / number, 1e-9)
     power = (inside - total * n / number) ** 2 / spread
-    k, at = np.unravel_index(int(np.argmax(power)), power.shape)
+    first = int(np.argmax(power >= power.max() * (1.0 - rules.EQUAL_SHARE)))
+    k, at = np.unravel_index(first, power.shape)
     return float(power[k, at]), at / rules.PULSE_BINS, widths[k] / rules.PULSE_BINS
 
 
@@ -98,10 +107,17 @@ def _sharpened(residual: Array, rate_hz: float, train: Train) -> Train:
     period, start = np.polyfit(ranks, ups, 1)
     _, ends = np.polyfit(_matched(time, falling, train.start_s + train.width_s, train.period_s)[1], downs, 1)
     grid = 1.0 / rate_hz
-    start, width = np.round(start / grid) * grid, np.round((ends - start) / grid) * grid
-    if abs(period / grid - np.round(period / grid)) * len(ups) < 1.0:
-        period = np.round(period / grid) * grid
+    start, width = _floor(start / grid + 0.5) * grid, _floor((ends - start) / grid + 0.5) * grid
+    whole = _floor(period / grid + 0.5)
+    # Edges are whole samples, so this is a fraction, and may be one but for rounding.
+    if abs(period / grid - whole) * len(ups) < 1.0 - _SLACK:
+        period = whole * grid
     return Train(float(start), float(period), float(width), train.size)
+
+
+def _floor(x: ArrayLike) -> NDArray[np.intp]:
+    """The whole numbers below, where what is a rounding error below one counts as it."""
+    return np.floor(np.asarray(x) + _SLACK).astype(np.intp)
 
 
 def _edges(above: NDArray[np.bool_], rising: bool) -> NDArray[np.intp]:

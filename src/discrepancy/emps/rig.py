@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -80,7 +80,7 @@ class EmpsRig(Rig):
         cut = blocks(signals, period)
         reduction = Reduction.of(log.rate_hz, cut, log.usable & ~log.saturated)
         cut, reduction = _long_enough(log, cut, reduction)
-        hints = hints_of(signals, reduction)
+        hints = hints_of(signals, reduction, period)
         left = remainder(signals, reduction, hints)
         if period is not None and repeated(signals, period):
             noise = from_repeats(left, signals, reduction, period, rules.EMPS_AR_ORDER)
@@ -183,6 +183,11 @@ class EmpsRig(Rig):
             worst = worst_intervals(t, time, z[:, 0], rules.EMPS_PUSH_S, two_sided=True)
             out += [cause.event(self.tolerances[cause.name], when) for cause in causes for when in worst]
         return out
+
+    def imitators(self, candidate: Candidate) -> Iterator[list[Array]]:
+        """The candidate in shapes that what repeats with the motion may have."""
+        shapes = CAUSES[candidate.cause].imitators(self.signals, self.hints, candidate.shape)
+        return (self.columns(replace(candidate, shape=dict(shape))) for shape in shapes)
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a push with its interval moved."""

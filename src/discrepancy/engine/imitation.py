@@ -1,4 +1,4 @@
-"""Is it a transient, or one sensor that was wrong for as long?"""
+"""Is it what it seems, or something simpler, such as one sensor that was wrong for as long?"""
 
 from collections.abc import Sequence
 
@@ -10,14 +10,13 @@ from discrepancy.rig import Rig
 
 
 def imitated(rig: Rig, leader: Leader, free: Sequence[int]) -> bool:
-    """Whether an error of a single sensor tells as much as a transient, its fewer numbers counted.
+    """Whether one of a rig's imitators tells more than the candidate, their numbers counted.
 
     A lasting cause that shows at rare loads only, such as the hardening of one spring, looks like a push at that
-    time; but then its torque alone accounts for it, and a push has six numbers for the same.
+    time; but then its torque alone accounts for it, and a push has six numbers for the same. Friction where an axis
+    turns round looks like pulses of force that come about as often; but then pulses in step with the motion tell more.
     """
     candidate, problem = leader.candidate, leader.problem
-    if not candidate.transient:
-        return False
     without = Fit.of(problem, free, fixed=(leader.evidence.index, np.zeros(len(candidate.parameters))))
     each = price(problem)
     own = without.fall_with(rig.columns(candidate)) - each * len(candidate.parameters)

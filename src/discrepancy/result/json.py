@@ -18,8 +18,8 @@ causes              list, in the order of discovery, of
 evidence            the strongest candidates, see ``evidence_list``: {before, after, by_chance} with nothing named and
                     with what is named (null), lists of {cause, kind, name, family, robot, joint, place, at, gain,
                     log10_p}
-rejected            significant candidates that other trials did not confirm: list of {cause, kind, name, family,
-                    robot, joint, place}
+rejected            significant candidates that other trials did not confirm, or of which something simpler tells more:
+                    list of {cause, kind, name, family, robot, joint, place}
 gain                null where the closed loop was not simulated and there is nothing to estimate, or
     held_out        {before, after}: {<channel>_nrmse, <channel>_rms, chi2_per_n}, means over trials, null if failed
     units           of the channels' rms

@@ -32,7 +32,9 @@ def format_diagnosis(values: Values) -> str:
         )
     if values["rejected"]:
         names = ", ".join(name_of(candidate) for candidate in values["rejected"])
-        notes.append(f"Looked likely, but did not hold on other trials: {names}.")
+        notes.append(
+            f"Looked likely, but did not hold on other trials, or something simpler tells more: {names}."
+        )
     if notes:
         lines += ["", "[[Notes]]"]
         for note in notes:

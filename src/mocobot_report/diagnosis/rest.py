@@ -32,7 +32,9 @@ def rest_sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
     notes = [tidy(note) for note in values["notes"]]
     if values["rejected"]:
         names = ", ".join(name_of(c) for c in values["rejected"])
-        notes.append(f"Looked likely, but did not hold on other trials: {names}.")
+        notes.append(
+            f"Looked likely, but did not hold on other trials, or something simpler tells more: {names}."
+        )
     outline = [
         ("What would have been noticed", limits),
         ("What such recordings cannot decide", el("dl", entries, class_="list") if entries else None),

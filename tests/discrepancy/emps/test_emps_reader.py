@@ -196,6 +196,18 @@ def test_resolution_is_read_off(step: float) -> None:
     assert read.step_m == pytest.approx(step, rel=1e-6)
 
 
+def test_rounding_hides_neither_steps_nor_a_stuck_reading() -> None:
+    """A log of twelve digits."""
+    made = axis()
+    position = np.round(made.position / 1e-6) * 1e-6
+    position[1000:1500] = position[1000]
+    position *= 1.0 + 1e-12 * np.random.default_rng(0).standard_normal(len(position))
+    log = replace(made, position=position)
+    assert log.step_m == pytest.approx(1e-6, rel=1e-6)
+    ((start, stop),) = stuck(log)
+    assert (start, stop) == pytest.approx((1000, 1500), abs=2)
+
+
 def test_a_smooth_position_has_no_steps() -> None:
     made = axis()
     noise = 1e-9 * np.random.default_rng(0).standard_normal(7200)

@@ -10,6 +10,7 @@ import pytest
 from discrepancy.emps.blocks import blocks, period_of
 from discrepancy.emps.catalogue import candidate_of
 from discrepancy.emps.causes import CAUSES
+from discrepancy.emps.causes.train import in_step
 from discrepancy.emps.noise import repeated
 from discrepancy.emps.pulse_search import pulse_train, rectangle
 from discrepancy.emps.recording.axis_log import AxisLog
@@ -135,6 +136,33 @@ def test_pulses_are_found_to_the_sample(train: PulseTrain) -> None:
     np.testing.assert_array_equal(rectangle(time, *found[:3]), train.on(time))
     assert found.period_s == pytest.approx(train.period_s, abs=1e-6)
     assert found.size == pytest.approx(train.size, abs=0.05)
+
+
+def test_the_train_that_is_found_does_not_hang_on_rounding() -> None:
+    """In noise any train fits badly; a box and what is between its boxes fit equally, and look different sharpened."""
+    for seed in range(2):
+        rng = np.random.default_rng(seed)
+        residual = np.convolve(rng.standard_normal(7200), np.ones(30) / 30, mode="same")
+        found = pulse_train(residual, RATE_HZ)
+        for _ in range(4):
+            disturbed = residual * (1.0 + 1e-12 * rng.standard_normal(len(residual)))
+            np.testing.assert_allclose(pulse_train(disturbed, RATE_HZ), found, rtol=1e-9)
+
+
+def test_trains_in_step_with_the_motion_are_where_a_train_is_on() -> None:
+    time, cycle = np.arange(7200) / RATE_HZ, 2.4
+    near = {"start_s": -0.007, "period_s": 2.3824, "width_s": 0.06}
+    places = np.unique(np.round(time[rectangle(time, **near) > 0.5] % cycle, 3))
+    shapes = in_step(time, cycle, near)
+    assert {s["period_s"] for s in shapes} == {cycle}
+    assert {round(s["width_s"], 9) for s in shapes} == {0.02, 0.04, 0.06}
+    for shape in shapes:
+        on = np.round(time[rectangle(time, **shape) > 0.5] % cycle, 3)
+        assert len(on) == pytest.approx(3 * RATE_HZ * shape["width_s"], abs=3)
+        # A step of the places is a sixth of a pulse.
+        assert np.abs(on[:, None] - places).min(axis=1).max() <= 0.01
+    often = in_step(time, cycle, near | {"period_s": 0.7})
+    assert {round(s["period_s"], 9) for s in often} == {2.4, 0.8}
 
 
 def test_rectangle_counts_samples_exactly() -> None:

@@ -53,6 +53,31 @@ def test_transient_that_one_sensor_imitates_is_not_named(turn, values, named):
     assert ("push" in [c.cause for c in explanation.rejected]) is not named
 
 
+class InStep(FakeRig):
+    """What imitates a lasting cause has a share of its trace, and a share of whatever the data hold."""
+
+    share = 0.0
+
+    def imitators(self, candidate):
+        (k,) = (k for k, c in enumerate(self.catalogue) if c.key == candidate.key)
+        return [
+            [
+                (1.0 - self.share) * rows.causes[k] + self.share * rows.residual[..., None]
+                for rows in self.rows(self.catalogue)
+            ]
+        ]
+
+
+@pytest.mark.parametrize(("share", "named"), [(0.0, True), (1.0, False)])
+def test_lasting_cause_that_is_imitated_is_not_named(share, named):
+    """The same trace tells no more than the cause; the data themselves do."""
+    rig = InStep({2: 25.0})
+    rig.share = share
+    explanation = search(rig)
+    assert ("cause 2" in [f.candidate.cause for f in explanation.found]) is named
+    assert ("cause 2" in [c.cause for c in explanation.rejected]) is not named
+
+
 def test_fall_is_that_of_the_extended_problem():
     rig = with_burst(FakeRig({2: 25.0}, burst=(TRIAL, 0.0, 3)), [2.0, -1.0, 0.5])
     problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())

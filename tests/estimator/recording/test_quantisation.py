@@ -19,6 +19,14 @@ def test_a_constant_has_no_step_however_few_levels_are_asked_for() -> None:
     assert quantisation_step(np.empty(0), levels=2) is None
 
 
+@pytest.mark.parametrize("digits", [1e-15, 1e-13, 1e-12, 1e-11])
+def test_values_that_differ_in_rounding_are_one(digits: float) -> None:
+    rng = np.random.default_rng(0)
+    values = 2e-7 * rng.integers(0, 400000, 5000)
+    disturbed = values * (1.0 + digits * rng.standard_normal(len(values)))
+    assert quantisation_step(disturbed) == pytest.approx(2e-7, rel=1e-5)
+
+
 def test_gaps_far_wider_than_a_step_do_not_hide_it() -> None:
     """A channel that visits two distant places only."""
     here = 1e-4 * np.arange(12)

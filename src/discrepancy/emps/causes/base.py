@@ -20,6 +20,7 @@ class Hints:
         wavelength_m: of the strongest ripple along the way.
         voltage_train, force_train: ``start_s``, ``period_s``, ``width_s`` of what looks most like rectangles.
         voltage_spread, force_spread: what is left around these [V, N], standard deviation of rows.
+        cycle_s: after which the reference repeats itself; None if it does not.
     """
 
     wavelength_m: float
@@ -27,6 +28,7 @@ class Hints:
     force_train: Shape
     voltage_spread: float
     force_spread: float
+    cycle_s: float | None = None
 
 
 class Cause(base.Cause):
@@ -53,6 +55,10 @@ class Cause(base.Cause):
     def visible(self, signals: Signals, hints: Hints, values: Array) -> bool:
         """Whether a cause of that size stands out of rounding, or of what it was searched in."""
         return True
+
+    def imitators(self, signals: Signals, hints: Hints, shape: Shape) -> Sequence[Shape]:
+        """Shapes in which the motion itself may leave the same trace, so that they must tell less than this one."""
+        return []
 
     def rests(self, signals: Signals, shape: Shape) -> list[Array]:
         """Forces (Q,) that the cause leaves open, such as dry friction at rest, one unit each."""

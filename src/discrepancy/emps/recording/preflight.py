@@ -55,7 +55,7 @@ def checked(log: AxisLog) -> AxisLog:
 
 def stuck(log: AxisLog) -> list[tuple[int, int]]:
     """Spans of samples with one and the same position, long enough, while the reference moves away."""
-    same = np.diff(log.position) == 0
+    same = np.abs(np.diff(log.position)) <= rules.STUCK_SHARE * np.ptp(log.position)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int))).reshape(-1, 2)
     return [
         (int(a), int(b) + 1)

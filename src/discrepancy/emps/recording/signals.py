@@ -62,4 +62,6 @@ def smooth(x: Array, rate_hz: float) -> Array:
 def at_delay(x: Array, rate_hz: float, delay_s: float) -> Array:
     """x(t - delay) of even samples, shape (Q,); held at the ends."""
     time = np.arange(len(x)) / rate_hz
-    return np.asarray(CubicSpline(time, x)(np.clip(time - delay_s, 0.0, time[-1])), dtype=np.float64)
+    at = np.clip(time - delay_s, 0.0, time[-1])
+    # The last piece meets the last sample but for rounding, and what is held is the sample.
+    return np.where(at < time[-1], CubicSpline(time, x)(at), x[-1])

@@ -28,5 +28,8 @@ class Late(ReadingError):
         late = {}
         for name in self.readings:
             x = getattr(signals, name)[:, robot]
-            late[name] = one_robot(x - CubicSpline(time, x)(at), trial.robots, robot)
+            shifted = CubicSpline(time, x)(at)
+            # The last piece meets the last sample but for rounding, and what is held is the sample.
+            shifted[at >= time[-1]] = x[-1]
+            late[name] = one_robot(x - shifted, trial.robots, robot)
         return signals.minus(**late)
