@@ -248,6 +248,10 @@ PULSE_BINS = 50
 """Of a folded series, so widths from 4 to 96 %. Chosen; edges are sharpened to the sample afterwards."""
 EQUAL_SHARE = 1e-9
 """By which what is equal may differ. Derived: rounding is a thousandth of that."""
+ON_IT = 1e-6
+"""To a whole number, or an edge of pulses [s]: what is that close is on it. Derived: rounding is far less."""
+PULSE_STEPS = 6
+"""Of a pulse, by which pulses in step with the motion are moved and shortened. Chosen."""
 PULSE_FOLD_HZ = 100.0
 """Rate of the folded series. Chosen: that of the rows."""
 SLOW_MPS = 1e-3

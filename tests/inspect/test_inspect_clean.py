@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,9 +18,12 @@ from mocobot_sim.effects import apply_effects
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import PRESETS
 from mocobot_sim.trial.simulate import TrialRequest, simulate
+from mocobot_sim.trial.trajectories import static_orientations
 from omnid_design import DESIGN
 
 SHORT = {"random": {"vias": 8}, "periodic": {"duration_s": 10.0}, "static": {}}
+HOLD_S = 3.0
+"""Of static trials: postures count here, not how long they are held."""
 
 
 def inspected(recording: Recording, folder: Path) -> Inspection:
@@ -34,7 +38,11 @@ def inspected(recording: Recording, folder: Path) -> Inspection:
     ("payload", "trial"),
     [("a", "random"), ("b", "static"), ("c", "periodic"), ("d", "random")],
 )
-def test_trials_of_all_payloads(tmp_path: Path, payload: str, trial: str, preset: str) -> None:
+def test_trials_of_all_payloads(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, payload: str, trial: str, preset: str
+) -> None:
+    short = partial(static_orientations, hold_s=HOLD_S)
+    monkeypatch.setattr("mocobot_sim.trial.simulate.static_orientations", short)
     request = TrialRequest(payload, trial, seed=11, **SHORT[trial])
     recording = simulate(request, [PRESETS[preset]]).recordings[preset]
     found = inspected(recording, tmp_path)

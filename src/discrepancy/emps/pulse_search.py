@@ -16,8 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from discrepancy import rules
 from estimator.arrays import Array
 
-_SLACK = 1e-6  # what is that close to a whole number, or to an edge [s], is on it
-
 
 class Train(NamedTuple):
     """Rectangular pulses from ``start_s`` on: on for ``width_s`` every ``period_s``."""
@@ -69,7 +67,7 @@ def rectangle(time: Array, start_s: float, period_s: float, width_s: float) -> A
     """1 while a pulse is on, else 0, shape (Q,); nothing before the start."""
     since = time - start_s
     # Stamps are on a grid, and so are edges: what is a rounding error before an edge is on it.
-    return ((since > -_SLACK) & ((since + _SLACK) % period_s < width_s)).astype(float)
+    return ((since > -rules.ON_IT) & ((since + rules.ON_IT) % period_s < width_s)).astype(float)
 
 
 def _box(level: Array, phase: Array) -> tuple[float, float, float]:
@@ -110,14 +108,14 @@ def _sharpened(residual: Array, rate_hz: float, train: Train) -> Train:
     start, width = _floor(start / grid + 0.5) * grid, _floor((ends - start) / grid + 0.5) * grid
     whole = _floor(period / grid + 0.5)
     # Edges are whole samples, so this is a fraction, and may be one but for rounding.
-    if abs(period / grid - whole) * len(ups) < 1.0 - _SLACK:
+    if abs(period / grid - whole) * len(ups) < 1.0 - rules.ON_IT:
         period = whole * grid
     return Train(float(start), float(period), float(width), train.size)
 
 
 def _floor(x: ArrayLike) -> NDArray[np.intp]:
     """The whole numbers below, where what is a rounding error below one counts as it."""
-    return np.floor(np.asarray(x) + _SLACK).astype(np.intp)
+    return np.floor(np.asarray(x) + rules.ON_IT).astype(np.intp)
 
 
 def _edges(above: NDArray[np.bool_], rising: bool) -> NDArray[np.intp]:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from discrepancy.causes.words import Words
@@ -120,5 +121,7 @@ def _broken(trace: Trace, values: Array) -> Array:
 
 
 def _save(figure: Figure, path: Path) -> Path:
-    figure.savefig(path, dpi=110, format="png")
+    # As savefig does it, which would arrange and draw everything twice.
+    figure.dpi = 110
+    FigureCanvasAgg(figure).print_png(path)
     return path

@@ -11,7 +11,6 @@ from estimator.arm.unit import COUNT, ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate.alone import AloneEquations
 from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration
-from estimator.calibrate.equations import TrialEquations
 from estimator.calibrate.fit import Fit, KnownMass, Trial, fit
 from estimator.calibrate.held_out import held_out
 from estimator.calibrate.prior import Prior
@@ -68,7 +67,7 @@ def calibrate(
     labels = list(groups)
     rows = [_rows(recording) for recording in recordings]
     payload_of = [labels.index(recording.metadata.payload) for recording in recordings]
-    trials = [Trial(TrialEquations.of(r, sensing), k) for r, k in zip(rows, payload_of, strict=True)]
+    trials = [Trial(r, k, sensing) for r, k in zip(rows, payload_of, strict=True)]
     bases = [start_bases(r, units, shared[k]) for r, k in zip(rows, payload_of, strict=True)]
     alone = [AloneEquations.of(_rows(recording), sensing) for recording in free]
     found = fit(

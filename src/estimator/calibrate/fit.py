@@ -15,6 +15,8 @@ from estimator.calibrate import rules
 from estimator.calibrate.alone import AloneEquations
 from estimator.calibrate.equations import TrialEquations
 from estimator.calibrate.prior import Prior
+from estimator.calibrate.rows import Rows
+from estimator.calibrate.sensing import Sensing
 from estimator.calibrate.unknowns import Layout, Unknowns
 
 
@@ -38,12 +40,20 @@ class Trial:
     """A trial with a payload.
 
     Attributes:
-        equations: its rows.
+        rows: its rows.
         payload: which of the payloads it carries, from 0.
+        sensing: of its robots.
     """
 
-    equations: TrialEquations
+    rows: Rows
     payload: int
+    sensing: Sensing
+
+    def blocks(self, every: int = 1) -> list[TrialEquations]:
+        """Its equations in blocks, of every so-and-so-many-th row."""
+        chosen = np.arange(0, len(self.rows.time), every)
+        parts = np.array_split(chosen, max(1, -(-len(chosen) // rules.BLOCK_ROWS)))
+        return [TrialEquations.of(self.rows.take(part), self.sensing) for part in parts]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +80,12 @@ class Quadratic:
         flat = white.reshape(residual.size, -1)
         gram = flat.T @ flat
         return cls(index, gram[:-1, :-1], gram[:-1, -1], float(gram[-1, -1]), residual.size)
+
+    def plus(self, other: Quadratic) -> Quadratic:
+        """The sum of both, of the same unknowns."""
+        return Quadratic(
+            self.index, self.H + other.H, self.g + other.g, self.c + other.c, self.count + other.count
+        )
 
     def at(self, dx: Array) -> float:
         """chi2 after a step of all unknowns, shape (K,)."""
@@ -152,10 +168,15 @@ def fit(
     z, information = np.zeros(basis.shape[1]), np.zeros(basis.shape[1])
     information[: of_units.shape[1]] = 1.0
     at, step = start, 0
-    adjustments: list[Array | None] = [None] * len(trials)
+    every = max(1, sum(len(trial.rows.time) for trial in trials) // rules.COARSE_ROWS)
     before = np.zeros((len(trials), 2))
+    blocks, adjusted = _blocks(trials, every)
     while True:
-        done = [_trial_fit(k, trial, at, layout, adjustments) for k, trial in enumerate(trials)]
+        complete = every == 1
+        done = [
+            _trial_fit(k, trial, blocks[k], at, layout, adjusted[k], split=complete or step == 0)
+            for k, trial in enumerate(trials)
+        ]
         lone = tuple(_alone_fit(equations, at, layout) for equations in alone)
         known = tuple(_weighed(one, at, layout) for one in known_mass)
         H, g = np.zeros((layout.size, layout.size)), np.zeros(layout.size)
@@ -166,11 +187,14 @@ def fit(
         reduced, score = basis.T @ H @ basis + np.diag(information), basis.T @ g + information * z
         dz, covariance_z = solved(reduced, score)
         size = float(np.max(np.abs(dz) / np.sqrt(np.diag(covariance_z))))
-        if size < rules.CONVERGED or step == rules.MAX_STEPS:
+        if complete and (size < rules.CONVERGED or step == rules.MAX_STEPS):
             break
         z += dz
         at = layout.moved(at, basis @ dz)
         step += 1
+        if not complete and (size < rules.COARSE or step == rules.MAX_STEPS - 2):
+            every = 1
+            blocks, adjusted = _blocks(trials, every)
     by_scale = np.zeros(layout.size)
     if not known_mass:
         by_scale[layout.unit_indices(np.r_[AT["stiffness_ratio"]])] = 1.0
@@ -189,19 +213,40 @@ def solved(H: Array, g: Array) -> tuple[Array, Array]:
     return -scale * cho_solve(factor, scale * g), scale[:, None] * cho_solve(factor, np.diag(scale))
 
 
+def _blocks(
+    trials: Sequence[Trial], every: int
+) -> tuple[list[list[TrialEquations]], list[list[Array | None]]]:
+    """Equations of all trials, and how their signals are to be adjusted: not yet known."""
+    blocks = [trial.blocks(every) for trial in trials]
+    return blocks, [[None] * len(parts) for parts in blocks]
+
+
 def _trial_fit(
-    k: int, trial: Trial, at: Unknowns, layout: Layout, adjustments: list[Array | None]
+    k: int,
+    trial: Trial,
+    blocks: Sequence[TrialEquations],
+    at: Unknowns,
+    layout: Layout,
+    adjusted: list[Array | None],
+    *,
+    split: bool,
 ) -> TrialFit:
-    rowed = trial.equations.at(at.units, at.carried[trial.payload], at.bases[k], adjustments[k])
-    adjustments[k] = rowed.adjustment
-    n, C = rowed.residual.shape
-    J = np.concatenate([rowed.by_units.reshape(n, C, -1), rowed.by_carried, rowed.by_bases], axis=2)
+    """A trial at some unknowns; loops and balance apart only where asked. ``adjusted`` is brought up to date."""
     index = np.r_[layout.of_units, layout.of_payload(trial.payload), layout.of_trial(k)]
-    parts = []
-    for rows in (slice(0, C), slice(0, C - 6), slice(C - 6, C)):
-        covariance = rowed.covariance[:, rows, rows]
-        parts.append(Quadratic.of(J[:, rows], rowed.residual[:, rows], covariance, index))
-    return TrialFit(*parts)
+    sums: list[Quadratic | None] = [None, None, None]
+    for place, equations in enumerate(blocks):
+        rowed = equations.at(at.units, at.carried[trial.payload], at.bases[k], adjusted[place])
+        adjusted[place] = rowed.adjustment
+        n, C = rowed.residual.shape
+        J = np.concatenate([rowed.by_units.reshape(n, C, -1), rowed.by_carried, rowed.by_bases], axis=2)
+        kinds = (slice(0, C), slice(0, C - 6), slice(C - 6, C))
+        for kind, rows in enumerate(kinds if split else kinds[:1]):
+            part = Quadratic.of(J[:, rows], rowed.residual[:, rows], rowed.covariance[:, rows, rows], index)
+            before = sums[kind]
+            sums[kind] = part if before is None else before.plus(part)
+    total = sums[0]
+    assert total is not None
+    return TrialFit(total, sums[1] or total, sums[2] or total)
 
 
 def _alone_fit(equations: AloneEquations, at: Unknowns, layout: Layout) -> Quadratic:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,6 +43,20 @@ class Rows:
     def __call__(self, x: Array) -> Array:
         """Rows of samples, shape (q, ...) -> (n, ...)."""
         return np.asarray(self.operator @ x.reshape(len(x), -1)).reshape(-1, *x.shape[1:])
+
+    def take(self, chosen: NDArray[np.intp]) -> Rows:
+        """Some of the rows, in order, with the instants that they need."""
+        operator = self.operator[chosen]
+        needed = np.unique(operator.indices)
+        return replace(
+            self,
+            s=self.s[needed],
+            operator=csr_array(operator[:, needed]),
+            time=self.time[chosen],
+            moving=int(np.sum(chosen < self.moving)),
+            length=self.length[chosen],
+            travel=self.travel[chosen],
+        )
 
     @classmethod
     def of(cls, recording: Recording) -> Rows:

@@ -27,7 +27,13 @@ exp(-2 pi^2 0.35^2) of the error's variance)."""
 ANGLE_FLOOR_RAD, TORQUE_FLOOR_NM = 2e-6, 3e-4
 """What the model itself leaves at 100 Hz beside any sensor: rods and welds that give, integration."""
 FLOOR_HZ = 100.0
+BLOCK_ROWS = 512
+"""Rows whose derivatives are held at a time; the result does not depend on it."""
+COARSE_ROWS = 250
+"""Rows that the first steps take, evenly from all trials: the way to the solution needs no more."""
 MAX_STEPS = 12
 """Gauss-Newton steps; teams off by three times the prior needed five."""
+COARSE = 0.5
+"""Largest step, in the same, that ends those on few rows."""
 CONVERGED = 0.02
 """Largest step of any unknown that ends them, in posterior standard errors."""

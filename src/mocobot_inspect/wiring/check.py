@@ -18,7 +18,7 @@ from mocobot_inspect.signals import Signals
 from mocobot_inspect.wiring.misfit import SUSPICIOUS, Misfit, team_misfit
 from mocobot_inspect.wiring.mistakes import SUSPICIONS, Mistake, suspects, wrong_zero
 from mocobot_inspect.wiring.mistakes.wrong_zero import WrongZero
-from mocobot_inspect.wiring.motion import Fault, Grasp, arm_motion, gimbal_motion, grasp_motion
+from mocobot_inspect.wiring.motion import Fault, Grasp, Motions, grasp_motion
 from mocobot_inspect.wiring.rigid_body import Body, rigid_body
 
 DECISIVE = 4.0
@@ -82,13 +82,14 @@ Told = tuple[Grasp | None, tuple[Fault, ...]]
 class Team:
     """Misfits of one log with mistakes undone; what a mistake does not touch is not computed again."""
 
-    def __init__(self, signals: Signals, design: OmnidDesign) -> None:
-        """Compute every robot's motion."""
+    def __init__(self, signals: Signals, design: OmnidDesign, motions: Motions | None = None) -> None:
+        """Compute every robot's motion, as far as it is not among those of the same log."""
         self.signals, self._design = signals, design
+        self._motions = motions or Motions(design)
         robots = range(signals.robots)
         with np.errstate(all="ignore"):
-            self._arms = [arm_motion(signals, robot, design) for robot in robots]
-            self._gimbals = [gimbal_motion(signals, robot, design) for robot in robots]
+            self._arms = [self._motions.arm(signals, robot) for robot in robots]
+            self._gimbals = [self._motions.gimbal(signals, robot) for robot in robots]
             self._told = [
                 grasp_motion(signals, robot, self._arms[robot], self._gimbals[robot], design)
                 for robot in robots
@@ -103,14 +104,14 @@ class Team:
         same_gimbals = signals.theta is self.signals.theta
         with np.errstate(all="ignore"):  # wrong channels may divide by zero: an infinite misfit
             for robot in mistake.robots:
-                arm = self._arms[robot] if same_arms else arm_motion(signals, robot, self._design)
-                gimbal = self._gimbals[robot] if same_gimbals else gimbal_motion(signals, robot, self._design)
+                arm = self._arms[robot] if same_arms else self._motions.arm(signals, robot)
+                gimbal = self._gimbals[robot] if same_gimbals else self._motions.gimbal(signals, robot)
                 told[robot] = grasp_motion(signals, robot, arm, gimbal, self._design)
         return self._judge(told, self._body if same_arms and same_gimbals else None, enough)
 
     def undone(self, mistake: Mistake) -> Team:
         """The team with a mistake undone."""
-        return Team(mistake.undo(self.signals), self._design)
+        return Team(mistake.undo(self.signals), self._design, self._motions)
 
     def _judge(self, told: Sequence[Told], body: Body | None, enough: float = np.inf) -> Misfit:
         grasps, faults = [t[0] for t in told], [t[1] for t in told]

@@ -100,6 +100,30 @@ class Gimbal:
     faults: tuple[Fault, ...]
 
 
+class Motions:
+    """Arms and gimbals of one log: many mistakes leave a robot the same numbers, and these are worked through once."""
+
+    def __init__(self, design: OmnidDesign) -> None:
+        """Nothing is known yet."""
+        self._design = design
+        self._arms: dict[tuple[str, int, bytes], Arm | Fault] = {}
+        self._gimbals: dict[tuple[int, bytes], Gimbal] = {}
+
+    def arm(self, signals: Signals, robot: int) -> Arm | Fault:
+        """What ``arm_motion`` says."""
+        key = signals.level, robot, signals.position.values[:, :, robot].tobytes()
+        if key not in self._arms:
+            self._arms[key] = arm_motion(signals, robot, self._design)
+        return self._arms[key]
+
+    def gimbal(self, signals: Signals, robot: int) -> Gimbal:
+        """What ``gimbal_motion`` says."""
+        key = robot, signals.theta.values[:, :, robot].tobytes()
+        if key not in self._gimbals:
+            self._gimbals[key] = gimbal_motion(signals, robot, self._design)
+        return self._gimbals[key]
+
+
 def arm_motion(signals: Signals, robot: int, design: OmnidDesign) -> Arm | Fault:
     """The arm of one robot (from 0), or why it cannot be in such postures."""
     position, wrist = signals.position.values[:, :, robot], signals.level == "wrist"

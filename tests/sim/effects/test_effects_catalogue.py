@@ -8,6 +8,7 @@ import pytest
 
 from effect_cases import SIZES, example, one_robot, team_with
 from estimator.errors import InputError
+from estimator.recording.model import Recording
 from mocobot_sim.effects import EFFECTS, apply_effects, effect_from_dict, effect_to_dict, make_effect
 from mocobot_sim.extended.extended import load_extended, write_extended
 from mocobot_sim.scene.scene import build_team
@@ -16,6 +17,14 @@ from mocobot_sim.trial.trajectories import Trajectory, random_vias
 from mocobot_sim.trial.trial import run_trial
 
 EACH = pytest.mark.parametrize("cause", list(EFFECTS))
+
+
+@pytest.fixture(scope="module")
+def clean(tmp_path_factory) -> tuple[Trajectory, Recording]:
+    """A motion, and what ideal sensors make of it without any effect."""
+    scene = one_robot(tmp_path_factory.mktemp("clean"))
+    trajectory = random_vias(scene.wrist_home_b, np.random.default_rng(0), 1, box_m=(0.03, 0.03, 0.03))
+    return trajectory, predicted(run_trial(scene, trajectory))
 
 
 def test_every_cause_is_named_as_it_is_listed():
@@ -37,11 +46,9 @@ def test_plain_data_there_and_back(cause):
 
 
 @EACH
-def test_nothing_at_zero_size(cause, tmp_path):
+def test_nothing_at_zero_size(cause, clean, tmp_path):
     """A trial with motion is the same as without the effect, through ideal sensors."""
-    clean = one_robot(tmp_path)
-    trajectory = random_vias(clean.wrist_home_b, np.random.default_rng(0), 1, box_m=(0.03, 0.03, 0.03))
-    expected = predicted(run_trial(clean, trajectory))
+    trajectory, expected = clean
     with_zero = predicted(run_trial(one_robot(tmp_path, example(cause, zero=True)), trajectory))
     for channel in ("phi", "theta", "tau"):
         difference = np.abs(getattr(with_zero, channel) - getattr(expected, channel)).max()
@@ -49,10 +56,8 @@ def test_nothing_at_zero_size(cause, tmp_path):
 
 
 @EACH
-def test_something_at_a_plausible_size(cause, tmp_path):
-    clean = one_robot(tmp_path)
-    trajectory = random_vias(clean.wrist_home_b, np.random.default_rng(0), 1, box_m=(0.03, 0.03, 0.03))
-    expected = predicted(run_trial(clean, trajectory))
+def test_something_at_a_plausible_size(cause, clean, tmp_path):
+    trajectory, expected = clean
     rows = slice(100, None)
     changes = {"push": {"force_x_N": 0.3, "force_z_N": 0.1}, "base_creep": {"x_mps": 1e-4}}.get(cause, {})
     hidden = predicted(run_trial(one_robot(tmp_path, example(cause, **changes)), trajectory))

@@ -20,8 +20,8 @@ PAIRS = ("12", "23", "31")
 MOMENTS = ("Ixx", "Iyy", "Izz")
 
 
-LESS = {"vias": 26, "duration_s": 20.0}
-"""A third of the paper's motion; errors grow by its root, and the bars below do not move."""
+LESS = {"vias": 15, "duration_s": 10.0}
+"""A sixth of the paper's motion; errors grow by its root, and the bars below do not move."""
 
 
 @pytest.fixture(scope="module")

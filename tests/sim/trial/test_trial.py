@@ -366,10 +366,10 @@ def test_simulated_time_is_the_logged_time(monkeypatch, rate_hz, timestep_s):
 def _paper_trial(scene: TeamScene, kind: str, seed: int = 0) -> Trajectory:
     rng = np.random.default_rng(seed)
     if kind == "random":
-        return random_vias(scene.wrist_home_b, rng, vias=20)
+        return random_vias(scene.wrist_home_b, rng, vias=12)
     if kind == "periodic":
-        return sphere_motion(scene.wrist_home_b, scene.X_1i, 20.0, rng)
-    return static_orientations(scene.wrist_home_b, scene.X_1i, hold_s=4.0)
+        return sphere_motion(scene.wrist_home_b, scene.X_1i, 12.0, rng)
+    return static_orientations(scene.wrist_home_b, scene.X_1i, hold_s=1.5)
 
 
 def _check_paper_trial(scene, log) -> None:

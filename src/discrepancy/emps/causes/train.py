@@ -4,14 +4,12 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.causes.base import Shape
 from discrepancy.causes.numbers import Numbers
 from discrepancy.emps.causes.base import Cause, filtered, force, voltage
 from discrepancy.emps.pulse_search import rectangle
 from estimator.arrays import Array
-
-STEPS = 6
-"""Of a pulse, by which pulses in step with the motion are moved and shortened. Chosen."""
 
 
 class Pulses(Cause):
@@ -50,13 +48,13 @@ def in_step(time: Array, cycle_s: float, shape: Shape) -> list[Shape]:
         cycle_s: after which the motion repeats itself.
         shape: of the given train.
     """
-    step, on = shape["width_s"] / STEPS, time[rectangle(time, **shape) > 0.5]
+    step, on = shape["width_s"] / rules.PULSE_STEPS, time[rectangle(time, **shape) > 0.5]
     out = []
     for period in {cycle_s, cycle_s / max(1, round(cycle_s / shape["period_s"]))}:
         count = max(1, round(period / step))
         reached = np.bincount((on / period % 1.0 * count).astype(int) % count, minlength=count) > 0
         for first in np.flatnonzero(reached):
-            for width in range(2, min(STEPS, count) + 1, 2):
+            for width in range(2, min(rules.PULSE_STEPS, count) + 1, 2):
                 if reached[(first + np.arange(width)) % count].all():
                     timing = {"start_s": first / count * period - period, "period_s": period}
                     out.append(timing | {"width_s": width / count * period})
