@@ -11,12 +11,10 @@ from estimator.arm.unit import COUNT, GROUPS, ArmUnit, Group
 from estimator.errors import InputError
 from estimator.strict import Fields
 
-_SUFFIX = {"rad": "_rad", "m": "_m", "N m": "_Nm", "": ""}
-
 
 def key_of(group: Group) -> str:
     """The group's name with its unit, such as ``tau_zero_Nm``."""
-    return group.name + _SUFFIX[group.unit]
+    return f"{group.name}_{group.unit.replace(' ', '')}" if group.unit else group.name
 
 
 KEYS = tuple(key_of(group) for group in GROUPS)
