@@ -10,6 +10,11 @@ Arms = OmnidDesign | ArmUnit
 """One arm or several: as designed, all alike, or as they are, side by side in leading axes of ``ArmUnit.x``."""
 
 
+def design_of(arms: Arms) -> OmnidDesign:
+    """What arms are meant to be."""
+    return arms.design if isinstance(arms, ArmUnit) else arms
+
+
 def arm_of(arms: Arms, robot: int) -> Arms:
     """The arm of one robot (from 0) among several."""
     return ArmUnit(arms.design, arms.x[robot]) if isinstance(arms, ArmUnit) else arms

@@ -9,9 +9,8 @@ import numpy as np
 from discrepancy.team.linear.jacobian import by_signals, needed_wrench
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals, with_rates
-from estimator.arm.arms import Arms, arm_of
+from estimator.arm.arms import Arms, arm_of, design_of
 from estimator.arm.design import OmnidDesign
-from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.estimate.fusion import fusion_matrix
 from estimator.rigid_team.residual import (
@@ -58,7 +57,7 @@ class TrialLinear:
     @property
     def design(self) -> OmnidDesign:
         """What the robots are meant to be: good enough for how a cause changes what they do."""
-        return self.arms.design if isinstance(self.arms, ArmUnit) else self.arms
+        return design_of(self.arms)
 
     def arm(self, robot: int) -> Arms:
         """One robot (from 0) as it is, or as designed."""
