@@ -11,18 +11,21 @@ from estimator.arm.unit import COUNT, ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate.alone import AloneEquations
 from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration
+from estimator.calibrate.findings import findings
 from estimator.calibrate.fit import Fit, KnownMass, Trial, fit
 from estimator.calibrate.held_out import held_out
 from estimator.calibrate.prior import Prior
 from estimator.calibrate.rows import Rows
 from estimator.calibrate.sensing import Sensing
 from estimator.calibrate.start import start_bases
+from estimator.calibrate.undecided import undecided
 from estimator.calibrate.unknowns import Unknowns
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.checks import check_duration, check_recording
+from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 from estimator.rigid_team.residual import Shared
 
@@ -51,7 +54,7 @@ def calibrate(
     """
     prior = prior or Prior()
     groups = _by_payload(recordings)
-    _check_together([*recordings, *free])
+    _check_together(recordings, free)
     design, N = recordings[0].metadata.design, recordings[0].metadata.robots
     if N < 2:
         raise InputError(
@@ -60,7 +63,7 @@ def calibrate(
     shared = []
     for label, members in groups.items():
         say(f"payload {label}" if label else "payload")
-        shared.append(_start(estimate_payload(members, "auto", withhold=False), members))
+        shared.append(_start(estimate_payload(members, "auto", compare_masses=True, withhold=False), members))
     say("calibration")
     units = ArmUnit(design, np.zeros((N, COUNT)))
     sensing = Sensing.of([*recordings, *free])
@@ -93,9 +96,18 @@ def _by_payload(recordings: Sequence[Recording]) -> dict[str | None, list[Record
     return groups
 
 
-def _check_together(recordings: Sequence[Recording]) -> None:
-    first = recordings[0]
-    for recording in recordings:
+def _check_together(carrying: Sequence[Recording], free: Sequence[Recording]) -> None:
+    first = carrying[0]
+    for recording in carrying:
+        if recording.metadata.trial == FREE:
+            raise InputError(f"{recording.name} is of robots that hold nothing; give it as a free recording")
+    for recording in free:
+        if recording.metadata.trial != FREE:
+            raise InputError(
+                f"{recording.name} is a {recording.metadata.trial} trial of a payload; a free recording is of robots "
+                "that hold nothing"
+            )
+    for recording in (*carrying, *free):
         check_recording(recording)
         check_duration(recording, 2.0)
         if recording.metadata.robots != first.metadata.robots:
@@ -194,20 +206,23 @@ def _result(
             )
         )
     at = layout.of_units
-    calibration = Calibration(
+    scale_sd = 0.0 if known_mass else prior.stiffness_ratio / np.sqrt(3.0 * N)
+    single = [
+        recording.name for k, recording in enumerate(recordings) if list(payload_of).count(payload_of[k]) == 1
+    ]
+    return Calibration(
         units=found.unknowns.units,
         covariance=found.covariance[at, at],
         by_scale=found.by_scale[at].reshape(N, COUNT),
-        scale_sd=0.0 if known_mass else prior.stiffness_ratio / np.sqrt(3.0 * N),
+        scale_sd=scale_sd,
         prior=prior,
         payloads=tuple(payloads),
         trials=tuple(trials),
         known_mass=known_mass,
         steps=found.steps,
-        findings=(),
-        open=(),
+        findings=tuple(findings(found, [recording.name for recording in recordings])),
+        open=tuple(undecided(found, prior, scale_sd, alone=bool(free), single=single)),
     )
-    return calibration
 
 
 def _length(recording: Recording) -> float:

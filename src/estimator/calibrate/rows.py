@@ -105,11 +105,8 @@ class Rows:
         thin = s[at]
         speeds = np.abs(np.concatenate([thin[..., 3:6], thin[..., 12:15]], axis=2))
         count = np.array([len(columns) for columns, _ in rows], dtype=float)
-        travel = (
-            np.abs(operator)
-            @ speeds.reshape(len(at), -1)
-            / np.maximum(np.abs(operator).sum(axis=1), 1e-300)[:, None]
-        )
+        weights = abs(operator)
+        travel = weights @ speeds.reshape(len(at), -1) / np.maximum(weights.sum(axis=1), 1e-300)[:, None]
         travel = np.asarray(travel).reshape(len(rows), -1, 6)
         span = np.where(np.array(length) > 0, count * stride / rate, rules.ROW_S)
         return cls(
