@@ -13,10 +13,6 @@ FREE = {
     "discrepancy.result.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
     "discrepancy.result.text": {"WIDTH"},
     "discrepancy.result.traces_file": {"VERSION"},
-    "estimator.rigid_team.slots": {
-        "COUNT",
-        "STEPS",
-    },  # a layout, with the steps of its numerical derivatives
 }
 """Formats, layouts and sizes of pictures, by module."""
 

@@ -108,11 +108,11 @@ def length_jacobians(legs: LegGeometry, phi: ArrayLike, design: Arm) -> tuple[Ar
     """
     phi = np.asarray(phi, dtype=float)
     along = np.cos(phi)[..., None] * LEG_DIRECTIONS + np.sin(phi)[..., None] * _Z
-    inverse = np.linalg.inv(legs.rod)
-    length = np.broadcast_to(np.asarray(design.rod_length_m, dtype=float), phi.shape)
-    parts = np.sum(legs.rod * LEG_DIRECTIONS, axis=-1), np.sum(legs.rod * along, axis=-1), length
-    by_radius, by_proximal, by_rod = (inverse * part[..., None, :] for part in parts)
-    return by_radius, by_proximal, by_rod
+    inverse = np.asarray(np.linalg.inv(legs.rod), dtype=np.float64)
+    length = np.broadcast_to(np.asarray(design.rod_length_m, dtype=np.float64), phi.shape)
+    by_radius: Array = inverse * np.sum(legs.rod * LEG_DIRECTIONS, axis=-1)[..., None, :]
+    by_proximal: Array = inverse * np.sum(legs.rod * along, axis=-1)[..., None, :]
+    return by_radius, by_proximal, inverse * length[..., None, :]
 
 
 def wrist_motion(legs: LegGeometry, phi_dot: ArrayLike, phi_ddot: ArrayLike) -> tuple[Array, Array]:

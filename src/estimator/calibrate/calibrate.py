@@ -11,6 +11,7 @@ from estimator.arm.unit import COUNT, ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate.alone import AloneEquations
 from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration
+from estimator.calibrate.findings import findings
 from estimator.calibrate.fit import Fit, KnownMass, Trial, fit
 from estimator.calibrate.held_out import held_out
 from estimator.calibrate.outcome.shares import shares
@@ -18,12 +19,14 @@ from estimator.calibrate.prior import Prior
 from estimator.calibrate.rows import Rows
 from estimator.calibrate.sensing import Sensing
 from estimator.calibrate.start import start_bases
+from estimator.calibrate.undecided import undecided
 from estimator.calibrate.unknowns import Unknowns
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.checks import check_duration, check_recording
+from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 from estimator.rigid_team.residual import Shared
 
@@ -34,6 +37,7 @@ def calibrate(
     prior: Prior | None = None,
     known_mass: Mapping[str, tuple[float, float]] | None = None,
     say: Callable[[str], object] = lambda _: None,
+    robots: Calibration | None = None,
 ) -> Calibration:
     """Geometry, springs, zeros and, where asked, masses of every robot, with what they carry.
 
@@ -46,14 +50,25 @@ def calibrate(
         prior: how far the robots may be off; None for robots out of the box.
         known_mass: weighed mass of payloads by label, with its standard error [kg]; "" for one without a label.
         say: takes the name of the stage that begins.
+        robots: an earlier calibration of the same robots, which are held as it found them: the payloads alone are
+            estimated, and its covariance goes on to theirs. Excludes ``free``, ``prior`` and ``known_mass``.
 
     Raises:
         InputError: the recordings do not belong together, do not move enough, or cannot be solved.
     """
-    prior = prior or Prior()
+    if robots is not None and (free or prior or known_mass):
+        raise InputError(
+            "robots are held as calibrated: unloaded arms, a prior or a known mass cannot change them"
+        )
+    prior = prior or (Prior() if robots is None else robots.prior)
     groups = _by_payload(recordings)
-    _check_together([*recordings, *free])
+    _check_together(recordings, free)
     design, N = recordings[0].metadata.design, recordings[0].metadata.robots
+    if robots is not None and (robots.design != design or robots.robots != N):
+        raise InputError(
+            f"{recordings[0].name}: the calibration is of {robots.robots} robots and the recording of {N}, or their "
+            "designs differ; it must be of the same robots"
+        )
     if N < 2:
         raise InputError(
             f"{recordings[0].name}: one robot closes no loop; two or more that carry one payload are needed"
@@ -61,9 +76,9 @@ def calibrate(
     shared = []
     for label, members in groups.items():
         say(f"payload {label}" if label else "payload")
-        shared.append(_start(estimate_payload(members, "auto", withhold=False), members))
+        shared.append(_start(estimate_payload(members, "auto", compare_masses=True, withhold=False), members))
     say("calibration")
-    units = ArmUnit(design, np.zeros((N, COUNT)))
+    units = ArmUnit(design, np.zeros((N, COUNT))) if robots is None else robots.units
     sensing = Sensing.of([*recordings, *free])
     labels = list(groups)
     rows = [_rows(recording) for recording in recordings]
@@ -77,8 +92,10 @@ def calibrate(
         prior,
         alone,
         _weights(known_mass or {}, labels),
+        robots,
     )
-    return _result(found, recordings, free, labels, payload_of, prior, tuple(known_mass or ()))
+    known = tuple(known_mass or ()) if robots is None else robots.known_mass
+    return _result(found, recordings, free, labels, payload_of, prior, known)
 
 
 def _by_payload(recordings: Sequence[Recording]) -> dict[str | None, list[Recording]]:
@@ -94,9 +111,18 @@ def _by_payload(recordings: Sequence[Recording]) -> dict[str | None, list[Record
     return groups
 
 
-def _check_together(recordings: Sequence[Recording]) -> None:
-    first = recordings[0]
-    for recording in recordings:
+def _check_together(carrying: Sequence[Recording], free: Sequence[Recording]) -> None:
+    first = carrying[0]
+    for recording in carrying:
+        if recording.metadata.trial == FREE:
+            raise InputError(f"{recording.name} is of robots that hold nothing; give it as a free recording")
+    for recording in free:
+        if recording.metadata.trial != FREE:
+            raise InputError(
+                f"{recording.name} is a {recording.metadata.trial} trial of a payload; a free recording is of robots "
+                "that hold nothing"
+            )
+    for recording in (*carrying, *free):
         check_recording(recording)
         check_duration(recording, 2.0)
         if recording.metadata.robots != first.metadata.robots:
@@ -197,20 +223,23 @@ def _result(
             )
         )
     at = layout.of_units
-    calibration = Calibration(
+    scale_sd = 0.0 if known_mass else prior.stiffness_ratio / np.sqrt(3.0 * N)
+    single = [
+        recording.name for k, recording in enumerate(recordings) if list(payload_of).count(payload_of[k]) == 1
+    ]
+    return Calibration(
         units=found.unknowns.units,
         covariance=found.covariance[at, at],
         by_scale=found.by_scale[at].reshape(N, COUNT),
-        scale_sd=0.0 if known_mass else prior.stiffness_ratio / np.sqrt(3.0 * N),
+        scale_sd=scale_sd,
         prior=prior,
         payloads=tuple(payloads),
         trials=tuple(trials),
         known_mass=known_mass,
         steps=found.steps,
-        findings=(),
-        open=(),
+        findings=tuple(findings(found, [recording.name for recording in recordings])),
+        open=tuple(undecided(found, prior, scale_sd, alone=bool(free), single=single)),
     )
-    return calibration
 
 
 def _length(recording: Recording) -> float:

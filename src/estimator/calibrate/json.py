@@ -50,7 +50,8 @@ from typing import Any
 import numpy as np
 
 from estimator.arm.design import OmnidDesign
-from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit, Group
+from estimator.arm.unit import AT, COUNT, GROUPS, ArmUnit
+from estimator.arm.units_json import key_of
 from estimator.arrays import Array
 from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.outcome.payload_json import payload_from_dict, payload_to_dict
@@ -64,11 +65,6 @@ KEYS = (
     "format", "version", "robots", "design", "deviations", "covariance", "scale_sd", "prior", "payloads", "trials",
     "known_mass", "steps", "findings", "open",
 )  # fmt: skip
-
-
-def key_of(group: Group) -> str:
-    """A group's key in the file, which ends in its unit."""
-    return f"{group.name}_{group.unit.replace(' ', '')}" if group.unit else group.name
 
 
 def deviation_names(robots: int) -> list[str]:

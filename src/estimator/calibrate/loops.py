@@ -38,7 +38,7 @@ def pose_derivatives(rows: Rows, units: ArmUnit, shared: Shared, bases: Bases) -
     for j in range(1, N):
         about, along = slice(6 * (j - 1), 6 * (j - 1) + 3), slice(6 * (j - 1) + 3, 6 * j)
         lever = R_bi[:, 0] @ shared.grasps.p_1i[j]
-        swept = rows(np.cross(turn[:, 0], lever[:, :, None], axis=1))
+        swept = rows(np.asarray(np.cross(turn[:, 0], lever[:, :, None], axis=1), dtype=np.float64))
         by_units[:, about, 0, _POSE] = -mean_turn[:, 0]
         by_units[:, along, 0, _POSE] = -mean_shift[:, 0] - swept
         by_units[:, about, j, _POSE] = bases.R[j] @ mean_turn[:, j]

@@ -10,7 +10,7 @@ from scipy.linalg import null_space
 from estimator.arm.unit import AT, COUNT
 from estimator.arrays import Array
 
-_MASSES = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]
+MASSES = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Prior:
         """
         columns = np.diag(np.tile(self._sd(), robots))
         springs = (np.arange(robots)[:, None] * COUNT + np.r_[AT["stiffness_ratio"]]).ravel()
-        masses = (np.arange(robots)[:, None] * COUNT + _MASSES).ravel()
+        masses = (np.arange(robots)[:, None] * COUNT + MASSES).ravel()
         parts = [columns]
         if hold_scale:
             columns[:, springs] = 0.0
@@ -69,7 +69,7 @@ class Prior:
         out[AT["stiffness_ratio"]] = self.stiffness_ratio
         out[AT["tau_zero"]] = self.tau_zero_Nm
         out[AT["tilt"]] = self.tilt_rad
-        out[_MASSES] = self.arm_mass_ratio
+        out[MASSES] = self.arm_mass_ratio
         return out
 
     def scaled(self, factor: float) -> Prior:

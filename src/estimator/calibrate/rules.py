@@ -1,39 +1,46 @@
 """Constants of the calibration, each with where it comes from."""
 
 PRE_HZ = 12.0
-"""Cut-off of joint signals before they are mapped to poses and wrenches. Angles filtered at 5 Hz and then mapped leave
-harmonics of micrometres and millinewtons, which moved spring scales by two to five standard errors."""
+"""Cut-off of joint signals before they are mapped to poses and wrenches. Measured: angles filtered at 5 Hz and then
+mapped leave harmonics of micrometres and millinewtons, which moved spring scales by two to five standard errors."""
 SAMPLE_HZ = 33.0
-"""Instants at which loops and balance are evaluated, before the residual is averaged into rows."""
+"""Instants at which loops and balance are evaluated, before the residual is averaged into rows. Derived: above twice
+``PRE_HZ``."""
 ROW_S = 0.25
-"""Time between rows. Noise of accelerations grows with frequency, and biases scales
-where rows are shorter (one standard error at 0.12 s)."""
+"""Time between rows. Measured: noise of accelerations grows with frequency, and biases scales where rows are shorter
+(one standard error at 0.12 s)."""
 LOBES = 3
-"""Of the sinc that rows are weighed with, to either side."""
+"""Half length, in rows, of the kernel that they are weighed with. Chosen: rows of white noise then correlate by 0.013."""
+ROLL_OFF = 0.5
+"""Of that kernel. Chosen: nothing passes above 3 Hz."""
 TRIM_S = 2.0
-"""Dropped at both ends against the filters' transients, as in the paper."""
+"""Dropped at both ends against the filters' transients. Chosen, as in the paper."""
 STILL_RADPS = 1.5e-3
-"""Joint speed below which an encoder's rounding counts as one error that lasts. A 16 bit encoder makes sixteen steps a
-second at this speed."""
+"""Joint speed below which an encoder's rounding counts as one error that lasts. Chosen: a 16 bit encoder makes sixteen
+steps a second at this speed."""
 STILL_HZ = 2.0
-"""Cut-off of the joint speeds that are held against it."""
+"""Cut-off of the joint speeds that are held against it. Chosen: rounding at rest then stays below a twentieth."""
 SETTLING_S, SHORTEST_HOLD_S = 0.4, 1.0
-"""Left out at both ends of a hold, and the least that must be left of it."""
+"""Left out at both ends of a hold, and the least that must be left of it. Chosen: twice what ``STILL_HZ`` takes."""
 NOISE_ABOVE_HZ = 25.0
-"""Above it a signal is noise."""
+"""Above it a signal is noise. Measured: commanded motion ends at 5 Hz."""
 DITHER = 0.35
-"""White noise, in steps, from which on rounding errors of neighbouring samples are independent (correlation below 3 %:
-exp(-2 pi^2 0.35^2) of the error's variance)."""
+"""White noise, in steps, from which on rounding errors of neighbouring samples are independent. Derived: their
+correlation is exp(-4 pi^2 0.35^2), below one percent."""
 ANGLE_FLOOR_RAD, TORQUE_FLOOR_NM = 2e-6, 3e-4
-"""What the model itself leaves at 100 Hz beside any sensor: rods and welds that give, integration."""
+"""What the model itself leaves at 100 Hz beside any sensor. Measured: rods and welds that give, integration."""
 FLOOR_HZ = 100.0
+"""Rate that the floors above are given for. Chosen."""
 BLOCK_ROWS = 512
-"""Rows whose derivatives are held at a time; the result does not depend on it."""
+"""Rows whose derivatives are held at a time. Chosen; the result does not depend on it."""
 COARSE_ROWS = 250
-"""Rows that the first steps take, evenly from all trials: the way to the solution needs no more."""
+"""Rows that the first steps take, evenly from all trials. Chosen: the way to the solution needs no more."""
 MAX_STEPS = 12
-"""Gauss-Newton steps; teams off by three times the prior needed five."""
+"""Gauss-Newton steps. Measured: teams off by three times the prior needed five."""
 COARSE = 0.5
-"""Largest step, in the same, that ends those on few rows."""
+"""Largest step of any unknown, in posterior standard errors, that ends those on few rows. Chosen."""
 CONVERGED = 0.02
-"""Largest step of any unknown that ends them, in posterior standard errors."""
+"""The same that ends all. Chosen."""
+MISFIT = 1.3
+"""chi2/n of loops or balance of a recording above which no calibration explains it. Measured: below 1.1 on uncalibrated
+teams with nothing else wrong; what noise adds to it is 0.03."""

@@ -164,11 +164,15 @@ def test_deviations_change_what_they_should_and_nothing_else(tmp_path):
     rods = [built.body(f"omnid2/rod{k + 1}").id for k in range(3)]
     others = np.setdiff1d(np.arange(built.nbody), rods)
     for name in ("body_inertia", "body_ipos"):
-        np.testing.assert_array_equal(getattr(nominal, name)[others], getattr(built, name)[others], err_msg=name)
+        np.testing.assert_array_equal(
+            getattr(nominal, name)[others], getattr(built, name)[others], err_msg=name
+        )
     design, lengths = omnid_design(), after["rod_length_m"]
     np.testing.assert_allclose(built.body_ipos[rods, 0], lengths / 2, rtol=1e-14)
     across = np.sort(built.body_inertia[rods], axis=1)[:, 1:]
-    np.testing.assert_allclose(across, np.tile(design.rod_mass_kg * lengths[:, None] ** 2 / 12, 2), rtol=1e-12)
+    np.testing.assert_allclose(
+        across, np.tile(design.rod_mass_kg * lengths[:, None] ** 2 / 12, 2), rtol=1e-12
+    )
     # The legs stay in their planes: the deviations are along the links.
     data = _state(built)
     R_Wb = data.body("omnid2/base").xmat.reshape(3, 3)

@@ -94,11 +94,14 @@ def test_other_masses_show_in_the_springs_as_they_should(trials: dict[str, Trial
         assert np.sqrt(np.mean(residual(trials["heavier"], partly) ** 2)) > 0.01, part
 
 
-def test_masses_and_springs_of_every_leg_show_as_an_arm_as_it_is_has_them() -> None:
-    built = CalibrationSpread(stiffness_ratio=0.02, arm_mass_ratio=0.05).draw(1, np.random.default_rng(3))[0]
+def test_masses_springs_and_lengths_of_every_leg_show_as_an_arm_as_it_is_has_them() -> None:
+    spread = CalibrationSpread(stiffness_ratio=0.02, geometry_m=1e-3, arm_mass_ratio=0.05)
+    built = spread.draw(1, np.random.default_rng(3))[0]
     x = np.zeros(COUNT)
     for name in ("stiffness_ratio", "proximal_mass_ratio", "rod_mass_ratio", "wrist_mass_ratio"):
         x[AT[name]] = getattr(built, name)
+    x[AT["radius"]] = built.base_radius_m - built.platform_radius_m
+    x[AT["proximal_length"]], x[AT["rod_length"]] = built.proximal_length_m, built.rod_length_m
     arm = ArmUnit(DESIGN, x)
     log = run_trial(build_free_team(1, [built]), free_motion(HOME, np.random.default_rng(4), vias=2))
     # A reading is the design's stiffness times the deflection.

@@ -1,0 +1,126 @@
+"""What is wrong with the recordings of a calibration: which one stands out, and what would explain it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.arm.unit import AT, COUNT
+from estimator.arrays import Array
+from estimator.calibrate import rules
+from estimator.calibrate.fit import Fit, Quadratic
+
+_SENSORS = (
+    ("phi_zero", "the encoder of phi{entry}", "slipped by {size:.2g} deg", np.rad2deg(1.0)),
+    ("theta_zero", "the encoder of theta_{axis}", "slipped by {size:.2g} deg", np.rad2deg(1.0)),
+    ("tau_zero", "the torque zero of tau{entry}", "moved by {size:.2g} N m", 1.0),
+)
+
+
+class Change(NamedTuple):
+    """Something that may have been otherwise in one recording than in all others.
+
+    Attributes:
+        trial: which one, from 0.
+        what: in words.
+        drop: by which chi2 falls.
+        unknowns: how many it takes.
+    """
+
+    trial: int
+    what: str
+    drop: float
+    unknowns: int
+
+
+def findings(fit: Fit, names: Sequence[str]) -> list[str]:
+    """Sentences on what no calibration explains; none on good recordings.
+
+    Args:
+        fit: the calibration.
+        names: of the recordings with a payload.
+    """
+    out = []
+    if not fit.converged:
+        out.append(
+            f"The calibration did not settle within {rules.MAX_STEPS} steps: its numbers are not to be used."
+        )
+    odd = [
+        k
+        for k, trial in enumerate(fit.trials)
+        if _ratio(trial.loops) > rules.MISFIT or _ratio(trial.balance) > rules.MISFIT
+    ]
+    if not odd:
+        return out
+    worst = max(odd, key=lambda k: fit.trials[k].all.c)
+    changes = sorted(_changes(fit, names), key=lambda change: _worth(fit, change), reverse=True)
+    total, count = sum(trial.all.c for trial in fit.trials), sum(trial.all.count for trial in fit.trials)
+    if changes and _worth(fit, changes[0]) > 0 and (total - changes[0].drop) / count < rules.MISFIT:
+        best = changes[0]
+        rest = "the other recordings" if len(names) > 2 else "the other recording"
+        out.append(f"{names[best.trial]} contradicts {rest}: {best.what}. Leave it out, or record it again.")
+        return out
+    parts = []
+    for k in odd:
+        loops, balance = _ratio(fit.trials[k].loops), _ratio(fit.trials[k].balance)
+        parts.append(f"{names[k]} ({loops:.3g} in its loops, {balance:.3g} in its balance)")
+    out.append(
+        f"No calibration explains {'; '.join(parts)}: chi2/n is 1 where robots, payload and noise are all there is, "
+        f"and {rules.MISFIT} at most. Something else acts on these robots, most in {names[worst]}; the numbers are not "
+        "to be trusted before mocobot diagnose has named it."
+    )
+    return out
+
+
+def _ratio(part: Quadratic) -> float:
+    return part.c / max(1, part.count)
+
+
+def _worth(fit: Fit, change: Change) -> float:
+    """Drop in chi2 beyond what as many free numbers buy (Schwarz)."""
+    return change.drop - change.unknowns * np.log(fit.trials[change.trial].all.count)
+
+
+def _changes(fit: Fit, names: Sequence[str]) -> list[Change]:
+    """Every sensor's zero, the payload and its grasps, each otherwise in one recording."""
+    if len(names) < 2:
+        return []
+    out = []
+    layout = fit.layout
+    for k, trial in enumerate(fit.trials):
+        for robot in range(layout.robots):
+            for group, sensor, moved, scale in _SENSORS:
+                for entry in range(3):
+                    place = robot * COUNT + AT[group].start + entry
+                    drop, size = _freed(fit, trial.all, np.array([place]))
+                    words = f"{sensor} of omnid{robot + 1} {moved}".format(
+                        entry=entry + 1, axis="zyx"[entry], size=abs(float(size[0])) * scale
+                    )
+                    out.append(Change(k, words, drop, 1))
+        own = trial.all.index[layout.of_units.stop : layout.of_units.stop + layout.per_payload]
+        grasps, inertia = own[:-10], own[-10:]
+        payload = [i for i, other in enumerate(fit.trials) if other.all.index[layout.of_units.stop] == own[0]]
+        if len(payload) > 1:
+            out.append(Change(k, "it looks like another payload", _freed(fit, trial.all, inertia)[0], 10))
+            drop = _freed(fit, trial.all, own)[0]
+            out.append(Change(k, "it looks like another payload, held elsewhere", drop, len(own)))
+            drop = _freed(fit, trial.all, grasps)[0]
+            out.append(Change(k, "the robots hold the payload elsewhere", drop, len(grasps)))
+    return out
+
+
+def _freed(fit: Fit, part: Quadratic, places: NDArray[np.intp]) -> tuple[float, Array]:
+    """Drop in chi2 if unknowns were others in one recording and the rest refitted, and by how much they would be."""
+    own = np.searchsorted(part.index, places)
+    H_ee, H_ex, g_e = part.H[np.ix_(own, own)], part.H[own], part.g[own]
+    C = fit.covariance[np.ix_(part.index, part.index)]
+    S = H_ee - H_ex @ C @ H_ex.T
+    scale = np.sqrt(np.maximum(np.diag(H_ee), 1e-300))
+    values, vectors = np.linalg.eigh(S / np.outer(scale, scale))
+    told = values > 1e-9
+    along = vectors[:, told].T @ (g_e / scale)
+    size = -(vectors[:, told] @ (along / values[told])) / scale
+    return float(np.sum(along**2 / values[told])), size
