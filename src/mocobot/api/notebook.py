@@ -42,7 +42,7 @@ def estimate_html(estimate: PayloadEstimate) -> str:
 
 def calibration_html(calibration: Calibration) -> str:
     """Every robot's deviations with standard errors, payloads, recordings, then findings and what stays open."""
-    said = [*calibration.findings, *(f"Open: {sentence}." for sentence in calibration.open)]
+    said = [*calibration.findings, *(f"Open: {sentence}" for sentence in calibration.open)]
     return _whole(
         *deviation_tables(calibration),
         payload_table(calibration),

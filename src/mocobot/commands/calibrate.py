@@ -34,39 +34,36 @@ def run(options: Calibrate) -> None:
     if options.out is not None:
         check_folder(options.out, inputs, is_calibration, "an earlier calibration", force=options.force)
     logs, notes = Logs(options.map), []
-    with whole_folder(options.out) if options.out else nullcontext() as folder:
-        with stages() as (say, _):
-            read = []
-            for path in files:
-                say(f"reading {path.name}")
-                read.append(logs.read(path))
-            logs.check_map()
-            held = read[: len(options.rec)]
-            found = calibrate(
-                held,
-                free=read[len(options.rec) :],
-                prior=options.prior,
-                payload_of={
-                    one.name: labels[path]
-                    for one, path in zip(held, options.rec, strict=True)
-                    if path in labels
-                },
-                known_mass=masses,
-                parallel_flanges=options.parallel_flanges,
-                tilt=options.tilt,
-                arm_masses=options.arm_masses,
-                say=say,
-            )
-            if folder is not None:
-                say("write")
-                notes = write_into(folder, found, provenance("calibrate", asdict(options), inputs))
+    with whole_folder(options.out) if options.out else nullcontext() as folder, stages() as (say, _):
+        read = []
+        for path in files:
+            say(f"reading {path.name}")
+            read.append(logs.read(path))
+        logs.check_map()
+        held = read[: len(options.rec)]
+        found = calibrate(
+            held,
+            free=read[len(options.rec) :],
+            prior=options.prior,
+            payload_of={
+                one.name: labels[path] for one, path in zip(held, options.rec, strict=True) if path in labels
+            },
+            known_mass=masses,
+            parallel_flanges=options.parallel_flanges,
+            tilt=options.tilt,
+            arm_masses=options.arm_masses,
+            say=say,
+        )
+        if folder is not None:
+            say("write")
+            notes = write_into(folder, found, provenance("calibrate", asdict(options), inputs))
     for path, converted in logs.converted.items():
         print(format_on_the_fly(converted, str(path)))
     print(found)  # after the folder is in place: whoever reads may close the pipe
     if options.out:
         print("\n".join([f"\nWritten to {options.out}.", *(f"But {note}." for note in notes)]))
     if options.strict and found.findings:
-        raise NotGood(f"the calibration is not to be trusted: {found.findings[0]}")
+        raise NotGood(f"the calibration is not to be trusted: {found.findings[0].rstrip('.')}")
 
 
 def _labels(given: Sequence[str], recordings: Sequence[Path]) -> dict[Path, str]:

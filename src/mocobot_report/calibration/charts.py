@@ -57,7 +57,8 @@ def deviation_chart(book: Book, calibration: Calibration) -> Node:
         most = max([most, *np.abs(x)])
         traces.append(dots(x, y, key, text, size=7, error_x={"array": bars, "thickness": 1.3, "width": 3}))
     shown = figure(
-        traces, xaxis=axis("deviation in prior standard deviations", range=[-1.08 * most, 1.08 * most], zerolinewidth=1.5),
+        traces,
+        xaxis=axis("deviation in prior standard deviations", range=[-1.08 * most, 1.08 * most], zerolinewidth=1.5),
         yaxis=row_axis(kind_names([group.name for group in groups]), 30), margin_l=178,
     )  # fmt: skip
     for rule in (-1.0, 1.0):
@@ -115,7 +116,9 @@ def fit_charts(book: Book, calibration: Calibration) -> Node:
     """chi²/n of every recording: loops, balance."""
     names = short_names([Path(trial.name).name for trial in calibration.trials])
     charts = []
-    for kind, title in enumerate(("Loops: where robots have each other's grasps", "Balance: wrenches and motion")):
+    for kind, title in enumerate(
+        ("Loops: where robots have each other's grasps", "Balance: wrenches and motion")
+    ):
         at = [k for k, trial in enumerate(calibration.trials) if trial.count[kind]]
         traces, seen = [], [1.0]
         for key in FITS:

@@ -34,7 +34,7 @@ def answer(calibrated: Calibrated) -> list[Node]:
     )
     out = [paragraph(said, kind="lede"), tiles(_tiles(c)), _doubts(c)]
     if c.open:
-        out.append(verdict("plain", "What stays open", bullets([f"{tidy(said)}." for said in c.open])))
+        out.append(verdict("plain", "What stays open", bullets([tidy(said) for said in c.open])))
     return out
 
 
@@ -46,7 +46,9 @@ def _tiles(c: Calibration) -> list[tuple[str, str, str]]:
         out.append((f"mass{label}", with_error(found.mass_kg, found.mass_se_kg, "kg"), ""))
     for name, key in (("as designed", "before"), ("calibrated", "after"), ("left out", "held_out")):
         pairs = [getattr(t, key) for t in c.trials if t.payload is not None and getattr(t, key) is not None]
-        value = " / ".join(plain(float(np.mean([p[k] for p in pairs])), 3) for k in range(2)) if pairs else NONE
+        value = (
+            " / ".join(plain(float(np.mean([p[k] for p in pairs])), 3) for k in range(2)) if pairs else NONE
+        )
         out.append((f"chi²/n {name}", value, "loops / balance, mean of recordings"))
     return out
 
@@ -55,7 +57,7 @@ def _doubts(c: Calibration) -> Node:
     if not c.findings:
         said = "Loops and balance fit to within noise, and nothing in the recordings contradicts the calibration."
         return verdict("good", "Nothing speaks against these numbers", said)
-    return verdict("bad", "What speaks against these numbers", bullets([f"{tidy(said)}." for said in c.findings]))
+    return verdict("bad", "What speaks against these numbers", bullets([tidy(said) for said in c.findings]))
 
 
 def sections(book: Book, calibrated: Calibrated) -> list[Node]:

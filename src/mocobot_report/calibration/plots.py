@@ -60,7 +60,9 @@ def _deviations(calibration: Calibration) -> Figure:
         _plain(axis)
     for axis in axes[len(groups) :]:
         axis.set_visible(False)
-    handles = [axes[0].plot([], [], "o", ms=4, color=LIGHT[COLOURS[k % 6]])[0] for k in range(calibration.robots)]
+    handles = [
+        axes[0].plot([], [], "o", ms=4, color=LIGHT[COLOURS[k % 6]])[0] for k in range(calibration.robots)
+    ]
     names = [f"robot {k + 1}" for k in range(calibration.robots)]
     figure.legend(handles, names, loc="outside upper right", ncols=6, frameon=False, fontsize=9)
     figure.suptitle(
@@ -108,7 +110,14 @@ def _shares(calibration: Calibration) -> Figure:
         share = 100.0 * np.array([trial.shares.get(kind, 0.0) for kind in kinds])
         axis.barh(range(len(kinds)), share, 0.66, left, color=LIGHT[COLOURS[k % len(COLOURS)]], label=name)
         left += share
-    axis.barh(range(len(kinds)), np.maximum(0.0, 100.0 - left), 0.66, left, color=LIGHT["band"], label="prior, weights")
+    axis.barh(
+        range(len(kinds)),
+        np.maximum(0.0, 100.0 - left),
+        0.66,
+        left,
+        color=LIGHT["band"],
+        label="prior, weights",
+    )
     axis.set_yticks(range(len(kinds)), kind_names(kinds), fontsize=9)
     axis.set_ylim(len(kinds) - 0.4, -0.6)
     axis.set_xlim(0.0, 100.0)

@@ -6,7 +6,7 @@ import numpy as np
 
 from estimator.arm.unit import AT
 from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.outcome.carried import carried
+from estimator.calibrate.outcome.carried import carried, grasps_of
 from estimator.calibrate.outcome.text import DEG, MASSES, SHOWN, alike, shown_groups
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import NONE, plain
@@ -23,7 +23,8 @@ def deviation_tables(calibration: Calibration) -> list[Node]:
             shown, at = SHOWN[group.name], AT[group.name]
             entries = zip(calibration.units.x[robot, at], calibration.sd[robot, at], strict=True)
             cells: list[Entry] = [
-                measurement(shown.scale * value, shown.scale * se) if se > 0 else Num("held") for value, se in entries
+                measurement(shown.scale * value, shown.scale * se) if se > 0 else Num("held")
+                for value, se in entries
             ]
             prior = plain(shown.scale * float(np.max(calibration.prior_sd[robot, at])), 2)
             rows.append([shown.name, shown.unit, *cells, *[""] * (3 - len(cells)), Num(prior)])
@@ -35,8 +36,8 @@ def deviation_tables(calibration: Calibration) -> list[Node]:
         out.append(
             table(
                 f"Robot {robot + 1}", ["", "unit", "leg 1, or z", "leg 2, or y", "leg 3, or x", "assumed ±"], rows,
-                note="± standard error; lengths, springs and masses: as built minus design; zeros: reading minus truth; "
-                "tilt: about x and y",
+                note="± standard error; lengths, springs and masses: as built minus design; zeros: reading minus "
+                "truth; tilt: about x and y",
             )
         )  # fmt: skip
     return out
@@ -53,17 +54,17 @@ def payload_table(calibration: Calibration) -> Node:
         cells = (component(f.principal.moments, f.principal.moments_se, k) for f in found)
         rows.append([f"principal moment {k + 1}", "kg m²", *cells])
     for j in range(2, calibration.robots + 1):
-        pairs = [payload.grasps.pair(1, j) for payload in calibration.payloads]
+        pairs = [grasps_of(payload, calibration.scale_sd).pair(1, j) for payload in calibration.payloads]
         for k, axis in enumerate("xyz"):
             cells = (component(pair.p_ij, pair.p_se_m, k, 1e3) for pair in pairs)
             rows.append([quantity(f"p_1{j} {axis}"), "mm", *cells])
         for k, axis in enumerate("xyz"):
             cells = (component(pair.axis_angle_rad, pair.axis_angle_se_rad, k, DEG) for pair in pairs)
             rows.append([quantity(f"R_1{j} {axis}"), "deg", *cells])
-    names = [
-        "value" if p.label is None else f"payload ({p.label})" for p in calibration.payloads
-    ]
-    note = "± standard error; p_1c: centre of mass in {1}; p_12, R_12: place and rotation vector of {2} in {1}"
+    names = ["value" if p.label is None else f"payload ({p.label})" for p in calibration.payloads]
+    note = (
+        "± standard error; p_1c: centre of mass in {1}; p_12, R_12: place and rotation vector of {2} in {1}"
+    )
     return table("What was carried", ["", "unit", *names], rows, note=note)
 
 
@@ -79,6 +80,10 @@ def trial_table(calibration: Calibration) -> Node:
         ]
         rows.append([name, trial.kind, Num(f"{trial.duration_s:.1f}"), *cells])
     head = ["recording", "trial", "length [s]"]
-    head += [f"{kind}: {stage}" for kind in ("loops", "balance") for stage in ("designed", "calibrated", "left out")]
+    head += [
+        f"{kind}: {stage}"
+        for kind in ("loops", "balance")
+        for stage in ("designed", "calibrated", "left out")
+    ]
     note = "chi²/n; 1 is noise alone; left out: foretold by a calibration from all other recordings"
     return table("Recordings", head, rows, note=note)

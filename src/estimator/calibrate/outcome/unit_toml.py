@@ -9,9 +9,9 @@ import numpy as np
 from estimator.calibrate.calibration import Calibration
 
 _HEAD = """\
-# Robot {robot} of {robots} as calibrated; SI units in the keys. Lists have one number a leg (1, 2, 3); theta_zero_rad is
-# in the order z, y, x; tilt_rad is the rotation vector of the base about x and y. Zeros are reading minus truth, and a
-# true torque is (reading - tau_zero_Nm) (1 + stiffness_ratio) where readings take all springs as designed
+# Robot {robot} of {robots} as calibrated; SI units in the keys. Lists have one number a leg (1, 2, 3); theta_zero_rad
+# is in the order z, y, x; tilt_rad is the rotation vector of the base about x and y. Zeros are reading minus truth, and
+# a true torque is (reading - tau_zero_Nm) (1 + stiffness_ratio) where readings take all springs as designed
 # ({stiffness:g} N m/rad). radius_m is base radius minus platform radius: kinematics sees no more of the two.
 # {frames}
 """
