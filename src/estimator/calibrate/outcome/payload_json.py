@@ -61,7 +61,7 @@ def payload_from_dict(entry: Any, N: int, where: str) -> CalibratedPayload:
         InputError: something is missing or not allowed.
     """
     read = Fields(entry, KEYS, where, DERIVED)
-    label = None if read.values["label"] is None else read.text("label")
+    label = None if read.values["label"] is None else read.words("label")
     R, p, count = np.tile(np.eye(3), (N, 1, 1)), np.zeros((N, 3)), 6 * (N - 1)
     for i, one in enumerate(by_robot(read, "grasps", N, GRASP, ("R_se_deg", "p_se_m")), 1):
         R[i] = Rotation.from_rotvec(one.array("R_axis_angle_deg", (3,)), degrees=True).as_matrix()
