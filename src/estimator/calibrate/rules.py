@@ -10,7 +10,7 @@ ROW_S = 0.25
 """Time between rows. Measured: noise of accelerations grows with frequency, and biases scales where rows are shorter
 (one standard error at 0.12 s)."""
 LOBES = 3
-"""Half length, in rows, of the kernel that they are weighed with. Chosen: white noise in them then correlates by 0.013."""
+"""Half length, in rows, of the kernel that they are weighed with. Chosen: white noise then correlates by 0.013."""
 ROLL_OFF = 0.5
 """Of that kernel. Chosen: nothing passes above 3 Hz."""
 TRIM_S = 2.0
