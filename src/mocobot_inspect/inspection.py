@@ -5,7 +5,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from estimator.arm.arms import Arms
 from estimator.arm.design import OmnidDesign
+from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.clocks.offsets import ClockEstimate, estimate_clocks
 from estimator.recording.metadata import FREE
@@ -60,6 +62,7 @@ class Inspection:
         wiring: suspected mistakes, or None.
         ready: what the log is good for as it is, or None.
         ready_undone: the same with all mistakes found undone, or None where there is none.
+        units: the robots as they are, where a calibration says, or None.
         free: whether the robots hold nothing: there are neither ``clocks`` nor ``wiring`` nor ``ready`` then.
     """
 
@@ -78,7 +81,13 @@ class Inspection:
     wiring: Wiring | None = None
     ready: Readiness | None = None
     ready_undone: Readiness | None = None
+    units: ArmUnit | None = None
     free: bool = False
+
+    @property
+    def arms(self) -> Arms:
+        """The robots as they are, or as designed."""
+        return self.design if self.units is None else self.units
 
     @property
     def standing(self) -> tuple[Standing, ...]:
@@ -104,6 +113,7 @@ def inspect_log(
     advance: Callable[[int], object] = lambda _: None,
     try_advance: Callable[[int], object] = lambda _: None,
     trial: str | None = None,
+    units: ArmUnit | None = None,
 ) -> Inspection:
     """Look at a log; whatever is wrong with its samples is reported and not refused.
 
@@ -113,11 +123,14 @@ def inspect_log(
         advance: takes the progress made in reading, in the source's units.
         try_advance: takes the number of wiring mistakes tried.
         trial: kind of trial, where the log does not say.
+        units: the robots as they are; None for what the log says.
 
     Raises:
         InputError: the log cannot be read.
     """
     known = source.metadata.design if source.metadata is not None else None
+    if units is None and source.metadata is not None:
+        units = source.metadata.units
     free = (source.metadata.trial if source.metadata is not None else trial) == FREE
     seen = survey(source, advance)
     if free:
@@ -132,6 +145,7 @@ def inspect_log(
         survey=seen,
         checked=(),
         unchecked=None,
+        units=units,
         free=free,
     )
     rates = [timing.rate_hz for timing in seen.timing]
@@ -189,11 +203,11 @@ def _motion(
         )
     noise = np.array([[c.white_noise for c in of_robot[:9]] for of_robot in result.survey.channels])
     samples = [part for _, part in parts]
-    wiring = check_wiring(signals_of(result.level, samples, noise), result.design, advance)
+    wiring = check_wiring(signals_of(result.level, samples, noise), result.arms, advance)
     undone = None
     if wiring.found:
         right = [(start, _undone(part, wiring, result.level)) for start, part in parts]
-        undone = readiness(result.name, result.level, right, result.design)
+        undone = readiness(result.name, result.level, right, result.arms)
         if clocks is not None and not clocks.determined:
             clocks = _known(clocks, _clocks(right))
     return replace(
@@ -203,7 +217,7 @@ def _motion(
         skewed=skewed,
         segments=segments(result.level, parts, result.design),
         wiring=wiring,
-        ready=readiness(result.name, result.level, parts, result.design),
+        ready=readiness(result.name, result.level, parts, result.arms),
         ready_undone=undone,
     )
 

@@ -3,7 +3,8 @@
 ::
 
     format "mocobot-inspection", version 1
-    log           name, level, robots, channels, assumed_design, free (whether the robots hold nothing)
+    log           name, level, robots, channels, assumed_design, calibrated (whether robots are as a calibration
+                has them), free (whether the robots hold nothing)
     streams       per robot: samples, start_s and duration_s (after the log's first stamp), rate_hz, jitter_rms_s,
                   jitter_max_s, gaps, missing, longest_gap_s, longest_gap_at_s, duplicates, backwards, recorder_s
                   (least and largest lead of the recorder's time over the stamps)
@@ -52,6 +53,7 @@ def inspection_dict(found: Inspection) -> dict[str, Any]:
                 "robots": found.robots,
                 "channels": found.channel_names,
                 "assumed_design": found.assumed_design,
+                "calibrated": found.units is not None,
                 "free": found.free,
             },
             "streams": [_timing(t, seen.origin_ns) for t in seen.timing],

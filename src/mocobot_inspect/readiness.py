@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from estimator.arm.design import OmnidDesign
+from estimator.arm.arms import Arms, design_of
+from estimator.arm.unit import ArmUnit
 from estimator.arm.wrist_level import joints_of, wrist_fault
 from estimator.arrays import Array
 from estimator.errors import InputError
@@ -47,7 +48,7 @@ class Readiness:
 
 
 def readiness(
-    name: str, level: Level, parts: Sequence[tuple[float, Array]], design: OmnidDesign
+    name: str, level: Level, parts: Sequence[tuple[float, Array]], arms: Arms
 ) -> Readiness:
     """Run the estimate and report on its steps.
 
@@ -55,12 +56,12 @@ def readiness(
         name: the log's name.
         level: what the channels are.
         parts: uniform stretches: first instant [s] and samples (q, N, 9) at 100 Hz.
-        design: the robots' numbers.
+        arms: the robots as they are, or as designed.
     """
     try:
         with np.errstate(over="raise", divide="raise"):
             data = [
-                _processed(f"{name} from {start:.1f} s", level, part, start, design) for start, part in parts
+                _processed(f"{name} from {start:.1f} s", level, part, start, arms) for start, part in parts
             ]
             trials = [Trial(f"stretch {k + 1}", "random", None, d) for k, d in enumerate(data)]
             estimate = estimate_from_trials(trials)
@@ -81,7 +82,8 @@ def readiness(
     )
 
 
-def _processed(name: str, level: Level, part: Array, start_s: float, design: OmnidDesign) -> GraspData:
+def _processed(name: str, level: Level, part: Array, start_s: float, arms: Arms) -> GraspData:
+    design, units = design_of(arms), arms if isinstance(arms, ArmUnit) else None
     position, theta, effort = np.split(part, 3, axis=2)
     if level == "wrist":
         fault = wrist_fault(position, design)
@@ -89,7 +91,7 @@ def _processed(name: str, level: Level, part: Array, start_s: float, design: Omn
             (row, robot), what = fault
             raise InputError(f"omnid{robot + 1}, {start_s + row / RATE_HZ:.2f} s: {what}")
         position, effort = joints_of(position, effort, design)
-    metadata = RecordingMetadata(part.shape[1], RATE_HZ, "random", "inspection", None, None, design)
+    metadata = RecordingMetadata(part.shape[1], RATE_HZ, "random", "inspection", None, None, design, units=units)
     time = start_s + np.arange(len(part)) / RATE_HZ
     return process_recording(
         Recording(time, position, theta, effort, None, metadata, name), CUTOFF_HZ, TRIM_S

@@ -20,6 +20,8 @@ def format_inspection(found: Inspection) -> str:
     lines = [f"[[Log {found.name}]]  {robots}, {found.level} level, {channels}"]
     if found.assumed_design:
         lines.append("    the log does not say what the robots' numbers are: those of the Omnid are assumed")
+    if found.units is not None:
+        lines.append("    the robots are taken as a calibration has them, not as designed")
     lines += _streams(found) + _channels(found)
     lines += _checked(found)
     wrong = findings(found)

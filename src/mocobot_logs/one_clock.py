@@ -177,7 +177,9 @@ def _said(
     given = {key: value for key, value in given.items() if value is not None}
     fixed = {"robots": resampled.robots, "rate_hz": resampled.rate_hz, "level": resampled.level}
     if known is not None:
-        return replace(known, **fixed, **given)
+        # Robots as they are, of another design, are other robots.
+        units = known.units if given.get("design", known.design) == known.design else None
+        return replace(known, **fixed, **given, units=units)
     for key in ("design", "trial"):
         if key not in given:
             raise InputError(f"{resampled.name}: says nothing about its {key}, which must be given")

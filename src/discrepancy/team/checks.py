@@ -2,7 +2,10 @@
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from discrepancy import rules
+from estimator.arm.unit import ArmUnit
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import CONTRADICTION
@@ -46,6 +49,15 @@ def check_recordings(recordings: Sequence[Recording]) -> None:
             raise InputError(
                 f"{other.name} and {first.name} are of robots of different design; diagnose one at a time"
             )
+        if not same_units(other.metadata.units, first.metadata.units):
+            raise InputError(
+                f"{other.name} and {first.name} carry different calibrations; give one to both (--calibration)"
+            )
+
+
+def same_units(a: ArmUnit | None, b: ArmUnit | None) -> bool:
+    """Whether robots are known to be the same: as designed, or as they are."""
+    return a is b or (a is not None and b is not None and np.array_equal(a.x, b.x))
 
 
 def check_estimate(estimate: PayloadEstimate) -> None:

@@ -12,6 +12,8 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.signals import Signals
+from estimator.arm.arms import true_joints
+from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.principal import inertia_matrix
@@ -20,14 +22,19 @@ from estimator.rigid_team.residual import Bases, Shared
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.catalogue import apply_effects, make_effect
 from mocobot_sim.errors import TrialError
-from mocobot_sim.scene.models import omnid_design
+from mocobot_sim.scene.as_built import units_as_built
+from mocobot_sim.scene.models import base_height_m, omnid_design
 from mocobot_sim.scene.payload_mjcf import payload_mjcf
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.resimulate import predicted, resimulate
 
 
 def team_of(
-    shared: Shared, bases: Bases, effects: Sequence[Effect], initial: tuple[Array, Array] | None = None
+    shared: Shared,
+    bases: Bases,
+    effects: Sequence[Effect],
+    initial: tuple[Array, Array] | None = None,
+    units: ArmUnit | None = None,
 ) -> TeamScene:
     """The team that the unknowns describe, effects applied.
 
@@ -35,7 +42,8 @@ def team_of(
         shared: grasps and inertial parameters.
         bases: where the robots stand, in {b1}.
         effects: what is off.
-        initial: posture near which trials start, (phi, theta), (N, 3) each.
+        initial: true posture near which trials start, (phi, theta), (N, 3) each.
+        units: the robots as they are; None for robots as designed.
     """
     grasps = shared.grasps
     # The rows have in the payload, and in the places of the bases, what an effect adds to them.
@@ -48,8 +56,14 @@ def team_of(
     about_c = inertia_matrix(pi[4:]) - mass * (p_1c @ p_1c * np.eye(3) - np.outer(p_1c, p_1c))
     X_1i = RigidTransform.from_components(grasps.p_1i, Rotation.from_matrix(grasps.R_1i))
     payload = payload_mjcf(mass, p_1c, physical_inertia(about_c), X_1i)
-    mounts = RigidTransform.from_components(p, Rotation.from_matrix(bases.R))
-    scene = build_team(payload, mounts=mounts, initial=initial, timestep_s=rules.TEAM_TIMESTEP_S)
+    as_built, R = (), bases.R
+    if units is not None:
+        as_built, R = units_as_built(units), bases.R @ units.R_ba
+        # A base tilts about {b}, and stands on its mount below.
+        down = np.array([0.0, 0.0, base_height_m()])
+        p = p + down - R @ down
+    mounts = RigidTransform.from_components(p, Rotation.from_matrix(R))
+    scene = build_team(payload, as_built, mounts=mounts, initial=initial, timestep_s=rules.TEAM_TIMESTEP_S)
     return apply_effects(scene, effects)
 
 
@@ -87,6 +101,13 @@ def why_not(recording: Recording) -> str | None:
     return None
 
 
+def posture(recording: Recording) -> tuple[tuple[Array, Array], ArmUnit | None]:
+    """True (phi, theta) of the first sample, (N, 3) each, and the robots as they are, as far as they are known."""
+    units = recording.metadata.units
+    phi, theta, _ = true_joints(recording.metadata.arms, recording.phi[0], recording.theta[0], recording.tau[0])
+    return (phi, theta), units
+
+
 def scale_of_response(noise: Noise, signals: Signals) -> dict[str, tuple[Array, Array]]:
     """Standard deviation of the noise and of the motion, by channel, shape (N, 3) each."""
     floors = {"phi": rules.PHI_FLOOR_RAD, "theta": rules.THETA_FLOOR_RAD, "tau": rules.TAU_FLOOR_NM}
@@ -120,7 +141,7 @@ def resimulation_errors(
     None where the simulation of these effects cannot be trusted or assembled.
     """
     try:
-        scene = team_of(shared, bases, effects, (recording.phi[0], recording.theta[0]))
+        scene = team_of(shared, bases, effects, *posture(recording))
         log = resimulate(recording, replace(scene), timestep_s=rules.TEAM_TIMESTEP_S, trial_number=number)
     except (TrialError, InputError):
         return None

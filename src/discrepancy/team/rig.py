@@ -28,6 +28,7 @@ from discrepancy.team.closed_loop import (
     effect_of,
     impossible,
     named_effect,
+    posture,
     resimulation_errors,
     scale_of_response,
     team_of,
@@ -217,7 +218,7 @@ class TeamRig(Rig):
                 else:
                     signals = corrected
             residual = exact_residual(
-                signals, linear.shared.moved(shared), linear.bases.moved(x), linear.design, linear.reduction
+                signals, linear.shared.moved(shared), linear.bases.moved(x), linear.arms, linear.reduction
             )
             out.append(self.whitening[t](residual - modelled))
         return out
@@ -269,8 +270,7 @@ class TeamRig(Rig):
         fit = Fit.of(explanation.problem, explanation.fit.free, background=False)
         shared = self.linear[0].shared.moved(-fit.shared)
         bases = self.linear[0].bases.moved(-fit.local(0)[: self.local_unknowns])
-        first = self.recordings[0]
-        scene = team_of(shared, bases, effects, (first.phi[0], first.theta[0]))
+        scene = team_of(shared, bases, effects, *posture(self.recordings[0]))
         causes = [found.candidate.label for found in explanation.found]
         write_extended(scene, effects, folder, {"recordings": list(self.trials), "causes": causes})
 

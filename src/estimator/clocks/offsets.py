@@ -135,7 +135,7 @@ def unknown_clocks(robots: int, middle_s: float, why: str) -> ClockEstimate:
 
 def recorded_clocks(recording: Recording, max_offset_s: float = MAX_OFFSET_S) -> ClockEstimate:
     """The same of a recording, whose robots share one column of time; see ``estimate_clocks``."""
-    theta = [recording.theta[:, i] for i in range(recording.metadata.robots)]
+    theta = [recording.joints(i)[1] for i in range(recording.metadata.robots)]
     starts = np.full(len(theta), recording.time[0])
     return estimate_clocks(theta, starts, recording.metadata.rate_hz, max_offset_s)
 

@@ -76,7 +76,7 @@ def estimate_payload(
         with np.errstate(over="raise", divide="raise"):
             for recording in recordings:
                 names.append(recording.name)
-                trials.append(_trial(recording, cutoff_hz, trim_s))
+                trials.append(trial_of(recording, cutoff_hz, trim_s))
                 del recording  # or the next one would be read before this one is let go
             return estimate_from_trials(
                 trials, method, window_s, say, compare_masses=compare_masses, withhold=withhold
@@ -87,7 +87,8 @@ def estimate_payload(
         ) from error
 
 
-def _trial(recording: Recording, cutoff_hz: float, trim_s: float) -> Trial:
+def trial_of(recording: Recording, cutoff_hz: float = 5.0, trim_s: float = 2.0) -> Trial:
+    """A recording processed for ``estimate_from_trials``; arguments and errors as for ``estimate_payload``."""
     check_carries(recording, "estimated")
     labels = recording.metadata
     return Trial(

@@ -161,20 +161,21 @@ def _check_torques(recording: Recording) -> None:
 
 
 def _check_legs(recording: Recording) -> None:
-    phi, design = recording.phi, recording.metadata.design
+    robots = range(recording.metadata.robots)
 
     def fail(row: int, robot: int, what: str) -> None:
-        angles = ", ".join(f"{value:.6g}" for value in phi[row, robot])
+        angles = ", ".join(f"{value:.6g}" for value in recording.phi[row, robot])
         raise InputError(
             f"{recording.name}: omnid{robot + 1} has phi = ({angles}) rad in row {row}, where {what}; "
             "are zeros, signs and order of the joints right?"
         )
 
     # One robot at a time: the geometry takes ten times the memory of its angles.
-    apart = [np.flatnonzero(~is_reachable(phi[:, robot], design)) for robot in range(phi.shape[1])]
+    arms = [(recording.joints(robot)[0], recording.arm(robot)) for robot in robots]
+    apart = [np.flatnonzero(~is_reachable(phi, arm)) for phi, arm in arms]
     if (first := _first(apart)) is not None:
         fail(*first, "the three rods cannot meet")
-    folded = [leg_geometry(phi[:, robot], design).leverage <= 0 for robot in range(phi.shape[1])]
+    folded = [leg_geometry(phi, arm).leverage <= 0 for phi, arm in arms]
     if (first := _first([np.flatnonzero(legs.any(axis=1)) for legs in folded])) is not None:
         leg = int(np.argmax(folded[first[1]][first[0]]))
         fail(*first, f"leg {leg + 1} is past its stretched position")

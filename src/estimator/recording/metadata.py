@@ -6,15 +6,18 @@ import json
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from estimator.arm.arms import Arms
 from estimator.arm.design import OmnidDesign
+from estimator.arm.unit import COUNT, ArmUnit
+from estimator.arm.units_json import units_from_list, units_to_list
 from estimator.errors import InputError
 from estimator.recording.sampling import Sampling
 from estimator.strict import Fields, parse_json
 
 FORMAT = "mocobot-recording"
-VERSIONS = (1, 2, 3, 4)
-"""Version 2 has the key ``level``, version 3 ``sampling`` besides, version 4 free trials, with or without ``sampling``;
-each is written only where it is needed."""
+VERSIONS = (1, 2, 3, 4, 5)
+"""Version 2 has the key ``level``, version 3 ``sampling`` besides, version 4 free trials, with or without ``sampling``,
+version 5 ``units``, of any trial; each is written only where it is needed."""
 FREE = "free"
 """Kind of trial in which the robots hold nothing."""
 TRIALS = ("random", "periodic", "static", FREE)
@@ -39,6 +42,8 @@ class RecordingMetadata:
         control: gains, feed-forward and inner loop as plain JSON values, or None.
         level: how the file tells the samples: "joint" (phi, theta, tau) or "wrist" (h, theta, force).
         sampling: how each robot's sensors were read, N entries, where the samples are not as they were read.
+        units: the robots as they are, ``x`` of shape (N, ``COUNT``), where a calibration says; the samples stay as
+            they were read.
     """
 
     robots: int
@@ -51,6 +56,12 @@ class RecordingMetadata:
     control: dict[str, Any] | None = None
     level: Level = "joint"
     sampling: tuple[Sampling, ...] | None = None
+    units: ArmUnit | None = None
+
+    @property
+    def arms(self) -> Arms:
+        """The robots as they are, or as designed where nothing is known."""
+        return self.design if self.units is None else self.units
 
     @property
     def team(self) -> int:
@@ -62,11 +73,11 @@ class RecordingMetadata:
         """The metadata as JSON text.
 
         Raises:
-            InputError: a value is not allowed, or ``control`` is not plain finite JSON.
+            InputError: a value is not allowed, ``units`` are of other robots, or ``control`` is not plain finite JSON.
         """
         values: dict[str, Any] = {
             "format": FORMAT,
-            "version": 4 if self.trial == FREE else 3 if self.sampling else 2 if self.level != "joint" else 1,
+            "version": self._version,
             **{key: getattr(self, key) for key in _REQUIRED[2:]},
             "design": self.design.to_dict(),
         }
@@ -74,6 +85,9 @@ class RecordingMetadata:
             values["level"] = self.level
         if self.sampling:
             values["sampling"] = [sampling.to_dict() for sampling in self.sampling]
+        if self.units is not None:
+            check_of_robots(self.units, self, "recording metadata: units")
+            values["units"] = units_to_list(self.units)
         if self.control is not None:
             values["control"] = self.control
         try:
@@ -83,6 +97,12 @@ class RecordingMetadata:
         # One set of rules: what cannot be read back must not be written.
         self.from_json(text, "recording metadata")
         return text
+
+    @property
+    def _version(self) -> int:
+        if self.units is not None:
+            return 5
+        return 4 if self.trial == FREE else 3 if self.sampling else 2 if self.level != "joint" else 1
 
     @classmethod
     def from_json(cls, text: str | bytes, where: str = "metadata") -> RecordingMetadata:
@@ -98,7 +118,8 @@ class RecordingMetadata:
         values = parse_json(text, where)
         _check_format(values, where)
         version = values.get("version", 1)
-        required = _REQUIRED + ((), ("level",), ("level", "sampling"), ("level",))[version - 1]
+        newer = (), ("level",), ("level", "sampling"), ("level",), ("level", "units")
+        required = _REQUIRED + newer[version - 1]
         optional = _OPTIONAL if version < 4 else ("sampling", *_OPTIONAL)
         _check_values(Fields(values, required, where, optional))
         kept = {key: value for key, value in values.items() if key not in ("format", "version")}
@@ -106,7 +127,27 @@ class RecordingMetadata:
         if "sampling" in values:
             parts = enumerate(values["sampling"])
             kept["sampling"] = tuple(Sampling.from_dict(x, f"{where}: sampling[{k}]") for k, x in parts)
+        if "units" in values:
+            kept["units"] = units_from_list(values["units"], design, f"{where}: units")
         return cls(**kept | {"rate_hz": float(values["rate_hz"]), "design": design})
+
+
+def check_of_robots(units: ArmUnit, metadata: RecordingMetadata, what: str) -> None:
+    """Whether units are of as many robots, and of the same design.
+
+    Args:
+        units: robots as they are.
+        metadata: of a recording of robots.
+        what: how messages call the units.
+
+    Raises:
+        InputError: they are not.
+    """
+    if units.x.shape != (metadata.robots, COUNT):
+        count = len(units.x) if units.x.ndim == 2 else 1
+        raise InputError(f"{what}: of {count} robots; the recording is of {metadata.robots}")
+    if units.design != metadata.design:
+        raise InputError(f"{what}: of robots of another design than the recording's")
 
 
 def _check_format(values: dict[str, Any], where: str) -> None:
@@ -151,5 +192,9 @@ def _check_values(fields: Fields) -> None:
         sampling = values["sampling"]
         good = isinstance(sampling, list) and len(sampling) == robots
         require("sampling", "a list with one object for each robot", good=good)
+    if "units" in fields:
+        units = values["units"]
+        good = isinstance(units, list) and len(units) == robots
+        require("units", "a list with one object for each robot", good=good)
     if "control" in fields:
         require("control", "an object (leave it out if unknown)", good=isinstance(values["control"], dict))

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.arm.arms import Arms, arm_of, true_joints
 from estimator.arm.wrist_level import wrist_of
 from estimator.arrays import Array
 from estimator.errors import InputError
@@ -30,6 +31,9 @@ CHANNELS: dict[Level, dict[str, tuple[str, ...]]] = {
 @dataclass(frozen=True, eq=False)
 class Recording:
     """Samples of one trial with N robots, all taken at the same instants.
+
+    Samples are what the sensors read. What follows from them goes by ``arm`` and ``joints``, which know the robots as
+    they are where the metadata say.
 
     Attributes:
         time: sample times [s], shape (Q,).
@@ -65,12 +69,23 @@ class Recording:
                 raise InputError(f"{self.name}: {field} has shape {array.shape}; it must be {expected}")
             object.__setattr__(self, field, array)
 
+    def arm(self, robot: int) -> Arms:
+        """The arm of one robot (from 0), as it is or as designed."""
+        return arm_of(self.metadata.arms, robot)
+
+    def joints(self, robot: int) -> tuple[Array, Array, Array]:
+        """True phi [rad], theta [rad] and tau [N m] of one robot (from 0), shape (Q, 3) each."""
+        return true_joints(self.arm(robot), self.phi[:, robot], self.theta[:, robot], self.tau[:, robot])
+
     def columns(self) -> dict[str, Array]:
         """Driven angles, gimbal angles, torques and commands by their column's name, each of shape (Q,)."""
         return self._named("joint", {"phi": self.phi, "theta": self.theta, "tau": self.tau, "ref": self.ref})
 
     def file_columns(self) -> dict[str, Array]:
         """Every column of the file by its name, in file order, each of shape (Q,).
+
+        Wrist positions and forces are those of the design, as a robot's own controller tells them: ``units`` say how
+        readings differ from the truth, at both levels alike.
 
         Raises:
             InputError: the level is "wrist" and some driven angles have no wrist position (see ``wrist_of``).

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from estimator.arm.arms import Arms, levelled
 from estimator.arm.delta import forward_kinematics
-from estimator.arm.design import OmnidDesign
 from estimator.arm.gimbal import rotation
 from estimator.arrays import Array
 from estimator.estimate.fusion import fuse
@@ -66,9 +66,14 @@ class Bases:
         )
 
 
-def pose_residual(phi: Array, theta: Array, shared: Shared, bases: Bases, design: OmnidDesign) -> Array:
-    """e_rot [rad] and e_pos [m] of the robots i >= 2, shape (Q, 6 (N - 1)), from angles (Q, N, 3)."""
-    return pose_error(rotation(theta), forward_kinematics(phi, design), shared, bases)
+def poses(phi: Array, theta: Array, arms: Arms) -> tuple[Array, Array]:
+    """R_bi and h [m] in level base frames, (..., N, 3, 3) and (..., N, 3), from true angles (..., N, 3)."""
+    return levelled(arms, rotation(theta), forward_kinematics(phi, arms))
+
+
+def pose_residual(phi: Array, theta: Array, shared: Shared, bases: Bases, arms: Arms) -> Array:
+    """e_rot [rad] and e_pos [m] of the robots i >= 2, shape (Q, 6 (N - 1)), from true angles (Q, N, 3)."""
+    return pose_error(*poses(phi, theta, arms), shared, bases)
 
 
 def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:
@@ -82,12 +87,19 @@ def pose_error(R: Array, h: Array, shared: Shared, bases: Bases) -> Array:
     return np.concatenate(parts, axis=1) if parts else np.zeros((len(R), 0))
 
 
-def robot_data(s: Array, design: OmnidDesign) -> ArmData:
-    """R_bi, h, twist, twist_dot and wrench of robots whose signals are s (``slots``), shape (Q, ..., 21)."""
+def robot_data(s: Array, arms: Arms) -> ArmData:
+    """R_bi and h in level base frames, twist, twist_dot and wrench of robots whose true signals are s (``slots``).
+
+    Args:
+        s: shape (Q, ..., 21).
+        arms: of one robot, or of all in the axis before the last.
+    """
     phi, phi_dot, phi_ddot, theta, theta_dot, theta_ddot, tau = np.moveaxis(
         s.reshape(*s.shape[:-1], 7, 3), -2, 0
     )
-    return arm_data((phi, phi_dot, phi_ddot), (theta, theta_dot, theta_ddot), tau, design)
+    data = arm_data((phi, phi_dot, phi_ddot), (theta, theta_dot, theta_ddot), tau, arms)
+    R_bi, h = levelled(arms, data.R_bi, data.h)
+    return data._replace(R_bi=R_bi, h=h)
 
 
 def balance(data: GraspData, shared: Shared) -> tuple[Array, Array]:
@@ -99,7 +111,7 @@ def balance(data: GraspData, shared: Shared) -> tuple[Array, Array]:
     return np.concatenate([motion.force, motion.moment], axis=1) - Y @ shared.pi, Y
 
 
-def grasp_data(s: Array, design: OmnidDesign, rate_hz: float) -> GraspData:
-    """Data points of all robots from signals s, shape (Q, N, 21); time is not needed here."""
-    R, h, twist, twist_dot, wrench = robot_data(s, design)
-    return GraspData(np.zeros(len(s)), R, h, twist, twist_dot, wrench, rate_hz, design.gravity_mps2)
+def grasp_data(s: Array, arms: Arms, rate_hz: float) -> GraspData:
+    """Data points of all robots from true signals s, shape (Q, N, 21); time is not needed here."""
+    R, h, twist, twist_dot, wrench = robot_data(s, arms)
+    return GraspData(np.zeros(len(s)), R, h, twist, twist_dot, wrench, rate_hz, arms.gravity_mps2)

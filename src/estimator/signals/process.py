@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from estimator.arm.design import OmnidDesign
+from estimator.arm.arms import Arms, levelled
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.filtering import differentiate, low_pass, trim_slice
@@ -18,7 +18,7 @@ BLOCK = 16_384
 def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: float = 2.0) -> GraspData:
     """Filter, differentiate and convert a recording to poses, twists, twist derivatives and wrenches.
 
-    Joint angles and torques pass through the same zero-phase filter. Rates and accelerations come from
+    Readings are corrected where the metadata know the robots as they are. Joint angles and torques pass through the same zero-phase filter. Rates and accelerations come from
     sixth-order differences of the *joint* angles; the twist (29), its derivative and the wrench then
     follow analytically.
 
@@ -38,7 +38,7 @@ def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: floa
             f"cutoff_hz is {cutoff_hz!r}; with {trim_s:g} s dropped at each end it must be at least "
             f"{1.0 / trim_s:g} Hz, or the filter's transients remain"
         )
-    rate_hz, design = recording.metadata.rate_hz, recording.metadata.design
+    rate_hz = recording.metadata.rate_hz
     keep = trim_slice(len(recording.time), rate_hz, trim_s)
     time = recording.time[keep]
     shape = len(time), recording.metadata.robots
@@ -50,17 +50,17 @@ def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: floa
         twist_dot=np.empty((*shape, 6)),
         wrench=np.empty((*shape, 6)),
         rate_hz=rate_hz,
-        gravity_mps2=design.gravity_mps2,
+        gravity_mps2=recording.metadata.design.gravity_mps2,
     )
     for robot in range(shape[1]):
-        sensors = (samples[:, robot] for samples in (recording.phi, recording.theta, recording.tau))
-        phi, theta, tau = (low_pass(samples, rate_hz, cutoff_hz) for samples in sensors)
+        arm = recording.arm(robot)
+        phi, theta, tau = (low_pass(samples, rate_hz, cutoff_hz) for samples in recording.joints(robot))
         driven, gimbal = (_derivatives(angles, rate_hz, keep) for angles in (phi, theta))
         tau = tau[keep]
         # In blocks: what lies between takes ten times the memory of the result.
         for first in range(0, len(time), BLOCK):
             block = slice(first, first + BLOCK)
-            _fill(data, robot, block, driven[:, block], gimbal[:, block], tau[block], design)
+            _fill(data, robot, block, driven[:, block], gimbal[:, block], tau[block], arm)
     return data
 
 
@@ -77,10 +77,10 @@ def _fill(
     phi: Array,
     theta: Array,
     tau: Array,
-    design: OmnidDesign,
+    arm: Arms,
 ) -> None:
     """Data points of one robot from its angles with their derivatives, (3, q, 3), and its torques, (q, 3)."""
-    found = arm_data((phi[0], phi[1], phi[2]), (theta[0], theta[1], theta[2]), tau, design)
-    data.R_bi[block, robot], data.p_bi[block, robot] = found.R_bi, found.h
+    found = arm_data((phi[0], phi[1], phi[2]), (theta[0], theta[1], theta[2]), tau, arm)
+    data.R_bi[block, robot], data.p_bi[block, robot] = levelled(arm, found.R_bi, found.h)
     data.twist[block, robot], data.twist_dot[block, robot] = found.twist, found.twist_dot
     data.wrench[block, robot] = found.wrench

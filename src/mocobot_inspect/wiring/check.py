@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.arm.arms import Arms, design_of
 from estimator.arm.design import OmnidDesign
 from mocobot_inspect.signals import Signals
 from mocobot_inspect.wiring.misfit import SUSPICIOUS, Misfit, team_misfit
@@ -82,16 +83,16 @@ Told = tuple[Grasp | None, tuple[Fault, ...]]
 class Team:
     """Misfits of one log with mistakes undone; what a mistake does not touch is not computed again."""
 
-    def __init__(self, signals: Signals, design: OmnidDesign, motions: Motions | None = None) -> None:
+    def __init__(self, signals: Signals, arms: Arms, motions: Motions | None = None) -> None:
         """Compute every robot's motion, as far as it is not among those of the same log."""
-        self.signals, self._design = signals, design
-        self._motions = motions or Motions(design)
+        self.signals, self._robots = signals, arms
+        self._motions = motions or Motions(arms)
         robots = range(signals.robots)
         with np.errstate(all="ignore"):
             self._arms = [self._motions.arm(signals, robot) for robot in robots]
             self._gimbals = [self._motions.gimbal(signals, robot) for robot in robots]
             self._told = [
-                grasp_motion(signals, robot, self._arms[robot], self._gimbals[robot], design)
+                grasp_motion(signals, robot, self._arms[robot], self._gimbals[robot], arms)
                 for robot in robots
             ]
             self._body = rigid_body([t[0] for t in self._told if t[0] is not None])
@@ -106,22 +107,22 @@ class Team:
             for robot in mistake.robots:
                 arm = self._arms[robot] if same_arms else self._motions.arm(signals, robot)
                 gimbal = self._gimbals[robot] if same_gimbals else self._motions.gimbal(signals, robot)
-                told[robot] = grasp_motion(signals, robot, arm, gimbal, self._design)
+                told[robot] = grasp_motion(signals, robot, arm, gimbal, self._robots)
         return self._judge(told, self._body if same_arms and same_gimbals else None, enough)
 
     def undone(self, mistake: Mistake) -> Team:
         """The team with a mistake undone."""
-        return Team(mistake.undo(self.signals), self._design, self._motions)
+        return Team(mistake.undo(self.signals), self._robots, self._motions)
 
     def _judge(self, told: Sequence[Told], body: Body | None, enough: float = np.inf) -> Misfit:
         grasps, faults = [t[0] for t in told], [t[1] for t in told]
         most_noise = self._body.noise if self._body is not None else None
-        return team_misfit(grasps, faults, self._design.gravity_mps2, body, enough, most_noise)
+        return team_misfit(grasps, faults, self._robots.gravity_mps2, body, enough, most_noise)
 
 
 def check_wiring(
     signals: Signals,
-    design: OmnidDesign,
+    arms: Arms,
     advance: Callable[[int], object] = lambda _: None,
     *,
     look_for_hidden: bool = True,
@@ -130,11 +131,12 @@ def check_wiring(
 
     Args:
         signals: the team's channels.
-        design: the robots' numbers.
+        arms: the robots as they are, or as designed.
         advance: takes the number of mistakes tried since the last call.
         look_for_hidden: whether to find out which mistakes would not show.
     """
-    first = team = Team(signals, design)
+    design = design_of(arms)
+    first = team = Team(signals, arms)
     chain: list[tuple[Mistake, tuple[Mistake, ...]]] = []
     while team.misfit.total > WORTH_TRYING and team.misfit.tells and len(chain) < MOST:
         best, alike, after = _best(team, design, advance)

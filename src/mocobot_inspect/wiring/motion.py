@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from estimator.arm.arms import Arms, arm_of, design_of
 from estimator.arm.delta import (
     LegGeometry,
     inverse_kinematics,
@@ -15,6 +16,7 @@ from estimator.arm.delta import (
 from estimator.arm.design import OmnidDesign
 from estimator.arm.dynamics import arm_torque
 from estimator.arm.gimbal import angular_motion, rotation
+from estimator.arm.unit import ArmUnit
 from estimator.arm.wrist_level import driven_motion
 from estimator.arrays import Array
 from estimator.errors import InputError
@@ -72,12 +74,14 @@ class Arm:
 
     Attributes:
         legs: geometry at the driven angles.
-        h_dot, h_ddot: velocity and acceleration of the wrist in {b} [m/s, m/s^2], shape (Q, 3).
+        told: the same by the design at the angles as read, which is how wrist positions and forces are told.
+        h_dot, h_ddot: velocity and acceleration of the wrist in the arm's own frame [m/s, m/s^2], shape (Q, 3).
         own_torque: spring torques that move the arm itself [N m], shape (Q, 3).
         faults: why the positions cannot be right.
     """
 
     legs: LegGeometry
+    told: LegGeometry
     h_dot: Array
     h_ddot: Array
     own_torque: Array
@@ -89,7 +93,7 @@ class Gimbal:
     """What follows from one robot's gimbal angles alone.
 
     Attributes:
-        R_bi: orientation of {i} in {b}, shape (Q, 3, 3).
+        R_bi: orientation of {i} in the arm's own frame, shape (Q, 3, 3).
         omega, alpha: its angular velocity [rad/s] and acceleration [rad/s^2] in {i}, shape (Q, 3).
         faults: why the angles cannot be right.
     """
@@ -103,9 +107,9 @@ class Gimbal:
 class Motions:
     """Arms and gimbals of one log: many mistakes leave a robot the same numbers, and these are worked through once."""
 
-    def __init__(self, design: OmnidDesign) -> None:
+    def __init__(self, arms: Arms) -> None:
         """Nothing is known yet."""
-        self._design = design
+        self._robots = arms
         self._arms: dict[tuple[str, int, bytes], Arm | Fault] = {}
         self._gimbals: dict[tuple[int, bytes], Gimbal] = {}
 
@@ -113,46 +117,50 @@ class Motions:
         """What ``arm_motion`` says."""
         key = signals.level, robot, signals.position.values[:, :, robot].tobytes()
         if key not in self._arms:
-            self._arms[key] = arm_motion(signals, robot, self._design)
+            self._arms[key] = arm_motion(signals, robot, self._robots)
         return self._arms[key]
 
     def gimbal(self, signals: Signals, robot: int) -> Gimbal:
         """What ``gimbal_motion`` says."""
         key = robot, signals.theta.values[:, :, robot].tobytes()
         if key not in self._gimbals:
-            self._gimbals[key] = gimbal_motion(signals, robot, self._design)
+            self._gimbals[key] = gimbal_motion(signals, robot, self._robots)
         return self._gimbals[key]
 
 
-def arm_motion(signals: Signals, robot: int, design: OmnidDesign) -> Arm | Fault:
+def arm_motion(signals: Signals, robot: int, arms: Arms) -> Arm | Fault:
     """The arm of one robot (from 0), or why it cannot be in such postures."""
+    design, arm = design_of(arms), arm_of(arms, robot)
     position, wrist = signals.position.values[:, :, robot], signals.level == "wrist"
     faults: tuple[Fault, ...] = ()
     if not wrist:
         faults = _out_of_range("phi", position[0], design.phi_min_rad, design.phi_max_rad, "rad", robot)
     posture = _posture(position, design, wrist=wrist)
+    if posture is not None and isinstance(arm, ArmUnit):
+        posture = _corrected(posture, arm)
     if posture is None:
         what = "no driven angles reach its wrist positions" if wrist else "its rods cannot meet"
         return Fault(1.0 + sum(fault.share for fault in faults), f"omnid{robot + 1}: {what}")
-    phi, position, legs = posture
+    phi, motion, legs, told = posture
     folded = float(np.mean(np.any(legs.leverage <= 0.0, axis=-1)))
     if folded > WRONG_SHARE:
         faults = (*faults, Fault(folded, f"omnid{robot + 1}: a leg is past its stretched position"))
-    h_dot, h_ddot = (position[1], position[2]) if wrist else wrist_motion(legs, phi[1], phi[2])
-    return Arm(legs, h_dot, h_ddot, arm_torque(phi[0], phi[1], phi[2], design, legs), faults)
+    h_dot, h_ddot = wrist_motion(legs, phi[1], phi[2]) if motion is None else motion
+    return Arm(legs, told, h_dot, h_ddot, arm_torque(phi[0], phi[1], phi[2], arm, legs), faults)
 
 
-def gimbal_motion(signals: Signals, robot: int, design: OmnidDesign) -> Gimbal:
+def gimbal_motion(signals: Signals, robot: int, arms: Arms) -> Gimbal:
     """The gimbal of one robot (from 0)."""
-    theta = signals.theta.values[:, :, robot]
-    limit = design.gimbal_limit_rad
-    omega, alpha = angular_motion(theta[0], theta[1], theta[2])
+    theta, arm = signals.theta.values[:, :, robot], arm_of(arms, robot)
+    limit = design_of(arms).gimbal_limit_rad
+    true = theta[0] - arm.of("theta_zero") if isinstance(arm, ArmUnit) else theta[0]
+    omega, alpha = angular_motion(true, theta[1], theta[2])
     faults = _out_of_range("theta", theta[0], -limit, limit, "rad", robot)
-    return Gimbal(rotation(theta[0]), omega, alpha, faults)
+    return Gimbal(rotation(true), omega, alpha, faults)
 
 
 def grasp_motion(
-    signals: Signals, robot: int, arm: Arm | Fault, gimbal: Gimbal, design: OmnidDesign
+    signals: Signals, robot: int, arm: Arm | Fault, gimbal: Gimbal, arms: Arms
 ) -> tuple[Grasp | None, tuple[Fault, ...]]:
     """Motion and force at one grasp, None where the arm cannot be in such postures.
 
@@ -160,18 +168,21 @@ def grasp_motion(
         signals: the team's channels.
         robot: which robot, from 0.
         arm, gimbal: what follows from its positions and gimbal angles.
-        design: the robots' numbers.
+        arms: the robots' numbers.
 
     Returns:
         The motion, and the faults of all channels.
     """
     if isinstance(arm, Fault):
         return None, (*gimbal.faults, arm)
-    wrist, legs = signals.level == "wrist", arm.legs
+    wrist, legs, told = signals.level == "wrist", arm.legs, arm.told
+    design, unit = design_of(arms), arm_of(arms, robot)
     effort = signals.effort.values[0, :, robot]
-    tau = legs.leverage * _solve(np.swapaxes(legs.rod, -1, -2), effort) if wrist else effort
+    tau = told.leverage * _solve(np.swapaxes(told.rod, -1, -2), effort) if wrist else effort
     limit = TORQUE_FACTOR * design.torque_limit_Nm
     faults = _out_of_range("force" if wrist else "tau", tau, -limit, limit, "N m", robot)
+    if isinstance(unit, ArmUnit):
+        tau = unit.true_tau(tau)
     # Each leg pushes along its rod, see ``wrist_of``.
     force = np.sum(legs.rod * ((tau - arm.own_torque) / legs.leverage)[..., None], axis=-2)
     value, rate, _ = noise_gains()
@@ -192,21 +203,26 @@ def grasp_motion(
         alpha=gimbal.alpha,
         velocity=_into(gimbal.R_bi, arm.h_dot),
         acceleration=_into(gimbal.R_bi, arm.h_ddot),
-        up=gimbal.R_bi[:, 2, :],
+        up=unit.up @ gimbal.R_bi,
         force=_into(gimbal.R_bi, force),
-        lift=force[:, 2],
-        rise=arm.h_ddot[:, 2],
+        lift=force @ unit.up,
+        rise=arm.h_ddot @ unit.up,
         noise=np.array(noise),
     )
     return grasp, (*arm.faults, *gimbal.faults, *faults)
 
 
-def _posture(position: Array, design: OmnidDesign, *, wrist: bool) -> tuple[Array, Array, LegGeometry] | None:
-    """Driven angles with rates and accelerations, and the positions themselves, both (3, Q, 3) and without the few
-    instants that no arm can be in; and the geometry at the angles."""
+Posture = tuple[Array, tuple[Array, Array] | None, LegGeometry, LegGeometry]
+"""Driven angles with rates and accelerations, (3, Q, 3); velocity and acceleration of the wrist, where they are told
+and not worked out; the geometry at the angles, and by the design at the angles as read."""
+
+
+def _posture(position: Array, design: OmnidDesign, *, wrist: bool) -> Posture | None:
+    """What a robot as designed does, without the few instants that no arm can be in."""
     if not wrist:
         try:
-            return position, position, leg_geometry(position[0], design)
+            legs = leg_geometry(position[0], design)
+            return position, None, legs, legs
         except InputError:  # some instants are impossible
             possible = is_reachable(position[0], design)
     else:
@@ -219,10 +235,22 @@ def _posture(position: Array, design: OmnidDesign, *, wrist: bool) -> tuple[Arra
         nearest = good[np.clip(np.searchsorted(good, np.arange(len(possible))), 0, len(good) - 1)]
         position = position[:, nearest]
     if not wrist:
-        return position, position, leg_geometry(position[0], design)
+        legs = leg_geometry(position[0], design)
+        return position, None, legs, legs
     angles = inverse_kinematics(position[0], design)
     legs = leg_geometry(angles, design)
-    return np.stack([angles, *driven_motion(legs, position[1], position[2])]), position, legs
+    phi = np.stack([angles, *driven_motion(legs, position[1], position[2])])
+    return phi, (position[1], position[2]), legs, legs
+
+
+def _corrected(posture: Posture, unit: ArmUnit) -> Posture | None:
+    """The same of a robot as it is; None where it cannot be in such postures."""
+    phi, _, _, told = posture
+    phi = np.stack([phi[0] - unit.of("phi_zero"), phi[1], phi[2]])
+    try:
+        return phi, None, leg_geometry(phi[0], unit), told
+    except InputError:
+        return None
 
 
 def _out_of_range(

@@ -5,6 +5,7 @@ from dataclasses import asdict, dataclass, field, replace
 
 import numpy as np
 
+from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.errors import InputError
 
@@ -50,6 +51,28 @@ class AsBuilt:
     def to_dict(self) -> dict[str, list[float] | float]:
         """Plain JSON values by the names above."""
         return {name: np.asarray(value).tolist() for name, value in asdict(self).items()}
+
+
+def units_as_built(units: ArmUnit) -> tuple[AsBuilt, ...]:
+    """Calibrated robots, ``x`` of shape (N, ``COUNT``), to be simulated; a tilted base is the mount's, not the arm's.
+
+    What the base's radius is off minus the platform's is given to the base, as kinematics cannot part them.
+    """
+    return tuple(
+        AsBuilt(
+            base_radius_m=one.of("radius"),
+            proximal_length_m=one.of("proximal_length"),
+            rod_length_m=one.of("rod_length"),
+            stiffness_ratio=one.of("stiffness_ratio"),
+            phi_zero_rad=one.of("phi_zero"),
+            theta_zero_rad=one.of("theta_zero"),
+            tau_zero_Nm=one.of("tau_zero"),
+            proximal_mass_ratio=one.of("proximal_mass_ratio"),
+            rod_mass_ratio=one.of("rod_mass_ratio"),
+            wrist_mass_ratio=float(one.of("wrist_mass_ratio")[0]),
+        )
+        for one in (ArmUnit(units.design, x) for x in units.x)
+    )
 
 
 def units_of(as_built: Sequence[AsBuilt], robots: int) -> tuple[AsBuilt, ...]:

@@ -26,7 +26,7 @@ class BaseCompliance(Cause):
     def columns(self, trial, robot, joint, shape):
         design, s = trial.design, trial.s[:, robot]
         force = np.einsum("qij,qj->qi", trial.data.R_bi[:, robot], trial.data.wrench[:, robot, 3:])
-        _, h_ddot = wrist_motion(leg_geometry(s[:, PHI], design), s[:, PHI_DOT], s[:, PHI_DDOT])
+        _, h_ddot = wrist_motion(leg_geometry(s[:, PHI], trial.arm(robot)), s[:, PHI_DOT], s[:, PHI_DDOT])
         force = force + (design.wrist_mass_kg + 1.5 * design.rod_mass_kg) * h_ddot
         horizontal = -force * np.array([1.0, 1.0, 0.0])
         return stack([trial.of_pose(robot, None, horizontal @ trial.bases.R[robot].T)])

@@ -47,7 +47,7 @@ class BaseTilt(Cause):
         raw[:, -6:-3] = mass * g * up
         raw[:, -3:] = np.cross(mass_c, g * up)
         # The arm's own weight, which the balance takes off the torques.
-        legs = leg_geometry(trial.s[:, robot, PHI], design)
+        legs = leg_geometry(trial.s[:, robot, PHI], trial.arm(robot))
         at_knee = (
             design.proximal_mass_kg * design.proximal_com_m / design.proximal_length_m
             + 0.5 * design.rod_mass_kg

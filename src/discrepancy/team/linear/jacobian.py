@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
-from estimator.arm.design import OmnidDesign
+from estimator.arm.arms import Arms, arm_of
 from estimator.arrays import Array
 from estimator.estimate.fusion import fuse, fusion_matrix
 from estimator.estimate.principal import inertia_matrix
@@ -13,7 +13,7 @@ from estimator.rigid_team.slots import COUNT, STEPS
 from estimator.signals.grasp_data import GraspData
 
 
-def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, design: OmnidDesign) -> Array:
+def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Arms) -> Array:
     """Derivative of the residual by every robot's signals, shape (N, Q, C, 21).
 
     Central differences through one robot's own formulas, then by hand through what is linear in the robots;
@@ -30,13 +30,13 @@ def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, design: 
     J = np.zeros((N, Q, 6 * N, COUNT))
     for i in range(N):
         G = fusion_matrix(grasps)[:, 6 * i : 6 * i + 6]
-        R_1i, p_1i = grasps.R_1i[i], grasps.p_1i[i]
+        R_1i, p_1i, arm = grasps.R_1i[i], grasps.p_1i[i], arm_of(arms, i)
         for k in range(COUNT):
             ends = []
             for sign in (1.0, -1.0):
                 moved = s[:, i].copy()
                 moved[:, k] += sign * STEPS[k]
-                ends.append(robot_data(moved, design))
+                ends.append(robot_data(moved, arm))
             dR, dh, dV, dV_dot, dF = (
                 (a - b) / (2.0 * STEPS[k]) for a, b in zip(ends[0], ends[1], strict=True)
             )

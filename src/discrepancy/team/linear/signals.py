@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discrepancy import rules
+from estimator.arm.arms import true_joints
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass, trim_slice
 from estimator.recording.model import Recording
@@ -19,7 +20,7 @@ class Signals:
 
     Attributes:
         time: [s], shape (Q,).
-        phi, theta, tau: as recorded or corrected, shape (Q, N, 3).
+        phi, theta, tau: as the robots' calibration and the causes correct what was recorded, shape (Q, N, 3).
         rate_hz: sampling rate [Hz].
         sampling: how each robot's sensors were read, where the samples are not as they were read.
     """
@@ -33,11 +34,10 @@ class Signals:
 
     @classmethod
     def of(cls, recording: Recording) -> Signals:
-        """The signals of a recording, untouched."""
+        """The signals of a recording: untouched, or true ones where its metadata know the robots as they are."""
         known = recording.metadata
-        return cls(
-            recording.time, recording.phi, recording.theta, recording.tau, known.rate_hz, known.sampling
-        )
+        signals = true_joints(known.arms, recording.phi, recording.theta, recording.tau)
+        return cls(recording.time, *signals, known.rate_hz, known.sampling)
 
     def minus(
         self, phi: Array | float = 0.0, theta: Array | float = 0.0, tau: Array | float = 0.0

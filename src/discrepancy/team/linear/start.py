@@ -15,15 +15,13 @@ from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear, filtered, linearise
 from estimator import so3
-from estimator.arm.delta import forward_kinematics
-from estimator.arm.design import OmnidDesign
-from estimator.arm.gimbal import rotation
+from estimator.arm.arms import Arms
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Bases, Shared, balance, grasp_data, pose_residual
+from estimator.rigid_team.residual import Bases, Shared, balance, grasp_data, pose_residual, poses
 
 
 def start_shared(estimate: PayloadEstimate) -> Shared:
@@ -53,24 +51,24 @@ def linearised_trials(
         InputError: the recordings do not determine the grasps, the mass and the centre of mass, or one is too short.
     """
     shared = start_shared(estimate)
-    design = recordings[0].metadata.design
+    arms = recordings[0].metadata.arms
     signals = [Signals.of(recording) for recording in recordings]
     noise = Noise.of(signals)
     reductions = [Reduction.of(s) for s in signals]
     for recording, reduction in zip(recordings, reductions, strict=True):
         if len(reduction.time) < 4:
             raise InputError(f"{recording.name}: too short to diagnose")
-    bases = [start_bases(s, shared, design) for s in signals]
+    bases = [start_bases(s, shared, arms) for s in signals]
     run = Parallel(n_jobs=jobs, prefer="processes" if jobs > 1 else "threads")
     tasks = [(s, b, r, k) for k, (s, b, r) in enumerate(zip(signals, bases, reductions, strict=True))]
     linear, whitening, torque_noise = zip(
-        *run(delayed(linearised)(s, shared, b, design, r, noise, k) for s, b, r, k in tasks), strict=True
+        *run(delayed(linearised)(s, shared, b, arms, r, noise, k) for s, b, r, k in tasks), strict=True
     )
     for _ in range(2):
         shared, bases = gauss_newton(linear, whitening)
         linear = tuple(
             replace(
-                t, shared=shared, bases=b, residual=exact_residual(t.signals, shared, b, design, t.reduction)
+                t, shared=shared, bases=b, residual=exact_residual(t.signals, shared, b, arms, t.reduction)
             )
             for t, b in zip(linear, bases, strict=True)
         )
@@ -78,10 +76,10 @@ def linearised_trials(
     return noise, tuple(with_adjusted_torques(*pair) for pair in pairs), tuple(whitening)
 
 
-def start_bases(signals: Signals, shared: Shared, design: OmnidDesign) -> Bases:
+def start_bases(signals: Signals, shared: Shared, arms: Arms) -> Bases:
     """Poses of the bases from the grasps and the mean of what the joints say."""
     keep = signals.keep
-    R, h = rotation(signals.theta[keep]), forward_kinematics(signals.phi[keep], design)
+    R, h = poses(signals.phi[keep], signals.theta[keep], arms)
     N = R.shape[1]
     turns, places = [np.eye(3)], [np.zeros(3)]
     for i in range(1, N):
@@ -96,23 +94,23 @@ def linearised(
     signals: Signals,
     shared: Shared,
     bases: Bases,
-    design: OmnidDesign,
+    arms: Arms,
     reduction: Reduction,
     noise: Noise,
     k: int,
 ) -> tuple[TrialLinear, Whitening, TorqueNoise]:
     """One trial's linearisation, and what the sensors' noise leaves in its rows; k is its number."""
-    linear = linearise(signals, shared, bases, design, reduction, full=True)
+    linear = linearise(signals, shared, bases, arms, reduction, full=True)
     draws, torques = noise_rows(linear, noise, np.random.default_rng([rules.NOISE_SEED, k]))
     moving = reduction.moving
     return linear, Whitening.of(draws, moving, uneven=True), TorqueNoise.of(draws, torques, moving)
 
 
 def exact_residual(
-    signals: Signals, shared: Shared, bases: Bases, design: OmnidDesign, reduction: Reduction
+    signals: Signals, shared: Shared, bases: Bases, arms: Arms, reduction: Reduction
 ) -> Array:
-    force = balance(grasp_data(filtered(signals), design, signals.rate_hz), shared)[0]
-    pose = pose_residual(signals.phi, signals.theta, shared, bases, design)
+    force = balance(grasp_data(filtered(signals), arms, signals.rate_hz), shared)[0]
+    pose = pose_residual(signals.phi, signals.theta, shared, bases, arms)
     return reduction(np.concatenate([pose, force], axis=1))
 
 

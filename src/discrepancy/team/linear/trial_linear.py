@@ -9,6 +9,7 @@ import numpy as np
 from discrepancy.team.linear.jacobian import by_signals, needed_wrench
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals, with_rates
+from estimator.arm.arms import Arms, arm_of, design_of
 from estimator.arm.design import OmnidDesign
 from estimator.arrays import Array
 from estimator.estimate.fusion import fusion_matrix
@@ -33,7 +34,7 @@ class TrialLinear:
         s: filtered signals, shape (Q, N, 21).
         data: data points of all robots.
         shared, bases: nominal unknowns.
-        design: the robots' numbers.
+        arms: the robots as they are, or as designed.
         reduction: samples to rows.
         residual: shape (n, C) with C = 6 N channels.
         J: derivative of the residual's samples by robot i's 21 signals, shape (N, Q, C, 21).
@@ -46,12 +47,21 @@ class TrialLinear:
     data: GraspData
     shared: Shared
     bases: Bases
-    design: OmnidDesign
+    arms: Arms
     reduction: Reduction
     residual: Array
     J: Array
     by_shared: Array
     by_bases: Array
+
+    @property
+    def design(self) -> OmnidDesign:
+        """What the robots are meant to be: good enough for how a cause changes what they do."""
+        return design_of(self.arms)
+
+    def arm(self, robot: int) -> Arms:
+        """One robot (from 0) as it is, or as designed."""
+        return arm_of(self.arms, robot)
 
     @property
     def robots(self) -> int:
@@ -176,14 +186,14 @@ class TrialLinear:
 
 
 def linearise(
-    signals: Signals, shared: Shared, bases: Bases, design: OmnidDesign, reduction: Reduction, *, full: bool
+    signals: Signals, shared: Shared, bases: Bases, arms: Arms, reduction: Reduction, *, full: bool
 ) -> TrialLinear:
     """Linearise one trial; without ``full`` the robots' signals are left out (J is empty)."""
     s = filtered(signals)
     Q, N = s.shape[:2]
-    data = grasp_data(s, design, signals.rate_hz)
+    data = grasp_data(s, arms, signals.rate_hz)
     force, Y = balance(data, shared)
-    pose = pose_residual(signals.phi, signals.theta, shared, bases, design)
+    pose = pose_residual(signals.phi, signals.theta, shared, bases, arms)
     residual = reduction(np.concatenate([pose, force], axis=1))
 
     def both(x: Array) -> Array:
@@ -201,9 +211,9 @@ def linearise(
         by_bases[:, :split, k] = _slope(
             lambda x: pose_error(data.R_bi, data.p_bi, shared, bases.moved(x)), k, 4 * (N - 1)
         )
-    J = by_signals(s, data, shared, bases, design) if full else np.zeros((N, 0, C, COUNT))
+    J = by_signals(s, data, shared, bases, arms) if full else np.zeros((N, 0, C, COUNT))
     columns = reduction(by_shared), reduction(by_bases)
-    return TrialLinear(signals, s, data, shared, bases, design, reduction, residual, J, *columns)
+    return TrialLinear(signals, s, data, shared, bases, arms, reduction, residual, J, *columns)
 
 
 def _slope(of: Callable[[Array], Array], k: int, count: int) -> Array:

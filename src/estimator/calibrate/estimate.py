@@ -1,0 +1,116 @@
+"""The estimate of a payload that a calibration found beside its robots."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from estimator.arrays import Array
+from estimator.calibrate.apply import calibrated
+from estimator.calibrate.calibration import CalibratedPayload, Calibration
+from estimator.calibrate.outcome.carried import Carried, carried
+from estimator.errors import InputError
+from estimator.estimate.consistency import Trial, wrench_balance
+from estimator.estimate.fusion import fuse
+from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.inertia import InertiaEstimate, inertia_regressor
+from estimator.estimate.payload import estimate_from_trials, trial_of
+from estimator.estimate.principal import inertia_parameters
+from estimator.estimate.result import PayloadEstimate
+from estimator.estimate.statics import MassEstimate
+from estimator.estimate.withheld import withheld
+from estimator.recording.model import Recording
+from estimator.statistics import rms
+
+METHOD = "calibrated"
+
+
+def estimate_calibrated(
+    calibration: Calibration,
+    recordings: Sequence[Recording],
+    cutoff_hz: float = 5.0,
+    say: Callable[[str], object] = lambda _: None,
+) -> PayloadEstimate:
+    """Grasps, mass, centre of mass and inertia as the calibration found them, errors of a held spring scale included.
+
+    What each recording says (holds, robots that contradict each other, wrenches left over) is judged with the
+    calibrated arms. All is in the frames that the encoders define.
+
+    Args:
+        calibration: made from these recordings, and others perhaps.
+        recordings: of one of its payloads.
+        cutoff_hz: cut-off of the low-pass filter for what each recording says [Hz].
+        say: takes the name of the stage that begins.
+
+    Raises:
+        InputError: the recordings are of several payloads, or of one that the calibration does not have.
+    """
+    payload = _payload_of(calibration, recordings)
+    trials = [trial_of(calibrated(recording, calibration), cutoff_hz) for recording in recordings]
+    staged = estimate_from_trials(trials, say=say, withhold=False)
+    numbers = carried(payload, calibration.scale_sd)
+    grasps = _grasps(payload, calibration.scale_sd, staged)
+    inertia = _inertia(trials, grasps, numbers)
+    records = list(staged.recordings)
+    for k, trial in enumerate(trials):
+        force, moment = wrench_balance(trial.data, grasps, numbers.mass_kg, numbers.p_1c, inertia)
+        records[k] = replace(records[k], force_residual=force, moment_residual_m=moment)
+    estimate = replace(
+        staged,
+        payload=payload.label,
+        method=METHOD,
+        grasps=grasps,
+        mass=MassEstimate(numbers.mass_kg, numbers.mass_se_kg, _force_residual(records, numbers, trials)),
+        p_1c=numbers.p_1c,
+        p_1c_covariance=numbers.covariance[1:4, 1:4],
+        inertia=inertia,
+        recordings=tuple(records),
+        flags=(*calibration.findings, *staged.flags, *calibration.open),
+    )
+    return withheld(estimate, max(trial.team for trial in trials))
+
+
+def _payload_of(calibration: Calibration, recordings: Sequence[Recording]) -> CalibratedPayload:
+    labels = {recording.metadata.payload for recording in recordings}
+    found = [payload for payload in calibration.payloads if {payload.label} == labels]
+    if len(found) != 1:
+        said = ", ".join(repr(payload.label) for payload in calibration.payloads)
+        names = ", ".join(recording.name for recording in recordings)
+        raise InputError(
+            f"{names}: of payload {' and '.join(sorted(map(repr, labels)))}; the calibration has {said}, and an "
+            "estimate is of one"
+        )
+    return found[0]
+
+
+def _grasps(payload: CalibratedPayload, scale_sd: float, staged: PayloadEstimate) -> GraspEstimate:
+    """The calibration's frames; residuals of twists, which it does not use, are those of the staged ones beside them."""
+    by_scale = payload.by_scale[:-10]
+    covariance = payload.covariance[:-10, :-10] + scale_sd**2 * np.outer(by_scale, by_scale)
+    found = staged.grasps or payload.grasps
+    return replace(found, R_1i=payload.grasps.R_1i, p_1i=payload.grasps.p_1i, covariance=covariance)
+
+
+def _inertia(trials: Sequence[Trial], grasps: GraspEstimate, numbers: Carried) -> InertiaEstimate:
+    left, explained = [], []
+    parameters = inertia_parameters(numbers.inertia)
+    for trial in trials:
+        motion = fuse(trial.data, grasps)
+        moment = inertia_regressor(motion.omega, motion.alpha) @ parameters
+        explained.append(moment)
+        left.append(motion.moment - np.cross(numbers.p_1c, motion.force) - moment)
+    return InertiaEstimate.of(parameters, numbers.covariance[4:, 4:], _rms(left), _rms(explained))
+
+
+def _rms(parts: Sequence[Array]) -> float:
+    return float(rms(np.concatenate(parts)))
+
+
+def _force_residual(records: Sequence, numbers: Carried, trials: Sequence[Trial]) -> float:
+    """rms of the forces left over [N], over all recordings."""
+    count = np.array([trial.data.samples for trial in trials])
+    share = np.array([record.force_residual for record in records])
+    weight = numbers.mass_kg * trials[0].data.gravity_mps2
+    return float(weight * np.sqrt(np.sum(count * share**2) / np.sum(count)))
