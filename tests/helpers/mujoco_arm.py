@@ -13,7 +13,7 @@ GIMBAL = ["gimbal_z", "gimbal_y", "gimbal_x"]
 
 
 class Arm:
-    """One Omnid in MuJoCo, its closed chain completed from driven and gimbal motion; as designed, unless a model is given."""
+    """One Omnid in MuJoCo, its closed chain completed from driven and gimbal motion."""
 
     def __init__(self, model=None):
         self.model = model or mujoco.MjModel.from_xml_path(str(OMNID_FOLDER / "omnid.xml"))

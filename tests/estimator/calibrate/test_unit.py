@@ -1,7 +1,7 @@
 """Robots as they are against MuJoCo: unequal legs and masses, a base that stands askew.
 
-The simulator builds the robot from the same deviations; kinematics and dynamics come from MuJoCo's compiled chain, balanced
-by linear algebra (``mujoco_arm``).
+The simulator builds the robot from the same deviations; kinematics and dynamics come from MuJoCo's compiled chain,
+balanced by linear algebra (``mujoco_arm``).
 """
 
 from dataclasses import replace
@@ -33,7 +33,10 @@ def unit_of(built: AsBuilt, tilt=(0.0, 0.0)) -> ArmUnit:
     unit.x[AT["proximal_length"]], unit.x[AT["rod_length"]] = built.proximal_length_m, built.rod_length_m
     unit.x[AT["stiffness_ratio"]], unit.x[AT["tau_zero"]] = built.stiffness_ratio, built.tau_zero_Nm
     unit.x[AT["tilt"]] = tilt
-    unit.x[AT["proximal_mass_ratio"]], unit.x[AT["rod_mass_ratio"]] = built.proximal_mass_ratio, built.rod_mass_ratio
+    unit.x[AT["proximal_mass_ratio"]], unit.x[AT["rod_mass_ratio"]] = (
+        built.proximal_mass_ratio,
+        built.rod_mass_ratio,
+    )
     unit.x[AT["wrist_mass_ratio"]] = built.wrist_mass_ratio
     return unit
 
@@ -113,7 +116,9 @@ def test_readings_become_true_signals_in_the_level_frame():
     tau, _ = arm.balance(f_a)
     # What the simulator's sensors read: deflection times design stiffness, zeros on top.
     reading = tau / (1.0 + built.stiffness_ratio) + built.tau_zero_Nm
-    s = np.concatenate([phi[0] + built.phi_zero_rad, *phi[1:], theta[0] + built.theta_zero_rad, *theta[1:], reading])
+    s = np.concatenate(
+        [phi[0] + built.phi_zero_rad, *phi[1:], theta[0] + built.theta_zero_rad, *theta[1:], reading]
+    )
     data = level_data(corrected(s[None, None], unit), unit)
     R_ba = Rotation.from_rotvec([*TILT, 0.0]).as_matrix()
     base, grasp = arm.data.site("base"), arm.data.site("grasp")
