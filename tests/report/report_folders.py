@@ -29,8 +29,8 @@ RATE_HZ, ROWS = 12.5, 400
 def paper_folder(folder: Path, presets: tuple[str, ...] = ("ideal", "nominal", "uncalibrated")) -> Path:
     """Scores are the published ones, divided by 1000, 100 and 2, with one number missing.
 
-    Beside the last preset a fit, a quarter of the published ones, a thousandth in the encoders' frames, and its transfer
-    from (a).
+    Beside the last preset a fit, a quarter of the published ones, a thousandth in the encoders' frames, and its
+    transfer from (a).
     """
     folder.mkdir()
     scores = {}
