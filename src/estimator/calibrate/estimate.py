@@ -125,7 +125,7 @@ def _payload_of(calibration: Calibration, recordings: Sequence[Recording]) -> Ca
 
 
 def _grasps(payload: CalibratedPayload, scale_sd: float, staged: PayloadEstimate) -> GraspEstimate:
-    """The calibration's frames; residuals of twists, which it does not use, are those of the staged ones beside them."""
+    """The calibration's frames; residuals of twists, which it does not use, are those of the staged ones."""
     by_scale = payload.by_scale[:-10]
     covariance = payload.covariance[:-10, :-10] + scale_sd**2 * np.outer(by_scale, by_scale)
     found = staged.grasps or payload.grasps

@@ -30,7 +30,7 @@ recordings                 list of {name, trial, duration_s, holds, grasps, iner
                            explains ("flange_position", "flange_rotation", "force", "moment"), and what noise leaves}
 contradicts                true if some of these are beyond noise: standard errors are too small then; null if not known
 flags                      list of sentences
-calibrated                 only where the robots were not taken as designed: {design, units}, as in a recording's metadata
+calibrated                 only where robots were not taken as designed: {design, units}, as in a recording's metadata
 
 ``mocobot estimate`` adds ``provenance``: versions, options and hashes of the recordings (``mocobot.files.provenance``).
 Readers ignore it and any other key.

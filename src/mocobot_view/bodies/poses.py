@@ -64,7 +64,8 @@ def rod_angles(phi: Array, arms: Arms) -> tuple[Array, Array, Array]:
         arms: the robots as they are, or as designed.
 
     Returns:
-        Wrist positions in the arms' own frames [m], and swing and tilt of each leg's rod against its link [rad]; shapes (..., 3).
+        Wrist positions in the arms' own frames [m], and swing and tilt of each leg's rod against its link [rad]; shapes
+        (..., 3).
 
     Raises:
         InputError: the rods do not meet at some sample.

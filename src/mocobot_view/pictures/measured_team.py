@@ -119,8 +119,9 @@ def _model(bases: Bases, payload: str | Path | None, design: OmnidDesign, height
     """Robots of a design at given bases, links in their colours, and a payload that floats."""
     root = mjcf.from_path(str(models_dir() / "team.xml"))
     turns = Rotation.from_matrix(bases.R_Wb).as_quat(scalar_first=True)
-    for i, (p, quat) in enumerate(zip(bases.p_Wb, turns, strict=True), start=1):
-        stand(root, load_omnid(i), p - [0.0, 0.0, height_m], quat)
+    feet = bases.p_Wb - bases.R_Wb @ [0.0, 0.0, height_m]
+    for i, (p, quat) in enumerate(zip(feet, turns, strict=True), start=1):
+        stand(root, load_omnid(i), p, quat)
     if payload is not None:
         root.worldbody.attach(load_payload(payload)).add("freejoint")
     model = compiled(root)
