@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.estimate import estimate_calibrated, one_payload, with_errors_of
+from estimator.calibrate.outcome.estimate import estimate_calibrated, one_payload, with_errors_of
 from estimator.errors import InputError
 from estimator.estimate.payload import Method, estimate_payload
 from estimator.estimate.result import PayloadEstimate

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from estimator.arm.design import OmnidDesign
 from estimator.arm.unit import ArmUnit
-from estimator.calibrate.apply import calibrated, units_for
 from estimator.calibrate.calibration import Calibration
+from estimator.calibrate.outcome.apply import calibrated, units_for
 from estimator.errors import InputError
 from estimator.recording.model import Recording
 from mocobot.files.calibrations import NAME, read_calibration

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from estimator.calibrate.apply import calibrated
 from estimator.calibrate.calibrate import calibrate
 from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.estimate import estimate_calibrated, with_errors_of
+from estimator.calibrate.outcome.apply import calibrated
+from estimator.calibrate.outcome.estimate import estimate_calibrated, with_errors_of
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording

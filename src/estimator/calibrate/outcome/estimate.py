@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.arrays import Array
-from estimator.calibrate.apply import calibrated
 from estimator.calibrate.calibration import CalibratedPayload, Calibration
+from estimator.calibrate.outcome.apply import calibrated
 from estimator.calibrate.outcome.carried import Carried, carried
 from estimator.errors import InputError
 from estimator.estimate.consistency import Trial, wrench_balance
