@@ -10,6 +10,15 @@ Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 Force = Annotated[Flag, tyro.conf.arg(help="Replace what exists there; nothing is overwritten without it.")]
 
 
+Calibrated = Annotated[
+    Path | None,
+    tyro.conf.arg(
+        metavar="CALIBRATION.json",
+        help="The robots as `mocobot calibrate` found them, in place of what the recordings say of them.",
+    ),
+]
+
+
 @dataclass(frozen=True)
 class Paper:
     """Run the paper's experiment and print Tables II-V, published figures beside ours."""
@@ -46,6 +55,10 @@ class Estimate:
     force: Force = False
     strict: Flag = False
     """Exit with 1 if the estimate is flagged, or nothing could be determined."""
+    calibration: Calibrated = None
+    self_calibrate: Flag = False
+    """Calibrate the robots on these recordings, and take what they carry from the same fit; free trials may be among
+    them."""
     method: Literal["auto", "staged", "joint"] = "auto"
     """The paper's stages, one joint least squares, or stages where static holds allow."""
     cutoff_hz: float = 5.0
@@ -99,6 +112,7 @@ class Diagnose:
     """Exit with 1 if the verdict is neither consistent nor explained."""
     jobs: int = 2
     """Parallel processes."""
+    calibration: Calibrated = None
     tolerances: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """How far a healthy robot may be off; see docs/diagnosis/guide.md."""
     exclude: Annotated[tuple[str, ...], tyro.conf.arg(metavar="CAUSE...")] = ()
@@ -165,6 +179,7 @@ class Replay:
     """Recordings (Parquet); several are shown side by side."""
     estimate: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
     """Estimate to show, as `mocobot estimate --out` writes it; made from each recording if not given."""
+    calibration: Calibrated = None
     truth: bool = False
     """Show the truth beside each recording, too (REC.truth.json)."""
     diagnosis: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
@@ -193,6 +208,7 @@ class Inspect:
     """Exit with 1 if the log is ready for nothing."""
     design: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """Numbers of the robots, where the log does not say; the Omnid's if not given."""
+    calibration: Calibrated = None
     episode: int | None = None
     """Episode of a LeRobot dataset."""
 

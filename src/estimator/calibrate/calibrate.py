@@ -86,14 +86,16 @@ def calibrate(
     trials = [Trial(r, k, sensing) for r, k in zip(rows, payload_of, strict=True)]
     bases = [start_bases(r, units, shared[k]) for r, k in zip(rows, payload_of, strict=True)]
     alone = [AloneEquations.of(_rows(recording), sensing) for recording in free]
-    found = fit(
-        trials,
-        Unknowns(units, tuple(shared), tuple(bases)),
-        prior,
-        alone,
-        _weights(known_mass or {}, labels),
-        robots,
-    )
+    start = Unknowns(units, tuple(shared), tuple(bases))
+    weights = _weights(known_mass or {}, labels)
+    try:
+        found = fit(trials, start, prior, alone, weights, robots)
+    except (InputError, np.linalg.LinAlgError) as error:
+        names = ", ".join(recording.name for recording in (*recordings, *free))
+        raise InputError(
+            f"{names} fit no team of robots near its design ({error}); are all of them of the same robots, and of the "
+            "payloads that they name?"
+        ) from error
     known = tuple(known_mass or ()) if robots is None else robots.known_mass
     return _result(found, recordings, free, labels, payload_of, prior, known)
 
@@ -199,7 +201,7 @@ def _result(
                 payload_of[k],
                 _length(recording),
                 count,
-                _per(found.before[k], count),
+                (float(found.before[k, 0]), float(found.before[k, 1])),
                 _per((done.loops.c, done.balance.c), count),
                 left,
                 found.unknowns.bases[k],
