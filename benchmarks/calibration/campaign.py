@@ -14,7 +14,6 @@ from tqdm import tqdm
 
 from calibration.score import of_estimate, score, score_calibration
 from calibration.teams import TILT_RAD, Team
-from calibration.transfer import HELD, transferred
 from calibration.truth import Truth
 from estimator.calibrate.calibrate import calibrate
 from estimator.calibrate.calibration import Calibration
@@ -24,6 +23,7 @@ from estimator.recording.model import Recording
 from hidden.store import append_result, read_results
 from mocobot_sim.errors import TrialError
 
+HELD = Prior(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 ARM_MASS_RATIO = 0.05
 WEIGHED = 1e-4
 """Relative standard error of a known weight."""
@@ -147,9 +147,9 @@ def _outcome(task: Task, folder: Path) -> dict[str, Any]:
 def _transfer(task: Task, folder: Path, recordings: list[Recording], truth: Truth) -> dict[str, Any]:
     calibration = calibrate(replace(task.team, payload="a").recordings(folder)[0])
     start = time.process_time()
-    found = transferred(calibration, recordings)
+    found = calibrate(recordings, robots=calibration)
     took = time.process_time() - start
-    return score_calibration(replace(calibration, payloads=(found,)), 0, truth) | {"cpu_s": took}
+    return score_calibration(found, 0, truth) | {"cpu_s": took}
 
 
 def _weighed(task: Task, folder: Path, recordings: list[Recording], truth: Truth) -> dict[str, Any]:

@@ -8,14 +8,16 @@ import numpy as np
 
 SPACING_M = 1.0
 MASS_PER_ROBOT_KG = 3.5
+LARGEST_RADIUS_M = 1.1
+"""Of the circle: turned about its middle by 3.4 deg a payload moves the grasps of a larger one out of reach."""
 
 
 def write_plate(robots: int, path: Path) -> Path:
-    """Grasps on a circle, a metre apart, no two alike in orientation; the mass off the middle and below the grasps.
+    """Grasps on a circle, a metre apart or as near as it takes; the mass off the middle and below the grasps.
 
     Two grasps alone let the payload swing, so it must hang.
     """
-    radius = SPACING_M / (2.0 * np.sin(np.pi / robots))
+    radius = min(LARGEST_RADIUS_M, SPACING_M / (2.0 * np.sin(np.pi / robots)))
     angles = 2.0 * np.pi * np.arange(robots) / robots
     places = radius * np.column_stack([np.cos(angles) - 1.0, np.sin(angles)])
     sites = "\n".join(

@@ -36,7 +36,12 @@ class Found:
 
 def of_estimate(estimate: PayloadEstimate) -> Found | None:
     """A staged or joint estimate; its mass, centre of mass and inertia claim no correlation."""
-    mass, com, com_covariance, inertia = estimate.mass, estimate.p_1c, estimate.p_1c_covariance, estimate.inertia
+    mass, com, com_covariance, inertia = (
+        estimate.mass,
+        estimate.p_1c,
+        estimate.p_1c_covariance,
+        estimate.inertia,
+    )
     if estimate.grasps is None or mass is None or com is None or com_covariance is None or inertia is None:
         return None
     covariance = np.zeros((10, 10))
@@ -69,7 +74,9 @@ def score(found: Found, truth: Truth, scale: float) -> dict[str, Any]:
         "m_percent_raw": 100.0 * abs(found.centred[0] / truth.mass - 1.0),
         "I_percent_raw": _principal_percent(found.centred[4:], inertia_parameters(truth.inertia)),
     }
-    return result | {"claims": {"grasps": claim(grasps, found.grasps.covariance)} | claims(error, found.covariance)}
+    return result | {
+        "claims": {"grasps": claim(grasps, found.grasps.covariance)} | claims(error, found.covariance)
+    }
 
 
 def grasp_errors(grasps: GraspEstimate, truth: Truth) -> tuple[Array, Array]:
@@ -88,7 +95,11 @@ def claim(error: Array, covariance: Array) -> dict[str, Any]:
     sd = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     correlation = covariance / np.outer(sd, sd)
     z = error / sd
-    return {"z": z.tolist(), "nees": float(z @ np.linalg.lstsq(correlation, z, rcond=1e-12)[0]), "n": len(error)}
+    return {
+        "z": z.tolist(),
+        "nees": float(z @ np.linalg.lstsq(correlation, z, rcond=1e-12)[0]),
+        "n": len(error),
+    }
 
 
 def score_calibration(calibration: Calibration, payload: int, truth: Truth) -> dict[str, Any]:

@@ -45,14 +45,21 @@ class Truth:
         p = np.array([grasp["p_1i_m"] for grasp in told["grasps"]])
         units = np.array([_unit(one) for one in told["as_built"]])
         for effect in told["effects"]:
-            units[effect["robot"] - 1, AT["tilt"]] = [effect["parameters"][k] for k in ("roll_rad", "pitch_rad")]
+            units[effect["robot"] - 1, AT["tilt"]] = [
+                effect["parameters"][k] for k in ("roll_rad", "pitch_rad")
+            ]
         R_1c = Rotation.from_rotvec(told["R_1c_rotvec_deg"], degrees=True).as_matrix()
         inertia = R_1c @ np.diag(told["principal_inertia_kgm2"]) @ R_1c.T
         zeros = [one["theta_zero_rad"][2] if encoder_frames else 0.0 for one in told["as_built"]]
         turn = Rotation.from_rotvec(np.outer(zeros, [1.0, 0.0, 0.0])).as_matrix()
         back = turn[0].T
         return cls(
-            back @ R @ turn, p @ back.T, told["mass_kg"], back @ told["p_1c_m"], back @ inertia @ back.T, units
+            back @ R @ turn,
+            p @ back.T,
+            told["mass_kg"],
+            back @ told["p_1c_m"],
+            back @ inertia @ back.T,
+            units,
         )
 
     @property

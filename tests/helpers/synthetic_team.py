@@ -65,7 +65,7 @@ def load(robots: int, rng: np.random.Generator) -> Load:
         inertia = 0.9 * (np.eye(3) - np.outer(u, u))
         return Load(7.0, 0.45 * along, inertia, R, np.array([np.zeros(3), along]))
     angle = 2.0 * np.pi * np.arange(robots) / robots
-    radius = 0.5 + 0.09 * robots
+    radius = 0.7
     p = radius * np.column_stack([np.cos(angle) - 1.0, np.sin(angle), 0.05 * np.sin(3 * angle + 1)])
     p -= p[0]
     tilt = rng.uniform(-0.06, 0.06, (robots, 2))
@@ -105,7 +105,13 @@ class Exact:
 
 
 def carry(
-    units: ArmUnit, held: Load, path: Sines, rng: np.random.Generator, duration_s=20.0, rate_hz=100.0, **labels
+    units: ArmUnit,
+    held: Load,
+    path: Sines,
+    rng: np.random.Generator,
+    duration_s=20.0,
+    rate_hz=100.0,
+    **labels,
 ) -> Exact:
     """A trial; ``labels`` go into its metadata."""
     time = np.arange(round(duration_s * rate_hz)) / rate_hz
@@ -157,7 +163,9 @@ def carry(
     )
 
 
-def with_noise(recording: Recording, angle_rad: float, torque_Nm: float, rng: np.random.Generator) -> Recording:
+def with_noise(
+    recording: Recording, angle_rad: float, torque_Nm: float, rng: np.random.Generator
+) -> Recording:
     """White Gaussian noise in every reading."""
     shape = recording.phi.shape
     return replace(

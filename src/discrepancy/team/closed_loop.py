@@ -104,7 +104,9 @@ def why_not(recording: Recording) -> str | None:
 def posture(recording: Recording) -> tuple[tuple[Array, Array], ArmUnit | None]:
     """True (phi, theta) of the first sample, (N, 3) each, and the robots as they are, as far as they are known."""
     units = recording.metadata.units
-    phi, theta, _ = true_joints(recording.metadata.arms, recording.phi[0], recording.theta[0], recording.tau[0])
+    phi, theta, _ = true_joints(
+        recording.metadata.arms, recording.phi[0], recording.theta[0], recording.tau[0]
+    )
     return (phi, theta), units
 
 

@@ -201,7 +201,7 @@ def _result(
                 payload_of[k],
                 _length(recording),
                 count,
-                _per(found.before[k], count),
+                (float(found.before[k, 0]), float(found.before[k, 1])),
                 _per((done.loops.c, done.balance.c), count),
                 left,
                 found.unknowns.bases[k],

@@ -127,7 +127,7 @@ class Fit:
         trials: the trials with a payload at the solution.
         alone: recordings of unloaded arms there.
         known: weighed masses there.
-        before: chi2 of loops and balance of every trial with the robots as designed, shape (trials, 2).
+        before: chi2/n of loops and balance of every trial with the robots as designed, shape (trials, 2).
         steps: Gauss-Newton steps.
         converged: whether the last step was small.
     """
@@ -256,7 +256,8 @@ def _trial_fit(
         J = np.concatenate([rowed.by_units.reshape(n, C, -1), rowed.by_carried, rowed.by_bases], axis=2)
         kinds = (slice(0, C), slice(0, C - 6), slice(C - 6, C))
         for kind, rows in enumerate(kinds if split else kinds[:1]):
-            part = Quadratic.of(J[:, rows], rowed.residual[:, rows], rowed.covariance[:, rows, rows], index)
+            noise = rowed.scatter if kind else rowed.covariance
+            part = Quadratic.of(J[:, rows], rowed.residual[:, rows], noise[:, rows, rows], index)
             before = sums[kind]
             sums[kind] = part if before is None else before.plus(part)
     total = sums[0]
@@ -283,9 +284,10 @@ def _weighed(known: KnownMass, at: Unknowns, layout: Layout) -> Quadratic:
 
 
 def _with_robots_held(trials: Sequence[TrialFit], H: Array, g: Array, layout: Layout) -> Array:
-    """chi2 of loops and balance of every trial when payloads and bases alone are fitted, shape (trials, 2)."""
+    """chi2/n of loops and balance of every trial when payloads and bases alone are fitted, shape (trials, 2)."""
     rest = np.arange(layout.of_units.stop, layout.size)
     dx = np.zeros(layout.size)
     if len(rest):
         dx[rest] = solved(H[np.ix_(rest, rest)], g[rest])[0]
-    return np.array([[trial.loops.at(dx), trial.balance.at(dx)] for trial in trials]).reshape(-1, 2)
+    parts = [(part.at(dx) / max(1, part.count)) for trial in trials for part in (trial.loops, trial.balance)]
+    return np.array(parts).reshape(-1, 2)

@@ -93,4 +93,5 @@ def write_calibrated(
     """
     scene = calibrated_team(calibration, payload, initial)
     label = calibration.payloads[payload].label
-    write_extended(scene, scene.effects, folder, {"calibrated": True, "payload": label})
+    tilts = [effect for effect in scene.effects if isinstance(effect, BaseTilt)]
+    write_extended(scene, tilts, folder, {"calibrated": True, "payload": label})

@@ -11,9 +11,7 @@ from estimator.errors import InputError
 from estimator.recording.model import Recording
 
 
-def calibrated(
-    recording: Recording, calibration: Calibration, called: str = "the calibration"
-) -> Recording:
+def calibrated(recording: Recording, calibration: Calibration, called: str = "the calibration") -> Recording:
     """A recording with the calibration's robots in its metadata; its samples stay as they were read.
 
     What the metadata said of the robots before gives way.
@@ -52,7 +50,9 @@ def units_for(
             "robots it was made with, in their order"
         )
     if calibration.design != design:
-        raise InputError(f"{called} and {name} differ in design; a calibration is for the robots it was made with")
+        raise InputError(
+            f"{called} and {name} differ in design; a calibration is for the robots it was made with"
+        )
     return calibration.units
 
 

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from estimator.arrays import Array
-from estimator.calibrate.apply import calibrated
 from estimator.calibrate.calibration import CalibratedPayload, Calibration
+from estimator.calibrate.outcome.apply import calibrated
 from estimator.calibrate.outcome.carried import Carried, carried
 from estimator.errors import InputError
 from estimator.estimate.consistency import Trial, wrench_balance
@@ -67,9 +67,48 @@ def estimate_calibrated(
         p_1c_covariance=numbers.covariance[1:4, 1:4],
         inertia=inertia,
         recordings=tuple(records),
+        units=calibration.units,
         flags=(*calibration.findings, *staged.flags, *calibration.open),
     )
     return withheld(estimate, max(trial.team for trial in trials))
+
+
+def with_errors_of(calibration: Calibration, estimate: PayloadEstimate) -> PayloadEstimate:
+    """An estimate on calibrated robots, with the error of a held spring scale in that of mass and inertia.
+
+    Masses and inertias come out as much too small as all springs together are too stiff.
+    """
+    share, mass, inertia = calibration.scale_sd, estimate.mass, estimate.inertia
+    if share == 0.0:
+        return estimate
+    flags = estimate.flags
+    if mass is not None:
+        mass = replace(mass, se=float(np.hypot(mass.se, share * mass.mass)))
+        flags = (
+            *flags,
+            f"The springs' common scale is the design's, to {100 * share:.2g} %: mass and inertia are off by as much, "
+            "which their standard errors have; a calibration with a known weight decides it.",
+        )
+    if inertia is not None:
+        parameters = inertia_parameters(inertia.inertia)
+        covariance = inertia.covariance + share**2 * np.outer(parameters, parameters)
+        inertia = InertiaEstimate.of(parameters, covariance, inertia.residual_rms, inertia.moment_rms)
+    return replace(estimate, mass=mass, inertia=inertia, flags=flags)
+
+
+def one_payload(recordings: Sequence[Recording]) -> None:
+    """Check that recordings are of one payload.
+
+    Raises:
+        InputError: they are of several.
+    """
+    first = recordings[0] if recordings else None
+    for other in recordings[1:]:
+        if first is not None and other.metadata.payload != first.metadata.payload:
+            raise InputError(
+                f"{other.name} is of payload {other.metadata.payload!r} and {first.name} of "
+                f"{first.metadata.payload!r}; estimate one payload at a time"
+            )
 
 
 def _payload_of(calibration: Calibration, recordings: Sequence[Recording]) -> CalibratedPayload:
@@ -86,7 +125,7 @@ def _payload_of(calibration: Calibration, recordings: Sequence[Recording]) -> Ca
 
 
 def _grasps(payload: CalibratedPayload, scale_sd: float, staged: PayloadEstimate) -> GraspEstimate:
-    """The calibration's frames; residuals of twists, which it does not use, are those of the staged ones beside them."""
+    """The calibration's frames; residuals of twists, which it does not use, are those of the staged estimate."""
     by_scale = payload.by_scale[:-10]
     covariance = payload.covariance[:-10, :-10] + scale_sd**2 * np.outer(by_scale, by_scale)
     found = staged.grasps or payload.grasps
