@@ -38,6 +38,8 @@ class Paper:
     force: Force = False
     recordings: bool = False
     """Write the recordings, too (needs --out)."""
+    staged_only: bool = False
+    """The paper's own method alone, without the calibrations and fits beside it."""
 
 
 @dataclass(frozen=True)

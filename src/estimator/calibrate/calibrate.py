@@ -14,6 +14,7 @@ from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, 
 from estimator.calibrate.findings import findings
 from estimator.calibrate.fit import Fit, KnownMass, Trial, fit
 from estimator.calibrate.held_out import held_out
+from estimator.calibrate.outcome.shares import shares
 from estimator.calibrate.prior import Prior
 from estimator.calibrate.rows import Rows
 from estimator.calibrate.sensing import Sensing
@@ -36,6 +37,7 @@ def calibrate(
     prior: Prior | None = None,
     known_mass: Mapping[str, tuple[float, float]] | None = None,
     say: Callable[[str], object] = lambda _: None,
+    robots: Calibration | None = None,
 ) -> Calibration:
     """Geometry, springs, zeros and, where asked, masses of every robot, with what they carry.
 
@@ -48,14 +50,25 @@ def calibrate(
         prior: how far the robots may be off; None for robots out of the box.
         known_mass: weighed mass of payloads by label, with its standard error [kg]; "" for one without a label.
         say: takes the name of the stage that begins.
+        robots: an earlier calibration of the same robots, which are held as it found them: the payloads alone are
+            estimated, and its covariance goes on to theirs. Excludes ``free``, ``prior`` and ``known_mass``.
 
     Raises:
         InputError: the recordings do not belong together, do not move enough, or cannot be solved.
     """
-    prior = prior or Prior()
+    if robots is not None and (free or prior or known_mass):
+        raise InputError(
+            "robots are held as calibrated: unloaded arms, a prior or a known mass cannot change them"
+        )
+    prior = prior or (Prior() if robots is None else robots.prior)
     groups = _by_payload(recordings)
     _check_together(recordings, free)
     design, N = recordings[0].metadata.design, recordings[0].metadata.robots
+    if robots is not None and (robots.design != design or robots.robots != N):
+        raise InputError(
+            f"{recordings[0].name}: the calibration is of {robots.robots} robots and the recording of {N}, or their "
+            "designs differ; it must be of the same robots"
+        )
     if N < 2:
         raise InputError(
             f"{recordings[0].name}: one robot closes no loop; two or more that carry one payload are needed"
@@ -65,7 +78,7 @@ def calibrate(
         say(f"payload {label}" if label else "payload")
         shared.append(_start(estimate_payload(members, "auto", compare_masses=True, withhold=False), members))
     say("calibration")
-    units = ArmUnit(design, np.zeros((N, COUNT)))
+    units = ArmUnit(design, np.zeros((N, COUNT))) if robots is None else robots.units
     sensing = Sensing.of([*recordings, *free])
     labels = list(groups)
     rows = [_rows(recording) for recording in recordings]
@@ -73,14 +86,18 @@ def calibrate(
     trials = [Trial(r, k, sensing) for r, k in zip(rows, payload_of, strict=True)]
     bases = [start_bases(r, units, shared[k]) for r, k in zip(rows, payload_of, strict=True)]
     alone = [AloneEquations.of(_rows(recording), sensing) for recording in free]
-    found = fit(
-        trials,
-        Unknowns(units, tuple(shared), tuple(bases)),
-        prior,
-        alone,
-        _weights(known_mass or {}, labels),
-    )
-    return _result(found, recordings, free, labels, payload_of, prior, tuple(known_mass or ()))
+    start = Unknowns(units, tuple(shared), tuple(bases))
+    weights = _weights(known_mass or {}, labels)
+    try:
+        found = fit(trials, start, prior, alone, weights, robots)
+    except (InputError, np.linalg.LinAlgError) as error:
+        names = ", ".join(recording.name for recording in (*recordings, *free))
+        raise InputError(
+            f"{names} fit no team of robots near its design ({error}); are all of them of the same robots, and of the "
+            "payloads that they name?"
+        ) from error
+    known = tuple(known_mass or ()) if robots is None else robots.known_mass
+    return _result(found, recordings, free, labels, payload_of, prior, known)
 
 
 def _by_payload(recordings: Sequence[Recording]) -> dict[str | None, list[Recording]]:
@@ -173,7 +190,7 @@ def _result(
         shared = found.unknowns.carried[k]
         grasps = replace(shared.grasps, covariance=covariance[:grasped, :grasped])
         payloads.append(CalibratedPayload(label, grasps, shared.pi, covariance, found.by_scale[at]))
-    trials = []
+    trials, shared_out = [], shares(found)
     for k, (recording, left) in enumerate(zip(recordings, held_out(found), strict=True)):
         done = found.trials[k]
         count = done.loops.count, done.balance.count
@@ -184,13 +201,14 @@ def _result(
                 payload_of[k],
                 _length(recording),
                 count,
-                _per(found.before[k], count),
+                (float(found.before[k, 0]), float(found.before[k, 1])),
                 _per((done.loops.c, done.balance.c), count),
                 left,
                 found.unknowns.bases[k],
+                shared_out[k],
             )
         )
-    for recording, one in zip(free, found.alone, strict=True):
+    for recording, one, share in zip(free, found.alone, shared_out[len(found.trials) :], strict=True):
         count = 0, one.count
         trials.append(
             CalibratedTrial(
@@ -203,6 +221,7 @@ def _result(
                 (0.0, one.c / one.count),
                 None,
                 None,
+                share,
             )
         )
     at = layout.of_units

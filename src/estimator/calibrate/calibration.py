@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -49,6 +50,7 @@ class CalibratedTrial:
         after: with the calibration.
         held_out: by the calibration from all other recordings, bases fitted; None where it cannot be had.
         bases: where the robots stood in {b1}; None for a free trial.
+        shares: its share in what is known of each kind of unknown, by name (``outcome.shares``); empty if not known.
     """
 
     name: str
@@ -60,6 +62,7 @@ class CalibratedTrial:
     after: tuple[float, float]
     held_out: tuple[float, float] | None
     bases: Bases | None
+    shares: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

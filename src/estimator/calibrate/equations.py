@@ -8,7 +8,7 @@ model): of signals as measured, noise is in derivative and residual alike, and s
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -43,7 +43,8 @@ class Rowed(NamedTuple):
         by_units: derivative by every robot's deviations, shape (n, C, N, ``COUNT``).
         by_carried: by ``Shared.moved``, shape (n, C, 6 (N - 1) + 10).
         by_bases: by ``Bases.moved``, shape (n, C, 4 (N - 1)).
-        covariance: of the residual's noise, shape (n, C, C).
+        covariance: of the residual's noise as it counts: errors that come again are not averaged out, shape (n, C, C).
+        scatter: of the residual's noise as it shows, shape (n, C, C).
         adjustment: what moves the rows' signals towards the model, shape (n, N, ``SLOTS``).
     """
 
@@ -52,6 +53,7 @@ class Rowed(NamedTuple):
     by_carried: Array
     by_bases: Array
     covariance: Array
+    scatter: Array
     adjustment: Array
 
 
@@ -61,12 +63,14 @@ class TrialEquations:
 
     Attributes:
         rows: its signals, and how they are averaged.
-        variances: of one sample in motion and of a hold's mean, shape (n, N, 9) each.
+        variances: of one sample in motion, as it counts, and of a hold's mean, shape (n, N, 9) each.
+        shown: the same, as it shows.
         mean: averaged readings, shape (n, N, ``SLOTS``).
     """
 
     rows: Rows
     variances: tuple[Array, Array]
+    shown: tuple[Array, Array]
     mean: Array
 
     @classmethod
@@ -75,7 +79,8 @@ class TrialEquations:
         mean = rows(rows.s)
         # A hold is at rest: what rates it shows are noise.
         mean[rows.moving :, :, 3:9] = mean[rows.moving :, :, 12:18] = 0.0
-        return cls(rows, sensing.variances(rows), mean)
+        shown = sensing.variances(replace(rows, repeats=1.0))
+        return cls(rows, sensing.variances(rows), shown, mean)
 
     def residual(self, units: ArmUnit, shared: Shared, bases: Bases) -> Array:
         """Rows of the residual, shape (n, C)."""
@@ -98,19 +103,22 @@ class TrialEquations:
         poses = pose_derivatives(self.rows, units, shared, bases)
         loops = slice(0, residual.shape[1] - 6)
         by_units[:, loops], by_carried[:, loops], by_bases[:, loops] = poses
-        covariance = self._covariance(by_signals)
+        noise = self._noise(self.variances)
+        covariance = _covariance(by_signals, noise)
+        again = self.rows.repeats > 1.0
         return Rowed(
             residual,
             by_units,
             by_carried,
             by_bases,
             covariance,
-            self._adjustment(by_signals, covariance, residual),
+            _covariance(by_signals, self._noise(self.shown)) if again else covariance,
+            _adjustment(by_signals, noise, covariance, residual),
         )
 
-    def _noise(self) -> Array:
+    def _noise(self, variances: tuple[Array, Array]) -> Array:
         """Covariance of every joint's (value, rate, acceleration) and of every torque in the rows: (n, N, 7, 3, 3)."""
-        moving, held = self.variances
+        moving, held = variances
         n, N = moving.shape[:2]
         out = np.zeros((n, N, 7, 3, 3))
         at = slice(0, self.rows.moving)
@@ -121,30 +129,30 @@ class TrialEquations:
         out[at, :, 6, range(3), range(3)] = held[at, :, 6:]
         return out
 
-    def _covariance(self, J: Array) -> Array:
-        noise = self._noise()
-        total = np.zeros((len(J), J.shape[1], J.shape[1]))
-        for robot in range(J.shape[2]):
-            for joint, at in enumerate(_CHAINS):
-                part = J[:, :, robot, at]
-                total += part @ noise[:, robot, joint] @ np.swapaxes(part, 1, 2)
-        return total
-
-    def _adjustment(self, J: Array, covariance: Array, residual: Array) -> Array:
-        noise = self._noise()
-        weighed = np.linalg.solve(covariance, residual[..., None])
-        out = np.zeros((len(J), J.shape[2], SLOTS))
-        for robot in range(J.shape[2]):
-            for joint, at in enumerate(_CHAINS):
-                moved = noise[:, robot, joint] @ (np.swapaxes(J[:, :, robot, at], 1, 2) @ weighed)
-                out[:, robot, at] -= moved[..., 0]
-        return out
-
 
 # Value, rate and acceleration of each joint; the three torques.
 _CHAINS = [np.array([first + k + 3 * order for order in range(3)]) for first in (0, 9) for k in range(3)] + [
     np.arange(18, 21)
 ]
+
+
+def _covariance(J: Array, noise: Array) -> Array:
+    total = np.zeros((len(J), J.shape[1], J.shape[1]))
+    for robot in range(J.shape[2]):
+        for joint, at in enumerate(_CHAINS):
+            part = J[:, :, robot, at]
+            total += part @ noise[:, robot, joint] @ np.swapaxes(part, 1, 2)
+    return total
+
+
+def _adjustment(J: Array, noise: Array, covariance: Array, residual: Array) -> Array:
+    weighed = np.linalg.solve(covariance, residual[..., None])
+    out = np.zeros((len(J), J.shape[2], SLOTS))
+    for robot in range(J.shape[2]):
+        for joint, at in enumerate(_CHAINS):
+            moved = noise[:, robot, joint] @ (np.swapaxes(J[:, :, robot, at], 1, 2) @ weighed)
+            out[:, robot, at] -= moved[..., 0]
+    return out
 
 
 def _residual(data: ArmData, units: ArmUnit, shared: Shared, bases: Bases) -> Array:

@@ -13,6 +13,7 @@ from estimator.arm.unit import AT, COUNT
 from estimator.arrays import Array
 from estimator.calibrate import rules
 from estimator.calibrate.alone import AloneEquations
+from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.equations import TrialEquations
 from estimator.calibrate.prior import Prior
 from estimator.calibrate.rows import Rows
@@ -126,7 +127,7 @@ class Fit:
         trials: the trials with a payload at the solution.
         alone: recordings of unloaded arms there.
         known: weighed masses there.
-        before: chi2 of loops and balance of every trial with the robots as designed, shape (trials, 2).
+        before: chi2/n of loops and balance of every trial with the robots as designed, shape (trials, 2).
         steps: Gauss-Newton steps.
         converged: whether the last step was small.
     """
@@ -152,18 +153,24 @@ def fit(
     prior: Prior,
     alone: Sequence[AloneEquations] = (),
     known_mass: Sequence[KnownMass] = (),
+    robots: Calibration | None = None,
 ) -> Fit:
     """Calibrate.
 
     Args:
         trials: those with a payload.
-        start: values to start from, the robots as designed.
+        start: values to start from, the robots as designed, or as calibrated before.
         prior: spread of the robots.
         alone: recordings of unloaded arms.
         known_mass: weighed payloads; with one, the common spring scale is free.
+        robots: an earlier calibration, whose robots are held; their errors go on to the rest.
     """
     layout = Layout(len(start.units.x), len(start.carried), len(trials))
-    of_units = prior.factor(layout.robots, hold_scale=not known_mass)
+    of_units = (
+        prior.factor(layout.robots, hold_scale=not known_mass)
+        if robots is None
+        else np.zeros((layout.robots * COUNT, 0))
+    )
     basis = np.asarray(block_diag(of_units, np.eye(layout.size - len(of_units))))
     z, information = np.zeros(basis.shape[1]), np.zeros(basis.shape[1])
     information[: of_units.shape[1]] = 1.0
@@ -195,11 +202,19 @@ def fit(
         if not complete and (size < rules.COARSE or step == rules.MAX_STEPS - 2):
             every = 1
             blocks, adjusted = _blocks(trials, every)
-    by_scale = np.zeros(layout.size)
-    if not known_mass:
+
+    def followed(held: Array) -> Array:
+        """Changes of all unknowns with one of what is held, shapes (K, ...)."""
+        return held - basis @ (covariance_z @ (basis.T @ (H @ held)))
+
+    by_scale, covariance = np.zeros(layout.size), basis @ covariance_z @ basis.T
+    if robots is not None:
+        by_robots = followed(np.eye(layout.size)[:, layout.of_units])
+        by_scale = by_robots @ robots.by_scale.ravel()
+        covariance += by_robots @ robots.covariance @ by_robots.T
+    elif not known_mass:
         by_scale[layout.unit_indices(np.r_[AT["stiffness_ratio"]])] = 1.0
-        by_scale -= basis @ (covariance_z @ (basis.T @ (H @ by_scale)))
-    covariance = basis @ covariance_z @ basis.T
+        by_scale = followed(by_scale)
     return Fit(
         at, layout, basis, information, z, covariance, by_scale, tuple(done), lone, known, before, step,
         size < rules.CONVERGED,
@@ -241,7 +256,8 @@ def _trial_fit(
         J = np.concatenate([rowed.by_units.reshape(n, C, -1), rowed.by_carried, rowed.by_bases], axis=2)
         kinds = (slice(0, C), slice(0, C - 6), slice(C - 6, C))
         for kind, rows in enumerate(kinds if split else kinds[:1]):
-            part = Quadratic.of(J[:, rows], rowed.residual[:, rows], rowed.covariance[:, rows, rows], index)
+            noise = rowed.scatter if kind else rowed.covariance
+            part = Quadratic.of(J[:, rows], rowed.residual[:, rows], noise[:, rows, rows], index)
             before = sums[kind]
             sums[kind] = part if before is None else before.plus(part)
     total = sums[0]
@@ -268,9 +284,10 @@ def _weighed(known: KnownMass, at: Unknowns, layout: Layout) -> Quadratic:
 
 
 def _with_robots_held(trials: Sequence[TrialFit], H: Array, g: Array, layout: Layout) -> Array:
-    """chi2 of loops and balance of every trial when payloads and bases alone are fitted, shape (trials, 2)."""
+    """chi2/n of loops and balance of every trial when payloads and bases alone are fitted, shape (trials, 2)."""
     rest = np.arange(layout.of_units.stop, layout.size)
     dx = np.zeros(layout.size)
     if len(rest):
         dx[rest] = solved(H[np.ix_(rest, rest)], g[rest])[0]
-    return np.array([[trial.loops.at(dx), trial.balance.at(dx)] for trial in trials]).reshape(-1, 2)
+    parts = [(part.at(dx) / max(1, part.count)) for trial in trials for part in (trial.loops, trial.balance)]
+    return np.array(parts).reshape(-1, 2)

@@ -30,6 +30,8 @@ trials                     list of
     chi2_per_n             {before, after, held_out}: with the robots as designed, with the calibration, with one from
                            all other recordings; each {loops, balance}, or null where it cannot be had
     bases                  list of {i, yaw_deg, p_m [3]} for i = 2..N: bases in {b1}; null for a free one
+    shares                 {kind: its share in what is known of it}, by the names of the deviations without unit,
+                           "grasps" and "inertial_parameters"; the rest up to 1 is the prior's and that of known weights
 known_mass                 labels of payloads whose weight was known
 steps                      Gauss-Newton steps
 findings                   sentences: what to know before trusting the numbers

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import correlate, find_peaks
 from scipy.sparse import csr_array
 
 from estimator.arrays import Array
@@ -29,6 +30,7 @@ class Rows:
         length: samples that a row averages over in a hold, shape (n,); 0 in motion.
         travel: way that each driven and gimbal joint goes while a row is averaged [rad], shape (n, N, 6).
         rate_hz: of the samples.
+        repeats: how often the same rounding errors come again, because the motion does.
     """
 
     s: Array
@@ -39,6 +41,7 @@ class Rows:
     length: NDArray[np.intp]
     travel: Array
     rate_hz: float
+    repeats: float
 
     def __call__(self, x: Array) -> Array:
         """Rows of samples, shape (q, ...) -> (n, ...)."""
@@ -81,8 +84,10 @@ class Rows:
         first, last = max(-(-trim // stride), half), min((len(angles) - trim) // stride, len(at) - half)
         rows: list[tuple[NDArray[np.intp], Array]] = []
         centres, length = [], []
+        beside = round(rules.BESIDE_S * rate)
         for centre in range(first, last, spacing):
-            if not still[at[centre]]:
+            # Beside a hold, the kernel takes in the one rounding error that the hold's own row has already.
+            if not still[max(0, at[centre] - beside) : at[centre] + beside + 1].any():
                 rows.append((np.arange(centre - half, centre + half + 1), kernel))
                 centres.append(at[centre])
                 length.append(0)
@@ -118,19 +123,53 @@ class Rows:
             np.array(length, dtype=np.intp),
             travel * span[:, None, None],
             rate,
+            _repeats(angles[~still & _within(len(angles), trim)], rate),
         )
+
+
+def _within(samples: int, trim: int) -> NDArray[np.bool_]:
+    """Samples that are not trimmed, shape (Q,)."""
+    at = np.arange(samples)
+    return (at >= trim) & (at < samples - trim)
+
+
+def _repeats(angles: Array, rate_hz: float) -> float:
+    """Times that readings come again to the last digit, shape (Q, N, 6); 1 for none.
+
+    A commanded motion that repeats in whole samples repeats its rounding errors, too, and averaging over them does not
+    help. Periods are looked for where the autocorrelation of one joint is high.
+    """
+    shortest = round(rules.SHORTEST_PERIOD_S * rate_hz)
+    if len(angles) < 2 * shortest:
+        return 1.0
+    x = angles[:, 0, 0] - angles[:, 0, 0].mean()
+    alike = correlate(x, x, method="fft")[len(x) - 1 :] / np.arange(len(x), 0, -1)
+    lags = find_peaks(alike[: len(x) - shortest])[0]
+    lags = lags[lags >= shortest]
+    lags = lags[np.argsort(-alike[lags])[: rules.PERIODS]]
+    shares = [(float(np.mean(np.abs(angles[lag:] - angles[:-lag]) < 1e-9)), int(lag)) for lag in lags]
+    # Of multiples of the period, the period itself.
+    most = max((share for share, _ in shares), default=0.0)
+    if most < rules.REPEATED:
+        return 1.0
+    lag = min(lag for share, lag in shares if share > 0.8 * most)
+    return 1.0 + most * (len(angles) / lag - 1.0)
 
 
 def _kernel(rate_hz: float) -> tuple[Array, int]:
     """Weights of a row in motion, their sum 1, and instants between rows.
 
-    A windowed sinc: white noise in neighbouring rows hardly correlates. Means over overlapping windows do, by a sixth,
-    and what varies slowly would seem known by a seventh too well.
+    A root-raised-cosine (the square root of Nyquist's criterion: H. Nyquist, Certain Topics in Telegraph Transmission
+    Theory, 1928): white noise in different rows does not correlate, so that what varies slowly is known as well as the
+    rows' covariance says. A windowed sinc's neighbours correlate by an eighth, which claims a seventh too much.
     """
-    spacing = max(1, round(rules.ROW_S * rate_hz))
+    spacing, b = max(1, round(rules.ROW_S * rate_hz)), rules.ROLL_OFF
     half = rules.LOBES * spacing
-    at = np.arange(-half, half + 1)
-    weights = np.sinc(at / spacing) * np.hanning(2 * half + 3)[1:-1]
+    # An offset of a millionth keeps off the removable singularities at 0 and 1 / (4 b).
+    x = np.arange(-half, half + 1) / spacing + 1e-6
+    weights = np.sin(np.pi * x * (1.0 - b)) + 4.0 * b * x * np.cos(np.pi * x * (1.0 + b))
+    weights /= np.pi * x * (1.0 - (4.0 * b * x) ** 2)
+    weights += weights[::-1]
     return weights / weights.sum(), spacing
 
 

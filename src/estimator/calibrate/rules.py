@@ -10,7 +10,9 @@ ROW_S = 0.25
 """Time between rows. Measured: noise of accelerations grows with frequency, and biases scales where rows are shorter
 (one standard error at 0.12 s)."""
 LOBES = 3
-"""Of the sinc that rows are weighed with, to either side. Chosen: neighbouring rows of white noise correlate by 0.1."""
+"""Half length, in rows, of the kernel that they are weighed with. Chosen: white noise then correlates by 0.013."""
+ROLL_OFF = 0.5
+"""Of that kernel. Chosen: nothing passes above 3 Hz."""
 TRIM_S = 2.0
 """Dropped at both ends against the filters' transients. Chosen, as in the paper."""
 STILL_RADPS = 1.5e-3
@@ -20,6 +22,11 @@ STILL_HZ = 2.0
 """Cut-off of the joint speeds that are held against it. Chosen: rounding at rest then stays below a twentieth."""
 SETTLING_S, SHORTEST_HOLD_S = 0.4, 1.0
 """Left out at both ends of a hold, and the least that must be left of it. Chosen: twice what ``STILL_HZ`` takes."""
+BESIDE_S = 0.5
+"""Least time between a row in motion and a rest. Chosen: nine tenths of a row's weight lie within it."""
+SHORTEST_PERIOD_S, PERIODS, REPEATED = 1.0, 20, 0.2
+"""Period of a motion that repeats, the number of them looked at, and the least share of readings that are the same
+again. Chosen: motion that does not repeat gives less than a hundredth."""
 NOISE_ABOVE_HZ = 25.0
 """Above it a signal is noise. Measured: commanded motion ends at 5 Hz."""
 DITHER = 0.35

@@ -49,7 +49,7 @@ class Sensing:
         samples = 1.0 / rows.gain[0, 0]
         way = np.concatenate([rows.travel, np.full((*rows.travel.shape[:2], 3), np.inf)], axis=2)
         independent = np.clip(1.0 + way / step, 1.0, samples)
-        repeats = np.where(dithered, 1.0, samples / independent)
+        repeats = np.where(dithered, 1.0, rows.repeats * samples / independent)
         moving = noise + rounding * repeats + floor
         long = np.maximum(rows.length, 1)[:, None, None]
         lasting = np.clip(1.0 + way / step, 1.0, long)

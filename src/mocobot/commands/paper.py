@@ -13,7 +13,7 @@ from mocobot.options import Paper
 from mocobot.progress import share_bar
 from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
 from mocobot_sim.paper.plots import save_plots
-from mocobot_sim.paper.tables import format_summary, format_tables
+from mocobot_sim.paper.text import format_summary, format_tables
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import sensor_preset
 from mocobot_sim.trial.simulate import draw_units
@@ -29,7 +29,9 @@ def run(options: Paper) -> None:
         InputError: an option that cannot be met.
         TrialError: the physics of a trial cannot be trusted.
     """
-    plan = PaperPlan(options.payload, options.preset, options.trials, options.seed)
+    plan = PaperPlan(
+        options.payload, options.preset, options.trials, options.seed, staged_only=options.staged_only
+    )
     if options.recordings and not options.out:
         raise InputError("--recordings needs --out")
     if options.jobs < 1:

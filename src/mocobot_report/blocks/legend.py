@@ -55,6 +55,7 @@ _SHAPES: Mapping[str, tuple[str, Mapping[str, str]]] = {
     "diamond": ("path", {"d": "M8 0.5L13.5 6L8 11.5L2.5 6Z"}),
     "triangle-down": ("path", {"d": "M2.5 2H13.5L8 11Z"}),
     "triangle-up": ("path", {"d": "M2.5 10H13.5L8 1Z"}),
+    "triangle-up-open": ("path", {"d": "M3.2 9.5H12.8L8 2Z", "fill": "none", "stroke-width": "1.8"}),
     "x": ("path", {"d": "M4 2L12 10M12 2L4 10", "stroke-width": "2.4"}),
 }
 

@@ -14,22 +14,24 @@ from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.legend import Key
 from mocobot_report.blocks.numbers import PLUS_MINUS, plain
 from mocobot_report.blocks.units import spelled_text
+from mocobot_sim.paper.fits import ONE_FIT, SELF_CALIBRATED, TRANSFER
 from mocobot_sim.paper.published import payload_truth
 from mocobot_sim.paper.tables import MOMENTS, PaperTable
 
+FITS = {
+    ONE_FIT: ("nominal", "circle-open"), SELF_CALIBRATED: ("c1", "triangle-up"), TRANSFER: ("c1", "triangle-up-open"),
+}  # fmt: skip
+"""Colour and marker of each column of fits."""
 LEAST = 1e-7
 """Errors below this share of a unit are drawn at it: a logarithmic axis has no zero."""
 NARROW = {"margin.l": 46, "xaxis.tickfont.size": 9}
 
 
 def keys(columns: Sequence[str]) -> list[Key]:
-    """Legend of the paper's column and the presets'; presets that nobody knows yet get what is left."""
+    """Legend of the paper's column, the presets' and the fits'; presets that nobody knows yet get what is left."""
     left = zip(cycle(palette.OTHER_COLOURS), cycle(palette.OTHER_MARKERS))
-    known = palette.PRESETS
-    return [
-        Key(name, name, name, known[name]) if name in known else Key(name, name, *next(left))
-        for name in columns
-    ]
+    known = {name: (name, marker) for name, marker in palette.PRESETS.items()} | FITS
+    return [Key(name, name, *(known[name] if name in known else next(left))) for name in columns]
 
 
 def table_chart(book: Book, table: PaperTable, title: str, note: str) -> Node:
@@ -55,7 +57,13 @@ def table_chart(book: Book, table: PaperTable, title: str, note: str) -> Node:
             else None
         )
         traces.append(
-            dots([n + _aside(k, legend, 0.16) for n in range(len(rows))], values, key, text, error_y=up)
+            dots(
+                [n + _aside(k, legend, min(0.16, 0.85 / len(legend))) for n in range(len(rows))],
+                values,
+                key,
+                text,
+                error_y=up,
+            )
         )
     shown = _by_payload(traces, [(row.payload, row.quantity) for row in rows], f"error {unit}", seen)
     label = f"{title}. The numbers are in Table {table.number} below."
@@ -65,20 +73,21 @@ def table_chart(book: Book, table: PaperTable, title: str, note: str) -> Node:
 def summary_chart(book: Book, table: PaperTable) -> Node:
     """The largest errors in percent or degrees, one line per quantity."""
     rows = [row for row in table.rows if row.unit in ("%", "deg")]
+    names = [f"{row.quantity} [{row.unit}]" + (f", {row.frames}" if row.frames else "") for row in rows]
+    wide = any(row.frames for row in rows)
     legend, traces, seen = keys(table.columns), [], []
     for k, key in enumerate(legend):
         values = [row.cells[k].value for row in rows]
-        text = [
-            f"{key.label}, {row.quantity}: {plain(v)} {row.unit}" for row, v in zip(rows, values, strict=True)
-        ]
+        text = [f"{key.label}, {name}: {plain(v)}" for name, v in zip(names, values, strict=True)]
         traces.append(dots([*map(_drawn, values)], range(len(rows)), key, text, size=11))
         seen += map(_drawn, values)
     shown = figure(
         traces, xaxis=log_axis("largest error over the payloads", seen),
-        yaxis=row_axis([f"{row.quantity} [{row.unit}]" for row in rows], 40), margin_l=150,
+        yaxis=row_axis(names, 40), margin_l=245 if wide else 150,
     )  # fmt: skip
     return chart(
-        book, "Largest errors at a glance", shown, height=300, keys=legend, narrow={"yaxis.tickfont.size": 10},
+        book, "Largest errors at a glance", shown, height=60 + 30 * len(rows), keys=legend,
+        narrow={"yaxis.tickfont.size": 8 if wide else 10} | ({"margin.l": 165} if wide else {}),
         label="Largest error of every quantity, the paper's beside ours; the numbers are in the first table.",
     )  # fmt: skip
 

@@ -1,7 +1,7 @@
 """Simulate the paper's trials, estimate from the recordings, score against Table I.
 
 Order as in the paper (section IV.C): random trials first; the grasps estimated from them construct the periodic
-motion and the static orientations; then everything is estimated.
+motion and the static orientations; then everything is estimated, staged as in the paper and in one fit beside it.
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -14,18 +14,20 @@ from joblib import Parallel, delayed
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.arrays import Array
+from estimator.calibrate.calibration import Calibration
 from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from estimator.signals.process import process_recording
+from mocobot_sim.paper.fits import COLUMNS, SELF_CALIBRATED, TRANSFER, fit_trials, three_trials
 from mocobot_sim.paper.published import payload_truth
-from mocobot_sim.paper.scoring import score
+from mocobot_sim.paper.scoring import score, score_fit
 from mocobot_sim.paper.shares import shares
 from mocobot_sim.scene.models import payload_path
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset, sensor_preset
-from mocobot_sim.trial.simulate import TrialRequest, simulate
+from mocobot_sim.trial.simulate import TrialRequest, draw_units, simulate
 
 Progress = Callable[[float, float, str], object]
 # Positions p_1i and orientations R_1i between processes: arrays keep their bits there, a RigidTransform is normalised.
@@ -44,6 +46,7 @@ class PaperPlan:
         seed: seed of everything random.
         vias: vias of a random trial.
         duration_s: length of a periodic trial's motion [s].
+        staged_only: whether to leave the fits beside the paper's own method out.
 
     Raises:
         InputError: an unknown payload or preset, or a number out of range.
@@ -55,6 +58,7 @@ class PaperPlan:
     seed: int = 0
     vias: int = 80
     duration_s: float = 60.0
+    staged_only: bool = False
 
     def __post_init__(self) -> None:
         """Check before hours are spent."""
@@ -78,9 +82,27 @@ class PaperPlan:
 
     @property
     def steps(self) -> int:
-        """Units of progress: simulated trials and estimates."""
+        """Units of progress: simulated trials, estimates and fits."""
         teams = len(self.teams()) * len(self.payloads)
-        return teams * (self.trials + self.inertia_trials + 2) + len(self.presets) * len(self.payloads)
+        estimates = len(self.presets) * len(self.payloads) + len(self.fits()) + len(self.transfers())
+        return teams * (self.trials + self.inertia_trials + 2) + estimates
+
+    def fits(self) -> list[tuple[str, str, str]]:
+        """Column, preset and payload of every fit to a payload's own recordings."""
+        return [
+            (COLUMNS[preset][0], preset, payload)
+            for preset in self.presets
+            if preset in COLUMNS and not self.staged_only
+            for payload in self.payloads
+        ]
+
+    def transfers(self) -> list[tuple[str, str, str]]:
+        """The same of every fit with the robots as the first payload has calibrated them."""
+        return [
+            (TRANSFER, preset, payload)
+            for column, preset, payload in self.fits()
+            if column == SELF_CALIBRATED and payload != self.payloads[0]
+        ]
 
     def teams(self) -> list[list[SensorPreset]]:
         """Presets that share their robots, and so their trials; the least ideal last, however they were asked for."""
@@ -107,14 +129,17 @@ class PaperResult:
     """What came out, by preset and payload.
 
     Attributes:
-        scores: errors against Table I; the content of ``paper.json``.
-        estimates: the estimates.
+        scores: errors against Table I, by preset or column of fits; the content of ``paper.json``. The payload that
+            calibrated the robots has none (None) in the column of the transfer.
+        estimates: the staged estimates.
+        fits: the fits beside them, by column and payload.
         recordings: the recordings they came from.
         trials: a summary of every simulated trial.
     """
 
-    scores: dict[str, dict[str, dict[str, Any]]] = field(default_factory=dict)
+    scores: dict[str, dict[str, dict[str, Any] | None]] = field(default_factory=dict)
     estimates: dict[str, dict[str, PayloadEstimate]] = field(default_factory=dict)
+    fits: dict[str, dict[str, Calibration]] = field(default_factory=dict)
     recordings: dict[str, dict[str, list[Recording]]] = field(default_factory=dict)
     trials: list[TrialSummary] = field(default_factory=list)
 
@@ -171,8 +196,43 @@ def run_paper(plan: PaperPlan, jobs: int = 1, progress: Progress | None = None) 
         for (payload, preset), estimate in zip(sets, estimates, strict=True):
             result.estimates.setdefault(preset, {})[payload] = estimate
             result.recordings.setdefault(preset, {})[payload] = recordings[payload, preset]
-            result.scores.setdefault(preset, {})[payload] = score(estimate, payload_truth(payload))
+
+        for stage, tasks in (("calibrations", plan.fits()), ("transfer", plan.transfers())):
+            if not tasks:
+                continue
+            fitted = [
+                (
+                    three_trials(recordings[payload, preset]),
+                    preset,
+                    result.fits[SELF_CALIBRATED][plan.payloads[0]] if column == TRANSFER else None,
+                )
+                for column, preset, payload in tasks
+            ]
+            for (column, _, payload), found in zip(tasks, each(stage, _fit, fitted), strict=True):
+                result.fits.setdefault(column, {})[payload] = found
+    result.scores = _scores(plan, result)
     return result
+
+
+def _scores(plan: PaperPlan, result: PaperResult) -> dict[str, dict[str, dict[str, Any] | None]]:
+    """Presets in their order, the fits beside each."""
+    scores: dict[str, dict[str, dict[str, Any] | None]] = {}
+    for preset in plan.presets:
+        units = {payload: draw_units(payload, sensor_preset(preset), plan.seed) for payload in plan.payloads}
+        scores[preset] = {
+            payload: score(estimate, payload_truth(payload), units[payload])
+            for payload, estimate in result.estimates[preset].items()
+        }
+        for column in COLUMNS.get(preset, ()):
+            if column in result.fits:
+                found = result.fits[column]
+                scores[column] = {
+                    payload: score_fit(found[payload].payloads[0], payload_truth(payload), units[payload])
+                    if payload in found
+                    else None
+                    for payload in plan.payloads
+                }
+    return scores
 
 
 def _request(plan: PaperPlan, payload: str, trial: str, number: int) -> TrialRequest:
@@ -219,6 +279,12 @@ def _grasps(_share: Array, recordings: Sequence[Recording]) -> Grasps:
         weak = [str(direction) for step in steps for direction in step.weak]
         raise InputError(f"the random trials do not determine the grasps: {weak[0]}")
     return estimate.p_1i, estimate.R_1i
+
+
+def _fit(
+    _share: Array, recordings: Sequence[Recording], preset: str, robots: Calibration | None
+) -> Calibration:
+    return fit_trials(recordings, preset, robots)
 
 
 def _estimate(_share: Array, recordings: Sequence[Recording]) -> PayloadEstimate:

@@ -1,53 +1,74 @@
 """Pictures of Tables II-V: our errors beside the published ones, on logarithmic axes."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from estimator.files import whole_file
-from mocobot_sim.paper.tables import Row, paper_tables
+from mocobot_sim.paper.fits import ONE_FIT, SELF_CALIBRATED, TRANSFER
+from mocobot_sim.paper.tables import BY_ENCODERS, MOMENTS, AllScores, Row, paper_tables, spring_share
 
-COLOURS = {"paper": "#6b7280", "ideal": "#2a9d8f", "nominal": "#2f6fd0", "uncalibrated": "#e07b39"}
-MARKERS = {"paper": "D", "ideal": "v", "nominal": "o", "uncalibrated": "s"}
-Scores = Mapping[str, Any]
+COLOURS = {
+    "paper": "#6b7280", "ideal": "#2a9d8f", "nominal": "#2f6fd0", ONE_FIT: "#2f6fd0", "uncalibrated": "#e07b39",
+    SELF_CALIBRATED: "#a6407d", TRANSFER: "#a6407d",
+}  # fmt: skip
+MARKERS = {
+    "paper": "D", "ideal": "v", "nominal": "o", ONE_FIT: "o", "uncalibrated": "s", SELF_CALIBRATED: "^", TRANSFER: "^",
+}  # fmt: skip
+HOLLOW = (ONE_FIT, TRANSFER)
+SHARE = "springs' common scale"
+"""A line in the plots of mass and inertia: what no carry decides."""
 
 
-def save_plots(scores: Mapping[str, Mapping[str, Scores]], folder: Path) -> list[Path]:
+def save_plots(scores: AllScores, folder: Path) -> list[Path]:
     """Draw one picture per table group and return their paths.
 
     Args:
-        scores: by preset, then payload, as in ``paper.json``.
+        scores: by preset or column of fits, then payload, as in ``paper.json``.
         folder: existing folder for ``grasps.png``, ``mass_com.png`` and ``inertia.png``.
     """
     tables = {table.number: table for table in paper_tables(scores)}
-    columns = tables["II"].columns
+    columns, share = tables["II"].columns, spring_share(scores)
 
-    def panel(number: str, unit: str, title: str, quantity: str | None = None) -> tuple[Sequence[Row], str]:
-        return tables[number].part(unit, quantity).rows, f"Table {number}: {title}"
+    def panel(
+        number: str, unit: str, title: str, quantity: str | None = None, frames: str = ""
+    ) -> tuple[Sequence[Row], str]:
+        return tables[number].part(unit, quantity, frames).rows, f"Table {number}: {title}"
 
-    def picture(name: str, height: float, grid: tuple[int, int], *panels: tuple[Sequence[Row], str]) -> Path:
+    def picture(
+        name: str, size: tuple[float, float], across: int, *panels: tuple[Sequence[Row], str]
+    ) -> Path:
         # Without pyplot: no display, no global state.
-        figure = Figure(figsize=(11, height), layout="constrained")
-        axes = np.ravel(np.asarray(figure.subplots(*grid)))
-        for axis, (rows, title) in zip(axes, panels, strict=True):
+        shown = [one for one in panels if one[0]]
+        across = min(across, len(shown))
+        down = -(-len(shown) // across)
+        figure = Figure(figsize=(size[0], size[1] * down), layout="constrained")
+        axes = np.ravel(np.asarray(figure.subplots(down, across)))
+        for axis, (rows, title) in zip(axes, shown, strict=True):
             _dots(axis, columns, rows, title)
+            if share and rows[0].unit == "%" and rows[0].quantity in ("m", *MOMENTS):
+                axis.axhline(share, color=COLOURS[SELF_CALIBRATED], linewidth=0.9, linestyle=":", label=SHARE)
         return _save(figure, axes[0], folder / name)
 
     return [
         picture(
-            "grasps.png", 7.5, (2, 1),
-            panel("II", "deg", "rotation error [deg]"), panel("III", "%", "position error [% of |p|]"),
+            "grasps.png", (11, 2.9), 1,
+            panel("II", "deg", "rotation error [deg]"),
+            panel("II", "deg", "rotation error in the frames that the encoders define [deg]", frames=BY_ENCODERS),
+            panel("III", "%", "position error [% of |p|]"),
+            panel("III", "%", "position error in the frames that the encoders define [% of |p|]", frames=BY_ENCODERS),
         ),
         picture(
-            "mass_com.png", 4.2, (1, 2),
-            panel("IV", "%", "mass error [%]", "m"), panel("IV", "%", "centre-of-mass error [% of |p1c|]", "p1c"),
+            "mass_com.png", (11, 4.2), 3,
+            panel("IV", "%", "mass error [%]", "m"),
+            panel("IV", "%", "centre-of-mass error [% of |p1c|]", "p1c"),
+            panel("IV", "%", "the same, encoder frames", "p1c", BY_ENCODERS),
         ),
         picture(
-            "inertia.png", 4.4, (1, 1),
+            "inertia.png", (11, 4.4), 1,
             panel(
                 "V", "%",
                 "|mean error| of the principal moments [%] (whisker: mean + standard deviation of the estimates)",
@@ -66,13 +87,14 @@ def _dots(axis: Axes, columns: Sequence[str], rows: Sequence[Row], title: str) -
     """One dot per column and row; whiskers reach up by one standard deviation (down has no meaning on a log axis)."""
     labels = [_label(row) for row in rows]
     for k, name in enumerate(columns):
-        x = [i + 0.13 * (k - (len(columns) - 1) / 2) for i in range(len(rows))]
+        x = [i + min(0.13, 0.8 / len(columns)) * (k - (len(columns) - 1) / 2) for i in range(len(rows))]
         cells = [row.cells[k] for row in rows]
         shown = [float("nan") if cell.value is None else cell.value for cell in cells]
         up = [cell.spread or 0.0 for cell in cells]
         axis.errorbar(
             x, shown, yerr=[[0.0] * len(up), up], label=name, color=COLOURS.get(name),
             fmt=MARKERS.get(name, "o"), markersize=6, elinewidth=1.2, capsize=2,
+            markerfacecolor="white" if name in HOLLOW else COLOURS.get(name),
         )  # fmt: skip
     axis.set_yscale("log")
     axis.set_xlim(-0.5, len(labels) - 0.5)
@@ -85,8 +107,13 @@ def _dots(axis: Axes, columns: Sequence[str], rows: Sequence[Row], title: str) -
 
 
 def _save(figure: Figure, legend_of: Axes, path: Path) -> Path:
-    handles, labels = legend_of.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper right", ncols=len(labels), frameon=False, fontsize=9)
+    named = dict(zip(*reversed(legend_of.get_legend_handles_labels()), strict=True))
+    labels = sorted(named, key=lambda name: name == SHARE)
+    figure.legend(
+        [named[name] for name in labels], labels, loc="outside upper right",
+        ncols=len(labels) if len(labels) <= 6 else -(-len(labels) // 2), frameon=False, fontsize=9,
+        columnspacing=1.2, handletextpad=0.2,
+    )  # fmt: skip
     with whole_file(path) as temporary:
         figure.savefig(temporary, dpi=130, format="png")
     return path

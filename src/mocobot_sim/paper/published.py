@@ -1,6 +1,6 @@
 """The paper's tables as data: ground truth of the four payloads (Table I) and published errors (II-V)."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -39,6 +39,22 @@ class PayloadTruth:
     def inertia(self) -> Array:
         """Inertia matrix in {b}: about the centre of mass, axes of {1} [kg m^2], shape (3, 3)."""
         return self.R_1c @ np.diag(self.principal_moments) @ self.R_1c.T
+
+    def seen_by_encoders(self, theta_x_zero: Array) -> "PayloadTruth":
+        """The same in the frames that the encoders define: each {i} turned about its x axis by that theta_x's zero.
+
+        Args:
+            theta_x_zero: reading minus true theta_x of every robot [rad], shape (N,).
+        """
+        turn = Rotation.from_rotvec(np.outer(theta_x_zero, [1.0, 0.0, 0.0])).as_matrix()
+        back = turn[0].T
+        return replace(
+            self,
+            R_1i=back @ self.R_1i @ turn,
+            p_1i=self.p_1i @ turn[0],
+            p_1c=back @ self.p_1c,
+            R_1c=back @ self.R_1c,
+        )
 
     def T(self, i: int, j: int) -> Array:
         """Homogeneous transform T_ij, shape (4, 4); robots counted from 1."""

@@ -5,6 +5,9 @@ norm of the truth. Tables II and III: mean and standard deviation, over the rand
 error norm. Table IV: one static set, with the grasps pooled. Table V: magnitude of the mean *signed* error
 and standard deviation of the estimates over trials, so the two say bias and scatter. Standard deviations
 divide by n - 1; one trial has none (null).
+
+Sensors see grasp frames turned by the zero of the gimbal's last axis, which nothing that they measure can tell. Errors
+are therefore given in both frames: those of the CAD, as in the paper, and those that the encoders define.
 """
 
 from collections.abc import Sequence
@@ -14,14 +17,25 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.arrays import Array
+from estimator.calibrate.calibration import CalibratedPayload
 from estimator.estimate.grasp_estimate import GraspEstimate
+from estimator.estimate.principal import inertia_matrix
 from estimator.estimate.result import PayloadEstimate
 from mocobot_sim.paper.published import PayloadTruth
+from mocobot_sim.scene.as_built import AsBuilt, units_of
 
 MOMENTS = ("Ixx", "Iyy", "Izz")
 
 
-def score(estimate: PayloadEstimate, truth: PayloadTruth) -> dict[str, Any]:
+ENCODER_FRAMES = "encoder_frames"
+"""Key of the errors of grasps and centre of mass in the frames that the encoders define."""
+SPRING_SCALE = "spring_scale"
+"""Key of what the team's common spring scale does to a calibrated mass and inertia, and of the errors beyond it."""
+
+
+def score(
+    estimate: PayloadEstimate, truth: PayloadTruth, units: Sequence[AsBuilt] | None = None
+) -> dict[str, Any]:
     """Errors of one payload's estimate; null where the estimate has no value.
 
     Grasps are scored on each recording with trial ``"random"``, inertia on ``"random"`` and ``"periodic"``
@@ -29,16 +43,24 @@ def score(estimate: PayloadEstimate, truth: PayloadTruth) -> dict[str, Any]:
     ``"all"`` therefore pools the periodic recordings with as many of the first random ones (with all of
     either kind if the other has none), and ``"random"`` is that same selection.
 
+    Args:
+        estimate: of the payload.
+        truth: in the frames of the CAD.
+        units: the robots as built, empty for all as designed; None leaves ``"encoder_frames"`` out.
+
     Returns:
         ``{"R12_deg": {"mean", "std"}, "p12_m": {"mean", "std"}, "p12_percent": {"mean", "std"}, (23, 31),
         "m_kg", "m_percent", "p1c_m", "p1c_percent", "all": {"Ixx": {"mean", "std", "percent",
-        "std_percent"}, "Iyy", "Izz"}, "random": {the same}, "periodic": {the same}}``.
+        "std_percent"}, "Iyy", "Izz"}, "random": {the same}, "periodic": {the same}, "encoder_frames": {R, p and
+        p1c once more}}``.
         For other than three robots the pairs are (1, 2), (2, 3), ..., and (N, 1) when N > 2.
     """
     random = [r for r in estimate.recordings if r.trial == "random"]
     periodic = [r for r in estimate.recordings if r.trial == "periodic"]
-    result = _grasp_errors([r.grasps for r in random if r.grasps is not None], truth)
-    result |= _static_errors(estimate, truth)
+    grasps = [r.grasps for r in random if r.grasps is not None]
+    result = _grasp_errors(grasps, truth)
+    result |= _mass_errors(None if estimate.mass is None else estimate.mass.mass, truth)
+    result |= _com_errors(estimate.p_1c, truth)
     moments = {
         kind: [r.inertia.principal.moments for r in group if r.inertia is not None]
         for kind, group in (("random", random), ("periodic", periodic))
@@ -48,12 +70,54 @@ def score(estimate: PayloadEstimate, truth: PayloadTruth) -> dict[str, Any]:
     result["all"] = _moment_errors(moments["random"] + moments["periodic"], truth)
     result["random"] = _moment_errors(moments["random"], truth)
     result["periodic"] = _moment_errors(moments["periodic"], truth)
+    if units is not None:
+        seen = _seen(truth, units)
+        result[ENCODER_FRAMES] = _grasp_errors(grasps, seen) | _com_errors(estimate.p_1c, seen)
     return result
+
+
+def score_fit(found: CalibratedPayload, truth: PayloadTruth, units: Sequence[AsBuilt]) -> dict[str, Any]:
+    """Errors of a payload that one fit of several recordings gave; means of one, without standard deviations.
+
+    A carry does not decide the common scale of all springs, so masses and inertias come out as truth / (1 + mean
+    stiffness ratio) of the team; ``"spring_scale"`` says how much that is, and what the errors are beyond it.
+
+    Args:
+        found: of the payload.
+        truth: in the frames of the CAD.
+        units: the robots as built, empty for all as designed.
+
+    Returns:
+        The keys of ``score`` but ``"random"`` and ``"periodic"``, and ``"spring_scale"``: ``{"percent", "m_percent",
+        "Ixx_percent", "Iyy_percent", "Izz_percent"}``, the first with its sign.
+    """
+    mass = float(found.parameters[0])
+    p_1c = found.parameters[1:4] / mass
+    about_1 = inertia_matrix(found.parameters[4:])
+    about_c = about_1 - mass * (p_1c @ p_1c * np.eye(3) - np.outer(p_1c, p_1c))
+    moments = np.asarray(np.linalg.eigvalsh(about_c), dtype=float)
+    seen = _seen(truth, units)
+    built = units_of(units, len(truth.p_1i))
+    share = 1.0 / (1.0 + float(np.mean([unit.stiffness_ratio for unit in built])))
+    beyond = {"m": mass / (share * truth.mass)}
+    beyond |= dict(zip(MOMENTS, moments / (share * truth.principal_moments), strict=True))
+    result = _grasp_errors([found.grasps], truth) | _mass_errors(mass, truth) | _com_errors(p_1c, truth)
+    return result | {
+        "all": _moment_errors([moments], truth),
+        ENCODER_FRAMES: _grasp_errors([found.grasps], seen) | _com_errors(p_1c, seen),
+        SPRING_SCALE: {"percent": 100.0 * (share - 1.0)}
+        | {f"{name}_percent": 100.0 * abs(float(ratio) - 1.0) for name, ratio in beyond.items()},
+    }
 
 
 def rotation_error_deg(R: Array, R_estimated: Array) -> float:
     """Angle of R^T R_estimated [deg], shapes (3, 3)."""
     return float(np.rad2deg(Rotation.from_matrix(R.T @ R_estimated).magnitude()))
+
+
+def _seen(truth: PayloadTruth, units: Sequence[AsBuilt]) -> PayloadTruth:
+    built = units_of(units, len(truth.p_1i))
+    return truth.seen_by_encoders(np.array([unit.theta_zero_rad[2] for unit in built]))
 
 
 def _grasp_errors(grasps: Sequence[GraspEstimate], truth: PayloadTruth) -> dict[str, Any]:
@@ -71,15 +135,14 @@ def _grasp_errors(grasps: Sequence[GraspEstimate], truth: PayloadTruth) -> dict[
     return result
 
 
-def _static_errors(estimate: PayloadEstimate, truth: PayloadTruth) -> dict[str, float | None]:
-    m = None if estimate.mass is None else abs(estimate.mass.mass - truth.mass)
-    p = None if estimate.p_1c is None else float(np.linalg.norm(estimate.p_1c - truth.p_1c))
-    return {
-        "m_kg": m,
-        "m_percent": _percent(m, truth.mass),
-        "p1c_m": p,
-        "p1c_percent": _percent(p, float(np.linalg.norm(truth.p_1c))),
-    }
+def _mass_errors(mass: float | None, truth: PayloadTruth) -> dict[str, float | None]:
+    m = None if mass is None else abs(mass - truth.mass)
+    return {"m_kg": m, "m_percent": _percent(m, truth.mass)}
+
+
+def _com_errors(p_1c: Array | None, truth: PayloadTruth) -> dict[str, float | None]:
+    p = None if p_1c is None else float(np.linalg.norm(p_1c - truth.p_1c))
+    return {"p1c_m": p, "p1c_percent": _percent(p, float(np.linalg.norm(truth.p_1c)))}
 
 
 def _percent(error: float | None, of: float) -> float | None:

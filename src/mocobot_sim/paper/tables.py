@@ -1,4 +1,8 @@
-"""Tables II-V: the paper's columns, then one column per sensor preset, as rows of numbers and as text."""
+"""Tables II-V: the paper's columns, then those of every sensor preset, as rows of numbers.
+
+Beside the staged estimate of a preset stands what one fit gives (``mocobot_sim.paper.fits``). Where the frames that the
+encoders define are known, grasps and centres of mass have rows in these, too.
+"""
 
 from __future__ import annotations
 
@@ -7,14 +11,17 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from mocobot_sim.paper.published import published_errors
+from mocobot_sim.paper.scoring import ENCODER_FRAMES, SPRING_SCALE
 
 PAIRS = ("12", "23", "31")
 MOMENTS = ("Ixx", "Iyy", "Izz")
 PAPER = "paper"
 """Name of the column of published figures."""
 Scores = Mapping[str, Any]
-AllScores = Mapping[str, Mapping[str, Scores]]
-"""By preset, then payload, as in ``paper.json``."""
+AllScores = Mapping[str, Mapping[str, Scores | None]]
+"""By preset or column of fits, then payload, as in ``paper.json``; None where a column has nothing for a payload."""
+BY_ENCODERS = "encoder frames"
+"""Marks rows in the frames that the encoders define; the others are in those of the CAD."""
 
 
 @dataclass(frozen=True)
@@ -34,12 +41,14 @@ class Row:
         quantity: such as ``R12`` or ``mass``.
         unit: of the numbers.
         cells: one per column of the table.
+        frames: ``BY_ENCODERS`` or, for the frames of the CAD, empty.
     """
 
     payload: str
     quantity: str
     unit: str
     cells: tuple[Cell, ...]
+    frames: str = ""
 
 
 @dataclass(frozen=True)
@@ -50,7 +59,7 @@ class PaperTable:
         number: of the paper's table, such as ``II``; empty for the summary.
         title: what it shows.
         note: what the numbers are.
-        columns: ``paper``, then the presets.
+        columns: ``paper``, then the presets and the fits beside them.
         rows: payload by payload.
     """
 
@@ -60,9 +69,13 @@ class PaperTable:
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
 
-    def part(self, unit: str, quantity: str | None = None) -> PaperTable:
-        """The rows of one unit only, or of one quantity in it."""
-        rows = tuple(row for row in self.rows if row.unit == unit and quantity in (None, row.quantity))
+    def part(self, unit: str, quantity: str | None = None, frames: str = "") -> PaperTable:
+        """The rows of one unit and kind of frames only, or of one quantity in them."""
+        rows = tuple(
+            row
+            for row in self.rows
+            if row.unit == unit and row.frames == frames and quantity in (None, row.quantity)
+        )
         return replace(self, rows=rows)
 
 
@@ -73,30 +86,35 @@ def paper_tables(scores: AllScores) -> list[PaperTable]:
         scores: by preset, then payload, as in ``paper.json``.
     """
     columns, payloads = _columns(scores)
+    frames = ("", BY_ENCODERS) if _knows_frames(scores) else ("",)
 
-    def table(
-        number: str, title: str, note: str, kinds: Sequence[tuple[str, str, Callable[[Scores], Cell]]]
-    ) -> PaperTable:
+    def table(number: str, title: str, note: str, kinds: Sequence[tuple[str, str, _Pick, str]]) -> PaperTable:
         rows = tuple(
-            Row(payload, quantity, unit, tuple(cell(column[payload]) for column in columns.values()))
+            Row(payload, quantity, unit, tuple(_cell(pick, c[payload], seen) for c in columns.values()), seen)
             for payload in payloads
-            for quantity, unit, cell in kinds
+            for quantity, unit, pick, seen in kinds
         )
         return PaperTable(number, title, note, tuple(columns), rows)
 
+    fits = _fits_note(scores)
     return [
         table(
             "II",
             "Relative grasp orientation: error angle [deg]",
-            "mean +- standard deviation over the random trials",
-            [(f"R{pair}", "deg", lambda s, key=f"R{pair}_deg": _mean(s[key])) for pair in PAIRS],
+            "mean +- standard deviation over the random trials" + fits,
+            [
+                (f"R{pair}", "deg", lambda s, key=f"R{pair}_deg": _mean(s[key]), seen)
+                for seen in frames
+                for pair in PAIRS
+            ],
         ),
         table(
             "III",
             "Relative grasp position: error [m] and error relative to |p| [%]",
-            "mean +- standard deviation over the random trials",
+            "mean +- standard deviation over the random trials" + fits,
             [
-                (f"p{pair}", unit, lambda s, key=f"p{pair}_{key}": _mean(s[key]))
+                (f"p{pair}", unit, lambda s, key=f"p{pair}_{key}": _mean(s[key]), seen)
+                for seen in frames
                 for pair in PAIRS
                 for unit, key in (("m", "m"), ("%", "percent"))
             ],
@@ -104,21 +122,26 @@ def paper_tables(scores: AllScores) -> list[PaperTable]:
         table(
             "IV",
             "Mass and centre of mass: error, and error relative to the truth [%]",
-            "one set of six static holds",
+            "one set of six static holds" + fits + _scale_note(scores, ("m",)),
             [
-                ("m", "kg", lambda s: Cell(s["m_kg"])),
-                ("m", "%", lambda s: Cell(s["m_percent"])),
-                ("p1c", "m", lambda s: Cell(s["p1c_m"])),
-                ("p1c", "%", lambda s: Cell(s["p1c_percent"])),
+                ("m", "kg", lambda s: Cell(s["m_kg"]), ""),
+                ("m", "%", lambda s: Cell(s["m_percent"]), ""),
+                *(
+                    ("p1c", unit, lambda s, key=f"p1c_{key}": Cell(s[key]), seen)
+                    for seen in frames
+                    for unit, key in (("m", "m"), ("%", "percent"))
+                ),
             ],
         ),
         table(
             "V",
             "Principal moments of inertia: error [kg m^2] and relative error [%]",
-            "|mean error| +- standard deviation of the estimates over random and periodic trials",
-            [(name, "kg m^2", lambda s, n=name: _mean(s["all"][n])) for name in MOMENTS]
+            "|mean error| +- standard deviation of the estimates over random and periodic trials"
+            + fits
+            + _scale_note(scores, MOMENTS),
+            [(name, "kg m^2", lambda s, n=name: _mean(s["all"][n]), "") for name in MOMENTS]
             + [
-                (name, "%", lambda s, n=name: Cell(s["all"][n]["percent"], s["all"][n]["std_percent"]))
+                (name, "%", lambda s, n=name: Cell(s["all"][n]["percent"], s["all"][n]["std_percent"]), "")
                 for name in MOMENTS
             ],
         ),
@@ -128,87 +151,135 @@ def paper_tables(scores: AllScores) -> list[PaperTable]:
 def summary_table(scores: AllScores) -> PaperTable:
     """The largest mean error of every kind over payloads (and pairs or moments), the paper's beside ours."""
     columns, payloads = _columns(scores)
+    frames = ("", BY_ENCODERS) if _knows_frames(scores) else ("",)
 
     def moments(kind: str) -> Callable[[Scores], list[float | None]]:
         return lambda s: [s[kind][name]["percent"] for name in MOMENTS] if kind in s else []
 
-    kinds: list[tuple[str, str, float, Callable[[Scores], list[float | None]]]] = [
-        ("grasp rotation", "deg", 1.0, lambda s: [s[f"R{pair}_deg"]["mean"] for pair in PAIRS]),
-        ("grasp position", "mm", 1e3, lambda s: [s[f"p{pair}_m"]["mean"] for pair in PAIRS]),
-        ("grasp position", "%", 1.0, lambda s: [s[f"p{pair}_percent"]["mean"] for pair in PAIRS]),
-        ("mass", "%", 1.0, lambda s: [s["m_percent"]]),
-        ("centre of mass", "mm", 1e3, lambda s: [s["p1c_m"]]),
-        ("centre of mass", "%", 1.0, lambda s: [s["p1c_percent"]]),
-        ("inertia, all trials", "%", 1.0, moments("all")),
-        ("inertia, periodic trials", "%", 1.0, moments("periodic")),
-        ("inertia, random trials", "%", 1.0, moments("random")),
+    kinds: list[tuple[str, str, float, Callable[[Scores], list[float | None]], str]] = [
+        *(
+            kind
+            for seen in frames
+            for kind in (
+                ("grasp rotation", "deg", 1.0, lambda s: [s[f"R{pair}_deg"]["mean"] for pair in PAIRS], seen),
+                ("grasp position", "mm", 1e3, lambda s: [s[f"p{pair}_m"]["mean"] for pair in PAIRS], seen),
+                (
+                    "grasp position",
+                    "%",
+                    1.0,
+                    lambda s: [s[f"p{pair}_percent"]["mean"] for pair in PAIRS],
+                    seen,
+                ),
+            )
+        ),
+        ("mass", "%", 1.0, lambda s: [s["m_percent"]], ""),
+        *(
+            kind
+            for seen in frames
+            for kind in (
+                ("centre of mass", "mm", 1e3, lambda s: [s["p1c_m"]], seen),
+                ("centre of mass", "%", 1.0, lambda s: [s["p1c_percent"]], seen),
+            )
+        ),
+        ("inertia, all trials", "%", 1.0, moments("all"), ""),
+        ("inertia, periodic trials", "%", 1.0, moments("periodic"), ""),
+        ("inertia, random trials", "%", 1.0, moments("random"), ""),
     ]
 
     def largest(
-        column: Mapping[str, Scores], scale: float, values: Callable[[Scores], list[float | None]]
+        column: Mapping[str, Scores | None],
+        scale: float,
+        values: Callable[[Scores], list[float | None]],
+        seen: str,
     ) -> Cell:
-        found = [value for payload in payloads for value in values(column[payload])]
+        found = [
+            value
+            for payload in payloads
+            if (entry := _in_frames(column[payload], seen)) is not None
+            for value in values(entry)
+        ]
         return Cell(max((scale * value for value in found if value is not None), default=None))
 
     rows = tuple(
-        Row("", quantity, unit, tuple(largest(column, scale, values) for column in columns.values()))
-        for quantity, unit, scale, values in kinds
+        Row(
+            "",
+            quantity,
+            unit,
+            tuple(largest(column, scale, values, seen) for column in columns.values()),
+            seen,
+        )
+        for quantity, unit, scale, values, seen in kinds
     )
-    return PaperTable("", "largest error over the payloads", "", tuple(columns), rows)
+    note = (_fits_note(scores) + _scale_note(scores, ("m", *MOMENTS))).removeprefix("; ")
+    return PaperTable("", "largest error over the payloads", note, tuple(columns), rows)
 
 
-def format_tables(scores: AllScores) -> str:
-    """All four tables.
-
-    Args:
-        scores: by preset, then payload, as in ``paper.json``.
-    """
-    blocks = []
-    for table in paper_tables(scores):
-        cells, last = [["", "", *table.columns]], ""
-        for row in table.rows:
-            head = f"({row.payload})" if row.payload != last else ""
-            label = row.quantity if row.unit == "deg" else f"{row.quantity} [{row.unit}]"
-            cells.append([head, label, *map(format_cell, row.cells)])
-            last = row.payload
-        blocks.append(f"Table {table.number}. {table.title}\n{table.note}\n\n{_align(cells)}")
-    return "\n\n".join(blocks)
+def spring_share(scores: AllScores) -> float | None:
+    """Size of what the common spring scale of calibrated teams, all of one seed, takes off mass and inertia [%]."""
+    found = [abs(entry["percent"]) for entry in _entries(scores, SPRING_SCALE)]
+    return max(found, default=None)
 
 
-def format_summary(scores: AllScores) -> str:
-    """The summary as text."""
-    table = summary_table(scores)
-    cells = [[table.title, *table.columns]]
-    cells += [[f"{row.quantity} [{row.unit}]", *map(format_cell, row.cells)] for row in table.rows]
-    return _align(cells)
+_Pick = Callable[[Scores], Cell]
 
 
-def format_cell(cell: Cell) -> str:
-    """``0.94 +- 0.21``, two significant digits; ``none`` where there is no number."""
-    value = _number(cell.value)
-    return value if cell.spread is None else f"{value} +- {_number(cell.spread)}"
-
-
-def _columns(scores: AllScores) -> tuple[dict[str, Mapping[str, Scores]], list[str]]:
+def _columns(scores: AllScores) -> tuple[dict[str, Mapping[str, Scores | None]], list[str]]:
     """The columns by name, the published figures first, and the payloads."""
     payloads = list(next(iter(scores.values())))
     return {PAPER: {p: published_errors(p) for p in payloads}, **scores}, payloads
+
+
+def _entries(scores: AllScores, key: str) -> list[Scores]:
+    """What all columns and payloads have under a key that not all have."""
+    return [
+        entry[key]
+        for column in scores.values()
+        for entry in column.values()
+        if entry is not None and key in entry
+    ]
+
+
+def _knows_frames(scores: AllScores) -> bool:
+    return bool(_entries(scores, ENCODER_FRAMES))
+
+
+def _in_frames(entry: Scores | None, frames: str) -> Scores | None:
+    return entry if entry is None or not frames else entry.get(ENCODER_FRAMES)
+
+
+def _cell(pick: _Pick, entry: Scores | None, frames: str) -> Cell:
+    found = _in_frames(entry, frames)
+    return Cell(None) if found is None else pick(found)
+
+
+def _fits_note(scores: AllScores) -> str:
+    if not _entries(scores, SPRING_SCALE):
+        return ""
+    return (
+        "; one fit, self-calibrated, transfer: one number from one fit of three trials, the first random, the first "
+        "periodic and the static one"
+    )
+
+
+def _scale_note(scores: AllScores, names: Sequence[str]) -> str:
+    """How much of a calibrated mass's or inertia's error is the common spring scale's."""
+    found = [entry for entry in _entries(scores, SPRING_SCALE) if entry["percent"]]
+    if not found:
+        return ""
+    shares = sorted({f"{entry['percent']:+.2f}" for entry in found})
+    beyond = max(entry[f"{name}_percent"] for entry in found for name in names)
+    return (
+        f"; mass and inertia of calibrated teams are truth / (1 + mean stiffness ratio of their springs), here "
+        f"{' and '.join(shares)} %, which no carry decides; beyond that they err by at most {number(beyond)} %"
+    )
 
 
 def _mean(entry: Mapping[str, float | None]) -> Cell:
     return Cell(entry["mean"], entry["std"])
 
 
-def _number(value: float | None) -> str:
+def number(value: float | None) -> str:
+    """Two significant digits; ``none`` where there is no number."""
     if value is None:
         return "none"
     return f"{value:.2g}" if value >= 1e-4 or value == 0 else f"{value:.1e}"
-
-
-def _align(cells: Sequence[Sequence[str]]) -> str:
-    widths = [max(len(row[k]) for row in cells) for k in range(len(cells[0]))]
-    lines = [
-        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
-        for row in cells
-    ]
-    return "\n".join([lines[0], "-" * max(map(len, lines)), *lines[1:]])

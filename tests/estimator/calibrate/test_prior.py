@@ -37,7 +37,7 @@ def test_every_field_may_be_given_and_defaults_are_allowed(tmp_path: Path) -> No
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("geometry_mm = 1", r"unknown key 'geometry_mm' \(did you mean 'geometry_m'\?\); the keys are encoder_zero_rad,"),
+        ("geometry_mm = 1", r"unknown key 'geometry_mm' \(did you mean 'geometry_m'\?\); the keys are encoder_"),
         ("geometry_m = 1", "geometry_m is 1; it must be a standard deviation from 0 to 0.05 m$"),
         ("encoder_zero_rad = -0.01", "encoder_zero_rad is -0.01; it must be a standard deviation from 0 to 0.35 rad$"),
         ("stiffness_ratio = 2", "stiffness_ratio is 2; it must be a standard deviation from 0 to 0.5$"),

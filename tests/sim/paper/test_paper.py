@@ -4,16 +4,26 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict
+from collections.abc import Sequence
+from dataclasses import asdict, replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace as Namespace
 
+import numpy as np
 import pytest
 
+from estimator.calibrate.calibration import Calibration
 from mocobot.cli import main
+from mocobot_sim.paper import experiment
 from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
-from mocobot_sim.paper.published import published_errors
-from mocobot_sim.paper.tables import format_tables
+from mocobot_sim.paper.fits import ONE_FIT, SELF_CALIBRATED, TRANSFER, fit_trials, three_trials
+from mocobot_sim.paper.published import payload_truth, published_errors
+from mocobot_sim.paper.scoring import score_fit
+from mocobot_sim.paper.tables import BY_ENCODERS, summary_table
+from mocobot_sim.paper.text import format_tables
+from mocobot_sim.trial.sensors import SensorPreset, sensor_preset
+from mocobot_sim.trial.simulate import TrialRequest, draw_units
 
 PAYLOADS = ("a", "b", "c", "d")
 PAIRS = ("12", "23", "31")
@@ -26,8 +36,8 @@ LESS = {"vias": 15, "duration_s": 10.0}
 
 @pytest.fixture(scope="module")
 def result() -> PaperResult:
-    """All payloads and presets: 2 random trials, 1 periodic and 1 static one of each."""
-    return run_paper(PaperPlan(trials=2, **LESS), jobs=2)
+    """All payloads and presets: 2 random trials, 1 periodic and 1 static one of each; no fits beside the stages."""
+    return run_paper(PaperPlan(trials=2, staged_only=True, **LESS), jobs=2)
 
 
 # Upper bounds of the errors [deg, m, %, m, %], and of the inertia from periodic and from random trials [%].
@@ -85,6 +95,51 @@ def test_errors_grow_from_preset_to_preset(result: PaperResult) -> None:
             assert ideal[key] < nominal[key] < uncalibrated[key]
 
 
+@pytest.fixture(scope="module")
+def calibrated(result: PaperResult) -> Calibration:
+    """Robots and payload (a) from three of its recordings."""
+    return fit_trials(three_trials(result.recordings["uncalibrated"]["a"]), "uncalibrated")
+
+
+def check_calibrated(found: Calibration, payload: str) -> None:
+    """Errors in the frames that the encoders define, absolute ones and in multiples of what the fit claims."""
+    units = draw_units(payload, sensor_preset("uncalibrated"), 0)
+    errors = score_fit(found.payloads[0], payload_truth(payload), units)
+    seen = errors["encoder_frames"]
+    for pair in PAIRS:
+        assert seen[f"R{pair}_deg"]["mean"] < 0.004
+        assert seen[f"p{pair}_m"]["mean"] < 8e-4
+        assert errors[f"R{pair}_deg"]["mean"] > 0.1, "theta_x zeros of about 1 deg"
+    assert seen["p1c_m"] < 5e-4
+    scale = errors["spring_scale"]
+    assert max(scale[f"{name}_percent"] for name in ("m", *MOMENTS)) < 0.3
+    claimed = found.payloads[0].covariance[12, 12] ** 0.5
+    mass = payload_truth(payload).mass * (1.0 + scale["percent"] / 100.0)
+    assert abs(found.payloads[0].parameters[0] - mass) < 4.0 * claimed
+    assert claimed < 2e-3 * mass
+
+
+@pytest.mark.slow
+def test_uncalibrated_team_calibrates_itself(calibrated: Calibration) -> None:
+    assert [trial.kind for trial in calibrated.trials] == ["random", "static", "periodic"]
+    check_calibrated(calibrated, "a")
+
+
+@pytest.mark.slow
+def test_calibration_serves_another_payload(result: PaperResult, calibrated: Calibration) -> None:
+    """The robots of a seed are the same with every payload."""
+    recordings = three_trials(result.recordings["uncalibrated"]["b"])
+    found = fit_trials(recordings, "uncalibrated", calibrated)
+    np.testing.assert_array_equal(found.units.x, calibrated.units.x)
+    check_calibrated(found, "b")
+
+
+def test_robots_of_a_seed_carry_every_payload() -> None:
+    units = [[u.to_dict() for u in draw_units(p, sensor_preset("uncalibrated"), 3)] for p in PAYLOADS]
+    assert units[0] == units[1] == units[2] == units[3]
+    assert units[0] != [u.to_dict() for u in draw_units("a", sensor_preset("uncalibrated"), 4)]
+
+
 @pytest.mark.slow
 def test_trials_stay_within_the_papers_limits(result: PaperResult) -> None:
     assert len(result.trials) == 4 * 2 * (2 + 1 + 1)
@@ -116,8 +171,19 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 def test_paper_json(folder: Path) -> None:
     scores = json.loads((folder / "paper.json").read_text())
-    assert list(scores) == ["nominal"]
-    assert list(scores["nominal"]) == ["d"]
+    assert list(scores) == ["nominal", "nominal, one fit"]
+    assert list(scores["nominal"]) == list(scores["nominal, one fit"]) == ["d"]
+    fitted = scores["nominal, one fit"]["d"]
+    assert set(fitted) == set(scores["nominal"]["d"]) - {"random", "periodic"} | {"spring_scale"}
+    bars = BARS["nominal"]
+    for pair in PAIRS:
+        assert fitted[f"R{pair}_deg"]["mean"] < bars["R"] / 4
+        assert fitted[f"p{pair}_m"] == {"mean": pytest.approx(0, abs=bars["p"] / 4), "std": None}
+    assert fitted["p1c_m"] < bars["p1c"] / 4
+    assert fitted["m_percent"] < bars["m"] / 4
+    assert fitted["spring_scale"]["percent"] == 0.0
+    for moment in MOMENTS:
+        assert fitted["all"][moment]["percent"] < bars["periodic"] / 4
     score = scores["nominal"]["d"]
     grasp_keys = {
         f"{q}{pair}_{unit}" for pair in PAIRS for q, unit in (("R", "deg"), ("p", "m"), ("p", "percent"))
@@ -130,6 +196,11 @@ def test_paper_json(folder: Path) -> None:
         "all",
         "random",
         "periodic",
+        "encoder_frames",
+    }
+    # Nominal robots' encoders define the CAD's frames.
+    assert score["encoder_frames"] == {
+        key: score[key] for key in score["encoder_frames"].keys() | grasp_keys | {"p1c_m", "p1c_percent"}
     }
     for key in grasp_keys:
         assert set(score[key]) == {"mean", "std"}
@@ -161,6 +232,7 @@ def test_everything_else_in_the_folder(folder: Path) -> None:
     made = json.loads((folder / "provenance.json").read_text())
     assert made["options"] == {
         "payload": ["d"], "preset": ["nominal"], "trials": 2, "seed": 0, "recordings": True,
+        "staged_only": False,
     }  # fmt: skip
     assert made["files"] == []
     assert {entry["path"] for entry in made["written"]} == names - {"provenance.json"}
@@ -216,3 +288,83 @@ def test_tables_show_the_published_figures() -> None:
     ):
         assert row in text
     assert text.count("(b)") == 4
+
+
+def fitted_scores() -> dict:
+    """A preset and its fits: published errors, a tenth in the encoders' frames; (a) calibrated the robots for (b)."""
+
+    def entry(payload: str, share: float) -> dict:
+        errors = published_errors(payload)
+        seen = {key: value for key, value in errors.items() if key[0] in "Rp"}
+        for key, value in seen.items():
+            seen[key] = {"mean": value["mean"] / 10, "std": None} if isinstance(value, dict) else value / 10
+        scale = {"percent": share} | {f"{name}_percent": 0.02 for name in ("m", *MOMENTS)}
+        return errors | {"encoder_frames": seen, "spring_scale": scale}
+
+    fits = {p: entry(p, -0.64) for p in "ab"}
+    staged = {p: {key: v for key, v in entry(p, 0.0).items() if key != "spring_scale"} for p in "ab"}
+    return {"uncalibrated": staged, SELF_CALIBRATED: fits, TRANSFER: {"a": None, "b": fits["b"]}}
+
+
+def test_tables_show_both_frames_and_what_a_fit_has_not() -> None:
+    text = format_tables(fitted_scores())
+    for row in (
+        "                           paper         uncalibrated  uncalibrated,    uncalibrated,",
+        "                                                       self-calibrated  transfer",
+        "(a)  R12                  0.94 +- 0.21  0.94 +- 0.21  0.94 +- 0.21     none",
+        "     R12, encoder frames  none          0.094         0.094            none",
+        "(b)  R12                  1.8 +- 0.19   1.8 +- 0.19   1.8 +- 0.19      1.8 +- 0.19",
+        "     p1c [m], encoder frames  none   0.0018        0.0018           0.0018",
+    ):
+        assert row.strip() in text, text
+    assert "here -0.64 %," in text.replace("\n", " ")
+    summary = summary_table(fitted_scores())
+    (row,) = summary.part("mm", "centre of mass", BY_ENCODERS).rows
+    assert [cell.value for cell in row.cells] == [None, *(pytest.approx(v) for v in (2.1, 2.1, 1.8))]
+    assert "beyond that they err by at most 0.02 %" in summary.note
+
+
+def test_fits_stand_beside_their_presets(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Three trials each; the first payload calibrates the robots for the others; columns in the presets' order."""
+    plan = PaperPlan(("c", "a"), ("uncalibrated", "ideal", "nominal"), trials=2)
+    assert plan.fits() == [
+        (column, preset, payload)
+        for preset, column in (("uncalibrated", SELF_CALIBRATED), ("nominal", ONE_FIT))
+        for payload in ("c", "a")
+    ]
+    assert plan.transfers() == [(TRANSFER, "uncalibrated", "a")]
+    alone = replace(plan, staged_only=True)
+    assert (alone.fits(), alone.transfers()) == ([], [])
+    assert plan.steps - alone.steps == 5
+
+    def simulate(
+        request: TrialRequest, presets: Sequence[SensorPreset], *_: object, **__: object
+    ) -> Namespace:
+        recording = Namespace(
+            metadata=Namespace(trial=request.trial), name=f"{request.payload}{request.number}"
+        )
+        log = Namespace(
+            payload_rotation=lambda: np.zeros((1, 3)), tau=np.zeros(1), rod_error_m=0.0, weld_error_m=0.0,
+            weld_error_rad=0.0,
+        )  # fmt: skip
+        return Namespace(recordings={preset.name: recording for preset in presets}, log=log)
+
+    def fit(recordings: list, preset: str, robots: Namespace | None) -> Namespace:
+        assert [r.metadata.trial for r in recordings] == ["random", "static", "periodic"]
+        assert {r.name[1:] for r in recordings} == {"0"}
+        return Namespace(payloads=[(recordings[0].name, preset, robots and robots.payloads[0])])
+
+    for name, does in (("simulate", simulate), ("fit_trials", fit), ("_grasps", lambda *_: None),
+                       ("estimate_payload", lambda *_: None), ("score", lambda *_: {}),
+                       ("score_fit", lambda found, truth, units: (found, truth.name, len(units)))):  # fmt: skip
+        monkeypatch.setattr(experiment, name, does)
+    told: list[tuple[float, float, str]] = []
+    result = run_paper(plan, progress=lambda *now: told.append(now))
+    own = ("c0", "uncalibrated", None)
+    assert list(result.scores) == ["uncalibrated", SELF_CALIBRATED, TRANSFER, "ideal", "nominal", ONE_FIT]
+    assert result.scores[SELF_CALIBRATED] == {"c": (own, "c", 3), "a": (("a0", "uncalibrated", None), "a", 3)}
+    assert result.scores[TRANSFER] == {"c": None, "a": (("a0", "uncalibrated", own), "a", 3)}
+    assert result.scores[ONE_FIT]["a"] == (("a0", "nominal", None), "a", 0)
+    stages = list(dict.fromkeys(stage for _, _, stage in told))
+    assert stages == ["random trials", "grasps", "other trials", "estimates", "calibrations", "transfer"]
+    assert told[-1][:2] == (plan.steps, plan.steps)

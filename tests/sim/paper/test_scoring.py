@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from estimator.calibrate.calibration import CalibratedPayload
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.inertia import InertiaEstimate
@@ -14,7 +15,8 @@ from estimator.estimate.principal import principal_inertia
 from estimator.estimate.result import PayloadEstimate, RecordingEstimate
 from estimator.estimate.statics import MassEstimate
 from mocobot_sim.paper.published import PAYLOADS, payload_truth, printed_truth, published_errors
-from mocobot_sim.paper.scoring import rotation_error_deg, score
+from mocobot_sim.paper.scoring import rotation_error_deg, score, score_fit
+from mocobot_sim.scene.as_built import AsBuilt
 
 
 def rotvec(R):
@@ -175,6 +177,64 @@ def test_what_is_missing_is_null():
     assert result["random"]["Ixx"]["std"] is None
     assert result["periodic"]["Izz"] == {"mean": None, "std": None, "percent": None, "std_percent": None}
     assert (result["m_kg"], result["m_percent"], result["p1c_m"], result["p1c_percent"]) == (None,) * 4
+
+
+def seen_through(theta_x_zero):
+    """Grasps and centre of mass of a payload whose robots' last gimbal axes read too much, from poses as read."""
+    T = [TRUTH.T(1, i) for i in (1, 2, 3)]
+    world = [Rotation.from_euler("ZYX", [0.3, -0.2, 0.1]).as_matrix() @ t[:3, :3] for t in T]
+    angles = [Rotation.from_matrix(R).as_euler("ZYX") for R in world]
+    read = [
+        Rotation.from_euler("ZYX", a + np.array([0, 0, z])).as_matrix()
+        for a, z in zip(angles, theta_x_zero, strict=True)
+    ]
+    to_first = read[0].T @ world[0]
+    p = np.array([to_first @ t[:3, 3] for t in T])
+    R = np.array([read[0].T @ r for r in read])
+    return GraspEstimate(
+        R, p, np.zeros((12, 12)), *(np.zeros((3, 3)),) * 2, *(np.ones(3),) * 2
+    ), to_first @ TRUTH.p_1c
+
+
+def built(zeros, ratio=0.0):
+    return [AsBuilt(theta_zero_rad=np.array([0.0, 0.0, z]), stiffness_ratio=np.full(3, ratio)) for z in zeros]
+
+
+def test_errors_vanish_in_the_frames_of_the_encoders():
+    zeros = [0.02, -0.01, 0.0]
+    grasps, p_1c = seen_through(zeros)
+    result = score(estimate([recording("random", grasps)], p_1c=p_1c), TRUTH, built(zeros))
+    seen = result["encoder_frames"]
+    assert set(seen) == {k for k in result if k[0] in "Rp" and k not in ("random", "periodic")}
+    for pair in ("12", "23", "31"):
+        assert seen[f"R{pair}_deg"]["mean"] == pytest.approx(0, abs=1e-9)
+        assert seen[f"p{pair}_m"]["mean"] == pytest.approx(0, abs=1e-12)
+    assert seen["p1c_m"] == pytest.approx(0, abs=1e-12)
+    # {1} is turned about x by 0.02: a point at distance d from that axis moves by 2 d sin(0.01).
+    assert result["p1c_m"] == pytest.approx(2 * np.sin(0.01) * np.hypot(*TRUTH.p_1c[1:]))
+    assert result["R12_deg"]["mean"] > 0.5
+    assert "encoder_frames" not in score(estimate([]), TRUTH)
+
+
+def test_fit_is_one_number_whose_share_of_the_spring_scale_is_told():
+    """Everything as the encoders have it, masses over 1.01, the mass 0.1 % more."""
+    zeros = [0.02, -0.01, 0.0]
+    grasps, p_1c = seen_through(zeros)
+    turn = Rotation.from_rotvec([-0.02, 0, 0]).as_matrix()
+    mass = 1.001 * TRUTH.mass / 1.01
+    about_1 = turn @ TRUTH.inertia @ turn.T / 1.01 + mass * (p_1c @ p_1c * np.eye(3) - np.outer(p_1c, p_1c))
+    parameters = np.concatenate([[mass], mass * p_1c, about_1[np.triu_indices(3)]])
+    found = CalibratedPayload("a", grasps, parameters, np.zeros((22, 22)), np.zeros(22))
+    result = json.loads(json.dumps(score_fit(found, TRUTH, built(zeros, 0.01)), allow_nan=False))
+    assert result["encoder_frames"]["R31_deg"] == {"mean": pytest.approx(0, abs=1e-9), "std": None}
+    assert result["encoder_frames"]["p1c_m"] == pytest.approx(0, abs=1e-12)
+    assert result["m_percent"] == pytest.approx(100 * (1 - 1.001 / 1.01))
+    assert result["all"]["Iyy"]["percent"] == pytest.approx(100 * (1 - 1 / 1.01))
+    assert result["all"]["Iyy"]["std"] is None
+    scale = result["spring_scale"]
+    assert scale["percent"] == pytest.approx(100 * (1 / 1.01 - 1))
+    assert scale["m_percent"] == pytest.approx(0.1)
+    assert scale["Ixx_percent"] == pytest.approx(0, abs=1e-9)
 
 
 def test_keys_are_those_of_the_results_file():

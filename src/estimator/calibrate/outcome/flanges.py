@@ -76,7 +76,7 @@ def parallel_flanges(payloads: Sequence[CalibratedPayload], sd_rad: float) -> Fl
     # The noise's directions turn with the zeros, which is little.
     by_grasps = numerical_jacobian(lambda errors: slant(np.zeros(N), errors), np.zeros(count))
     noise = by_grasps @ covariance @ by_grasps.T + FLOOR_RAD**2 * np.eye(len(by_grasps))
-    white: Array = np.linalg.inv(np.linalg.cholesky(noise))
+    white = np.asarray(np.linalg.inv(np.linalg.cholesky(noise)), dtype=float)
     zeros = least_squares(
         lambda z: np.concatenate([white @ slant(z), z / sd_rad]), np.zeros(N), x_scale=sd_rad, xtol=1e-14
     ).x
@@ -86,7 +86,8 @@ def parallel_flanges(payloads: Sequence[CalibratedPayload], sd_rad: float) -> Fl
     spare = max(1, len(left) - N)
     chi2 = float(np.sum((white @ left) ** 2))
     excess = chi2 / spare if chi2 > BEYOND_CHANCE * spare else 1.0  # parallel but for a little
-    posterior: Array = np.linalg.inv(whitened.T @ whitened / excess + np.eye(N) / sd_rad**2)
+    information = whitened.T @ whitened / excess + np.eye(N) / sd_rad**2
+    posterior = np.asarray(np.linalg.inv(information), dtype=float)
     by_errors = -posterior @ whitened.T @ (white @ by_grasps) / excess
     return Flanges(zeros, posterior, by_errors, float(np.max(np.linalg.norm(left.reshape(-1, 2), axis=1))))
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from estimator.arm.unit import GROUPS
 from estimator.calibrate.calibration import CalibratedTrial
 from estimator.calibrate.outcome.robot_list import by_robot
 from estimator.rigid_team.residual import Bases
@@ -14,6 +15,7 @@ from estimator.strict import Fields
 
 KEYS = ("name", "kind", "payload", "duration_s", "count", "chi2_per_n", "bases")
 BASE, FITS, PAIR = ("i", "yaw_deg", "p_m"), ("before", "after", "held_out"), ("loops", "balance")
+SHARED = (*(group.name for group in GROUPS), "grasps", "inertial_parameters")
 KINDS = ("random", "periodic", "static", "free")
 
 
@@ -37,6 +39,7 @@ def trial_to_dict(trial: CalibratedTrial) -> dict[str, Any]:
             for i, (R, p) in enumerate(zip(bases.R, bases.p, strict=True))
             if i
         ],
+        "shares": {name: float(share) for name, share in trial.shares.items()},
     }
 
 
@@ -52,7 +55,7 @@ def trial_from_dict(entry: Any, N: int, payloads: int, where: str) -> Calibrated
     Raises:
         InputError: something is missing or not allowed.
     """
-    read = Fields(entry, KEYS, where)
+    read = Fields(entry, KEYS, where, ("shares",))
     payload = None if read.values["payload"] is None else read.whole("payload", 0)
     if payload is not None and payload >= payloads:
         read.refuse("payload", f"the index, from 0, of one of {payloads} payloads")
@@ -71,6 +74,7 @@ def trial_from_dict(entry: Any, N: int, payloads: int, where: str) -> Calibrated
         after=after,
         held_out=_read_fit(fits, "held_out"),
         bases=None if read.values["bases"] is None else _read_bases(read, N),
+        shares=_read_shares(read),
     )
 
 
@@ -80,6 +84,13 @@ def _read_fit(fits: Fields, key: str) -> tuple[float, float] | None:
     inner = fits.within(key, PAIR)
     loops, balance = (None if inner.values[name] is None else inner.number(name, 0.0) for name in PAIR)
     return loops or 0.0, balance or 0.0
+
+
+def _read_shares(read: Fields) -> dict[str, float]:
+    if "shares" not in read:
+        return {}
+    inner = Fields(read.object("shares"), (), f"{read.where}: shares", SHARED)
+    return {name: inner.number(name, 0.0) for name in inner.values}
 
 
 def _read_bases(read: Fields, N: int) -> Bases:

@@ -15,8 +15,8 @@ GIMBAL = ["gimbal_z", "gimbal_y", "gimbal_x"]
 class Arm:
     """One Omnid in MuJoCo, its closed chain completed from driven and gimbal motion."""
 
-    def __init__(self):
-        self.model = mujoco.MjModel.from_xml_path(str(OMNID_FOLDER / "omnid.xml"))
+    def __init__(self, model=None):
+        self.model = model or mujoco.MjModel.from_xml_path(str(OMNID_FOLDER / "omnid.xml"))
         self.model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_EQUALITY
         self.model.opt.gravity[2] = -DESIGN.gravity_mps2
         # The estimator's rods are slender; the model needs a speck of inertia about their own axis.

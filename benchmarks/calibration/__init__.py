@@ -1,0 +1,1 @@
+"""How good calibrations of simulated teams are, against the truth."""
