@@ -98,13 +98,16 @@ def test_too_little_for_the_errors_is_said(recordings: list[Recording], made: Ca
     """One posture: holds give the mass, and no fit of grasps."""
     still = replace(
         recordings[0],
-        **{name: np.repeat(getattr(recordings[0], name)[:1], 1200, axis=0) for name in ("phi", "theta", "tau")},
+        **{
+            name: np.repeat(getattr(recordings[0], name)[:1], 1200, axis=0)
+            for name in ("phi", "theta", "tau")
+        },
         time=recordings[0].time[:1200],
     )
     found = estimate_on(made, [still])
     assert found.method == "staged"
     assert found.mass is not None
-    assert "Standard errors do not include those of the robots' calibration" in found.flags[-1]
+    assert "Standard errors lack those of the robots' calibration" in found.flags[-1]
 
 
 def test_an_estimate_is_of_one_payload(recordings: list[Recording], made: Calibration) -> None:

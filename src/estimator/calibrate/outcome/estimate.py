@@ -112,7 +112,7 @@ def _with_errors(estimate: PayloadEstimate, held: Calibration | None) -> Payload
     """
     mass, grasps, inertia = estimate.mass, estimate.grasps, estimate.inertia
     if held is None:
-        flag = "Standard errors do not include those of the robots' calibration: the recordings do not suffice for them."
+        flag = "Standard errors lack those of the robots' calibration: the recordings do not suffice for them."
         return replace(estimate, flags=(*estimate.flags, flag))
     payload, numbers = held.payloads[0], carried(held.payloads[0], held.scale_sd)
     if grasps is not None:
