@@ -15,6 +15,8 @@ from discrepancy.rig import Channel
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.parquet import write_recording
+from invented_calibration import invented_calibration
+from mocobot.files.calibrations import write_calibration
 from mocobot.files.provenance import provenance
 from mocobot_sim.paper.fits import SELF_CALIBRATED, TRANSFER
 from mocobot_sim.paper.published import published_errors
@@ -170,6 +172,21 @@ def _scaled(values: object, part: float) -> object:
     if isinstance(values, dict):
         return {key: _scaled(item, part) for key, item in values.items()}
     return values * part if isinstance(values, int | float) else values
+
+
+def calibration_folder(folder: Path, findings: tuple[str, ...] = ()) -> Path:
+    """Invented numbers, written as the command does but for model and pictures; labels and names that break pages."""
+    folder.mkdir()
+    made = invented_calibration(3)
+    trials = tuple(replace(trial, name=f"{trial.name[:-8]} {NASTY}.parquet") for trial in made.trials)
+    said = (f"The zeros of {NASTY} are open.",)
+    made = replace(
+        made, payloads=(replace(made.payloads[0], label=NASTY),), trials=trials, findings=findings, open=said
+    )
+    write_calibration(
+        folder / "calibration.json", made, provenance("calibrate", {"tilt": False, "known_mass": []})
+    )
+    return folder
 
 
 def _write(path: Path, values: object) -> None:

@@ -111,6 +111,23 @@ def test_units_are_those_of_the_calibration() -> None:
         assert unit.wrist_mass_ratio == one.of("wrist_mass_ratio")[0]
 
 
+def test_a_flat_payload_stays_one_in_spite_of_noise() -> None:
+    """A plate's largest moment is the sum of the others; noise makes it more, which no body has."""
+    made = invented_calibration(2)
+    plate = np.array([2.0, 0.0, 0.0, 3.0, 0.0, 5.004])  # about the centre of mass, in {1}
+    held = replace(made.payloads[0], parameters=np.r_[10.0, 0.0, 0.0, 0.0, plate])
+    scene = calibrated_team(replace(made, payloads=(noisy(held, 2e-3),)))
+    moments = np.sort(mocobot.GroundTruth.of(scene).principal_kgm2)
+    np.testing.assert_allclose(moments, [2.0, 3.0, 5.0], atol=5e-3)
+    with pytest.raises(InputError, match="at most the sum of the others"):
+        calibrated_team(replace(made, payloads=(noisy(held, 1e-5),)))
+
+
+def noisy(payload: CalibratedPayload, sd: float) -> CalibratedPayload:
+    count = len(payload.covariance)
+    return replace(payload, covariance=sd**2 * np.eye(count), by_scale=np.zeros(count))
+
+
 def test_what_no_model_can_be_made_of() -> None:
     made = invented_calibration(2)
     with pytest.raises(InputError, match="no recording of a payload number 2"):

@@ -61,9 +61,10 @@ def frames_sentence(calibration: Calibration) -> str:
 
 def format_calibration(calibration: Calibration) -> str:
     """Readable report, values as ``value +- standard error``."""
+    count = len(calibration.trials)
     seconds = sum(trial.duration_s for trial in calibration.trials)
     lines = [
-        f"[[Calibration]]  {calibration.robots} robots, {len(calibration.trials)} recordings, {seconds:.0f} s, "
+        f"[[Calibration]]  {calibration.robots} robots, {count} recording{'s' * (count != 1)}, {seconds:.0f} s, "
         f"{calibration.steps} steps",
         f"    {frames_sentence(calibration)}",
     ]
