@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.outcome.estimate import estimate_calibrated, one_payload, with_errors_of
+from estimator.calibrate.outcome.estimate import estimate_calibrated, estimate_on, one_payload
 from estimator.errors import InputError
 from estimator.estimate.payload import Method, estimate_payload
 from estimator.estimate.result import PayloadEstimate
@@ -67,7 +67,7 @@ def estimate(
         self_calibrate: calibrate the robots on these recordings, free trials among them perhaps, and take what they
             carry from the same fit.
         method: ``"staged"``, the paper's sequence; ``"joint"``, one least squares; ``"auto"``, staged where static
-            holds determine the centre of mass.
+            holds determine the centre of mass; with a calibration, its own least squares with the robots held.
         cutoff_hz: cut-off of the low-pass filter [Hz].
         say: takes the name of the stage that begins.
 
@@ -81,10 +81,10 @@ def estimate(
                 raise InputError(f"{name} and self_calibrate are both given; choose one")
         return public(Estimate, _self_calibrated(list(recordings_of(recordings, map)), cutoff_hz, say))
     robots = Robots(calibration)
-    found = estimate_payload(recordings_of(recordings, map, robots), method, cutoff_hz, say=say)
-    if robots.calibration is not None:
-        found = with_errors_of(robots.calibration, found)
-    return public(Estimate, found)
+    given = recordings_of(recordings, map, robots)
+    if robots.calibration is None:
+        return public(Estimate, estimate_payload(given, method, cutoff_hz, say=say))
+    return public(Estimate, estimate_on(robots.calibration, list(given), method, cutoff_hz, say))
 
 
 def _self_calibrated(

@@ -10,9 +10,9 @@ import pytest
 from estimator.calibrate.calibrate import calibrate
 from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.outcome.apply import calibrated
-from estimator.calibrate.outcome.estimate import estimate_calibrated, with_errors_of
+from estimator.calibrate.outcome.estimate import estimate_calibrated, estimate_on
 from estimator.errors import InputError
-from estimator.estimate.payload import estimate_payload
+from estimator.estimate.payload import Method, estimate_payload
 from estimator.recording.model import Recording
 from invented_calibration import invented_calibration
 from recorded_team import COM, GRASPS, INERTIA, MASS
@@ -73,23 +73,41 @@ def test_estimate_from_a_calibration(recordings: list[Recording], made: Calibrat
     assert max(record.force_residual or 1.0 for record in found.recordings) < 1e-3
 
 
-def test_a_frozen_calibration_leaves_its_scale_in_the_errors(
-    recordings: list[Recording], made: Calibration
-) -> None:
-    bare = estimate_payload([calibrated(recordings[0], made)])
-    found = with_errors_of(made, bare)
-    assert bare.mass is not None
-    assert bare.inertia is not None
+@pytest.mark.parametrize("method", ["auto", "joint"])
+def test_estimate_on_robots_held(recordings: list[Recording], made: Calibration, method: Method) -> None:
+    """Errors of the calibration are in those of the estimate, whatever its method."""
+    found = estimate_on(made, recordings[:1], method)
+    bare = estimate_payload([calibrated(recordings[0], made)], "joint")
+    assert found.method == ("calibrated" if method == "auto" else "joint")
+    assert found.contradicts is False
     assert found.mass is not None
+    assert bare.mass is not None
     assert found.inertia is not None
-    assert found.mass.mass == bare.mass.mass
-    assert found.mass.se == pytest.approx(np.hypot(bare.mass.se, made.scale_sd * bare.mass.mass))
-    scaled = made.scale_sd * bare.inertia.inertia[0, 0]
-    expected = np.hypot(np.sqrt(bare.inertia.covariance[0, 0]), scaled)
-    assert np.sqrt(found.inertia.covariance[0, 0]) == pytest.approx(expected)
-    assert "0.67 %" in found.flags[-1]
-    weighed = replace(made, scale_sd=0.0)
-    assert with_errors_of(weighed, bare) is bare
+    assert found.p_1c is not None
+    assert found.p_1c_se_m is not None
+    assert bare.p_1c_se_m is not None
+    assert found.mass.mass == pytest.approx(MASS, rel=2e-3)
+    np.testing.assert_allclose(found.p_1c, COM, atol=3e-4)
+    assert found.mass.se / MASS == pytest.approx(made.scale_sd, rel=0.05)
+    assert bare.mass.se < 0.1 * found.mass.se
+    assert np.all(np.abs(found.p_1c - COM) < 4 * found.p_1c_se_m)
+    assert np.all(found.p_1c_se_m > bare.p_1c_se_m)
+
+
+def test_too_little_for_the_errors_is_said(recordings: list[Recording], made: Calibration) -> None:
+    """One posture: holds give the mass, and no fit of grasps."""
+    still = replace(
+        recordings[0],
+        **{
+            name: np.repeat(getattr(recordings[0], name)[:1], 1200, axis=0)
+            for name in ("phi", "theta", "tau")
+        },
+        time=recordings[0].time[:1200],
+    )
+    found = estimate_on(made, [still])
+    assert found.method == "staged"
+    assert found.mass is not None
+    assert "Standard errors lack those of the robots' calibration" in found.flags[-1]
 
 
 def test_an_estimate_is_of_one_payload(recordings: list[Recording], made: Calibration) -> None:
