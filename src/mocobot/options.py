@@ -66,6 +66,35 @@ class Estimate:
 
 
 @dataclass(frozen=True)
+class Calibrate:
+    """Find out how every robot differs from its design, from recordings of what the team carries."""
+
+    rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
+    """Recordings (Parquet) of one team that carries payloads, or logs of any format that ``convert`` reads."""
+    free: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="REC...")] = ()
+    """Recordings of the same robots with nothing in their hands; they tell what the arms weigh."""
+    map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
+    """Map of the logs that are no recordings; found out if not given."""
+    prior: Annotated[Path | None, tyro.conf.arg(metavar="PRIOR.toml")] = None
+    """How far the robots may be off (docs/calibration.md); robots out of the box if not given."""
+    payload_of: Annotated[tuple[str, ...], tyro.conf.arg(metavar="REC=LABEL...")] = ()
+    """Which payload a recording is of, where it does not say so itself."""
+    known_mass: Annotated[tuple[str, ...], tyro.conf.arg(metavar="[LABEL=]KG[+-SE]...")] = ()
+    """Weighed payloads: c=10.48+-0.005; 0.1 % if no standard error is given. One decides the springs' common scale."""
+    parallel_flanges: Flag = False
+    """The z axes of all flanges are parallel: decides the zeros of theta_x, and with them the frames of drawings."""
+    tilt: Flag = False
+    """Bases may not stand level (0.2 deg, if the prior says nothing)."""
+    arm_masses: Flag = False
+    """Each arm's masses may be off (10 %, if the prior says nothing)."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for calibration.json, report.txt, every robot's numbers, plots and the calibrated team's model."""
+    force: Force = False
+    strict: Flag = False
+    """Exit with 1 if there are findings that speak against the numbers."""
+
+
+@dataclass(frozen=True)
 class Diagnose:
     """Find out what the simulation gets wrong, name the physical cause, and measure what fixing it is worth."""
 
@@ -186,10 +215,10 @@ class Inspect:
 
 @dataclass(frozen=True)
 class Report:
-    """Make one HTML page of what `paper`, `estimate` or `diagnose` wrote: tables, plots, pictures, provenance."""
+    """Make one HTML page of what `paper`, `estimate`, `calibrate` or `diagnose` wrote: tables, plots, provenance."""
 
     dir: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
-    """Folder of `mocobot paper --out` or `mocobot diagnose --out`, or one with files of `mocobot estimate --out`."""
+    """Folder of `mocobot paper`, `calibrate` or `diagnose --out`, or one with files of `mocobot estimate --out`."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.html")] = None
     """Page to write; DIR/report.html if not given."""
     force: Force = False

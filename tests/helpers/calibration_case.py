@@ -32,7 +32,7 @@ def instants(exact: Exact, units: ArmUnit, count=8) -> TrialEquations:
     gain[0, 2] = gain[2, 0] = -1.5
     rows = Rows(
         s, csr_array(np.eye(count)), np.arange(count) / 4.0, count, gain, np.zeros(count, dtype=np.intp),
-        np.full((count, N, 6), 0.05), 100.0,
+        np.full((count, N, 6), 0.05), 100.0, 1.0,
     )  # fmt: skip
     sensing = Sensing(np.zeros((N, 9)), np.tile(np.repeat([3e-5, 2e-5, 0.01], 3), (N, 1)))
     return TrialEquations.of(rows, sensing)

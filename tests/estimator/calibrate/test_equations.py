@@ -65,7 +65,7 @@ def test_derivatives_of_averaged_rows_are_taken_at_the_mean():
 
 def with_signals(equations: TrialEquations, change) -> TrialEquations:
     rows = replace(equations.rows, s=equations.rows.s + change)
-    return TrialEquations(rows, equations.variances, rows.s)
+    return replace(equations, rows=rows, mean=rows.s)
 
 
 def test_covariance_is_that_of_drawn_noise():

@@ -26,7 +26,9 @@ def test_a_slow_signal_passes_with_its_derivatives(rate_hz):
     """To a percent, residual and derivatives alike."""
     time = np.arange(round(20 * rate_hz)) / rate_hz
     w = 2 * np.pi * 0.3
-    rows = Rows.of(recording_of(0.2 * np.sin(w * time) + 0.4, rate_hz))
+    recording = recording_of(0.2 * np.sin(w * time) + 0.4, rate_hz)
+    recording.theta[:, 1] = 0.2 * np.cos(w * time)[:, None]  # something always moves
+    rows = Rows.of(recording)
     out = rows(rows.s)[:, 0]
     assert len(rows.time) > 50
     assert out[:, 0] == pytest.approx(0.2 * np.sin(w * rows.time) + 0.4, abs=0.002)
@@ -70,7 +72,7 @@ def test_holds_are_one_row_each():
     settled = 5.0 - 2 * rules.SETTLING_S
     assert rows.length[rows.moving + 1] / 100.0 == pytest.approx(settled, abs=0.6)
     assert (rows.length[: rows.moving] == 0).all()
-    assert rows.moving > 10
+    assert rows.moving > 5
 
 
 def test_a_hold_of_encoders_without_noise_has_one_rounding_error():
