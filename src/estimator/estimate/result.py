@@ -30,6 +30,7 @@ recordings                 list of {name, trial, duration_s, holds, grasps, iner
                            explains ("flange_position", "flange_rotation", "force", "moment"), and what noise leaves}
 contradicts                true if some of these are beyond noise: standard errors are too small then; null if not known
 flags                      list of sentences
+open                       only where there are any: sentences on what the robots' calibration does not decide
 calibrated                 only where robots were not taken as designed: {design, units}, as in a recording's metadata
 
 ``mocobot estimate`` adds ``provenance``: versions, options and hashes of the recordings (``mocobot.files.provenance``).
@@ -127,6 +128,7 @@ class PayloadEstimate:
         recordings: per-recording results, in the order given.
         flags: what a reader should know before trusting the numbers, one sentence each.
         units: the robots as they were taken to be, or None for robots as designed.
+        open: what the robots' calibration does not decide, one sentence each; the standard errors have it in them.
     """
 
     payload: str | None
@@ -141,6 +143,7 @@ class PayloadEstimate:
     recordings: tuple[RecordingEstimate, ...]
     flags: tuple[str, ...]
     units: ArmUnit | None = None
+    open: tuple[str, ...] = ()
 
     @property
     def p_1c_se_m(self) -> Array | None:
@@ -176,6 +179,7 @@ class PayloadEstimate:
                 "distance_se_m": self.p_1c_distance_se_m,
                 "covariance_m2": self.p_1c_covariance.tolist(),
             }
+        more: dict[str, Any] = {} if self.units is None else {"calibrated": _calibrated(self.units)}
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -191,7 +195,7 @@ class PayloadEstimate:
             "recordings": [recording.to_dict() for recording in self.recordings],
             "contradicts": self.contradicts,
             "flags": list(self.flags),
-        } | ({} if self.units is None else {"calibrated": _calibrated(self.units)})
+        } | (more | {"open": list(self.open)} if self.open else more)
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> PayloadEstimate:
@@ -217,6 +221,7 @@ class PayloadEstimate:
                 recordings=tuple(RecordingEstimate.from_dict(r, robots) for r in values["recordings"]),
                 flags=tuple(values["flags"]),
                 units=_if_given(values.get("calibrated"), _units),
+                open=tuple(values.get("open", ())),
             )
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"not a complete estimate ({type(error).__name__}: {error})") from error

@@ -57,6 +57,8 @@ def format_estimate(estimate: PayloadEstimate) -> str:
         lines += ["[[Not determined]]"] + [f"    {weak}" for weak in estimate.undetermined]
     if estimate.flags:
         lines += ["[[Flags]]"] + [f"    {flag}" for flag in estimate.flags]
+    if estimate.open:
+        lines += ["[[Left open by the calibration]]"] + [f"    {sentence}" for sentence in estimate.open]
     return "\n".join(lines)
 
 

@@ -89,9 +89,10 @@ def _doubts(e: PayloadEstimate) -> Node:
     known = {"mass": e.mass, "centre of mass": e.p_1c, "inertia": e.inertia}
     known |= {"grasps": e.grasps} if e.robots > 1 else {}
     missing = [name for name, found in known.items() if found is None]
+    left_open = [*(["Left open by the robots' calibration:", bullets(list(e.open))] if e.open else [])]
     if not e.undetermined and not e.flags and not missing:
         said = "The recordings determine every one of them and fit one rigid payload."
-        return verdict("good", "Nothing speaks against these numbers", said)
+        return verdict("good", "Nothing speaks against these numbers", said, *left_open)
     return verdict(
         "bad" if e.contradicts else "warn",
         "The robots contradict each other: do not trust the standard errors"
@@ -104,6 +105,7 @@ def _doubts(e: PayloadEstimate) -> Node:
             if e.undetermined
             else []
         ),
+        *left_open,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,8 @@ from estimator.calibrate.outcome.apply import calibrated
 from estimator.calibrate.outcome.estimate import estimate_calibrated, estimate_on
 from estimator.errors import InputError
 from estimator.estimate.payload import Method, estimate_payload
+from estimator.estimate.result import PayloadEstimate
+from estimator.estimate.text import format_estimate
 from estimator.recording.model import Recording
 from invented_calibration import invented_calibration
 from recorded_team import COM, GRASPS, INERTIA, MASS
@@ -69,7 +72,12 @@ def test_estimate_from_a_calibration(recordings: list[Recording], made: Calibrat
     assert found.mass.se / MASS == pytest.approx(made.scale_sd, rel=0.05)
     share = found.inertia.principal.moments_se / found.inertia.principal.moments
     np.testing.assert_allclose(share, made.scale_sd, rtol=0.2)
-    assert set(made.open) <= set(found.flags)
+    assert made.open
+    assert found.open == made.open
+    again = PayloadEstimate.from_dict(json.loads(json.dumps(found.to_dict(), allow_nan=False)))
+    assert again.open == made.open
+    assert made.open[0] in format_estimate(again)
+    assert found.flags == ()
     assert max(record.force_residual or 1.0 for record in found.recordings) < 1e-3
 
 

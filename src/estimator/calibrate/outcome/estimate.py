@@ -70,7 +70,8 @@ def estimate_calibrated(
         inertia=inertia,
         recordings=tuple(records),
         units=calibration.units,
-        flags=(*calibration.findings, *staged.flags, *calibration.open),
+        flags=(*calibration.findings, *staged.flags),
+        open=calibration.open,
     )
     return withheld(estimate, max(trial.team for trial in trials))
 
@@ -101,18 +102,22 @@ def estimate_on(
     with suppress(InputError):  # what other methods need not, or say in their own words
         held = calibrate(known, robots=calibration, say=say)
     if method == "auto" and held is not None:
-        return estimate_calibrated(held, known, cutoff_hz, say)
-    return _with_errors(estimate_payload(known, method, cutoff_hz, say=say), held)
+        return estimate_calibrated(replace(held, open=calibration.open), known, cutoff_hz, say)
+    return _with_errors(estimate_payload(known, method, cutoff_hz, say=say), calibration, held)
 
 
-def _with_errors(estimate: PayloadEstimate, held: Calibration | None) -> PayloadEstimate:
+def _with_errors(
+    estimate: PayloadEstimate, calibration: Calibration, held: Calibration | None
+) -> PayloadEstimate:
     """An estimate with the errors that a fit with the robots held has, on top of its own.
 
     Those are the robots' and, within, those of a fit that follows noise less: at most 1.4 times too much.
     """
     mass, grasps, inertia = estimate.mass, estimate.grasps, estimate.inertia
     if held is None:
-        flag = "Standard errors lack those of the robots' calibration: the recordings do not suffice for them."
+        flag = (
+            "Standard errors lack those of the robots' calibration: the recordings do not suffice for them."
+        )
         return replace(estimate, flags=(*estimate.flags, flag))
     payload, numbers = held.payloads[0], carried(held.payloads[0], held.scale_sd)
     if grasps is not None:
@@ -130,7 +135,9 @@ def _with_errors(estimate: PayloadEstimate, held: Calibration | None) -> Payload
             inertia.residual_rms,
             inertia.moment_rms,
         )
-    return replace(estimate, grasps=grasps, mass=mass, p_1c_covariance=com, inertia=inertia)
+    return replace(
+        estimate, grasps=grasps, mass=mass, p_1c_covariance=com, inertia=inertia, open=calibration.open
+    )
 
 
 def one_payload(recordings: Sequence[Recording]) -> None:
