@@ -1,12 +1,13 @@
-"""Wall time of `mocobot paper` with one and with two processes: python benchmarks/speed/paper.py [--quick]
+"""Wall time of `mocobot paper` with one and with two processes: python benchmarks/speed/paper.py [--quick] [--staged-only]
 
---quick runs one payload with two random trials instead of the whole experiment.
+--quick runs one payload with two random trials instead of the whole experiment, --staged-only the paper's own method alone.
 """
 
 from __future__ import annotations
 
 import sys
 import time
+from dataclasses import replace
 
 from mocobot_sim.paper.experiment import PaperPlan, run_paper
 
@@ -14,6 +15,7 @@ from mocobot_sim.paper.experiment import PaperPlan, run_paper
 def main() -> None:
     """Print the wall times and their ratio."""
     plan = PaperPlan(payloads=("a",), trials=2) if "--quick" in sys.argv[1:] else PaperPlan()
+    plan = replace(plan, staged_only="--staged-only" in sys.argv[1:])
     run_paper(
         PaperPlan(payloads=("a",), presets=("ideal",), trials=1, vias=2, duration_s=8.0)
     )  # compile, warm up

@@ -168,6 +168,13 @@ class Fields:
             self.refuse(key, "printable text")
         return value
 
+    def words(self, key: str) -> str:
+        """Text of any characters, such as a file's name."""
+        value = self.values[key]
+        if not isinstance(value, str):
+            self.refuse(key, "a text")
+        return value
+
     def one_of(self, key: str, allowed: Iterable[str]) -> Any:
         """One of a few words."""
         value, allowed = self.values[key], tuple(allowed)

@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from mocobot import pictures as pictures
     from mocobot import robots as robots
     from mocobot import trajectories as trajectories
+    from mocobot.api.calibration import Calibration as Calibration
+    from mocobot.api.calibration import calibrate as calibrate
+    from mocobot.api.calibration import read_calibration as read_calibration
     from mocobot.api.conversion import Conversion as Conversion
     from mocobot.api.conversion import convert as convert
     from mocobot.api.conversion import convert_parts as convert_parts
@@ -57,6 +60,7 @@ _NAMES = {
     "estimator.recording.model": "Recording",
     "estimator.recording.parquet": "read_recording write_recording",
     "mocobot": "bases emps guiding pictures robots trajectories",
+    "mocobot.api.calibration": "Calibration calibrate read_calibration",
     "mocobot.api.conversion": "Conversion convert convert_parts",
     "mocobot.api.diagnosis": "Cause Diagnosis diagnose",
     "mocobot.api.estimation": "Estimate estimate read_estimate",

@@ -16,6 +16,7 @@ from mocobot_sim.errors import TrialError
 COMMANDS = {
     "paper": options.Paper,
     "estimate": options.Estimate,
+    "calibrate": options.Calibrate,
     "diagnose": options.Diagnose,
     "convert": options.Convert,
     "map": options.Map,

@@ -10,6 +10,15 @@ Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 Force = Annotated[Flag, tyro.conf.arg(help="Replace what exists there; nothing is overwritten without it.")]
 
 
+Calibrated = Annotated[
+    Path | None,
+    tyro.conf.arg(
+        metavar="CALIBRATION.json",
+        help="The robots as `mocobot calibrate` found them, in place of what the recordings say of them.",
+    ),
+]
+
+
 @dataclass(frozen=True)
 class Paper:
     """Run the paper's experiment and print Tables II-V, published figures beside ours."""
@@ -46,10 +55,43 @@ class Estimate:
     force: Force = False
     strict: Flag = False
     """Exit with 1 if the estimate is flagged, or nothing could be determined."""
+    calibration: Calibrated = None
+    self_calibrate: Flag = False
+    """Calibrate the robots on these recordings, and take what they carry from the same fit; free trials may be among
+    them."""
     method: Literal["auto", "staged", "joint"] = "auto"
     """The paper's stages, one joint least squares, or stages where static holds allow."""
     cutoff_hz: float = 5.0
     """Cut-off of the low-pass filter [Hz]."""
+
+
+@dataclass(frozen=True)
+class Calibrate:
+    """Find out how every robot differs from its design, from recordings of what the team carries."""
+
+    rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
+    """Recordings (Parquet) of one team that carries payloads, or logs of any format that ``convert`` reads."""
+    free: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="REC...")] = ()
+    """Recordings of the same robots with nothing in their hands; they tell what the arms weigh."""
+    map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
+    """Map of the logs that are no recordings; found out if not given."""
+    prior: Annotated[Path | None, tyro.conf.arg(metavar="PRIOR.toml")] = None
+    """How far the robots may be off (docs/calibration.md); robots out of the box if not given."""
+    payload_of: Annotated[tuple[str, ...], tyro.conf.arg(metavar="REC=LABEL...")] = ()
+    """Which payload a recording is of, where it does not say so itself."""
+    known_mass: Annotated[tuple[str, ...], tyro.conf.arg(metavar="[LABEL=]KG[+-SE]...")] = ()
+    """Weighed payloads: c=10.48+-0.005; 0.1 % if no standard error is given. One decides the springs' common scale."""
+    parallel_flanges: Flag = False
+    """The z axes of all flanges are parallel: decides the zeros of theta_x, and with them the frames of drawings."""
+    tilt: Flag = False
+    """Bases may not stand level (0.2 deg, if the prior says nothing)."""
+    arm_masses: Flag = False
+    """Each arm's masses may be off (10 %, if the prior says nothing)."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for calibration.json, report.txt, every robot's numbers, plots and the calibrated team's model."""
+    force: Force = False
+    strict: Flag = False
+    """Exit with 1 if there are findings that speak against the numbers."""
 
 
 @dataclass(frozen=True)
@@ -70,6 +112,7 @@ class Diagnose:
     """Exit with 1 if the verdict is neither consistent nor explained."""
     jobs: int = 2
     """Parallel processes."""
+    calibration: Calibrated = None
     tolerances: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """How far a healthy robot may be off; see docs/diagnosis/guide.md."""
     exclude: Annotated[tuple[str, ...], tyro.conf.arg(metavar="CAUSE...")] = ()
@@ -136,6 +179,7 @@ class Replay:
     """Recordings (Parquet); several are shown side by side."""
     estimate: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
     """Estimate to show, as `mocobot estimate --out` writes it; made from each recording if not given."""
+    calibration: Calibrated = None
     truth: bool = False
     """Show the truth beside each recording, too (REC.truth.json)."""
     diagnosis: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
@@ -164,16 +208,17 @@ class Inspect:
     """Exit with 1 if the log is ready for nothing."""
     design: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """Numbers of the robots, where the log does not say; the Omnid's if not given."""
+    calibration: Calibrated = None
     episode: int | None = None
     """Episode of a LeRobot dataset."""
 
 
 @dataclass(frozen=True)
 class Report:
-    """Make one HTML page of what `paper`, `estimate` or `diagnose` wrote: tables, plots, pictures, provenance."""
+    """Make one HTML page of what `paper`, `estimate`, `calibrate` or `diagnose` wrote: tables, plots, provenance."""
 
     dir: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
-    """Folder of `mocobot paper --out` or `mocobot diagnose --out`, or one with files of `mocobot estimate --out`."""
+    """Folder of `mocobot paper`, `calibrate` or `diagnose --out`, or one with files of `mocobot estimate --out`."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.html")] = None
     """Page to write; DIR/report.html if not given."""
     force: Force = False

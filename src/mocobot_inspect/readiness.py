@@ -47,9 +47,7 @@ class Readiness:
     flags: tuple[str, ...]
 
 
-def readiness(
-    name: str, level: Level, parts: Sequence[tuple[float, Array]], arms: Arms
-) -> Readiness:
+def readiness(name: str, level: Level, parts: Sequence[tuple[float, Array]], arms: Arms) -> Readiness:
     """Run the estimate and report on its steps.
 
     Args:
@@ -91,7 +89,9 @@ def _processed(name: str, level: Level, part: Array, start_s: float, arms: Arms)
             (row, robot), what = fault
             raise InputError(f"omnid{robot + 1}, {start_s + row / RATE_HZ:.2f} s: {what}")
         position, effort = joints_of(position, effort, design)
-    metadata = RecordingMetadata(part.shape[1], RATE_HZ, "random", "inspection", None, None, design, units=units)
+    metadata = RecordingMetadata(
+        part.shape[1], RATE_HZ, "random", "inspection", None, None, design, units=units
+    )
     time = start_s + np.arange(len(part)) / RATE_HZ
     return process_recording(
         Recording(time, position, theta, effort, None, metadata, name), CUTOFF_HZ, TRIM_S

@@ -13,6 +13,9 @@ from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import NAME as RESIDUALS
 from discrepancy.result.traces_file import load_traces
 from discrepancy.rig import Channel
+from estimator.calibrate.calibration import Calibration
+from estimator.calibrate.json import FORMAT as CALIBRATION
+from estimator.calibrate.json import calibration_from_dict
 from estimator.errors import InputError
 from estimator.estimate.result import FORMAT as ESTIMATE
 from estimator.estimate.result import VERSION as ESTIMATE_VERSION
@@ -23,8 +26,8 @@ from mocobot_sim.paper.tables import paper_tables, summary_table
 from mocobot_view.facts.fact_files import read_estimate
 
 SOUGHT = (
-    "paper.json of `mocobot paper --out`, diagnosis.json of `mocobot diagnose --out`, or JSON files of "
-    "`mocobot estimate --out`"
+    "paper.json of `mocobot paper --out`, diagnosis.json of `mocobot diagnose --out`, calibration.json of "
+    "`mocobot calibrate --out`, or JSON files of `mocobot estimate --out`"
 )
 PROVENANCE = "mocobot-provenance"
 TRIAL_KEYS = ("rotation_deg", "torque_Nm", "rod_error_m", "weld_error_m", "weld_error_deg")
@@ -58,6 +61,15 @@ class Estimated:
 
 
 @dataclass(frozen=True)
+class Calibrated:
+    """What ``mocobot calibrate --out`` wrote."""
+
+    path: Path
+    calibration: Calibration
+    provenance: Json | None
+
+
+@dataclass(frozen=True)
 class Diagnosed:
     """What ``mocobot diagnose --out`` wrote.
 
@@ -87,6 +99,7 @@ class Contents:
     paper: Paper | None
     estimates: tuple[Estimated, ...]
     diagnosis: Diagnosed | None
+    calibrations: tuple[Calibrated, ...]
     files: tuple[Path, ...]
 
 
@@ -103,7 +116,7 @@ def read_folder(folder: Path) -> Contents:
             raise InputError(f"{folder}: is a file; name the folder that holds it")
         jsons = sorted(path for path in folder.glob("*.json") if path.is_file())
     paper = diagnosis = None
-    estimates, files = [], []
+    estimates, calibrations, files = [], [], []
     for path in jsons:
         if path.name == "paper.json":
             paper = _paper(folder)
@@ -116,14 +129,19 @@ def read_folder(folder: Path) -> Contents:
             elif values.get("format") == ESTIMATE:
                 estimates.append(_estimate(path, values))
                 files.append(path)
-    if paper is None and diagnosis is None and not estimates:
+            elif values.get("format") == CALIBRATION:
+                made = values.get("provenance")
+                found = calibration_from_dict(values, str(path))
+                calibrations.append(Calibrated(path, found, made if isinstance(made, dict) else None))
+                files.append(path)
+    if paper is None and diagnosis is None and not estimates and not calibrations:
         raise InputError(f"{folder}: holds no result of mocobot; a report is made of {SOUGHT}")
     if paper is not None:
         files += [p for p in (folder / "trials.json", folder / "provenance.json") if p.is_file()]
         files += [folder / "estimates" / f"{p}_{preset}.json" for p, preset in paper.estimates]
     if diagnosis is not None and diagnosis.traces:
         files.append(folder / RESIDUALS)
-    return Contents(folder, paper, tuple(estimates), diagnosis, tuple(files))
+    return Contents(folder, paper, tuple(estimates), diagnosis, tuple(calibrations), tuple(files))
 
 
 def _paper(folder: Path) -> Paper:

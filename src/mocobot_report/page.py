@@ -8,10 +8,11 @@ from types import ModuleType
 from estimator.files import check_target, whole_file
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import el, to_bytes
+from mocobot_report.calibration import part as calibration_part
 from mocobot_report.diagnosis import part as diagnosis_part
 from mocobot_report.document import document
 from mocobot_report.estimate import part as estimate_part
-from mocobot_report.folder import Contents, Diagnosed, Estimated, Paper, complete, read_folder
+from mocobot_report.folder import Calibrated, Contents, Diagnosed, Estimated, Paper, complete, read_folder
 from mocobot_report.glossary import glossary, link_terms
 from mocobot_report.paper import part as paper_part
 from mocobot_report.provenance_part import provenance_part
@@ -24,7 +25,7 @@ def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: Non
     """Write the report of a result folder.
 
     Args:
-        folder: what ``mocobot paper``, ``estimate`` or ``diagnose`` wrote.
+        folder: what ``mocobot paper``, ``estimate``, ``calibrate`` or ``diagnose`` wrote.
         out: file to write; ``report.html`` in the folder if None. An existing file is replaced.
         say: takes the name of every stage that begins.
 
@@ -98,7 +99,7 @@ class _Result:
     """One result: its file, what was read, the module that makes nodes of it, its id, and how headings call it."""
 
     path: Path
-    found: Paper | Estimated | Diagnosed
+    found: Paper | Estimated | Calibrated | Diagnosed
     part: ModuleType
     identity: str
     name: str
@@ -116,6 +117,11 @@ def _results(contents: Contents) -> list[_Result]:
         name = f"Estimate {one.path.name}" if several else "The estimate in detail"
         of = f": {one.path.name}" if several else ""
         out.append(_Result(one.path, one, estimate_part, f"estimate-{k}", name, one.path.name, of))
+    for k, one in enumerate(contents.calibrations, start=1):
+        several = len(contents.calibrations) > 1
+        name = f"Calibration {one.path.name}" if several else "The calibration in detail"
+        of = f": {one.path.name}" if several else ""
+        out.append(_Result(one.path, one, calibration_part, f"calibration-{k}", name, one.path.name, of))
     if (diagnosis := contents.diagnosis) is not None:
         path = diagnosis.folder / "diagnosis.json"
         out.append(

@@ -114,12 +114,15 @@ class Tags(HTMLParser):
 def test_every_example_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In order and in one place, as a reader would run them; what they leave is looked at here."""
     monkeypatch.chdir(tmp_path)
-    assert len(EXAMPLES) == 7
+    assert len(EXAMPLES) == 8
     space: dict[str, object] = {"__name__": "page"}
     for example in EXAMPLES:
         exec(compile(example, f"docs/api.md: {example[:40]!r}", "exec"), space)
 
-    estimate, verdict, look = (space[name] for name in ("est", "verdict", "look"))
+    estimate, verdict, look, calibration = (space[name] for name in ("est", "verdict", "look", "cal"))
+    assert isinstance(calibration, mocobot.Calibration)
+    np.testing.assert_allclose(calibration.units.of("phi_zero"), 0.0, atol=1e-3)
+    assert json.loads(Path("calibration/calibration.json").read_text()) == calibration.to_dict()
     assert isinstance(estimate, mocobot.Estimate)
     assert isinstance(verdict, mocobot.Diagnosis)
     assert isinstance(look, mocobot.Inspection)
@@ -130,7 +133,12 @@ def test_every_example_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.Monk
     assert verdict.causes[0].parameters["bias_Nm"] == pytest.approx(0.08, rel=0.1)
     assert str(verdict).startswith("EXPLAINED. Robot 2, joint 1: the torque sensor reads 0.0")
     assert json.loads(Path("est.json").read_text()) == estimate.to_dict()
-    for result, word in ((estimate, "11.67"), (verdict, "sea_bias"), (look, "rec.parquet")):
+    for result, word in (
+        (estimate, "11.67"),
+        (verdict, "sea_bias"),
+        (look, "rec.parquet"),
+        (calibration, "Robot 3"),
+    ):
         assert repr(result).startswith(f"<{type(result).__name__} ")
         assert len(repr(result)) < 200
         page = Tags(result._repr_html_())

@@ -10,6 +10,9 @@ from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.rigid_team.residual import Bases
 from omnid_design import DESIGN
 
+SHARES = {"phi_zero": 0.3, "rod_length": 0.2, "grasps": 0.33, "inertial_parameters": 0.25}
+FREE = {"phi_zero": 0.05, "rod_length": 0.1, "grasps": 0.0, "inertial_parameters": 0.2}
+
 
 def invented_calibration(robots: int = 3, seed: int = 0) -> Calibration:
     """Robots off by about their prior, known a hundred times better; one payload, three trials and a free one."""
@@ -35,9 +38,9 @@ def invented_calibration(robots: int = 3, seed: int = 0) -> Calibration:
             np.concatenate([np.zeros((1, 3)), rng.normal(0.0, 1.0, (robots - 1, 3))]),
         )
         fits = [(a * 1.1**k, b * 1.1**k) for a, b in ((6e4, 9e3), (0.9, 1.0), (1.5, 1.1))]
-        trials.append(CalibratedTrial(f"{kind}.parquet", kind, 0, 40.0, (1200, 600), *fits, bases))
+        trials.append(CalibratedTrial(f"{kind}.parquet", kind, 0, 40.0, (1200, 600), *fits, bases, SHARES))
     trials.append(
-        CalibratedTrial("free.parquet", "free", None, 30.0, (0, 900), None, (0.0, 1.02), None, None)
+        CalibratedTrial("free.parquet", "free", None, 30.0, (0, 900), None, (0.0, 1.02), None, None, FREE)
     )
     by_scale = np.zeros((robots, COUNT))
     by_scale[:] = 0.02 * rng.standard_normal((robots, COUNT)) * (x != 0)

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arm.delta import inverse_kinematics, jacobian
 from estimator.arm.dynamics import arm_torque, gimbal_torque
+from estimator.arm.unit import AT, ArmUnit
 from estimator.recording.model import Recording
 from omnid_design import DESIGN
 from recordings import metadata
@@ -74,19 +75,27 @@ class Carried:
     wrench: np.ndarray
 
 
-def carry(path: Sines, squeeze: Sines, duration_s: float, rate_hz: float = 100.0) -> Carried:
-    """path: roll, pitch, yaw [rad] and CoM displacement [m]; squeeze: three internal forces [N]."""
+def carry(
+    path: Sines, squeeze: Sines, duration_s: float, rate_hz: float = 100.0, units: ArmUnit | None = None
+) -> Carried:
+    """path: roll, pitch, yaw [rad] and CoM displacement [m]; squeeze: three internal forces [N].
+
+    units: what the robots are really like; the recording does not say so.
+    """
+    arms = [DESIGN] * 3 if units is None else [ArmUnit(DESIGN, x) for x in units.x]
     time = np.arange(round(duration_s * rate_hz)) / rate_hz
     x = path(time[:, None] + STEP_S * np.arange(-4, 5))
     R = as_matrix("xyz", x[..., :3])  # {1} in the world
     twists, motion = [], []
-    for R_1i, p_1i in GRASPS:
+    for (R_1i, p_1i), arm in zip(GRASPS, arms, strict=True):
         # Each base frame {b} is turned like the grasp frame of its robot at rest.
         R_bi = R_1i.T @ R @ R_1i
         p_bi = (x[..., 3:] + np.einsum("...ij,j->...i", R, p_1i - COM) - (p_1i - COM)) @ R_1i + HOME
         twists.append(twist_of(R_bi, p_bi))
+        if units is not None:  # in the arm's own frame, which may not stand level
+            R_bi, p_bi = arm.R_ba.T @ R_bi, p_bi @ arm.R_ba
         theta = Rotation.from_matrix(R_bi.reshape(-1, 3, 3)).as_euler("ZYX").reshape(p_bi.shape)
-        motion.append(derivatives(np.concatenate([inverse_kinematics(p_bi, DESIGN), theta], axis=-1)))
+        motion.append(derivatives(np.concatenate([inverse_kinematics(p_bi, arm), theta], axis=-1)))
     twist, twist_dot = (np.stack(parts, axis=1) for parts in zip(*twists, strict=True))
     omega, omega_dot = twist[:, 0, :3], twist_dot[:, 0, :3]  # {1} is also the payload's frame
     force = MASS * np.einsum("qji,qj->qi", R[:, 4], derivatives(x)[2][:, 3:] + GRAVITY)
@@ -98,15 +107,21 @@ def carry(path: Sines, squeeze: Sines, duration_s: float, rate_hz: float = 100.0
     f_1 = shared(force, moment, squeeze(time))
     f_i = [f_1[:, i] @ GRASPS[i][0] for i in range(3)]
     tau = [
-        np.einsum("qij,qi->qj", jacobian(phi[i][0], DESIGN), turned(theta[i][0], f_i[i]))
-        + arm_torque(*phi[i], DESIGN)
+        np.einsum("qij,qi->qj", jacobian(phi[i][0], arms[i]), turned(theta[i][0], f_i[i]))
+        + arm_torque(*phi[i], arms[i])
         for i in range(3)
     ]
+    read = np.stack([p[0] for p in phi], 1), np.stack([t[0] for t in theta], 1), np.stack(tau, 1)
+    if units is not None:
+        phi_zero, theta_zero, tau_zero, ratio = (
+            units.x[:, AT[name]] for name in ("phi_zero", "theta_zero", "tau_zero", "stiffness_ratio")
+        )
+        read = read[0] + phi_zero, read[1] + theta_zero, read[2] / (1.0 + ratio) + tau_zero
     recording = Recording(
         time=time,
-        phi=np.stack([p[0] for p in phi], axis=1),
-        theta=np.stack([t[0] for t in theta], axis=1),
-        tau=np.stack(tau, axis=1),
+        phi=read[0],
+        theta=read[1],
+        tau=read[2],
         ref=None,
         metadata=metadata(rate_hz=rate_hz),
     )

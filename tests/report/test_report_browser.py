@@ -9,7 +9,7 @@ import pytest
 
 from chromium import DESKTOP, PHONE, Seen, browser_running, opened
 from mocobot_report.page import write_report
-from report_folders import NASTY, diagnosis_folder, estimate_folder, paper_folder
+from report_folders import NASTY, calibration_folder, diagnosis_folder, estimate_folder, paper_folder
 
 pytestmark = pytest.mark.slow
 
@@ -17,6 +17,7 @@ MAKE: dict[str, Callable[[Path], Path]] = {
     "paper": paper_folder,
     "estimate": estimate_folder,
     "diagnosis": diagnosis_folder,
+    "calibration": calibration_folder,
     "axis": lambda folder: diagnosis_folder(folder, "consistent", axis=True),
 }
 CONTRAST = """() => {

@@ -16,6 +16,7 @@ import pytest
 
 from estimator.leftover.leftover import Leftover
 from mocobot_report.blocks.html import data_block, el, raw, to_bytes
+from mocobot_report.blocks.numbers import measured, plain
 from mocobot_report.blocks.palette import DARK, LIGHT
 from mocobot_report.blocks.series import around_zero
 from mocobot_report.folder import read_folder
@@ -23,7 +24,14 @@ from mocobot_report.glossary import link_terms
 from mocobot_report.page import write_report
 from mocobot_report.sources import sources
 from mocobot_sim.paper.published import published_errors
-from report_folders import NASTY, diagnosis_folder, estimate_folder, paper_folder, payload_estimate
+from report_folders import (
+    NASTY,
+    calibration_folder,
+    diagnosis_folder,
+    estimate_folder,
+    paper_folder,
+    payload_estimate,
+)
 
 VOID = {"meta", "link", "input", "img", "br"}
 
@@ -95,6 +103,7 @@ def folders(tmp_path_factory: pytest.TempPathFactory, no_pictures: pytest.Monkey
         "estimate": estimate_folder(root / "estimate"),
         "diagnosis": diagnosis_folder(root / "diagnosis"),
         "axis": diagnosis_folder(root / "axis", "consistent", axis=True),
+        "calibration": calibration_folder(root / "calibration"),
     }
     for folder in made.values():
         write_report(folder)
@@ -174,6 +183,25 @@ def test_plotted_errors_are_those_of_the_tables(pages: dict[str, Reader]) -> Non
     assert shown["paper"]["error_y"]["array"] == [entry["std"] for entry in want]
     np.testing.assert_allclose(shown["nominal"]["y"], [1e-2 * entry["mean"] for entry in want])
     assert block["layout"]["yaxis"]["type"] == "log"
+
+
+def test_fits_are_told_in_both_frames(pages: dict[str, Reader]) -> None:
+    """R31 of (b) is 1.91 deg in the paper: a quarter of it against the CAD, a thousandth as the encoders have it."""
+    text = pages["paper"].rows().replace("\u00a0", " ")
+    assert (
+        "uncalibrated, transfer (the uncalibrated team as one payload has calibrated it, carrying the others): "
+        "in the frames that the encoders define, grasps within 0.0019 deg and 0.039 mm, centre of mass within "
+        "0.018 mm; mass and inertia within 0.030 % beyond the springs' common scale (0.64 %). Against the CAD, "
+        "grasps are off by up to 0.48 deg"
+    ) in text
+    assert "calibrated teams are truth / (1 + mean stiffness ratio of their springs), here -0.64 %" in text
+    block = next(b for b in pages["paper"].blocks.values() if "R31" in str(b["layout"]["xaxis"].get("ticktext")) and
+                 b["data"][0]["y"][0] is None)  # fmt: skip
+    shown = {trace["name"]: trace["y"] for trace in block["data"]}
+    want = [1e-3 * published_errors(p)[f"R{pair}_deg"]["mean"] for p in "ab" for pair in ("12", "23", "31")]
+    np.testing.assert_allclose(shown["uncalibrated, self-calibrated"], want)
+    assert shown["uncalibrated, transfer"] == [None, None, None, *shown["uncalibrated, self-calibrated"][3:]]
+    assert shown["paper"] == shown["nominal"] == [None] * 6
 
 
 def test_residuals_of_the_page_are_those_of_the_file(
@@ -439,3 +467,34 @@ def _luminance(colour: str) -> float:
     parts = (int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5))
     red, green, blue = (p / 12.92 if p <= 0.04045 else ((p + 0.055) / 1.055) ** 2.4 for p in parts)
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
+
+
+def test_numbers_of_a_calibration_are_in_its_page(pages: dict[str, Reader], folders: dict[str, Path]) -> None:
+    values = json.loads((folders["calibration"] / "calibration.json").read_text(encoding="utf-8"))
+    text = pages["calibration"].rows()
+    for robot, deviations in enumerate(values["deviations"], start=1):
+        assert f"Robot {robot}" in text
+        value, se = (deviations["rod_length_m"][key][1] for key in ("value", "se"))
+        assert " ± ".join(measured(1e3 * value, 1e3 * se)) in text
+    payload = values["payloads"][0]
+    assert " ± ".join(measured(payload["m_kg"], payload["m_se_kg"])) in text
+    assert " ± ".join(measured(1e3 * payload["p_1c_m"][1], 1e3 * payload["p_1c_se_m"][1])) in text
+    assert "Nothing speaks against these numbers" in text
+    assert "held as designed" in text  # the springs' scale
+    for trial in values["trials"]:
+        fits = [fit for fit in trial["chi2_per_n"].values() if fit is not None]
+        assert all(plain(fit["balance"]) in text for fit in fits)
+    # What recordings leave of the whole is the prior's.
+    bars = [block for block in pages["calibration"].blocks.values() if block["data"][0].get("type") == "bar"]
+    (block,) = bars
+    totals = np.sum([trace["x"] for trace in block["data"]], axis=0)
+    np.testing.assert_allclose(totals, 100.0)
+    assert len(block["data"]) == 5
+
+
+def test_findings_of_a_calibration_come_first(tmp_path: Path, no_pictures: pytest.MonkeyPatch) -> None:
+    folder = calibration_folder(tmp_path / "bad", ("The encoder of phi2 of robot 3 slipped by 1.2 deg.",))
+    text = Reader(write_report(folder).read_bytes()).rows()
+    assert "What speaks against these numbers" in text
+    assert "The encoder of phi2 of robot 3 slipped by 1.2 deg." in text
+    assert "Nothing speaks against" not in text

@@ -24,7 +24,7 @@ from mocobot_sim.effects.catalogue import apply_effects, make_effect
 from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.as_built import units_as_built
 from mocobot_sim.scene.models import base_height_m, omnid_design
-from mocobot_sim.scene.payload_mjcf import payload_mjcf
+from mocobot_sim.scene.payload_mjcf import nearest_inertia, payload_mjcf
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.trial.resimulate import predicted, resimulate
 
@@ -104,7 +104,9 @@ def why_not(recording: Recording) -> str | None:
 def posture(recording: Recording) -> tuple[tuple[Array, Array], ArmUnit | None]:
     """True (phi, theta) of the first sample, (N, 3) each, and the robots as they are, as far as they are known."""
     units = recording.metadata.units
-    phi, theta, _ = true_joints(recording.metadata.arms, recording.phi[0], recording.theta[0], recording.tau[0])
+    phi, theta, _ = true_joints(
+        recording.metadata.arms, recording.phi[0], recording.theta[0], recording.tau[0]
+    )
     return (phi, theta), units
 
 
@@ -125,12 +127,7 @@ def impossible() -> None:
 
 def physical_inertia(inertia: Array) -> Array:
     """The nearest inertia that a rigid body can have: principal moments positive, none above the others' sum."""
-    moments, axes = np.linalg.eigh(inertia)
-    moments = np.maximum(moments, rules.LEAST_MOMENT_RATIO * max(moments[-1], 1e-9))
-    excess = moments[2] - moments[0] - moments[1]
-    if excess > 0:  # moved to the sum of the others in equal parts
-        moments = moments + np.array([1.0, 1.0, -1.0]) * excess / 3.0 * 1.001
-    return (axes * moments) @ axes.T
+    return nearest_inertia(inertia, rules.LEAST_MOMENT_RATIO)
 
 
 def resimulation_errors(

@@ -12,6 +12,7 @@ from itertools import combinations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.fusion import fuse
@@ -46,6 +47,7 @@ class Trial:
         data: the data points.
         steps: rounding of its channels, or None where nobody asks whether the robots contradict each other.
         team: number of robots that carried the payload, as far as the metadata say.
+        units: the robots as they are, or None for robots as designed.
     """
 
     name: str
@@ -54,6 +56,7 @@ class Trial:
     data: GraspData
     steps: Steps | None = None
     team: int = 1
+    units: ArmUnit | None = None
 
 
 def check_same_payload(trials: Sequence[Trial]) -> str | None:

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from estimator.arm.unit import ArmUnit
 from estimator.errors import InputError
 from estimator.estimate.consistency import (
     Trial,
@@ -98,6 +99,7 @@ def trial_of(recording: Recording, cutoff_hz: float = 5.0, trim_s: float = 2.0) 
         process_recording(recording, cutoff_hz, trim_s),
         steps_of(recording, cutoff_hz),
         labels.team,
+        labels.units,
     )
 
 
@@ -191,8 +193,18 @@ def estimate_from_trials(
         steps=tuple(steps),
         recordings=tuple(records),
         flags=tuple(flags),
+        units=_units(trials),
     )
     return withheld(estimate, max(trial.team for trial in trials)) if withhold else estimate
+
+
+def _units(trials: Sequence[Trial]) -> ArmUnit | None:
+    """The robots as they are, if all recordings say the same of them."""
+    first = trials[0].units
+    same = first is not None and all(
+        trial.units is not None and np.array_equal(trial.units.x, first.x) for trial in trials
+    )
+    return first if same else None
 
 
 def _grasps(

@@ -4,7 +4,7 @@
 determine.
 
 format, version            "mocobot-estimate", 1
-payload, robots, method    label or null; N; "staged" or "joint"
+payload, robots, method    label or null; N; "staged", "joint" or "calibrated" (found with the robots' calibration)
 grasps                     null, or
     pairs                  list over i < j of {i, j, R_axis_angle_deg [3], R_se_deg [3], p_m [3], p_se_m [3],
                            distance_m, distance_se_m, angular_residual_radps, linear_residual_mps}
@@ -30,6 +30,7 @@ recordings                 list of {name, trial, duration_s, holds, grasps, iner
                            explains ("flange_position", "flange_rotation", "force", "moment"), and what noise leaves}
 contradicts                true if some of these are beyond noise: standard errors are too small then; null if not known
 flags                      list of sentences
+calibrated                 only where robots were not taken as designed: {design, units}, as in a recording's metadata
 
 ``mocobot estimate`` adds ``provenance``: versions, options and hashes of the recordings (``mocobot.files.provenance``).
 Readers ignore it and any other key.
@@ -43,6 +44,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from estimator.arm.design import OmnidDesign
+from estimator.arm.unit import ArmUnit
+from estimator.arm.units_json import units_from_list, units_to_list
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
@@ -113,7 +117,7 @@ class PayloadEstimate:
     Attributes:
         payload: the recordings' payload label, or None.
         robots: number of robots N.
-        method: ``"staged"`` (the paper's) or ``"joint"``.
+        method: ``"staged"`` (the paper's), ``"joint"``, or ``"calibrated"`` (found with the robots' calibration).
         grasps: grasp frames pooled over the recordings.
         mass: mass with its standard error.
         p_1c: centre of mass in {1} [m], shape (3,).
@@ -122,6 +126,7 @@ class PayloadEstimate:
         steps: excitation of every step.
         recordings: per-recording results, in the order given.
         flags: what a reader should know before trusting the numbers, one sentence each.
+        units: the robots as they were taken to be, or None for robots as designed.
     """
 
     payload: str | None
@@ -135,6 +140,7 @@ class PayloadEstimate:
     steps: tuple[StepReport, ...]
     recordings: tuple[RecordingEstimate, ...]
     flags: tuple[str, ...]
+    units: ArmUnit | None = None
 
     @property
     def p_1c_se_m(self) -> Array | None:
@@ -185,7 +191,7 @@ class PayloadEstimate:
             "recordings": [recording.to_dict() for recording in self.recordings],
             "contradicts": self.contradicts,
             "flags": list(self.flags),
-        }
+        } | ({} if self.units is None else {"calibrated": _calibrated(self.units)})
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> PayloadEstimate:
@@ -210,9 +216,19 @@ class PayloadEstimate:
                 steps=tuple(StepReport.from_dict(step) for step in values["steps"]),
                 recordings=tuple(RecordingEstimate.from_dict(r, robots) for r in values["recordings"]),
                 flags=tuple(values["flags"]),
+                units=_if_given(values.get("calibrated"), _units),
             )
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"not a complete estimate ({type(error).__name__}: {error})") from error
+
+
+def _calibrated(units: ArmUnit) -> dict[str, Any]:
+    return {"design": units.design.to_dict(), "units": units_to_list(units)}
+
+
+def _units(values: dict[str, Any]) -> ArmUnit:
+    design = OmnidDesign.from_dict(values["design"], "calibrated: design")
+    return units_from_list(values["units"], design, "calibrated: units")
 
 
 def _if_given(value: Any, make: Callable[[Any], Given]) -> Given | None:

@@ -12,13 +12,16 @@ from estimator.leftover.contradiction import beyond_noise
 from estimator.numbers import measured
 
 _ZERO_SIGMAS = 2.0
+HOW = {"calibrated": "self-calibrated"}
+"""Methods that are called otherwise."""
 
 
 def format_estimate(estimate: PayloadEstimate) -> str:
     """Readable report, values as ``value +- standard error (percent)``."""
     label = "" if estimate.payload is None else f" ({estimate.payload})"
     lines = [
-        f"[[Payload{label}]]  {estimate.robots} robots, {estimate.method} estimate, "
+        f"[[Payload{label}]]  {estimate.robots} {'calibrated ' * (estimate.units is not None)}robots, "
+        f"{HOW.get(estimate.method, estimate.method)} estimate, "
         f"{len(estimate.recordings)} recording{'s' * (len(estimate.recordings) > 1)}"
     ]
     lines += _grasps(estimate)

@@ -18,9 +18,9 @@ BLOCK = 16_384
 def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: float = 2.0) -> GraspData:
     """Filter, differentiate and convert a recording to poses, twists, twist derivatives and wrenches.
 
-    Readings are corrected where the metadata know the robots as they are. Joint angles and torques pass through the same zero-phase filter. Rates and accelerations come from
-    sixth-order differences of the *joint* angles; the twist (29), its derivative and the wrench then
-    follow analytically.
+    Readings are corrected where the metadata know the robots as they are. Joint angles and torques pass
+    through the same zero-phase filter. Rates and accelerations come from sixth-order differences of the
+    *joint* angles; the twist (29), its derivative and the wrench then follow analytically.
 
     Args:
         recording: one trial.

@@ -10,7 +10,7 @@ from discrepancy.result.diagnosed import Diagnosed, is_diagnosis
 from discrepancy.team.diagnosis import against_truth, diagnose_team
 from discrepancy.team.tolerances import read_tolerances
 from estimator.files import whole_folder
-from mocobot.api.given import Given, recordings_of
+from mocobot.api.given import Given, GivenCalibration, Robots, recordings_of
 from mocobot.api.public import public
 from mocobot.files.targets import check_folder
 from mocobot_sim.trial.truth import GroundTruth
@@ -83,6 +83,7 @@ def diagnose(
     *,
     map: Path | str | None = None,
     truth: GroundTruth | None = None,
+    calibration: GivenCalibration | None = None,
     tolerances: Path | str | None = None,
     exclude: Iterable[str] = (),
     closed_loop: bool = True,
@@ -97,6 +98,8 @@ def diagnose(
             that what is named can be validated.
         map: map of those logs, by file or built-in name (docs/measured-data.md); found out if not given.
         truth: of the payload, for the errors of the estimates; it is not looked at before the verdict.
+        calibration: the robots as they are, or its file; None for what the recordings say of them. Tolerances are then
+            of robots as it has them.
         tolerances: TOML file: how far a healthy robot may be off (docs/diagnosis/guide.md); None for the defaults.
         exclude: causes not to consider.
         closed_loop: whether to run the recorded commands again, without and with what is found.
@@ -105,11 +108,11 @@ def diagnose(
         simulated: called with 1 for every trial that was simulated.
 
     Raises:
-        InputError: recordings, tolerances or causes that cannot be used.
+        InputError: recordings, tolerances or causes that cannot be used, or a calibration of other robots.
     """
     known = read_tolerances(Path(tolerances) if tolerances is not None else None)
     found = diagnose_team(
-        list(recordings_of(recordings, map)), known, tuple(exclude),
+        list(recordings_of(recordings, map, Robots(calibration))), known, tuple(exclude),
         closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated,
     )  # fmt: skip
     if truth is not None:

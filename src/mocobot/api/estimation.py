@@ -1,14 +1,19 @@
 """Estimate a payload."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from estimator.calibrate.calibrate import calibrate
+from estimator.calibrate.outcome.estimate import estimate_calibrated, estimate_on, one_payload
+from estimator.errors import InputError
 from estimator.estimate.payload import Method, estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.text import format_estimate
 from estimator.files import write_json
-from mocobot.api.given import Given, recordings_of
+from estimator.recording.metadata import FREE
+from estimator.recording.model import Recording
+from mocobot.api.given import Given, GivenCalibration, Robots, recordings_of
 from mocobot.api.public import public
 
 
@@ -47,6 +52,8 @@ def estimate(
     recordings: Given | Iterable[Given],
     *,
     map: Path | str | None = None,
+    calibration: GivenCalibration | None = None,
+    self_calibrate: bool = False,
     method: Method = "auto",
     cutoff_hz: float = 5.0,
     say: Callable[[str], object] = lambda _: None,
@@ -56,15 +63,37 @@ def estimate(
     Args:
         recordings: one or several, or paths of their files, or of logs that ``convert`` reads as they are.
         map: map of those logs, by file or built-in name (docs/measured-data.md); found out if not given.
+        calibration: the robots as they are, or its file; None for what the recordings say of them.
+        self_calibrate: calibrate the robots on these recordings, free trials among them perhaps, and take what they
+            carry from the same fit.
         method: ``"staged"``, the paper's sequence; ``"joint"``, one least squares; ``"auto"``, staged where static
-            holds determine the centre of mass.
+            holds determine the centre of mass; with a calibration, its own least squares with the robots held.
         cutoff_hz: cut-off of the low-pass filter [Hz].
         say: takes the name of the stage that begins.
 
     Raises:
-        InputError: a recording cannot be used, they contradict each other, or nothing can be estimated.
+        InputError: a recording cannot be used, they contradict each other, nothing can be estimated, or the
+            calibration is of other robots.
     """
-    return public(Estimate, estimate_payload(recordings_of(recordings, map), method, cutoff_hz, say=say))
+    if self_calibrate:
+        for name, given in (("calibration", calibration is not None), ("method", method != "auto")):
+            if given:
+                raise InputError(f"{name} and self_calibrate are both given; choose one")
+        return public(Estimate, _self_calibrated(list(recordings_of(recordings, map)), cutoff_hz, say))
+    robots = Robots(calibration)
+    given = recordings_of(recordings, map, robots)
+    if robots.calibration is None:
+        return public(Estimate, estimate_payload(given, method, cutoff_hz, say=say))
+    return public(Estimate, estimate_on(robots.calibration, list(given), method, cutoff_hz, say))
+
+
+def _self_calibrated(
+    recordings: Sequence[Recording], cutoff_hz: float, say: Callable[[str], object]
+) -> PayloadEstimate:
+    carried = [recording for recording in recordings if recording.metadata.trial != FREE]
+    free = [recording for recording in recordings if recording.metadata.trial == FREE]
+    one_payload(carried)
+    return estimate_calibrated(calibrate(carried, free, say=say), carried, cutoff_hz, say)
 
 
 def read_estimate(path: Path | str) -> Estimate:

@@ -4,31 +4,93 @@ from collections.abc import Iterable, Iterator
 from dataclasses import fields
 from pathlib import Path
 
+from estimator.arm.design import OmnidDesign
+from estimator.arm.unit import ArmUnit
+from estimator.calibrate.calibration import Calibration
+from estimator.calibrate.outcome.apply import calibrated, units_for
 from estimator.errors import InputError
 from estimator.recording.model import Recording
+from mocobot.files.calibrations import NAME, read_calibration
 from mocobot.files.recordings import read
 from mocobot_logs.convert import Converted, Labels, convert
+from mocobot_logs.log import LogSource
 from mocobot_logs.map.files import read_map
 from mocobot_logs.open_log import is_recording, log_kind, open_log
 
+GivenCalibration = Calibration | Path | str
+"""A calibration, or the path of its file, or of the folder that ``mocobot calibrate --out`` wrote."""
 Given = Recording | Path | str
 """A recording, or the path of its file, or of a log of any format that ``convert`` reads."""
 
 
-def recordings_of(given: Given | Iterable[Given], map: Path | str | None = None) -> Iterator[Recording]:
+class Robots:
+    """The robots as a calibration has them, or as every recording says itself.
+
+    Attributes:
+        calibration: theirs, or None.
+    """
+
+    def __init__(self, given: GivenCalibration | None) -> None:
+        """Read the calibration, if there is one.
+
+        Raises:
+            InputError: it cannot be read.
+        """
+        self.calibration: Calibration | None = None
+        self.called = "the calibration"
+        if isinstance(given, Calibration):
+            self.calibration = given
+        elif given is not None:
+            self.calibration, self.called = read_calibration(given), str(given)
+
+    def of(self, recording: Recording) -> Recording:
+        """A recording that knows them.
+
+        Raises:
+            InputError: the calibration is of another number of robots, or of another design.
+        """
+        return recording if self.calibration is None else calibrated(recording, self.calibration, self.called)
+
+    def units(self, source: LogSource, design: OmnidDesign) -> ArmUnit | None:
+        """The same for a log, of robots of a design where the log does not say; None without a calibration.
+
+        Raises:
+            InputError: as ``of``.
+        """
+        if self.calibration is None:
+            return None
+        known = design if source.metadata is None else source.metadata.design
+        return units_for(self.calibration, source.robots, known, source.name, self.called)
+
+
+def calibration_file(given: Path | None) -> list[Path]:
+    """The file that a calibration is read from."""
+    if given is None:
+        return []
+    return [given / NAME if given.is_dir() else given]
+
+
+def recordings_of(
+    given: Given | Iterable[Given], map: Path | str | None = None, robots: Robots | None = None
+) -> Iterator[Recording]:
     """One or several recordings, read when their turn comes; what a simulation adds to one is left behind.
 
     Args:
         given: recordings, files of recordings, or logs.
         map: map of the logs, by file or built-in name; found out if not given.
+        robots: what they are; None for what every recording says itself.
 
     Raises:
-        InputError: a file cannot be read, or is not a plausible recording, or no log needs the map.
+        InputError: a file cannot be read, or is not a plausible recording, or no log needs the map, or the robots are
+            others.
     """
+    robots = robots or Robots(None)
     logs = Logs(map)
     for each in [given] if isinstance(given, Recording | Path | str) else given:
         recording = each if isinstance(each, Recording) else logs.read(Path(each))
-        yield Recording(**{field.name: getattr(recording, field.name) for field in fields(Recording)})
+        yield robots.of(
+            Recording(**{field.name: getattr(recording, field.name) for field in fields(Recording)})
+        )
     logs.check_map()
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 from estimator.arm.design import OmnidDesign, load_design
 from estimator.files import write_json
+from mocobot.api.given import GivenCalibration, Robots
 from mocobot.api.public import public
 from mocobot_inspect import inspection
 from mocobot_inspect.findings import Finding, findings
@@ -65,6 +66,7 @@ def inspect(
     *,
     map: Path | str | None = None,
     design: OmnidDesign | Path | str | None = None,
+    calibration: GivenCalibration | None = None,
     episode: int | None = None,
     advance: Callable[[int], object] = lambda _: None,
 ) -> Inspection:
@@ -74,14 +76,17 @@ def inspect(
         log: a recording, or a log of any format that ``convert`` reads.
         map: map file, or name of a built-in map (docs/measured-data.md); found out if not given.
         design: numbers of the robots, or a TOML file of them, where the log does not say; None for the Omnid's.
+        calibration: the robots as they are, or its file; None for what the log says of them.
         episode: of a LeRobot dataset that holds several.
         advance: takes the progress made in reading, in the log's units.
 
     Raises:
-        InputError: the log, map or design cannot be read.
+        InputError: the log, map, design or calibration cannot be read, or that is of other robots.
     """
+    robots = Robots(calibration)
     log_map = read_map(str(map)) if map is not None else None
     standard = load_design(Path(design)) if isinstance(design, Path | str) else design or omnid_design()
     source = open_log(Path(log), log_map, episode)
+    units = robots.units(source, standard)
     trial = log_map.trial if log_map is not None else None
-    return public(Inspection, inspection.inspect_log(source, standard, advance, trial=trial))
+    return public(Inspection, inspection.inspect_log(source, standard, advance, trial=trial, units=units))

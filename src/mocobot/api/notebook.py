@@ -6,12 +6,14 @@ from xml.etree import ElementTree
 
 from discrepancy.result.read import name_of
 from discrepancy.result.remains import remains
+from estimator.calibrate.calibration import Calibration
 from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.html import Child, Node, el
 from mocobot_report.blocks.numbers import percent, plain
 from mocobot_report.blocks.payload import distance, mass, moment, place
 from mocobot_report.blocks.prose import bullets, tidy
 from mocobot_report.blocks.tables import Entry, Num, measurement, quantity, table
+from mocobot_report.calibration.tables import deviation_tables, payload_table, trial_table
 from mocobot_report.diagnosis.keys import cause_name
 
 Values = Mapping[str, Any]
@@ -35,6 +37,17 @@ def estimate_html(estimate: PayloadEstimate) -> str:
     return _whole(
         table(title, ["", "value ± standard error", "unit"], rows, note=said),
         bullets(doubts) if doubts else None,
+    )
+
+
+def calibration_html(calibration: Calibration) -> str:
+    """Every robot's deviations with standard errors, payloads, recordings, then findings and what stays open."""
+    said = [*calibration.findings, *(f"Open: {sentence}" for sentence in calibration.open)]
+    return _whole(
+        *deviation_tables(calibration),
+        payload_table(calibration),
+        trial_table(calibration),
+        bullets(said) if said else None,
     )
 
 

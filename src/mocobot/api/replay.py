@@ -8,7 +8,7 @@ from discrepancy.result.read import read_diagnosis
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.files import check_target
-from mocobot.api.given import Given, recordings_of
+from mocobot.api.given import Given, GivenCalibration, Robots, recordings_of
 from mocobot_sim.trial.truth import GroundTruth
 from mocobot_view.facts.body_facts import BodyFacts
 from mocobot_view.facts.placement import Grasps
@@ -26,6 +26,7 @@ def replay(
     truth: GroundTruth | None = None,
     diagnosis: Path | str | None = None,
     payload: Path | str | None = None,
+    calibration: GivenCalibration | None = None,
 ) -> list[str]:
     """Write a replay for the Rerun viewer: ``rerun NAME.rrd`` opens it.
 
@@ -36,6 +37,7 @@ def replay(
         truth: of the payload, to be shown beside the estimate.
         diagnosis: folder of a diagnosis, whose causes are marked.
         payload: name or MJCF of the payload's geometry; what the recording's label names if not given.
+        calibration: the robots as they are, or its file; None for what the recordings or the estimate say of them.
 
     Returns:
         What a viewer should know, sentences.
@@ -51,7 +53,7 @@ def replay(
 
     check_enabled()
     found = read_diagnosis(Path(diagnosis)) if diagnosis is not None else None
-    each = list(recordings_of(recordings))
+    each = list(recordings_of(recordings, robots=Robots(calibration)))
     names = distinct_names([Path(recording.name) for recording in each])
     facts = None if truth is None else facts_of_truth(truth)
     trials = [

@@ -19,7 +19,7 @@ from discrepancy.team.tolerances import default_tolerances
 from estimator.errors import InputError
 from estimator.files import whole_folder
 from estimator.recording.model import Recording
-from mocobot.api.given import Logs
+from mocobot.api.given import Logs, Robots, calibration_file
 from mocobot.files.provenance import file_facts, provenance
 from mocobot.files.targets import check_folder, check_recordings, map_file
 from mocobot.options import Diagnose
@@ -35,7 +35,7 @@ class _Rig:
 
     causes: Collection[str]
     tolerances: Callable[[], Mapping[str, Mapping[str, float]]]
-    read: Callable[[Sequence[Path], Logs], Any]
+    read: Callable[[Sequence[Path], Logs, Robots], Any]
     diagnose: Callable[..., Diagnosed]
 
 
@@ -48,11 +48,12 @@ def run(options: Diagnose) -> None:
     """
     rig = RIGS[options.rig]
     inputs = [*options.rec, *([options.tolerances] if options.tolerances else []), *map_file(options.map)]
+    inputs += calibration_file(options.calibration)
     _check(options, rig.causes, inputs)
-    logs = Logs(options.map)
+    logs, robots = Logs(options.map), Robots(options.calibration)
     tolerances = read_tolerances(options.tolerances, rig.tolerances())
     with whole_folder(options.out) if options.out else nullcontext() as folder:
-        data = rig.read(options.rec, logs)
+        data = rig.read(options.rec, logs, robots)
         made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
         with stages() as (say, simulated):
             found = rig.diagnose(
@@ -92,6 +93,8 @@ def _check(options: Diagnose, causes: Collection[str], inputs: Sequence[Path]) -
         check_folder(options.out, inputs, is_diagnosis, "an earlier diagnosis", force=options.force)
     if options.rig == "emps" and options.map is not None:
         raise InputError("--map is for logs of a team; the emps rig reads its benchmark's MAT file")
+    if options.rig == "emps" and options.calibration is not None:
+        raise InputError("--calibration is of a team's robots; the emps rig has none")
     if options.rig == "team":
         for path in options.rec:
             if path.suffix == ".mat":
@@ -103,11 +106,11 @@ def _check(options: Diagnose, causes: Collection[str], inputs: Sequence[Path]) -
         )
 
 
-def _read(paths: Sequence[Path], logs: Logs) -> list[Recording]:
+def _read(paths: Sequence[Path], logs: Logs, robots: Robots) -> list[Recording]:
     recordings = []
     with bar(len(paths), "reading", "file") as advance:
         for path in paths:
-            recordings.append(logs.read(path))
+            recordings.append(robots.of(logs.read(path)))
             advance(1)
     logs.check_map()
     return recordings
@@ -131,7 +134,7 @@ RIGS = {
     "emps": _Rig(
         emps_causes.CAUSES,
         emps_catalogue.default_tolerances,
-        lambda paths, _: read_emps(paths[0]),
+        lambda paths, *_: read_emps(paths[0]),
         diagnose_emps,
     ),
 }

@@ -3,11 +3,12 @@
 from collections.abc import Iterator
 from dataclasses import asdict
 
+from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.files import write_json
 from estimator.recording.model import Recording
 from mocobot.api.estimation import estimate
-from mocobot.api.given import Logs
+from mocobot.api.given import Logs, calibration_file
 from mocobot.files.provenance import provenance
 from mocobot.files.targets import check_output, check_recordings, map_file
 from mocobot.options import Estimate
@@ -24,8 +25,10 @@ def run(options: Estimate) -> None:
         NotGood: with ``strict``, the estimate is flagged, or says nothing.
     """
     check_recordings(options.rec)
+    _check_choice(options)
+    inputs = [*options.rec, *map_file(options.map), *calibration_file(options.calibration)]
     if options.out is not None:
-        check_output(options.out, [*options.rec, *map_file(options.map)], force=options.force)
+        check_output(options.out, inputs, force=options.force)
     logs = Logs(options.map)
     with stages() as (say, _):
 
@@ -35,15 +38,27 @@ def run(options: Estimate) -> None:
                 yield logs.read(path)
             logs.check_map()
 
-        found = estimate(each(), method=options.method, cutoff_hz=options.cutoff_hz, say=say)
+        found = estimate(
+            each(), calibration=options.calibration, self_calibrate=options.self_calibrate,
+            method=options.method, cutoff_hz=options.cutoff_hz, say=say,
+        )  # fmt: skip
     if options.out:
-        made = provenance("estimate", asdict(options), [*options.rec, *map_file(options.map)])
+        made = provenance("estimate", asdict(options), inputs)
         write_json(options.out, found.to_dict() | {"provenance": made})
     for path, converted in logs.converted.items():
         print(format_on_the_fly(converted, str(path)))
     print(found)
     if options.strict:
         _expect_good(found)
+
+
+def _check_choice(options: Estimate) -> None:
+    for name, given in (
+        ("--calibration", options.calibration is not None),
+        (f"--method {options.method}", options.method != "auto"),
+    ):
+        if options.self_calibrate and given:
+            raise InputError(f"--self-calibrate and {name} are both given; choose one")
 
 
 def _expect_good(found: PayloadEstimate) -> None:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from estimator.arm.design import load_design
 from estimator.files import write_json
+from mocobot.api.given import Robots, calibration_file
 from mocobot.files.targets import check_output
 from mocobot.options import Inspect
 from mocobot.progress import bar
@@ -24,13 +25,15 @@ def run(options: Inspect) -> None:
         InputError: the log, map or design cannot be read, or the JSON cannot be written.
     """
     if options.json is not None:
-        check_output(options.json, [options.rec], force=options.force)
+        check_output(options.json, [options.rec, *calibration_file(options.calibration)], force=options.force)
     log_map = read_map(options.map) if options.map is not None else None
     design = load_design(options.design) if options.design is not None else omnid_design()
+    robots = Robots(options.calibration)
     source = open_log(Path(options.rec), log_map, options.episode)
+    units = robots.units(source, design)
     with bar(source.size, "reading", "") as advance, bar(None, "checking", "mistake") as try_advance:
         trial = log_map.trial if log_map is not None else None
-        found = inspect_log(source, design, advance, try_advance, trial)
+        found = inspect_log(source, design, advance, try_advance, trial, units)
     if options.json is not None:
         write_json(options.json, inspection_dict(found))
     print(format_inspection(found))

@@ -4,6 +4,7 @@ import time
 from dataclasses import asdict
 from pathlib import Path
 
+from estimator.calibrate.json import calibration_to_dict
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.recording.parquet import write_recording
@@ -49,7 +50,9 @@ def run(options: Paper) -> None:
         if options.recordings:
             written += _write_recordings(options.out / "recordings", plan, result)
         write_json(options.out / NAME, folder_provenance(made_with, options.out, written))
-        print(f"Written to {options.out}: paper.json, tables.txt, provenance.json, estimates and plots.")
+        print(
+            f"Written to {options.out}: paper.json, tables.txt, provenance.json, estimates, fits and plots."
+        )
 
 
 def _is_paper(folder: Path) -> bool:
@@ -68,7 +71,7 @@ def _summary(result: PaperResult) -> str:
 
 
 def _write(folder: Path, plan: PaperPlan, result: PaperResult, tables: str) -> list[Path]:
-    """Write scores, tables, estimates and plots, and say where."""
+    """Write scores, tables, estimates, fits and plots, and say where."""
     scores, text, trials = (folder / name for name in (SCORES, "tables.txt", "trials.json"))
     write_json(scores, result.scores)
     write_text(text, tables + "\n")
@@ -79,6 +82,10 @@ def _write(folder: Path, plan: PaperPlan, result: PaperResult, tables: str) -> l
         for payload in plan.payloads:
             written.append(estimates / f"{payload}_{preset}.json")
             write_json(written[-1], result.estimates[preset][payload].to_dict())
+    for column, fits in result.fits.items():
+        for payload, found in fits.items():
+            written.append(folder / "fits" / f"{payload}_{column.replace(', ', '_').replace(' ', '_')}.json")
+            write_json(written[-1], calibration_to_dict(found))
     return written + save_plots(result.scores, folder)
 
 

@@ -6,6 +6,7 @@ from pathlib import Path
 from discrepancy.result.read import read_diagnosis
 from estimator.errors import InputError
 from estimator.recording.metadata import FREE
+from mocobot.api.given import Robots, calibration_file
 from mocobot.api.replay import SUFFIX, check_rerun
 from mocobot.files.recordings import read
 from mocobot.files.targets import check_output, check_recordings
@@ -66,16 +67,17 @@ def _check(options: Replay) -> None:
     check_recordings(options.rec)
     if options.save is not None:
         inputs = [*options.rec, *([options.estimate] if options.estimate else [])]
+        inputs += calibration_file(options.calibration)
         check_output(options.save, inputs, force=options.force, suffix=SUFFIX)
 
 
 def _trials(options: Replay) -> list[ReplayTrial]:
     estimate = read_estimate(options.estimate) if options.estimate else None
     diagnosis = read_diagnosis(options.diagnosis) if options.diagnosis else None
-    trials = []
+    robots, trials = Robots(options.calibration), []
     with bar(len(options.rec), "reading", "recording") as advance:
         for path, name in zip(options.rec, distinct_names(options.rec), strict=True):
-            recording = read(path)
+            recording = robots.of(read(path))
             held = recording.metadata.trial != FREE
             truth = read_truth(path, recording.metadata.robots) if options.truth and held else None
             trials.append(

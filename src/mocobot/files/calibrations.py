@@ -1,16 +1,29 @@
-"""Calibrations as files: what ``mocobot calibrate`` writes and other commands take."""
+"""Calibrations as files: what ``mocobot calibrate`` writes and other commands take.
 
+calibration.json           see ``estimator.calibrate.json``
+report.txt                 what the command prints
+omnid1.toml ...            every robot's numbers as they are
+model, or model-1 ...      the calibrated team in MuJoCo, one for each payload; ``mocobot simulate --model`` takes it
+deviations.png, recordings.png, shares.png
+                           parameters against priors, what recordings leave over, what each of them contributes
+"""
+
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.json import calibration_from_dict, calibration_to_dict
-from estimator.files import write_json
+from estimator.calibrate.json import FORMAT, calibration_from_dict, calibration_to_dict
+from estimator.calibrate.outcome.text import format_calibration
+from estimator.calibrate.outcome.unit_toml import unit_toml
+from estimator.errors import InputError
+from estimator.files import write_json, write_text
 from estimator.strict import read_json
 
 NAME = "calibration.json"
 """The file in the folder of ``mocobot calibrate --out``."""
+REPORT, MODEL, PAGE = "report.txt", "model", "report.html"
 
 
 def read_calibration(path: Path | str) -> Calibration:
@@ -42,3 +55,45 @@ def write_calibration(
     """
     more = {} if made_with is None else {"provenance": dict(made_with)}
     write_json(path, calibration_to_dict(calibration) | more)
+
+
+def write_into(
+    folder: Path, calibration: Calibration, made_with: Mapping[str, Any] | None = None
+) -> list[str]:
+    """Write everything that is listed at the head of this module into an existing folder.
+
+    Returns:
+        What could not be made, and why, one sentence each.
+
+    Raises:
+        InputError: something cannot be written.
+    """
+    # matplotlib and MuJoCo, which reading does not need
+    from mocobot_report.calibration.plots import save_plots
+    from mocobot_sim.extended.calibrated import write_calibrated
+
+    notes = []
+    for k in range(len(calibration.payloads)):
+        name = MODEL if len(calibration.payloads) == 1 else f"{MODEL}-{k + 1}"
+        try:
+            write_calibrated(calibration, folder / name, k)
+        except InputError as error:  # numbers that no body has, robots that are not the simulated ones
+            notes.append(f"there is no {name}: {error}")
+    for robot in range(1, calibration.robots + 1):
+        write_text(folder / f"omnid{robot}.toml", unit_toml(calibration, robot))
+    save_plots(calibration, folder)
+    write_calibration(folder / NAME, calibration, made_with)
+    write_text(folder / REPORT, f"{format_calibration(calibration)}\n")
+    return notes
+
+
+def is_calibration(folder: Path) -> bool:
+    """Whether a folder holds a calibration and nothing that someone else put there."""
+    from mocobot_report.calibration.plots import PLOTS
+
+    try:
+        ours = json.loads((folder / NAME).read_text(encoding="utf-8"))["format"] == FORMAT
+    except (OSError, ValueError, TypeError, KeyError):
+        return False
+    known = [NAME, REPORT, MODEL, f"{MODEL}-*", PAGE, "omnid*.toml", *PLOTS]
+    return ours and all(any(path.match(pattern) for pattern in known) for path in folder.iterdir())

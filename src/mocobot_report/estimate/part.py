@@ -42,7 +42,13 @@ def answer(estimated: Estimated) -> list[Node]:
     e = estimated.estimate
     trials = [r.trial for r in e.recordings]
     kinds = ", ".join(f"{trials.count(kind)} {kind}" for kind in dict.fromkeys(trials))
-    how = "in stages as in the paper" if e.method == "staged" else "by one joint least squares"
+    how = {
+        "staged": "in stages as in the paper",
+        "joint": "by one joint least squares",
+        "calibrated": "in one least squares with the robots' own calibration",
+    }.get(e.method, e.method)
+    if e.units is not None and e.method != "calibrated":
+        how += ", on robots as a calibration has them"
     said = (
         f"Estimated from {len(trials)} recording{'s' * (len(trials) != 1)} ({kinds}; "
         f"{sum(r.duration_s for r in e.recordings):.0f} s in all) of {e.robots} robot{'s' * (e.robots != 1)} that "

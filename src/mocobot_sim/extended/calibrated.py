@@ -10,15 +10,20 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.outcome.carried import carried
+from estimator.calibrate.outcome.carried import Carried, carried
 from estimator.errors import InputError
 from mocobot_sim.effects.base_tilt import BaseTilt
 from mocobot_sim.effects.catalogue import apply_effects
 from mocobot_sim.extended.extended import write_extended
 from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.models import omnid_design
-from mocobot_sim.scene.payload_mjcf import payload_mjcf
+from mocobot_sim.scene.payload_mjcf import nearest_inertia, payload_mjcf
 from mocobot_sim.scene.scene import TeamScene, build_team
+
+NOISE = 4.0
+"""Standard errors by which a principal moment may be moved to be that of a body."""
+LEAST_MOMENT_RATIO = 1e-3
+"""Of a principal moment to the largest."""
 
 
 def as_built(units: ArmUnit) -> tuple[AsBuilt, ...]:
@@ -73,7 +78,7 @@ def calibrated_team(
     for tilt in tilts:  # they turn about the mount, below {b}
         p[tilt.robot - 1] -= trial.bases.R[tilt.robot - 1] @ tilt.base_shift()
     scene = build_team(
-        payload_mjcf(found.mass_kg, found.p_1c, 0.5 * (found.inertia + found.inertia.T), X_1i),
+        payload_mjcf(found.mass_kg, found.p_1c, _of_a_body(found), X_1i),
         as_built(calibration.units),
         mounts=RigidTransform.from_components(
             p - [0.0, 0.0, float(np.min(p[:, 2]))], Rotation.from_matrix(trial.bases.R)
@@ -81,6 +86,14 @@ def calibrated_team(
         initial=initial,
     )
     return apply_effects(scene, tilts)
+
+
+def _of_a_body(found: Carried) -> Array:
+    """The inertia that a body can have where noise made it none, as it does of a flat one; else what was found."""
+    inertia = 0.5 * (found.inertia + found.inertia.T)
+    nearest = nearest_inertia(inertia, LEAST_MOMENT_RATIO)
+    moved = np.abs(np.linalg.eigvalsh(nearest) - found.principal.moments)
+    return nearest if np.all(moved <= NOISE * found.principal.moments_se) else inertia
 
 
 def write_calibrated(
@@ -93,4 +106,5 @@ def write_calibrated(
     """
     scene = calibrated_team(calibration, payload, initial)
     label = calibration.payloads[payload].label
-    write_extended(scene, scene.effects, folder, {"calibrated": True, "payload": label})
+    tilts = [effect for effect in scene.effects if isinstance(effect, BaseTilt)]
+    write_extended(scene, tilts, folder, {"calibrated": True, "payload": label})

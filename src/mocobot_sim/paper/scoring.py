@@ -18,8 +18,8 @@ from scipy.spatial.transform import Rotation
 
 from estimator.arrays import Array
 from estimator.calibrate.calibration import CalibratedPayload
+from estimator.calibrate.outcome.carried import carried
 from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.principal import inertia_matrix
 from estimator.estimate.result import PayloadEstimate
 from mocobot_sim.paper.published import PayloadTruth
 from mocobot_sim.scene.as_built import AsBuilt, units_of
@@ -91,11 +91,8 @@ def score_fit(found: CalibratedPayload, truth: PayloadTruth, units: Sequence[AsB
         The keys of ``score`` but ``"random"`` and ``"periodic"``, and ``"spring_scale"``: ``{"percent", "m_percent",
         "Ixx_percent", "Iyy_percent", "Izz_percent"}``, the first with its sign.
     """
-    mass = float(found.parameters[0])
-    p_1c = found.parameters[1:4] / mass
-    about_1 = inertia_matrix(found.parameters[4:])
-    about_c = about_1 - mass * (p_1c @ p_1c * np.eye(3) - np.outer(p_1c, p_1c))
-    moments = np.asarray(np.linalg.eigvalsh(about_c), dtype=float)
+    numbers = carried(found, 0.0)
+    mass, p_1c, moments = numbers.mass_kg, numbers.p_1c, numbers.principal.moments
     seen = _seen(truth, units)
     built = units_of(units, len(truth.p_1i))
     share = 1.0 / (1.0 + float(np.mean([unit.stiffness_ratio for unit in built])))

@@ -49,6 +49,21 @@ def payload_mjcf(mass_kg: float, p_1c: Array, inertia_1: Array, X_1i: RigidTrans
     return root
 
 
+def nearest_inertia(inertia: Array, least_ratio: float) -> Array:
+    """The nearest inertia that a rigid body can have: principal moments positive, none above the others' sum.
+
+    Args:
+        inertia: symmetric, shape (3, 3) [kg m^2].
+        least_ratio: smallest moment over the largest.
+    """
+    moments, axes = np.linalg.eigh(inertia)
+    moments = np.maximum(moments, least_ratio * max(moments[-1], 1e-9))
+    excess = moments[2] - moments[0] - moments[1]
+    if excess > 0:  # moved to the sum of the others in equal parts
+        moments = moments + np.array([1.0, 1.0, -1.0]) * excess / 3.0 * 1.001
+    return (axes * moments) @ axes.T
+
+
 def _check_inertia(inertia: Array) -> None:
     if inertia.shape != (3, 3) or not np.isfinite(inertia).all():
         raise InputError("payload inertia is not 3 x 3 finite numbers; it must be")

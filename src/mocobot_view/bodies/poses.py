@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from estimator.arm.arms import Arms
 from estimator.arm.delta import LEG_DIRECTIONS, leg_geometry
-from estimator.arm.design import OmnidDesign
 from estimator.arrays import Array
 from mocobot_view.bodies.robot import GIMBAL, LEGS
 
@@ -21,7 +21,7 @@ class BodyMotion:
     """How the bodies of N robots move at Q samples.
 
     Attributes:
-        wrist: positions of the platform in {b} [m], shape (Q, N, 3).
+        wrist: positions of the platform in the arm's own frame [m], which is {b} where that stands level, (Q, N, 3).
         turns: quaternions (x, y, z, w) of the links, rods and gimbal bodies in their fixed frames, by name,
             shape (Q, N, 4).
     """
@@ -30,20 +30,20 @@ class BodyMotion:
     turns: dict[str, Array]
 
 
-def body_motion(phi: Array, theta: Array, design: OmnidDesign) -> BodyMotion:
+def body_motion(phi: Array, theta: Array, arms: Arms) -> BodyMotion:
     """Solve the arms and gimbals of all robots.
 
     A link turns by phi about minus its driven axis, the rod by Ry(swing) Rz(tilt) against the link.
 
     Args:
-        phi: driven angles [rad], shape (Q, N, 3).
-        theta: gimbal angles (theta_z, theta_y, theta_x) [rad], shape (Q, N, 3).
-        design: the robots' numbers.
+        phi: true driven angles [rad], shape (Q, N, 3).
+        theta: true gimbal angles (theta_z, theta_y, theta_x) [rad], shape (Q, N, 3).
+        arms: the robots as they are, or as designed.
 
     Raises:
         InputError: the rods do not meet at some sample.
     """
-    wrist, swing, tilt = rod_angles(phi, design)
+    wrist, swing, tilt = rod_angles(phi, arms)
     turns = {}
     for leg in LEGS:
         turns[f"proximal{leg}"] = _turned("Y", -phi[..., leg - 1])
@@ -53,26 +53,28 @@ def body_motion(phi: Array, theta: Array, design: OmnidDesign) -> BodyMotion:
     return BodyMotion(wrist, turns)
 
 
-def rod_angles(phi: Array, design: OmnidDesign) -> tuple[Array, Array, Array]:
+def rod_angles(phi: Array, arms: Arms) -> tuple[Array, Array, Array]:
     """Where the arms are, from the driven angles alone.
 
     Seen from the knee, the rod's direction (x, y, z) in the link is
     Ry(swing) Rz(tilt) e_x = (cos swing cos tilt, sin tilt, -sin swing cos tilt).
 
     Args:
-        phi: driven angles [rad], shape (..., 3).
-        design: the robots' numbers.
+        phi: true driven angles [rad], shape (..., N, 3).
+        arms: the robots as they are, or as designed.
 
     Returns:
-        Wrist positions in {b} [m], and swing and tilt of each leg's rod against its link [rad]; shapes (..., 3).
+        Wrist positions in the arms' own frames [m], and swing and tilt of each leg's rod against its link [rad]; shapes
+        (..., 3).
 
     Raises:
         InputError: the rods do not meet at some sample.
     """
-    legs = leg_geometry(phi, design)
+    legs = leg_geometry(phi, arms)
+    length = np.broadcast_to(np.asarray(arms.rod_length_m), legs.h.shape)[..., None]
     swing, tilt = np.empty_like(legs.h), np.empty_like(legs.h)
     for k, u in enumerate(LEG_DIRECTIONS):
-        angle, rod = phi[..., k], legs.rod[..., k, :] / design.rod_length_m
+        angle, rod = phi[..., k], legs.rod[..., k, :] / length[..., k, :]
         outward, aside, up = rod @ u, rod @ [-u[1], u[0], 0.0], rod[..., 2]
         x = np.cos(angle) * outward + np.sin(angle) * up
         z = np.cos(angle) * up - np.sin(angle) * outward

@@ -1,7 +1,7 @@
 """Where robots and payload are: from the grasps and the joint angles, as no sensor says where a base stands.
 
-The world W lies on the floor under robot 1, its axes those of {b1}. All bases are taken as level: a tilt is what a
-diagnosis looks for, not what a picture assumes.
+The world W lies on the floor under robot 1, its axes those of {b1}. All bases are taken as level, but for tilts that
+a calibration has found: any other is what a diagnosis looks for, not what a picture assumes.
 """
 
 from dataclasses import dataclass
@@ -34,7 +34,7 @@ class Bases:
     """Base frames {b} in the world.
 
     Attributes:
-        R_Wb: orientations, turned about z only, shape (N, 3, 3).
+        R_Wb: orientations, turned about z only where nothing is known of a tilt, shape (N, 3, 3).
         p_Wb: positions [m], shape (N, 3).
     """
 

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from estimator.arm.arms import levelled, true_joints
 from estimator.arm.design import OmnidDesign
 from estimator.arm.gimbal import rotation
 from estimator.arrays import Array
@@ -22,6 +23,7 @@ from mocobot_view.bodies.payload_shape import drawn_payload
 from mocobot_view.bodies.poses import rod_angles
 from mocobot_view.bodies.robot import LEGS, TINTED, fit_design, robot_shapes
 from mocobot_view.facts.body_facts import BodyFacts, check_robots, facts_of, held
+from mocobot_view.facts.known_robots import as_estimated, tilted
 from mocobot_view.facts.placement import Bases, Grasps, placed
 
 SAMPLES = 2000
@@ -80,22 +82,25 @@ def measured_team(
         InputError: the estimate is of another number of robots, the rods do not meet, or ``payload`` is not a payload
             for these robots.
     """
+    recording = as_estimated(recording, estimate)
     meta, notes = recording.metadata, []
     check_robots(estimate, recording)
     since = recording.time - recording.time[0]
     now = len(since) // 2 if time_s is None else int(np.argmin(np.abs(since - time_s)))
     samples = np.append(np.linspace(0, len(since) - 1, min(len(since), SAMPLES)).astype(int), now)
-    phi, theta = recording.phi[samples], recording.theta[samples]
-    wrist, swing, tilt = rod_angles(phi, meta.design)
-    R_bi, height = rotation(theta), robot_shapes(meta.design).base_height_m
+    parts = (channels[samples] for channels in (recording.phi, recording.theta, recording.tau))
+    phi, theta, _ = true_joints(meta.arms, *parts)
+    wrist, swing, tilt = rod_angles(phi, meta.arms)
+    R_bi, p_bi = levelled(meta.arms, rotation(theta), wrist)
+    height = robot_shapes(meta.design).base_height_m
     facts = facts_of(estimate)
     grasps = held(facts, meta.robots)
-    bases, motion = placed(R_bi, wrist, grasps, height, slice(-1, None))
+    bases, motion = placed(R_bi, p_bi, grasps, height, slice(-1, None))
     pose = None if motion is None else (motion.R_W1[0], motion.p_W1[0])
     drawn = None if grasps is None else drawn_payload(payload, meta.payload, grasps, notes)
     if grasps is None:
         notes.append("The grasps are not known: the robots are drawn in a row, without a payload.")
-    model = _model(bases, drawn, meta.design, height)
+    model = _model(tilted(bases, meta.arms), drawn, meta.design, height)
     angles = (phi[-1], theta[-1], wrist[-1], swing[-1], tilt[-1])
     return MeasuredTeam(
         model=model,
@@ -114,8 +119,9 @@ def _model(bases: Bases, payload: str | Path | None, design: OmnidDesign, height
     """Robots of a design at given bases, links in their colours, and a payload that floats."""
     root = mjcf.from_path(str(models_dir() / "team.xml"))
     turns = Rotation.from_matrix(bases.R_Wb).as_quat(scalar_first=True)
-    for i, (p, quat) in enumerate(zip(bases.p_Wb, turns, strict=True), start=1):
-        stand(root, load_omnid(i), p - [0.0, 0.0, height_m], quat)
+    feet = bases.p_Wb - bases.R_Wb @ [0.0, 0.0, height_m]
+    for i, (p, quat) in enumerate(zip(feet, turns, strict=True), start=1):
+        stand(root, load_omnid(i), p, quat)
     if payload is not None:
         root.worldbody.attach(load_payload(payload)).add("freejoint")
     model = compiled(root)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from discrepancy.result.read import WrittenDiagnosis
+from estimator.arm.arms import levelled, true_joints
 from estimator.arm.gimbal import rotation
 from estimator.arrays import Array
 from estimator.errors import InputError
@@ -20,6 +21,7 @@ from mocobot_view.bodies.poses import BodyMotion, body_motion
 from mocobot_view.bodies.robot import robot_shapes
 from mocobot_view.bodies.shapes import Shape
 from mocobot_view.facts.body_facts import BodyFacts, check_robots, facts_of, held
+from mocobot_view.facts.known_robots import as_estimated, tilted
 from mocobot_view.facts.placement import Bases, Grasps, PayloadMotion, placed
 from mocobot_view.replay.signals import Balance, balance, filtered
 
@@ -91,6 +93,7 @@ def replay_trial(
     Raises:
         InputError: estimate or diagnosis are of another number of robots, or ``payload`` is not a payload for them.
     """
+    recording = as_estimated(recording, estimate)
     meta = recording.metadata
     notes: list[str] = []
     if meta.trial == FREE:
@@ -102,8 +105,9 @@ def replay_trial(
         estimate = _given(estimate, recording, notes) if estimate else _estimated(recording, notes)
     if diagnosis is not None:
         _check_diagnosis(diagnosis, recording, notes)
-    bodies = body_motion(recording.phi, recording.theta, meta.design)
-    R_bi, wrist = rotation(recording.theta), bodies.wrist
+    phi, theta, _ = true_joints(meta.arms, recording.phi, recording.theta, recording.tau)
+    bodies = body_motion(phi, theta, meta.arms)
+    R_bi, wrist = levelled(meta.arms, rotation(theta), bodies.wrist)
     height = robot_shapes(meta.design).base_height_m
     facts = None if estimate is None else facts_of(estimate)
     grasps = held(facts, meta.robots)
@@ -126,7 +130,7 @@ def replay_trial(
         recording=recording,
         time=recording.time - recording.time[0],
         bodies=bodies,
-        bases=bases,
+        bases=tilted(bases, meta.arms),
         motion=motion,
         shape=_shape(recording, payload, facts, grasps, notes),
         data=data,

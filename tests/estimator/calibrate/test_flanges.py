@@ -77,7 +77,7 @@ def test_a_common_turn_about_parallel_x_axes_stays_open() -> None:
     np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), ONE_DEG / np.sqrt(3), rtol=1e-3)
     named = in_drawing_frames(replace(invented_calibration(3), payloads=(held,)))
     assert len(named.open) == 2
-    assert named.open[1].startswith("parallel flanges do not decide the zeros of theta_x of robots 1, 2, 3 (")
+    assert named.open[1].startswith("Parallel flanges do not decide the zeros of theta_x of robots 1, 2, 3 (")
     # A second payload, held with one flange turned, decides it.
     more, _ = team_of("b", truth)
     np.testing.assert_allclose(parallel_flanges([held, more], ONE_DEG).zeros, truth, atol=5e-6)

@@ -43,7 +43,17 @@ def test_what_is_written_is_read_back(robots: int) -> None:
         np.testing.assert_array_equal(a.grasps.p_1i, b.grasps.p_1i)
         np.testing.assert_array_equal(a.grasps.covariance, b.grasps.covariance)
     for a, b in zip(read.trials, made.trials, strict=True):
-        for name in ("name", "kind", "payload", "duration_s", "count", "before", "after", "held_out"):
+        for name in (
+            "name",
+            "kind",
+            "payload",
+            "duration_s",
+            "count",
+            "before",
+            "after",
+            "held_out",
+            "shares",
+        ):
             assert getattr(a, name) == getattr(b, name)
         assert (a.bases is None) == (b.bases is None)
         if a.bases is not None and b.bases is not None:

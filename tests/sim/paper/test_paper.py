@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 from estimator.calibrate.calibration import Calibration
+from estimator.calibrate.json import calibration_from_dict
 from mocobot.cli import main
 from mocobot_sim.paper import experiment
 from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
@@ -224,9 +225,13 @@ def test_everything_else_in_the_folder(folder: Path) -> None:
     assert (
         names
         == {"paper.json", "tables.txt", "trials.json", "estimates/d_nominal.json", "provenance.json"}
+        | {"fits/d_nominal_one_fit.json"}
         | plots
         | recordings
     )
+    fitted = calibration_from_dict(json.loads((folder / "fits" / "d_nominal_one_fit.json").read_text()))
+    assert [trial.kind for trial in fitted.trials] == ["random", "static", "periodic"]
+    assert fitted.payloads[0].parameters[0] == pytest.approx(payload_truth("d").mass, rel=1e-4)
     for name in plots:
         assert (folder / name).read_bytes().startswith(b"\x89PNG")
     made = json.loads((folder / "provenance.json").read_text())

@@ -106,9 +106,7 @@ def linearised(
     return linear, Whitening.of(draws, moving, uneven=True), TorqueNoise.of(draws, torques, moving)
 
 
-def exact_residual(
-    signals: Signals, shared: Shared, bases: Bases, arms: Arms, reduction: Reduction
-) -> Array:
+def exact_residual(signals: Signals, shared: Shared, bases: Bases, arms: Arms, reduction: Reduction) -> Array:
     force = balance(grasp_data(filtered(signals), arms, signals.rate_hz), shared)[0]
     pose = pose_residual(signals.phi, signals.theta, shared, bases, arms)
     return reduction(np.concatenate([pose, force], axis=1))

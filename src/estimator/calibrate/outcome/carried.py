@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from estimator.arrays import Array
 from estimator.calibrate.calibration import CalibratedPayload
+from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.principal import (
     PrincipalInertia,
     inertia_matrix,
@@ -49,6 +50,13 @@ class Carried:
     def inertia_se(self) -> Array:
         """Standard errors of the inertia [kg m^2], shape (3, 3)."""
         return inertia_matrix(standard_errors(self.covariance[4:, 4:]))
+
+
+def grasps_of(payload: CalibratedPayload, scale_sd: float) -> GraspEstimate:
+    """A payload's grasps with the error of a held spring scale in their covariance."""
+    by_scale = payload.by_scale[:-10]
+    covariance = payload.covariance[:-10, :-10] + scale_sd**2 * np.outer(by_scale, by_scale)
+    return replace(payload.grasps, covariance=covariance)
 
 
 def carried(payload: CalibratedPayload, scale_sd: float) -> Carried:

@@ -176,8 +176,8 @@ def _findings(found: Flanges) -> list[str]:
     if found.misfit_rad < NOT_PARALLEL_RAD:
         return []
     return [
-        f"flanges are taken as parallel, and the closest zeros of theta_x leave {np.rad2deg(found.misfit_rad):.2g} deg "
-        "between them: they are not parallel, or a gimbal is off in what no zero describes"
+        f"Flanges are taken as parallel, and the closest zeros of theta_x leave {np.rad2deg(found.misfit_rad):.2g} deg "
+        "between them: they are not parallel, or a gimbal is off in what no zero describes."
     ]
 
 
@@ -188,7 +188,7 @@ def _open(found: Flanges, calibration: Calibration) -> list[str]:
     robots = ", ".join(str(i + 1) for i in np.flatnonzero(share > OPEN))
     degrees = np.rad2deg(np.max(standard_errors(found.covariance)))
     return [
-        f"parallel flanges do not decide the zeros of theta_x of robots {robots} (standard error {degrees:.2g} deg): "
+        f"Parallel flanges do not decide the zeros of theta_x of robots {robots} (standard error {degrees:.2g} deg): "
         "their x axes are parallel, too, so that a common turn is left; a payload that is held with turned flanges, or "
-        "a level at one of them, decides it"
+        "a level at one of them, decides it."
     ]

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.calibrate.calibration import CalibratedPayload
-from estimator.calibrate.outcome.carried import carried
+from estimator.calibrate.outcome.carried import carried, grasps_of
 from estimator.calibrate.outcome.robot_list import by_robot
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.strict import Fields
@@ -23,12 +22,8 @@ GRASP, PARAMETERS = ("i", "R_axis_angle_deg", "p_m"), ("m_kg", "mp_1c_kgm", "J_1
 
 def payload_to_dict(payload: CalibratedPayload, scale_sd: float) -> dict[str, Any]:
     """Plain values of a payload; standard errors include that of a held spring scale."""
-    grasps, whole, about = payload.grasps, carried(payload, scale_sd), payload.parameters
-    count = 6 * (grasps.robots - 1)
-    by_scale = payload.by_scale[:count]
-    covariance = payload.covariance[:count, :count] + scale_sd**2 * np.outer(by_scale, by_scale)
-    held = replace(grasps, covariance=covariance)
-    pairs = [held.pair(1, j) for j in range(2, grasps.robots + 1)]
+    grasps, whole, about = grasps_of(payload, scale_sd), carried(payload, scale_sd), payload.parameters
+    pairs = [grasps.pair(1, j) for j in range(2, grasps.robots + 1)]
     return {
         "label": payload.label,
         "grasps": [
@@ -66,7 +61,7 @@ def payload_from_dict(entry: Any, N: int, where: str) -> CalibratedPayload:
         InputError: something is missing or not allowed.
     """
     read = Fields(entry, KEYS, where, DERIVED)
-    label = None if read.values["label"] is None else read.text("label")
+    label = None if read.values["label"] is None else read.words("label")
     R, p, count = np.tile(np.eye(3), (N, 1, 1)), np.zeros((N, 3)), 6 * (N - 1)
     for i, one in enumerate(by_robot(read, "grasps", N, GRASP, ("R_se_deg", "p_se_m")), 1):
         R[i] = Rotation.from_rotvec(one.array("R_axis_angle_deg", (3,)), degrees=True).as_matrix()

@@ -8,6 +8,7 @@ prior's and that of known weights.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.arm.unit import AT, GROUPS
 from estimator.arrays import Array
@@ -35,14 +36,13 @@ def shares(found: Fit) -> list[dict[str, float]]:
     ]
 
 
-def _kinds(found: Fit) -> dict[str, Array]:
+def _kinds(found: Fit) -> dict[str, NDArray[np.intp]]:
     layout = found.layout
     out = {group.name: layout.unit_indices(np.r_[AT[group.name]]) for group in GROUPS}
     payloads = range(layout.payloads)
-    grasps = [np.r_[layout.of_payload(k).start : layout.of_inertia(k).start] for k in payloads]
-    inertial = [np.r_[layout.of_inertia(k)] for k in payloads]
-    none = [np.zeros(0, dtype=int)]
-    return out | {GRASPS: np.concatenate(grasps or none), INERTIAL: np.concatenate(inertial or none)}
+    grasps = [k for p in payloads for k in range(layout.of_payload(p).start, layout.of_inertia(p).start)]
+    inertial = [k for p in payloads for k in range(layout.of_inertia(p).start, layout.of_inertia(p).stop)]
+    return out | {GRASPS: np.array(grasps, dtype=np.intp), INERTIAL: np.array(inertial, dtype=np.intp)}
 
 
 def _weights(part: Quadratic, covariance: Array) -> Array:

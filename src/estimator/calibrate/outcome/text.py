@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -9,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from estimator.arm.unit import AT, GROUPS, Group
+from estimator.arrays import Array
 from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration
-from estimator.calibrate.outcome.carried import carried
+from estimator.calibrate.outcome.carried import carried, grasps_of
 from estimator.estimate.uncertainty import standard_errors
 from estimator.numbers import measured
 
@@ -40,6 +42,8 @@ SHOWN = {
 """By group; deviations are as built minus design, zeros reading minus truth."""
 
 
+WIDTH = 118
+"""Columns that sentences are wrapped to."""
 MASSES = ("proximal_mass_ratio", "rod_mass_ratio", "wrist_mass_ratio")
 
 
@@ -57,9 +61,10 @@ def frames_sentence(calibration: Calibration) -> str:
 
 def format_calibration(calibration: Calibration) -> str:
     """Readable report, values as ``value +- standard error``."""
+    count = len(calibration.trials)
     seconds = sum(trial.duration_s for trial in calibration.trials)
     lines = [
-        f"[[Calibration]]  {calibration.robots} robots, {len(calibration.trials)} recordings, {seconds:.0f} s, "
+        f"[[Calibration]]  {calibration.robots} robots, {count} recording{'s' * (count != 1)}, {seconds:.0f} s, "
         f"{calibration.steps} steps",
         f"    {frames_sentence(calibration)}",
     ]
@@ -79,9 +84,13 @@ def format_calibration(calibration: Calibration) -> str:
     if calibration.untouched:
         lines += ["[[Hardly touched by these recordings]]", f"    {', '.join(calibration.untouched)}"]
     if calibration.findings:
-        lines += ["[[Findings]]", *(f"    {said}" for said in calibration.findings)]
-    lines += ["[[What stays open]]", *(f"    {said}" for said in calibration.open or ("nothing",))]
+        lines += ["[[Findings]]", *map(_wrapped, calibration.findings)]
+    lines += ["[[What stays open]]", *map(_wrapped, calibration.open or ("Nothing.",))]
     return "\n".join(lines)
+
+
+def _wrapped(sentences: str) -> str:
+    return textwrap.fill(sentences, WIDTH, initial_indent="    ", subsequent_indent="        ")
 
 
 def shown_groups(calibration: Calibration) -> list[Group]:
@@ -117,8 +126,9 @@ def _payload(payload: CalibratedPayload, scale_sd: float) -> list[str]:
     lines.append(_vector("centre of mass in {1} [mm]", 1e3 * found.p_1c, 1e3 * found.p_1c_se_m))
     moments = found.principal
     lines.append(_vector("principal moments [kg m^2]", moments.moments, moments.moments_se, "123"))
-    for j in range(2, payload.grasps.robots + 1):
-        pair = payload.grasps.pair(1, j)
+    grasps = grasps_of(payload, scale_sd)
+    for j in range(2, grasps.robots + 1):
+        pair = grasps.pair(1, j)
         lines.append(_vector(f"R_1{j} [deg]", DEG * pair.axis_angle_rad, DEG * pair.axis_angle_se_rad))
         lines.append(_vector(f"p_1{j} [mm]", 1e3 * pair.p_ij, 1e3 * pair.p_se_m))
     if scale_sd > 0:
@@ -130,7 +140,7 @@ def _payload(payload: CalibratedPayload, scale_sd: float) -> list[str]:
     return lines
 
 
-def _vector(name: str, values: Sequence[float], errors: Sequence[float], axes: str = "xyz") -> str:
+def _vector(name: str, values: Array, errors: Array, axes: str = "xyz") -> str:
     cells = (f"{axis}: {_value(v, se)}" for axis, v, se in zip(axes, values, errors, strict=True))
     return f"    {name:<33}" + "   ".join(f"{cell:<22}" for cell in cells).rstrip()
 

@@ -65,7 +65,7 @@ def trial_from_dict(entry: Any, N: int, payloads: int, where: str) -> Calibrated
     if after is None:
         fits.refuse("after", "an object")
     return CalibratedTrial(
-        name=read.text("name"),
+        name=read.words("name"),
         kind=read.one_of("kind", KINDS),
         payload=payload,
         duration_s=read.number("duration_s", 0.0),

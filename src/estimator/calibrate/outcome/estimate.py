@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
 
 from estimator.arrays import Array
-from estimator.calibrate.apply import calibrated
+from estimator.calibrate.calibrate import calibrate
 from estimator.calibrate.calibration import CalibratedPayload, Calibration
+from estimator.calibrate.outcome.apply import calibrated
 from estimator.calibrate.outcome.carried import Carried, carried
 from estimator.errors import InputError
 from estimator.estimate.consistency import Trial, wrench_balance
 from estimator.estimate.fusion import fuse
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.inertia import InertiaEstimate, inertia_regressor
-from estimator.estimate.payload import estimate_from_trials, trial_of
+from estimator.estimate.payload import Method, estimate_from_trials, estimate_payload, trial_of
 from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import MassEstimate
@@ -67,9 +69,83 @@ def estimate_calibrated(
         p_1c_covariance=numbers.covariance[1:4, 1:4],
         inertia=inertia,
         recordings=tuple(records),
+        units=calibration.units,
         flags=(*calibration.findings, *staged.flags, *calibration.open),
     )
     return withheld(estimate, max(trial.team for trial in trials))
+
+
+def estimate_on(
+    calibration: Calibration,
+    recordings: Sequence[Recording],
+    method: Method = "auto",
+    cutoff_hz: float = 5.0,
+    say: Callable[[str], object] = lambda _: None,
+) -> PayloadEstimate:
+    """Estimate a payload on robots held as an earlier calibration found them, whose errors go on to it.
+
+    Args:
+        calibration: of the same robots.
+        recordings: of one payload.
+        method: ``"auto"``, the calibration's own least squares with the robots held, where the recordings suffice for
+            it; else, and where it is asked for, as in ``estimate_payload``.
+        cutoff_hz: cut-off of the low-pass filter [Hz].
+        say: takes the name of the stage that begins.
+
+    Raises:
+        InputError: the recordings are of several payloads or other robots, or as in ``estimate_payload``.
+    """
+    one_payload(recordings)
+    known = [calibrated(recording, calibration) for recording in recordings]
+    held: Calibration | None = None
+    with suppress(InputError):  # what other methods need not, or say in their own words
+        held = calibrate(known, robots=calibration, say=say)
+    if method == "auto" and held is not None:
+        return estimate_calibrated(held, known, cutoff_hz, say)
+    return _with_errors(estimate_payload(known, method, cutoff_hz, say=say), held)
+
+
+def _with_errors(estimate: PayloadEstimate, held: Calibration | None) -> PayloadEstimate:
+    """An estimate with the errors that a fit with the robots held has, on top of its own.
+
+    Those are the robots' and, within, those of a fit that follows noise less: at most 1.4 times too much.
+    """
+    mass, grasps, inertia = estimate.mass, estimate.grasps, estimate.inertia
+    if held is None:
+        flag = "Standard errors lack those of the robots' calibration: the recordings do not suffice for them."
+        return replace(estimate, flags=(*estimate.flags, flag))
+    payload, numbers = held.payloads[0], carried(held.payloads[0], held.scale_sd)
+    if grasps is not None:
+        more = _grasps(payload, held.scale_sd, estimate).covariance
+        grasps = replace(grasps, covariance=grasps.covariance + more)
+    if mass is not None:
+        mass = replace(mass, se=float(np.hypot(mass.se, numbers.mass_se_kg)))
+    com = estimate.p_1c_covariance
+    if com is not None:
+        com = com + numbers.covariance[1:4, 1:4]
+    if inertia is not None:
+        inertia = InertiaEstimate.of(
+            inertia_parameters(inertia.inertia),
+            inertia.covariance + numbers.covariance[4:, 4:],
+            inertia.residual_rms,
+            inertia.moment_rms,
+        )
+    return replace(estimate, grasps=grasps, mass=mass, p_1c_covariance=com, inertia=inertia)
+
+
+def one_payload(recordings: Sequence[Recording]) -> None:
+    """Check that recordings are of one payload.
+
+    Raises:
+        InputError: they are of several.
+    """
+    first = recordings[0] if recordings else None
+    for other in recordings[1:]:
+        if first is not None and other.metadata.payload != first.metadata.payload:
+            raise InputError(
+                f"{other.name} is of payload {other.metadata.payload!r} and {first.name} of "
+                f"{first.metadata.payload!r}; estimate one payload at a time"
+            )
 
 
 def _payload_of(calibration: Calibration, recordings: Sequence[Recording]) -> CalibratedPayload:

@@ -1,0 +1,135 @@
+"""Pictures of a calibration: parameters against priors, what recordings leave over, what each of them contributes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from estimator.arm.unit import AT
+from estimator.calibrate.calibration import Calibration
+from estimator.calibrate.outcome.text import SHOWN, shown_groups
+from mocobot_report.blocks.palette import LIGHT
+from mocobot_report.blocks.units import short_names
+from mocobot_report.calibration.charts import COLOURS, FITS, hidden_kinds, kind_names
+
+PLOTS = ("deviations.png", "recordings.png", "shares.png")
+MARKERS = {"circle": "o", "square": "s", "diamond": "D"}
+
+
+def save_plots(calibration: Calibration, folder: Path) -> list[Path]:
+    """Draw ``PLOTS`` into an existing folder and return their paths."""
+    figures = _deviations(calibration), _recordings(calibration), _shares(calibration)
+    return [_save(figure, folder / name) for figure, name in zip(figures, PLOTS, strict=True)]
+
+
+def _save(figure: Figure, path: Path) -> Path:
+    FigureCanvasAgg(figure)
+    figure.savefig(path, dpi=110)
+    return path
+
+
+def _deviations(calibration: Calibration) -> Figure:
+    """One panel per kind: every robot's entries with two standard errors, the prior as a band."""
+    groups = shown_groups(calibration)
+    columns = 2
+    rows = -(-len(groups) // columns)
+    figure = Figure(figsize=(11.0, 1.9 * rows + 0.8), layout="constrained")
+    axes = figure.subplots(rows, columns, squeeze=False).ravel()
+    for axis, group in zip(axes, groups, strict=False):
+        shown, at = SHOWN[group.name], AT[group.name]
+        prior = shown.scale * float(np.max(calibration.prior_sd[:, at]))
+        axis.axhspan(-prior, prior, color=LIGHT["band"], lw=0)
+        axis.axhline(0.0, color=LIGHT["line"], lw=1.0)
+        count, places, names = len(group.entries), [], []
+        for robot in range(calibration.robots):
+            x = robot * (count + 1) + np.arange(count)
+            known = calibration.sd[robot, at] > 0
+            y, se = shown.scale * calibration.units.x[robot, at], shown.scale * calibration.sd[robot, at]
+            axis.errorbar(
+                x[known], y[known], 2.0 * se[known], fmt="o", ms=4, lw=1.3, capsize=2.5,
+                color=LIGHT[COLOURS[robot % len(COLOURS)]],
+            )  # fmt: skip
+            places += list(x)
+            names += list(group.entries)
+        axis.set_xticks(places, names, fontsize=8)
+        axis.set_title(f"{shown.name} [{shown.unit}]", loc="left", fontsize=10)
+        _plain(axis)
+    for axis in axes[len(groups) :]:
+        axis.set_visible(False)
+    handles = [
+        axes[0].plot([], [], "o", ms=4, color=LIGHT[COLOURS[k % 6]])[0] for k in range(calibration.robots)
+    ]
+    names = [f"robot {k + 1}" for k in range(calibration.robots)]
+    figure.legend(handles, names, loc="outside upper right", ncols=6, frameon=False, fontsize=9)
+    figure.suptitle(
+        "Deviations, with two standard errors (grey: assumed beforehand, one standard deviation)", x=0.01, ha="left",
+        fontsize=11,
+    )  # fmt: skip
+    return figure
+
+
+def _recordings(calibration: Calibration) -> Figure:
+    names = short_names([trial.name for trial in calibration.trials])
+    figure = Figure(figsize=(11.0, 0.38 * len(names) + 1.5), layout="constrained")
+    axes = figure.subplots(1, 2, squeeze=False, sharey=True)[0]
+    for kind, (axis, title) in enumerate(zip(axes, ("loops", "balance"), strict=True)):
+        for key in FITS:
+            pairs = [getattr(trial, key.group) for trial in calibration.trials]
+            shown = [
+                (pair[kind], row)
+                for row, (pair, trial) in enumerate(zip(pairs, calibration.trials, strict=True))
+                if pair is not None and trial.count[kind]
+            ]
+            axis.plot(
+                [x for x, _ in shown], [y for _, y in shown], MARKERS[key.symbol], color=LIGHT[key.colour],
+                label=key.label if not kind else None, ms=6,
+            )  # fmt: skip
+        axis.axvline(1.0, color=LIGHT["text"], lw=1.0, ls="--")
+        axis.set_xscale("log")
+        axis.set_yticks(range(len(names)), names, fontsize=9)
+        axis.set_ylim(len(names) - 0.4, -0.6)
+        axis.set_xlabel("chi$^2$/n")
+        axis.set_title(title, loc="left", fontsize=10)
+        _plain(axis)
+    figure.legend(loc="outside upper right", ncols=3, frameon=False, fontsize=9)
+    figure.suptitle("What recordings leave over; 1 is noise alone", x=0.01, ha="left", fontsize=11)
+    return figure
+
+
+def _shares(calibration: Calibration) -> Figure:
+    trials = [trial for trial in calibration.trials if trial.shares]
+    kinds = [k for k in (trials[0].shares if trials else {}) if k not in hidden_kinds(calibration)]
+    figure = Figure(figsize=(9.0, 0.36 * len(kinds) + 1.6), layout="constrained")
+    axis = figure.subplots()
+    left = np.zeros(len(kinds))
+    for k, (name, trial) in enumerate(zip(short_names([t.name for t in trials]), trials, strict=True)):
+        share = 100.0 * np.array([trial.shares.get(kind, 0.0) for kind in kinds])
+        axis.barh(range(len(kinds)), share, 0.66, left, color=LIGHT[COLOURS[k % len(COLOURS)]], label=name)
+        left += share
+    axis.barh(
+        range(len(kinds)),
+        np.maximum(0.0, 100.0 - left),
+        0.66,
+        left,
+        color=LIGHT["band"],
+        label="prior, weights",
+    )
+    axis.set_yticks(range(len(kinds)), kind_names(kinds), fontsize=9)
+    axis.set_ylim(len(kinds) - 0.4, -0.6)
+    axis.set_xlim(0.0, 100.0)
+    axis.set_xlabel("share [%]")
+    _plain(axis)
+    figure.legend(loc="outside lower center", ncols=4, frameon=False, fontsize=9)
+    figure.suptitle("What each recording contributes to what is known", x=0.01, ha="left", fontsize=11)
+    return figure
+
+
+def _plain(axis: Axes) -> None:
+    axis.grid(True, color=LIGHT["grid"], lw=0.6)
+    axis.set_axisbelow(True)
+    for side in ("top", "right"):
+        axis.spines[side].set_visible(False)
