@@ -92,7 +92,7 @@ def test_ten_robots():
     assert np.abs(error[:, :3]).max() < 1e-6
     assert np.abs(error[:, 3:]).max() < 1e-4
     assert np.abs(found.units.x - units.x)[:, AT["phi_zero"]].max() < 2e-5
-    assert found.payloads[0].parameters[0] == pytest.approx(loads[0].mass, rel=1e-4)
+    assert found.payloads[0].parameters[0] == pytest.approx(loads[0].mass, rel=1e-3)
 
 
 def test_a_held_scale_shrinks_all_that_is_weighed():
