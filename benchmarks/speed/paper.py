@@ -1,6 +1,7 @@
-"""Wall time of `mocobot paper` with one and with two processes: python benchmarks/speed/paper.py [--quick] [--staged-only]
+"""Wall time of `mocobot paper` with one and with two processes: python benchmarks/speed/paper.py [OPTIONS]
 
---quick runs one payload with two random trials instead of the whole experiment, --staged-only the paper's own method alone.
+--quick runs one payload with two random trials instead of the whole experiment, --staged-only leaves the fits beside
+the paper's own method out.
 """
 
 from __future__ import annotations
