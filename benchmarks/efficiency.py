@@ -3,17 +3,17 @@
     python benchmarks/efficiency.py --payload c --draws 12
     python benchmarks/efficiency.py --robots uncalibrated --sensors rounded
 
-One set of trials is simulated and read again and again. The bound is that of the raw samples at the full rate: at every
-instant loops and balance hold for the true angles and torques, and what is read is these plus white noise, so the samples'
-information about grasps, payload and bases (and robots, with their prior, where these are calibrated) is
+One set of trials is simulated and read again and again. The bound is that of the raw samples at the full rate: at
+every instant loops and balance hold for the true angles and torques, and what is read is these plus white noise, so the
+samples' information about grasps, payload and bases (and robots, with their prior, where these are calibrated) is
 
     sum over samples of D^T (B Q B^T)^-1 D,
 
-D and B the derivatives of loops and balance by the unknowns and by the readings, on the noise-free trajectory. The payload's
-pose at every instant is free in this, which costs the loops nothing; its rates and accelerations are taken to be known, so
-that no estimate can be better than this bound, and one that has to differentiate may be a little worse (at 1 Hz the
-encoders' noise is a tenth of the springs' in the balance). Nothing is lost to a filter. With ``rounded`` sensors the bound is
-that of white noise of the same variance, which rounding at rest is not.
+D and B the derivatives of loops and balance by the unknowns and by the readings, on the noise-free trajectory. The
+payload's pose at every instant is free in this, which costs the loops nothing; its rates and accelerations are taken to
+be known, so that no unbiased estimate can be better than this bound, and one that has to differentiate may be a little
+worse (at 1 Hz the encoders' noise is a tenth of the springs' in the balance). Nothing is lost to a filter. With
+``rounded`` sensors the bound is that of white noise of the same variance, which rounding at rest is not.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import numpy as np
 
 SPACING_M = 1.0
 MASS_PER_ROBOT_KG = 3.5
-LARGEST_RADIUS_M = 1.1
+LARGEST_RADIUS_M = 0.95
 """Of the circle: turned about its middle by 3.4 deg a payload moves the grasps of a larger one out of reach."""
 
 

@@ -91,4 +91,4 @@ def centred(parameters: Array) -> Array:
 
 def principal(inertia: Array) -> Array:
     """Principal moments, ascending, from xx, xy, xz, yy, yz, zz."""
-    return np.linalg.eigvalsh(inertia_matrix(inertia))
+    return np.asarray(np.linalg.eigvalsh(inertia_matrix(inertia)), dtype=float)

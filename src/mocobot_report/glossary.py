@@ -73,6 +73,8 @@ TERMS = (
     Term("principal moment, principal axes", r"[Pp]rincipal (?:moments?|axes)",
          "The moments of inertia about the three axes through the centre of mass about which a body turns without "
          "wobbling, smallest first."),
+    Term("prior", r"\b[Pp]riors?\b|as assumed beforehand",
+         "How far robots may be off their design as far as is known before any recording: standard deviations."),
     Term("rank", r"\brank\b", "How many independent directions the data determine."),
     Term("residual", r"\b[Rr]esiduals?\b", "What is left when the model is taken from what was recorded."),
     Term("rms", r"\b[Rr]ms\b", "Root mean square, the usual size of something that varies about zero."),

@@ -17,7 +17,7 @@ from estimator.recording.parquet import read_recording, write_recording
 from mocobot.cli import main
 from mocobot_sim.extended.extended import load_extended
 
-TRIALS = {"swing": ("random", "--vias", "12"), "turn": ("periodic", "--duration", "8")}
+TRIALS = {"swing": ("random", "--vias", "8"), "turn": ("periodic", "--duration", "6")}
 
 
 @pytest.fixture(scope="module")

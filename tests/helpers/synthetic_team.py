@@ -13,7 +13,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator.arm.delta import inverse_kinematics, jacobian
-from estimator.arm.design import OmnidDesign
 from estimator.arm.dynamics import arm_torque
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.calibrate.prior import Prior
@@ -54,16 +53,10 @@ class Load:
 
 
 def load(robots: int, rng: np.random.Generator) -> Load:
-    """Grasps on a circle, turned about the vertical and a little tilted; two hold a thin rod at its ends.
+    """Three or more grasps on a circle, turned about the vertical and a little tilted.
 
-    A rod needs no moment about its axis, which two ball joints could not give.
+    Two would let the payload swing about the line between them, on a path that is not to be chosen.
     """
-    if robots == 2:
-        along = np.array([0.8, 0.3, 0.0])
-        u = along / np.linalg.norm(along)
-        R = Rotation.from_rotvec([[0.0, 0.0, 0.0], [0.0, 0.0, 1.1]]).as_matrix()
-        inertia = 0.9 * (np.eye(3) - np.outer(u, u))
-        return Load(7.0, 0.45 * along, inertia, R, np.array([np.zeros(3), along]))
     angle = 2.0 * np.pi * np.arange(robots) / robots
     radius = 0.7
     p = radius * np.column_stack([np.cos(angle) - 1.0, np.sin(angle), 0.05 * np.sin(3 * angle + 1)])
@@ -77,10 +70,10 @@ def load(robots: int, rng: np.random.Generator) -> Load:
     return Load(3.6 * robots, com, inertia, R, p)
 
 
-def draw_units(robots: int, prior: Prior, rng: np.random.Generator, design: OmnidDesign = DESIGN) -> ArmUnit:
+def draw_units(robots: int, prior: Prior, rng: np.random.Generator) -> ArmUnit:
     """Robots drawn from a prior, the mean of their spring ratios 0."""
     factor = prior.factor(robots, hold_scale=True)
-    return ArmUnit(design, (factor @ rng.standard_normal(factor.shape[1])).reshape(robots, COUNT))
+    return ArmUnit(DESIGN, (factor @ rng.standard_normal(factor.shape[1])).reshape(robots, COUNT))
 
 
 def draw_path(held: Load, rng: np.random.Generator) -> Sines:
@@ -142,7 +135,7 @@ def carry(
     m_i = []
     for i in range(N):
         theta = tuple(part[:, 3:] for part in motion[i])
-        m_i.append(gimbal_moment(*theta) if units.design == DESIGN else np.zeros((len(time), 3)))
+        m_i.append(gimbal_moment(*theta))
         moment_1 = moment_1 - m_i[i] @ held.R_1i[i].T
     f_1 = _shared(held, force_1, moment_1, rng, time)
 
@@ -195,14 +188,7 @@ def _shared(held: Load, force, moment, rng, time):
     N = len(arms)
     skew = [np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]]) for x, y, z in arms]
     G = np.block([[np.eye(3)] * N, skew])
-    rank = 5 if N == 2 else 6
-    internal = np.linalg.svd(G)[2][rank:]
+    internal = np.linalg.svd(G)[2][6:]
     squeeze = Sines.draw(rng, [2.0] * len(internal), 3, 0.1, 0.6)(time)
-    f = np.concatenate([force, moment], axis=1) @ np.linalg.pinv(G, rcond=1e-10).T + squeeze @ internal
+    f = np.concatenate([force, moment], axis=1) @ np.linalg.pinv(G).T + squeeze @ internal
     return f.reshape(len(f), N, 3)
-
-
-LIGHT_GIMBAL = replace(
-    DESIGN, yoke_inertia_kgm2=(1e-15,) * 3, ring_inertia_kgm2=(1e-15,) * 3, flange_inertia_kgm2=(1e-15,) * 3
-)
-"""A gimbal that takes no moment, for a rod on two ball joints."""

@@ -37,7 +37,7 @@ def _deviations(calibration: Calibration) -> Figure:
     groups = shown_groups(calibration)
     columns = 2
     rows = -(-len(groups) // columns)
-    figure = Figure(figsize=(11.0, 1.9 * rows + 0.8), layout="constrained")
+    figure = Figure(figsize=(max(11.0, 2.0 * calibration.robots), 1.9 * rows + 0.8), layout="constrained")
     axes = figure.subplots(rows, columns, squeeze=False).ravel()
     for axis, group in zip(axes, groups, strict=False):
         shown, at = SHOWN[group.name], AT[group.name]
@@ -64,7 +64,7 @@ def _deviations(calibration: Calibration) -> Figure:
         axes[0].plot([], [], "o", ms=4, color=LIGHT[COLOURS[k % 6]])[0] for k in range(calibration.robots)
     ]
     names = [f"robot {k + 1}" for k in range(calibration.robots)]
-    figure.legend(handles, names, loc="outside upper right", ncols=6, frameon=False, fontsize=9)
+    figure.legend(handles, names, loc="outside lower center", ncols=10, frameon=False, fontsize=9)
     figure.suptitle(
         "Deviations, with two standard errors (grey: assumed beforehand, one standard deviation)", x=0.01, ha="left",
         fontsize=11,

@@ -15,15 +15,20 @@ from estimator.calibrate.rows import Rows
 from estimator.calibrate.sensing import Sensing
 from estimator.calibrate.unknowns import Unknowns
 from estimator.errors import InputError
+from mocobot_sim.scene.as_built import CalibrationSpread
+from mocobot_sim.scene.scene import build_team
+from mocobot_sim.trial.sensors import PRESETS, measure
+from mocobot_sim.trial.trajectories import random_vias
+from mocobot_sim.trial.trial import run_trial
 from omnid_design import DESIGN
-from synthetic_team import LIGHT_GIMBAL, Load, carry, draw_path, draw_units, load, with_noise
+from payload_mjcf import TWO
+from synthetic_team import Load, carry, draw_path, draw_units, load, with_noise
 
 
 def team(seed, robots=3, prior=None, trials=1, scale=0.0, payloads=1, duration_s=20.0):
     """Exact trials of one team; ``scale`` is the mean of all spring ratios. Trials go round the payloads."""
     rng = np.random.default_rng(seed)
-    design = LIGHT_GIMBAL if robots == 2 else DESIGN
-    units = draw_units(robots, prior or Prior(), rng, design)
+    units = draw_units(robots, prior or Prior(), rng)
     units.x[:, AT["stiffness_ratio"]] += scale
     loads = [load(robots, rng) for _ in range(payloads)]
     if payloads > 1:
@@ -87,7 +92,7 @@ def test_ten_robots():
     assert np.abs(error[:, :3]).max() < 1e-6
     assert np.abs(error[:, 3:]).max() < 1e-4
     assert np.abs(found.units.x - units.x)[:, AT["phi_zero"]].max() < 2e-5
-    assert found.payloads[0].parameters[0] == pytest.approx(loads[0].mass, rel=1e-4)
+    assert found.payloads[0].parameters[0] == pytest.approx(loads[0].mass, rel=1e-3)
 
 
 def test_a_held_scale_shrinks_all_that_is_weighed():
@@ -118,6 +123,27 @@ def test_a_known_mass_gives_the_scale_and_the_other_payload():
     for payload, held in zip(found.payloads, loads, strict=True):
         assert payload.parameters[0] == pytest.approx(held.mass, rel=5e-5)
         assert payload.parameters == pytest.approx(held.shared.pi, rel=2e-3, abs=1e-3)
+
+
+@pytest.mark.slow
+def test_two_robots(tmp_path):
+    """The payload swings between them, so the simulator carries it; errors within four claimed standard errors."""
+    units = CalibrationSpread(np.deg2rad(1.0), 0.0, 1e-3, 0.02).draw(2, np.random.default_rng(4))
+    scene = build_team(TWO.write(tmp_path), units)
+    log = run_trial(scene, random_vias(scene.wrist_home_b, np.random.default_rng(5), vias=24))
+    found = calibrate([measure(log, PRESETS["nominal"], np.random.default_rng(6))])
+    turn = Rotation.from_rotvec(
+        np.outer([unit.theta_zero_rad[2] for unit in units], [1.0, 0.0, 0.0])
+    ).as_matrix()
+    grasps = found.payloads[0].grasps
+    back = turn[0].T
+    R, p = back @ scene.X_1i.rotation.as_matrix()[1] @ turn[1], back @ scene.X_1i.translation[1]
+    error = np.concatenate([Rotation.from_matrix(grasps.R_1i[1] @ R.T).as_rotvec(), grasps.p_1i[1] - p])
+    sd = np.sqrt(np.diag(grasps.covariance))
+    assert np.abs(error / sd).max() < 4.0
+    assert np.linalg.norm(error[:3]) < np.deg2rad(0.01)
+    assert np.linalg.norm(error[3:]) < 2e-3
+    assert np.linalg.norm(sd[3:]) < 1e-3
 
 
 def test_one_robot_and_no_recording_are_refused():

@@ -78,6 +78,9 @@ def test_a_common_turn_about_parallel_x_axes_stays_open() -> None:
     named = in_drawing_frames(replace(invented_calibration(3), payloads=(held,)))
     assert len(named.open) == 2
     assert named.open[1].startswith("Parallel flanges do not decide the zeros of theta_x of robots 1, 2, 3 (")
+    # Turned about x with everything else, m c_z moves by m c_y.
+    turned_by = np.hypot(6.0 * ONE_DEG / np.sqrt(3), 1e-3)
+    assert np.sqrt(named.payloads[0].covariance[-7, -7]) == pytest.approx(turned_by, rel=0.02)
     # A second payload, held with one flange turned, decides it.
     more, _ = team_of("b", truth)
     np.testing.assert_allclose(parallel_flanges([held, more], ONE_DEG).zeros, truth, atol=5e-6)
