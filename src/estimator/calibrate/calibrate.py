@@ -11,6 +11,7 @@ from estimator.arm.unit import COUNT, ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration
 from estimator.calibrate.equations.alone import AloneEquations
+from estimator.calibrate.equations.level import corrected
 from estimator.calibrate.equations.rows import Rows
 from estimator.calibrate.equations.sensing import Sensing
 from estimator.calibrate.findings import findings
@@ -18,7 +19,6 @@ from estimator.calibrate.fit import Fit, KnownMass, Trial, fit
 from estimator.calibrate.held_out import held_out
 from estimator.calibrate.outcome.shares import shares
 from estimator.calibrate.prior import Prior
-from estimator.calibrate.start import start_bases
 from estimator.calibrate.undecided import undecided
 from estimator.calibrate.unknowns import Unknowns
 from estimator.errors import InputError
@@ -28,7 +28,8 @@ from estimator.estimate.result import PayloadEstimate
 from estimator.recording.checks import check_duration, check_recording
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Shared
+from estimator.rigid_team.residual import Bases, Shared, robot_data
+from estimator.rigid_team.start import start_bases
 
 
 def calibrate(
@@ -84,7 +85,7 @@ def calibrate(
     rows = [_rows(recording) for recording in recordings]
     payload_of = [labels.index(recording.metadata.payload) for recording in recordings]
     trials = [Trial(r, k, sensing) for r, k in zip(rows, payload_of, strict=True)]
-    bases = [start_bases(r, units, shared[k]) for r, k in zip(rows, payload_of, strict=True)]
+    bases = [_start_bases(r, units, shared[k]) for r, k in zip(rows, payload_of, strict=True)]
     alone = [AloneEquations.of(_rows(recording), sensing) for recording in free]
     start = Unknowns(units, tuple(shared), tuple(bases))
     weights = _weights(known_mass or {}, labels)
@@ -150,6 +151,11 @@ def _start(estimate: PayloadEstimate, members: Sequence[Recording]) -> Shared:
     inertia = estimate.inertia.inertia if estimate.inertia else 0.01 * mass.mass * np.eye(3)
     about_1 = inertia + mass.mass * (c @ c * np.eye(3) - np.outer(c, c))
     return Shared(grasps, np.concatenate([[mass.mass], mass.mass * c, inertia_parameters(about_1)]))
+
+
+def _start_bases(rows: Rows, units: ArmUnit, shared: Shared) -> Bases:
+    data = robot_data(corrected(rows(rows.s), units), units)
+    return start_bases(data.R_bi, data.h, shared)
 
 
 def _rows(recording: Recording) -> Rows:

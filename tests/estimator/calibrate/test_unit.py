@@ -15,7 +15,8 @@ from estimator.arm.delta import forward_kinematics, inverse_kinematics, jacobian
 from estimator.arm.dynamics import arm_torque, wrench_on_payload
 from estimator.arm.gimbal import rotation
 from estimator.arm.unit import AT, ArmUnit
-from estimator.calibrate.equations.level import corrected, level_data
+from estimator.calibrate.equations.level import corrected
+from estimator.rigid_team.residual import robot_data
 from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread
 from mocobot_sim.scene.omnid import deviate, load_omnid, park
 from mujoco_arm import Arm, random_motion
@@ -119,7 +120,7 @@ def test_readings_become_true_signals_in_the_level_frame():
     s = np.concatenate(
         [phi[0] + built.phi_zero_rad, *phi[1:], theta[0] + built.theta_zero_rad, *theta[1:], reading]
     )
-    data = level_data(corrected(s[None, None], unit), unit)
+    data = robot_data(corrected(s[None, None], unit), unit)
     R_ba = Rotation.from_rotvec([*TILT, 0.0]).as_matrix()
     base, grasp = arm.data.site("base"), arm.data.site("grasp")
     assert data.h[0, 0] == pytest.approx(R_ba @ (grasp.xpos - base.xpos), abs=1e-12)

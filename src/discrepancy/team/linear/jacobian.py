@@ -7,7 +7,7 @@ from discrepancy import rules
 from estimator.arm.arms import Arms, arm_of
 from estimator.arrays import Array
 from estimator.estimate.fusion import fuse, fusion_matrix
-from estimator.estimate.principal import inertia_matrix
+from estimator.rigid_team.changes import needed_wrench, vee
 from estimator.rigid_team.residual import Bases, Shared, robot_data
 from estimator.rigid_team.slots import COUNT, STEPS
 from estimator.signals.grasp_data import GraspData
@@ -40,7 +40,7 @@ def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Ar
             dR, dh, dV, dV_dot, dF = (
                 (a - b) / (2.0 * STEPS[k]) for a, b in zip(ends[0], ends[1], strict=True)
             )
-            turn = _vee(dR @ np.swapaxes(data.R_bi[:, i], -1, -2))  # in {b_i}
+            turn = vee(dR @ np.swapaxes(data.R_bi[:, i], -1, -2))  # in {b_i}
             for j in range(1, N):
                 at = 6 * (j - 1)
                 if i == 0:
@@ -51,7 +51,7 @@ def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Ar
                     J[i, :, at + 3 : at + 6, k] = dh @ bases.R[j].T
             d_up = dR[:, 2] @ R_1i.T / N
             d_up -= np.sum(d_up * motion.up, axis=1, keepdims=True) * motion.up
-            needed = needed_wrench(fused, dV @ G.T, dV_dot @ G.T, d_up, shared, data)
+            needed = needed_wrench(fused, dV @ G.T, dV_dot @ G.T, data.gravity_mps2 * d_up, shared.pi)
             d_force, d_moment = dF[:, 3:] @ R_1i.T, dF[:, :3] @ R_1i.T
             d_moment = d_moment + np.cross(p_1i, d_force)
             J[i, :, -6:-3, k], J[i, :, -3:, k] = d_force - needed[0], d_moment - needed[1]
@@ -62,33 +62,6 @@ def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Ar
     return J[:, low] * (1.0 - weight) + J[:, np.minimum(low + 1, Q - 1)] * weight
 
 
-def needed_wrench(
-    motion: Array, twist: Array, twist_dot: Array, up: Array, shared: Shared, data: GraspData
-) -> tuple[Array, Array]:
-    """Force and moment that a change of the payload's motion asks for, in {1}, shape (Q, 3) each.
-
-    Args:
-        motion: its twist, shape (Q, 6).
-        twist, twist_dot, up: changes of its twist, of that one's rate, and of the vertical.
-        shared: its inertia.
-        data: for gravity.
-    """
-    mass, mass_c, inertia = shared.pi[0], shared.pi[1:4], inertia_matrix(shared.pi[4:])
-    omega, v = motion[:, :3], motion[:, 3:]
-    d_omega, d_alpha = twist[:, :3], twist_dot[:, :3]
-    accel = twist_dot[:, 3:] + np.cross(d_omega, v) + np.cross(omega, twist[:, 3:]) + data.gravity_mps2 * up
-    force = mass * accel + np.cross(d_alpha, mass_c)
-    force += np.cross(d_omega, np.cross(omega, mass_c)) + np.cross(omega, np.cross(d_omega, mass_c))
-    moment = np.cross(mass_c, accel) + d_alpha @ inertia
-    return force, moment + np.cross(d_omega, omega @ inertia) + np.cross(omega, d_omega @ inertia)
-
-
 def _thinned(data: GraspData, rows: NDArray[np.intp]) -> GraspData:
     arrays = {f: getattr(data, f)[rows] for f in ("time", "R_bi", "p_bi", "twist", "twist_dot", "wrench")}
     return GraspData(**arrays, rate_hz=data.rate_hz, gravity_mps2=data.gravity_mps2)
-
-
-def _vee(A: Array) -> Array:
-    """Vector of the skew part of matrices, shapes (..., 3, 3) -> (..., 3)."""
-    low, high = A[..., (2, 0, 1), (1, 2, 0)], A[..., (1, 2, 0), (2, 0, 1)]
-    return 0.5 * (low - high)

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 from joblib import Parallel, delayed
-from scipy.spatial.transform import Rotation
 
 from discrepancy import rules
 from discrepancy.least_squares.whitening import Whitening
@@ -14,7 +13,6 @@ from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear, filtered, linearise
-from estimator import so3
 from estimator.arm.arms import Arms
 from estimator.arrays import Array
 from estimator.errors import InputError
@@ -22,6 +20,7 @@ from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from estimator.rigid_team.residual import Bases, Shared, balance, grasp_data, pose_residual, poses
+from estimator.rigid_team.start import start_bases
 
 
 def start_shared(estimate: PayloadEstimate) -> Shared:
@@ -58,7 +57,7 @@ def linearised_trials(
     for recording, reduction in zip(recordings, reductions, strict=True):
         if len(reduction.time) < 4:
             raise InputError(f"{recording.name}: too short to diagnose")
-    bases = [start_bases(s, shared, arms) for s in signals]
+    bases = [start_bases(*poses(s.phi[s.keep], s.theta[s.keep], arms), shared) for s in signals]
     run = Parallel(n_jobs=jobs, prefer="processes" if jobs > 1 else "threads")
     tasks = [(s, b, r, k) for k, (s, b, r) in enumerate(zip(signals, bases, reductions, strict=True))]
     linear, whitening, torque_noise = zip(
@@ -74,20 +73,6 @@ def linearised_trials(
         )
     pairs = zip(linear, torque_noise, strict=True)
     return noise, tuple(with_adjusted_torques(*pair) for pair in pairs), tuple(whitening)
-
-
-def start_bases(signals: Signals, shared: Shared, arms: Arms) -> Bases:
-    """Poses of the bases from the grasps and the mean of what the joints say."""
-    keep = signals.keep
-    R, h = poses(signals.phi[keep], signals.theta[keep], arms)
-    N = R.shape[1]
-    turns, places = [np.eye(3)], [np.zeros(3)]
-    for i in range(1, N):
-        mean = so3.chordal_mean(R[:, 0] @ shared.grasps.R_1i[i] @ np.swapaxes(R[:, i], -1, -2))
-        yaw = np.arctan2(mean[1, 0] - mean[0, 1], mean[0, 0] + mean[1, 1])
-        turns.append(Rotation.from_rotvec([0.0, 0.0, yaw]).as_matrix())
-        places.append(np.mean(h[:, 0] + R[:, 0] @ shared.grasps.p_1i[i] - h[:, i] @ turns[i].T, axis=0))
-    return Bases(np.array(turns), np.array(places))
 
 
 def linearised(

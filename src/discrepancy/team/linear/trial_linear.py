@@ -6,13 +6,14 @@ from functools import cached_property
 
 import numpy as np
 
-from discrepancy.team.linear.jacobian import by_signals, needed_wrench
+from discrepancy.team.linear.jacobian import by_signals
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals, with_rates
 from estimator.arm.arms import Arms, arm_of, design_of
 from estimator.arm.design import OmnidDesign
 from estimator.arrays import Array
 from estimator.estimate.fusion import fusion_matrix
+from estimator.rigid_team.changes import needed_wrench
 from estimator.rigid_team.residual import (
     Bases,
     Shared,
@@ -178,9 +179,7 @@ class TrialLinear:
                 along = self.data.R_bi[:, i, k]  # unit vector k of {b_i}, in {i}
                 none, turned = np.zeros_like(along), -np.cross(omega, along)
                 for column, (v, v_dot) in ((k, (along, turned)), (3 + k, (none, along))):
-                    needed = needed_wrench(
-                        motion, v @ G[:, at].T, v_dot @ G[:, at].T, none, self.shared, self.data
-                    )
+                    needed = needed_wrench(motion, v @ G[:, at].T, v_dot @ G[:, at].T, none, self.shared.pi)
                     out[i, :, :, column] = -np.concatenate(needed, axis=1)
         return out
 

@@ -16,14 +16,14 @@ from numpy.typing import NDArray
 
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.arrays import Array
-from estimator.calibrate.equations.level import corrected, level_data
+from estimator.calibrate.equations.level import corrected
 from estimator.calibrate.equations.loops import pose_derivatives
 from estimator.calibrate.equations.rows import Rows
 from estimator.calibrate.equations.sensing import Sensing
 from estimator.estimate.fusion import fusion_with, total_wrench
 from estimator.estimate.joint import newton_euler_regressor
-from estimator.estimate.principal import inertia_matrix
-from estimator.rigid_team.residual import Bases, Shared, pose_error
+from estimator.rigid_team.changes import needed_wrench, vee
+from estimator.rigid_team.residual import Bases, Shared, pose_error, robot_data
 from estimator.rigid_team.slots import COUNT as SLOTS
 from estimator.rigid_team.slots import PHI, STEPS, TAU, THETA
 from estimator.signals.arm_data import ArmData
@@ -84,7 +84,7 @@ class TrialEquations:
 
     def residual(self, units: ArmUnit, shared: Shared, bases: Bases) -> Array:
         """Rows of the residual, shape (n, C)."""
-        return self.rows(_residual(level_data(corrected(self.rows.s, units), units), units, shared, bases))
+        return self.rows(_residual(robot_data(corrected(self.rows.s, units), units), units, shared, bases))
 
     def at(self, units: ArmUnit, shared: Shared, bases: Bases, adjustment: Array | None = None) -> Rowed:
         """Everything at some unknowns.
@@ -186,7 +186,7 @@ def _derivatives(s: Array, units: ArmUnit, shared: Shared, bases: Bases) -> tupl
     """By signals (n, C, N, ``SLOTS``), units (n, C, N, ``COUNT``), ``Shared.moved`` and ``Bases.moved``."""
     n, N = s.shape[:2]
     C = 6 * N
-    data = level_data(s, units)
+    data = robot_data(s, units)
     G = _fusion(units, shared)
     motion = data.twist.reshape(n, -1) @ G.T
     motion_dot = data.twist_dot.reshape(n, -1) @ G.T
@@ -224,10 +224,10 @@ def _moved(s: Array, unit: ArmUnit, slots: NDArray[np.intp], steps: Array, of_un
     if of_unit:
         x = np.tile(unit.x, (count, 1, 1))
         x[np.arange(count), 0, slots] += steps
-        return level_data(np.broadcast_to(s, (count, *s.shape)), ArmUnit(unit.design, x))
+        return robot_data(np.broadcast_to(s, (count, *s.shape)), ArmUnit(unit.design, x))
     s = np.tile(s, (count, 1, 1))
     s[np.arange(count), :, slots] += steps[:, None]
-    return level_data(s, unit)
+    return robot_data(s, unit)
 
 
 def _chain(
@@ -238,7 +238,7 @@ def _chain(
     grasps, N = shared.grasps, shared.grasps.robots
     K, n = d.h.shape[:2]
     out = np.zeros((K, n, 6 * N))
-    turn = _vee(d.R_bi @ np.swapaxes(base.R_bi, -1, -2))
+    turn = vee(d.R_bi @ np.swapaxes(base.R_bi, -1, -2))
     for j in range(1, N):
         at = 6 * (j - 1)
         if i == 0:
@@ -250,24 +250,11 @@ def _chain(
     own = G[:, 6 * i : 6 * i + 6]
     d_up = d.R_bi[..., 2, :] @ grasps.R_1i[i].T
     d_up = (d_up - np.sum(d_up * up, axis=-1, keepdims=True) * up) / length
-    needed = _needed(motion, d.twist @ own.T, d.twist_dot @ own.T, d_up * units.gravity_mps2, shared.pi)
+    needed = needed_wrench(motion, d.twist @ own.T, d.twist_dot @ own.T, d_up * units.gravity_mps2, shared.pi)
     d_force, d_moment = d.wrench[..., 3:] @ grasps.R_1i[i].T, d.wrench[..., :3] @ grasps.R_1i[i].T
     d_moment = d_moment + np.cross(grasps.p_1i[i], d_force)
-    out[..., -6:] = np.concatenate([d_force, d_moment], axis=-1) - needed
+    out[..., -6:] = np.concatenate([d_force - needed[0], d_moment - needed[1]], axis=-1)
     return out
-
-
-def _needed(motion: Array, twist: Array, twist_dot: Array, gravity: Array, pi: Array) -> Array:
-    """Change of what moves the payload by changes of twist, its rate and gravity's opposite, shape (..., 6)."""
-    mass, mass_c, inertia = pi[0], pi[1:4], inertia_matrix(pi[4:])
-    omega, v = motion[:, :3], motion[:, 3:]
-    d_omega, d_alpha = twist[..., :3], twist_dot[..., :3]
-    accel = twist_dot[..., 3:] + np.cross(d_omega, v) + np.cross(omega, twist[..., 3:]) + gravity
-    force = mass * accel + np.cross(d_alpha, mass_c)
-    force += np.cross(d_omega, np.cross(omega, mass_c)) + np.cross(omega, np.cross(d_omega, mass_c))
-    moment = np.cross(mass_c, accel) + d_alpha @ inertia
-    moment += np.cross(d_omega, omega @ inertia) + np.cross(omega, d_omega @ inertia)
-    return np.concatenate([force, moment], axis=-1)
 
 
 def _by_carried(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
@@ -282,9 +269,3 @@ def _by_carried(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
         ends = [_balance(data, units, shared.moved(sign * dx)) for sign in (1.0, -1.0)]
         out[:, -6:, k] = (ends[0] - ends[1]) / (2.0 * step)
     return out
-
-
-def _vee(A: Array) -> Array:
-    """Vector of the skew part of matrices, shapes (..., 3, 3) -> (..., 3)."""
-    low, high = A[..., (2, 0, 1), (1, 2, 0)], A[..., (1, 2, 0), (2, 0, 1)]
-    return 0.5 * (low - high)

@@ -1,21 +1,21 @@
-"""Where a calibration starts: robots as designed, the payload as the staged estimate has it, bases from the joints."""
-
-from __future__ import annotations
+"""Where bases stand, from the grasps and the mean of what the joints say."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from estimator import so3
-from estimator.arm.unit import ArmUnit
-from estimator.calibrate.equations.rows import Rows
-from estimator.calibrate.equations.trial import corrected, level_data
+from estimator.arrays import Array
 from estimator.rigid_team.residual import Bases, Shared
 
 
-def start_bases(rows: Rows, units: ArmUnit, shared: Shared) -> Bases:
-    """Bases of one trial, in which all robots agree on average about where the payload is."""
-    data = level_data(corrected(rows(rows.s), units), units)
-    R, h = data.R_bi, data.h
+def start_bases(R: Array, h: Array, shared: Shared) -> Bases:
+    """Bases of one trial, in which all robots agree on average about where the payload is.
+
+    Args:
+        R: orientations R_bi, shape (Q, N, 3, 3).
+        h: wrist positions in {b} [m], shape (Q, N, 3).
+        shared: how the payload is held.
+    """
     turns, places = [np.eye(3)], [np.zeros(3)]
     for i in range(1, h.shape[1]):
         mean = so3.chordal_mean(R[:, 0] @ shared.grasps.R_1i[i] @ np.swapaxes(R[:, i], -1, -2))
