@@ -35,11 +35,11 @@ from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate import rules
 from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.equations import TrialEquations
+from estimator.calibrate.equations.rows import Rows
+from estimator.calibrate.equations.sensing import Sensing
+from estimator.calibrate.equations.trial import TrialEquations
 from estimator.calibrate.fit import Quadratic
 from estimator.calibrate.prior import Prior
-from estimator.calibrate.rows import Rows
-from estimator.calibrate.sensing import Sensing
 from estimator.calibrate.start import start_bases
 from estimator.calibrate.unknowns import Layout
 from estimator.estimate.grasp_estimate import GraspEstimate

@@ -9,15 +9,15 @@ import numpy as np
 
 from estimator.arm.unit import COUNT, ArmUnit
 from estimator.arrays import Array
-from estimator.calibrate.alone import AloneEquations
 from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, Calibration
+from estimator.calibrate.equations.alone import AloneEquations
+from estimator.calibrate.equations.rows import Rows
+from estimator.calibrate.equations.sensing import Sensing
 from estimator.calibrate.findings import findings
 from estimator.calibrate.fit import Fit, KnownMass, Trial, fit
 from estimator.calibrate.held_out import held_out
 from estimator.calibrate.outcome.shares import shares
 from estimator.calibrate.prior import Prior
-from estimator.calibrate.rows import Rows
-from estimator.calibrate.sensing import Sensing
 from estimator.calibrate.start import start_bases
 from estimator.calibrate.undecided import undecided
 from estimator.calibrate.unknowns import Unknowns

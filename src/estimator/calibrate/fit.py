@@ -12,12 +12,12 @@ from scipy.linalg import block_diag, cho_factor, cho_solve
 from estimator.arm.unit import AT, COUNT
 from estimator.arrays import Array
 from estimator.calibrate import rules
-from estimator.calibrate.alone import AloneEquations
 from estimator.calibrate.calibration import Calibration
-from estimator.calibrate.equations import TrialEquations
+from estimator.calibrate.equations.alone import AloneEquations
+from estimator.calibrate.equations.rows import Rows
+from estimator.calibrate.equations.sensing import Sensing
+from estimator.calibrate.equations.trial import TrialEquations
 from estimator.calibrate.prior import Prior
-from estimator.calibrate.rows import Rows
-from estimator.calibrate.sensing import Sensing
 from estimator.calibrate.unknowns import Layout, Unknowns
 
 

@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from estimator import so3
 from estimator.arm.unit import ArmUnit
-from estimator.calibrate.equations import corrected, level_data
-from estimator.calibrate.rows import Rows
+from estimator.calibrate.equations.rows import Rows
+from estimator.calibrate.equations.trial import corrected, level_data
 from estimator.rigid_team.residual import Bases, Shared
 
 

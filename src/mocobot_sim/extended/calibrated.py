@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.outcome.carried import Carried, carried
@@ -15,7 +14,7 @@ from estimator.errors import InputError
 from mocobot_sim.effects.base_tilt import BaseTilt
 from mocobot_sim.effects.catalogue import apply_effects
 from mocobot_sim.extended.extended import write_extended
-from mocobot_sim.scene.as_built import AsBuilt
+from mocobot_sim.scene.as_built import units_as_built
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.payload_mjcf import nearest_inertia, payload_mjcf
 from mocobot_sim.scene.scene import TeamScene, build_team
@@ -24,28 +23,6 @@ NOISE = 4.0
 """Standard errors by which a principal moment may be moved to be that of a body."""
 LEAST_MOMENT_RATIO = 1e-3
 """Of a principal moment to the largest."""
-
-
-def as_built(units: ArmUnit) -> tuple[AsBuilt, ...]:
-    """Robots side by side, ``x`` of shape (N, ``COUNT``), as the simulator has them; tilt is an effect there.
-
-    A radius counts as the base's: the platform's cannot be told from it.
-    """
-    return tuple(
-        AsBuilt(
-            base_radius_m=unit.of("radius"),
-            proximal_length_m=unit.of("proximal_length"),
-            rod_length_m=unit.of("rod_length"),
-            stiffness_ratio=unit.of("stiffness_ratio"),
-            phi_zero_rad=unit.of("phi_zero"),
-            theta_zero_rad=unit.of("theta_zero"),
-            tau_zero_Nm=unit.of("tau_zero"),
-            proximal_mass_ratio=unit.of("proximal_mass_ratio"),
-            rod_mass_ratio=unit.of("rod_mass_ratio"),
-            wrist_mass_ratio=float(unit.of("wrist_mass_ratio")[0]),
-        )
-        for unit in (ArmUnit(units.design, x) for x in units.x)
-    )
 
 
 def calibrated_team(
@@ -79,7 +56,7 @@ def calibrated_team(
         p[tilt.robot - 1] -= trial.bases.R[tilt.robot - 1] @ tilt.base_shift()
     scene = build_team(
         payload_mjcf(found.mass_kg, found.p_1c, _of_a_body(found), X_1i),
-        as_built(calibration.units),
+        units_as_built(calibration.units),
         mounts=RigidTransform.from_components(
             p - [0.0, 0.0, float(np.min(p[:, 2]))], Rotation.from_matrix(trial.bases.R)
         ),

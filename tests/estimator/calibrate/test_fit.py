@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.calibrate.calibrate import calibrate
 from estimator.calibrate.calibration import CalibratedPayload
+from estimator.calibrate.equations.rows import Rows
+from estimator.calibrate.equations.sensing import Sensing
 from estimator.calibrate.fit import Trial, fit
 from estimator.calibrate.prior import Prior
-from estimator.calibrate.rows import Rows
-from estimator.calibrate.sensing import Sensing
 from estimator.calibrate.unknowns import Unknowns
 from estimator.errors import InputError
 from mocobot_sim.scene.as_built import CalibrationSpread

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from estimator.arm.unit import COUNT, ArmUnit
+from estimator.calibrate.equations.rows import Rows
+from estimator.calibrate.equations.sensing import Sensing
 from estimator.calibrate.fit import Trial, fit
 from estimator.calibrate.held_out import held_out
 from estimator.calibrate.prior import Prior
-from estimator.calibrate.rows import Rows
-from estimator.calibrate.sensing import Sensing
 from estimator.calibrate.unknowns import Unknowns
 from omnid_design import DESIGN
 from synthetic_team import carry, draw_path, draw_units, load, with_noise

@@ -15,7 +15,7 @@ from estimator.arm.delta import forward_kinematics, inverse_kinematics, jacobian
 from estimator.arm.dynamics import arm_torque, wrench_on_payload
 from estimator.arm.gimbal import rotation
 from estimator.arm.unit import AT, ArmUnit
-from estimator.calibrate.level import corrected, level_data
+from estimator.calibrate.equations.level import corrected, level_data
 from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread
 from mocobot_sim.scene.omnid import deviate, load_omnid, park
 from mujoco_arm import Arm, random_motion

@@ -198,12 +198,12 @@ def test_no_metadata(path, table):
     ("changes", "message"),
     [
         ({"format": "other"}, "format is 'other'; it must be 'mocobot-recording'"),
-        ({"version": 5}, "version is 5; this program reads versions 1, 2, 3 and 4"),
-        ({"version": "1"}, "version is '1'; this program reads versions 1, 2, 3 and 4"),
-        ({"version": True}, "version is True; this program reads versions 1, 2, 3 and 4"),
+        ({"version": 6}, "version is 6; this program reads versions 1, 2, 3, 4 and 5"),
+        ({"version": "1"}, "version is '1'; this program reads versions 1, 2, 3, 4 and 5"),
+        ({"version": True}, "version is True; this program reads versions 1, 2, 3, 4 and 5"),
         (
-            {"version": 5, "robots": ..., "units": 1},
-            "version is 5; this program reads versions 1, 2, 3 and 4",
+            {"version": 6, "robots": ..., "units": 1},
+            "version is 6; this program reads versions 1, 2, 3, 4 and 5",
         ),
         ({"version": 3}, "missing key 'level'; required are format, version"),
         ({"version": 3, "level": "joint"}, "missing key 'sampling'; required are format, version"),

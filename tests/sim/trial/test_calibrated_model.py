@@ -19,8 +19,9 @@ from estimator.rigid_team.residual import Bases
 from invented_calibration import invented_calibration
 from mocobot.api.simulation import SimulatedRecording
 from mocobot_sim.effects.base_tilt import BaseTilt
-from mocobot_sim.extended.calibrated import as_built, calibrated_team, write_calibrated
+from mocobot_sim.extended.calibrated import calibrated_team, write_calibrated
 from mocobot_sim.extended.extended import extra_of, load_extended
+from mocobot_sim.scene.as_built import units_as_built
 from mocobot_sim.scene.models import base_height_m, omnid_design
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.resimulate import predicted, resimulate
@@ -103,7 +104,7 @@ def test_it_reads_like_the_team_that_was_calibrated(recording: SimulatedRecordin
 
 def test_units_are_those_of_the_calibration() -> None:
     units = invented_calibration(2).units
-    for unit, x in zip(as_built(units), units.x, strict=True):
+    for unit, x in zip(units_as_built(units), units.x, strict=True):
         one = ArmUnit(units.design, x)
         np.testing.assert_array_equal(unit.base_radius_m - unit.platform_radius_m, one.of("radius"))
         np.testing.assert_array_equal(unit.stiffness_ratio, one.of("stiffness_ratio"))

@@ -10,7 +10,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from estimator.arrays import Array
 from estimator.calibrate import rules
-from estimator.calibrate.rows import Rows
+from estimator.calibrate.equations.rows import Rows
 from estimator.quantisation import rounding_step
 from estimator.recording.model import Recording
 

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.arrays import Array
-from estimator.calibrate.level import corrected, level_data
-from estimator.calibrate.loops import pose_derivatives
-from estimator.calibrate.rows import Rows
-from estimator.calibrate.sensing import Sensing
+from estimator.calibrate.equations.level import corrected, level_data
+from estimator.calibrate.equations.loops import pose_derivatives
+from estimator.calibrate.equations.rows import Rows
+from estimator.calibrate.equations.sensing import Sensing
 from estimator.estimate.fusion import fusion_with, total_wrench
 from estimator.estimate.joint import newton_euler_regressor
 from estimator.estimate.principal import inertia_matrix

@@ -8,8 +8,8 @@ from estimator.arm.delta import jacobian_of, leg_geometry, length_jacobians
 from estimator.arm.gimbal import rate_matrix, rotation
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.arrays import Array
-from estimator.calibrate.level import corrected
-from estimator.calibrate.rows import Rows
+from estimator.calibrate.equations.level import corrected
+from estimator.calibrate.equations.rows import Rows
 from estimator.rigid_team.residual import Bases, Shared
 from estimator.rigid_team.slots import PHI, THETA
 

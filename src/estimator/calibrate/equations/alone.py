@@ -9,9 +9,9 @@ import numpy as np
 from estimator.arm.dynamics import arm_torque
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.arrays import Array
-from estimator.calibrate.level import corrected
-from estimator.calibrate.rows import Rows
-from estimator.calibrate.sensing import Sensing
+from estimator.calibrate.equations.level import corrected
+from estimator.calibrate.equations.rows import Rows
+from estimator.calibrate.equations.sensing import Sensing
 from estimator.rigid_team.slots import PHI, PHI_DDOT, PHI_DOT, STEPS, TAU
 
 _SIGNALS = np.r_[PHI, PHI_DOT, PHI_DDOT]
