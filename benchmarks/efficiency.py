@@ -35,18 +35,19 @@ from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate import rules
 from estimator.calibrate.calibrate import calibrate
+from estimator.calibrate.equations.level import corrected
 from estimator.calibrate.equations.rows import Rows
 from estimator.calibrate.equations.sensing import Sensing
 from estimator.calibrate.equations.trial import TrialEquations
 from estimator.calibrate.fit import Quadratic
 from estimator.calibrate.prior import Prior
-from estimator.calibrate.start import start_bases
 from estimator.calibrate.unknowns import Layout
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.payload import estimate_payload
 from estimator.filtering import differentiate, low_pass
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Shared
+from estimator.rigid_team.residual import Shared, robot_data
+from estimator.rigid_team.start import start_bases
 from mocobot_sim.trial.sensors import PRESETS, measure
 from mocobot_sim.trial.simulate import TrialRequest, simulate
 from mocobot_sim.trial.trial_log import TrialLog
@@ -167,7 +168,8 @@ def _bound(quiet: Sequence[Recording], truth: Truth, sigma: Array, prior: Prior)
     H = np.zeros((layout.size, layout.size))
     for k, recording in enumerate(quiet):
         samples = Rows.of(recording)
-        bases = start_bases(samples, units, shared)
+        data = robot_data(corrected(samples(samples.s), units), units)
+        bases = start_bases(data.R_bi, data.h, shared)
         index = np.r_[layout.of_units, layout.of_payload(0), layout.of_trial(k)]
         for rows in _instants(recording, 500):
             still = np.zeros((N, 9))

@@ -13,11 +13,12 @@ from discrepancy.team.checks import check_recordings
 from discrepancy.team.closed_loop import posture, team_of
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.start import start_bases
 from discrepancy.team.linear.trial_linear import TrialLinear, linearise
 from estimator.arm.unit import AT, ArmUnit
 from estimator.errors import InputError
 from estimator.recording.model import Recording
+from estimator.rigid_team.residual import poses
+from estimator.rigid_team.start import start_bases
 from team_case import true_shared
 from uncalibrated_team import knowing, uncalibrated
 
@@ -26,7 +27,12 @@ def linear(recording: Recording) -> TrialLinear:
     signals, shared = Signals.of(recording), true_shared()
     arms = recording.metadata.arms
     return linearise(
-        signals, shared, start_bases(signals, shared, arms), arms, Reduction.of(signals), full=True
+        signals,
+        shared,
+        start_bases(*poses(signals.phi, signals.theta, arms), shared),
+        arms,
+        Reduction.of(signals),
+        full=True,
     )
 
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from discrepancy.team.linear.signals import with_rates
-from discrepancy.team.linear.start import start_bases
-from estimator.rigid_team.residual import balance, grasp_data, pose_error, pose_residual
+from estimator.rigid_team.residual import balance, grasp_data, pose_error, pose_residual, poses
+from estimator.rigid_team.start import start_bases
 from recorded_team import GRASPS
 from team_case import DESIGN, exact, residual_of, true_bases, true_shared
 
@@ -36,7 +36,7 @@ def test_residual_of_an_ideal_team_is_zero(linear):
 
 
 def test_bases_are_found_from_grasps_and_joints(case):
-    found = start_bases(case.signals, case.shared, DESIGN)
+    found = start_bases(*poses(case.signals.phi, case.signals.theta, DESIGN), case.shared)
     np.testing.assert_allclose(found.R, case.bases.R, atol=1e-8)
     np.testing.assert_allclose(found.p, case.bases.p, atol=1e-8)
 
