@@ -155,6 +155,8 @@ def test_estimate_carries_it_and_is_the_same_bytes_again(
     values = json.loads(out[0].read_text())
     assert list(values["provenance"]) == KEYS
     assert values["provenance"]["command"] == "estimate"
-    assert values["provenance"]["options"] == {"map": None, "method": "auto", "cutoff_hz": 4.0}
+    assert values["provenance"]["options"] == {
+        "map": None, "method": "auto", "cutoff_hz": 4.0, "calibration": None, "self_calibrate": False,
+    }  # fmt: skip
     assert [entry["path"] for entry in values["provenance"]["files"]] == [str(biased_trials[0])]
     read_estimate(out[0])  # as replay reads it

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from estimator.arm.unit import AT, COUNT
 from estimator.arrays import Array
 from estimator.calibrate import rules
-from estimator.calibrate.fit import Fit, Quadratic
+from estimator.calibrate.fit import Fit
+from estimator.calibrate.quadratic import Quadratic
 
 _SENSORS = (
     ("phi_zero", "the encoder of phi{entry}", "slipped by {size:.2g} deg", np.rad2deg(1.0)),

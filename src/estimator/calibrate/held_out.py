@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from estimator.calibrate.fit import Fit, solved
+from estimator.calibrate.fit import Fit
+from estimator.calibrate.quadratic import solved
 
 
 def held_out(fit: Fit) -> list[tuple[float, float] | None]:

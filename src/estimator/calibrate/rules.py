@@ -36,6 +36,8 @@ ANGLE_FLOOR_RAD, TORQUE_FLOOR_NM = 2e-6, 3e-4
 """What the model itself leaves at 100 Hz beside any sensor. Measured: rods and welds that give, integration."""
 FLOOR_HZ = 100.0
 """Rate that the floors above are given for. Chosen."""
+CURVATURE_EVERY = 3
+"""Instants between those at which derivatives are taken where they are averaged. Chosen: eleven a second."""
 BLOCK_ROWS = 512
 """Rows whose derivatives are held at a time. Chosen; the result does not depend on it."""
 COARSE_ROWS = 250

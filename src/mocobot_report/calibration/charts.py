@@ -58,7 +58,7 @@ def deviation_chart(book: Book, calibration: Calibration) -> Node:
         traces.append(dots(x, y, key, text, size=7, error_x={"array": bars, "thickness": 1.3, "width": 3}))
     shown = figure(
         traces,
-        xaxis=axis("deviation in prior standard deviations", range=[-1.08 * most, 1.08 * most], zerolinewidth=1.5),
+        xaxis=axis("deviation over prior sd", range=[-1.08 * most, 1.08 * most], zerolinewidth=1.5),
         yaxis=row_axis(kind_names([group.name for group in groups]), 30), margin_l=178,
     )  # fmt: skip
     for rule in (-1.0, 1.0):

@@ -82,7 +82,7 @@ def summary_chart(book: Book, table: PaperTable) -> Node:
         traces.append(dots([*map(_drawn, values)], range(len(rows)), key, text, size=11))
         seen += map(_drawn, values)
     shown = figure(
-        traces, xaxis=log_axis("largest error over the payloads", seen),
+        traces, xaxis=log_axis("largest error", seen),
         yaxis=row_axis(names, 40), margin_l=245 if wide else 150,
     )  # fmt: skip
     return chart(

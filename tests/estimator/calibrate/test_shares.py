@@ -7,8 +7,9 @@ from typing import Any, cast
 import numpy as np
 
 from estimator.arm.unit import AT, COUNT
-from estimator.calibrate.fit import Fit, Quadratic, TrialFit
+from estimator.calibrate.fit import Fit, TrialFit
 from estimator.calibrate.outcome.shares import GRASPS, INERTIAL, shares
+from estimator.calibrate.quadratic import Quadratic
 from estimator.calibrate.unknowns import Layout
 
 

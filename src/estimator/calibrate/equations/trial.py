@@ -13,11 +13,14 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.arrays import Array
+from estimator.calibrate import rules
 from estimator.calibrate.equations.level import corrected
 from estimator.calibrate.equations.loops import pose_derivatives
+from estimator.calibrate.equations.noise import adjustment_of, covariance_of, noise_of
 from estimator.calibrate.equations.rows import Rows
 from estimator.calibrate.equations.sensing import Sensing
 from estimator.estimate.fusion import fusion_with, total_wrench
@@ -57,6 +60,18 @@ class Rowed(NamedTuple):
     adjustment: Array
 
 
+class Curvature(NamedTuple):
+    """Corrections of the balance's derivatives for motion within a row, as ``Rowed`` has them.
+
+    Attributes:
+        by_units: shape (n, 6, N, ``COUNT``).
+        by_carried: shape (n, 6, 6 (N - 1) + 10).
+    """
+
+    by_units: Array
+    by_carried: Array
+
+
 @dataclass(frozen=True, eq=False)
 class TrialEquations:
     """One trial's rows for any values of the unknowns.
@@ -86,12 +101,43 @@ class TrialEquations:
         """Rows of the residual, shape (n, C)."""
         return self.rows(_residual(robot_data(corrected(self.rows.s, units), units), units, shared, bases))
 
-    def at(self, units: ArmUnit, shared: Shared, bases: Bases, adjustment: Array | None = None) -> Rowed:
+    def curvature(self, units: ArmUnit, shared: Shared, bases: Bases) -> Curvature:
+        """What the balance's derivatives, averaged over each row, have beyond those at its mean signals."""
+        coarse = _derivatives(corrected(self.mean, units), units, shared, bases)
+        every = rules.CURVATURE_EVERY
+        fine = _derivatives(corrected(self.rows.s[::every], units), units, shared, bases)
+        # Each instant stands for those around it.
+        near = np.minimum((np.arange(len(self.rows.s)) + every // 2) // every, len(self.rows.s[::every]) - 1)
+        gather = csr_array(
+            (np.ones(len(near)), (np.arange(len(near)), near)), shape=(len(near), len(self.rows.s[::every]))
+        )
+        operator = csr_array(self.rows.operator @ gather)
+        parts = []
+        for mean, samples in zip(coarse[1:3], fine[1:3], strict=True):
+            balance = samples[:, -6:]
+            averaged = np.asarray(operator @ balance.reshape(len(balance), -1)).reshape(
+                -1, *balance.shape[1:]
+            )
+            parts.append(averaged - mean[:, -6:])
+        # At rest there is no curvature, but noise of rates.
+        for part in parts:
+            part[self.rows.moving :] = 0.0
+        return Curvature(*parts)
+
+    def at(
+        self,
+        units: ArmUnit,
+        shared: Shared,
+        bases: Bases,
+        adjustment: Array | None = None,
+        curvature: Curvature | None = None,
+    ) -> Rowed:
         """Everything at some unknowns.
 
         Args:
             units, shared, bases: the unknowns.
             adjustment: of the signals, as found at unknowns near these; None for none yet.
+            curvature: of the balance's derivatives, as found at unknowns near these; None to leave it out.
         """
         s = corrected(self.mean, units)
         if adjustment is not None:
@@ -103,8 +149,11 @@ class TrialEquations:
         poses = pose_derivatives(self.rows, units, shared, bases)
         loops = slice(0, residual.shape[1] - 6)
         by_units[:, loops], by_carried[:, loops], by_bases[:, loops] = poses
-        noise = self._noise(self.variances)
-        covariance = _covariance(by_signals, noise)
+        if curvature is not None:
+            by_units[:, -6:] += curvature.by_units
+            by_carried[:, -6:] += curvature.by_carried
+        noise = noise_of(self.rows, self.variances)
+        covariance = covariance_of(by_signals, noise)
         again = self.rows.repeats > 1.0
         return Rowed(
             residual,
@@ -112,47 +161,9 @@ class TrialEquations:
             by_carried,
             by_bases,
             covariance,
-            _covariance(by_signals, self._noise(self.shown)) if again else covariance,
-            _adjustment(by_signals, noise, covariance, residual),
+            covariance_of(by_signals, noise_of(self.rows, self.shown)) if again else covariance,
+            adjustment_of(by_signals, noise, covariance, residual),
         )
-
-    def _noise(self, variances: tuple[Array, Array]) -> Array:
-        """Covariance of every joint's (value, rate, acceleration) and of every torque in the rows: (n, N, 7, 3, 3)."""
-        moving, held = variances
-        n, N = moving.shape[:2]
-        out = np.zeros((n, N, 7, 3, 3))
-        at = slice(0, self.rows.moving)
-        out[at, :, :6] = moving[at, :, :6, None, None] * self.rows.gain
-        out[at, :, 6, range(3), range(3)] = moving[at, :, 6:] * self.rows.gain[0, 0]
-        at = slice(self.rows.moving, None)
-        out[at, :, :6, 0, 0] = held[at, :, :6]
-        out[at, :, 6, range(3), range(3)] = held[at, :, 6:]
-        return out
-
-
-# Value, rate and acceleration of each joint; the three torques.
-_CHAINS = [np.array([first + k + 3 * order for order in range(3)]) for first in (0, 9) for k in range(3)] + [
-    np.arange(18, 21)
-]
-
-
-def _covariance(J: Array, noise: Array) -> Array:
-    total = np.zeros((len(J), J.shape[1], J.shape[1]))
-    for robot in range(J.shape[2]):
-        for joint, at in enumerate(_CHAINS):
-            part = J[:, :, robot, at]
-            total += part @ noise[:, robot, joint] @ np.swapaxes(part, 1, 2)
-    return total
-
-
-def _adjustment(J: Array, noise: Array, covariance: Array, residual: Array) -> Array:
-    weighed = np.linalg.solve(covariance, residual[..., None])
-    out = np.zeros((len(J), J.shape[2], SLOTS))
-    for robot in range(J.shape[2]):
-        for joint, at in enumerate(_CHAINS):
-            moved = noise[:, robot, joint] @ (np.swapaxes(J[:, :, robot, at], 1, 2) @ weighed)
-            out[:, robot, at] -= moved[..., 0]
-    return out
 
 
 def _residual(data: ArmData, units: ArmUnit, shared: Shared, bases: Bases) -> Array:

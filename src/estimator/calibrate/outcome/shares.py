@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from estimator.arm.unit import AT, GROUPS
 from estimator.arrays import Array
-from estimator.calibrate.fit import Fit, Quadratic
+from estimator.calibrate.fit import Fit
+from estimator.calibrate.quadratic import Quadratic
 
 GRASPS, INERTIAL = "grasps", "inertial_parameters"
 
