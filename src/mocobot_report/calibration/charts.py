@@ -86,7 +86,7 @@ def certainty_chart(book: Book, calibration: Calibration) -> Node:
         seen += x
         traces.append(dots(x, y, key, text, size=7))
     shown = figure(
-        traces, xaxis=log_axis("standard error over prior standard deviation", seen),
+        traces, xaxis=log_axis("standard error over prior sd", seen),
         yaxis=row_axis(kind_names([group.name for group in groups]), 30), margin_l=178,
     )  # fmt: skip
     shown.add_vline(1.0)
