@@ -44,40 +44,46 @@ def findings(fit: Fit, names: Sequence[str]) -> list[str]:
         fit: the calibration.
         names: of the recordings with a payload.
     """
-    out = []
     if not fit.converged:
-        out.append(
-            f"The calibration did not settle within {rules.MAX_STEPS} steps: its numbers are not to be used."
-        )
+        listed = ", ".join(names)
+        return [
+            f"The calibration did not settle within {rules.MAX_STEPS} steps, so its numbers are not to be used: "
+            f"{listed} contradict each other, or leave too much open. Are all of them of the same robots, and of the "
+            "payloads that they name? Leave out one at a time."
+        ]
     odd = [
         k
         for k, trial in enumerate(fit.trials)
         if _ratio(trial.loops) > rules.MISFIT or _ratio(trial.balance) > rules.MISFIT
     ]
     if not odd:
-        return out
+        return []
     worst = max(odd, key=lambda k: fit.trials[k].all.c)
     changes = sorted(_changes(fit, names), key=lambda change: _worth(fit, change), reverse=True)
-    total, count = sum(trial.all.c for trial in fit.trials), sum(trial.all.count for trial in fit.trials)
-    if changes and _worth(fit, changes[0]) > 0 and (total - changes[0].drop) / count < rules.MISFIT:
+    if changes and _worth(fit, changes[0]) > 0 and _suffices(fit, changes[0]):
         best = changes[0]
         rest = "the other recordings" if len(names) > 2 else "the other recording"
-        out.append(f"{names[best.trial]} contradicts {rest}: {best.what}. Leave it out, or record it again.")
-        return out
+        return [f"{names[best.trial]} contradicts {rest}: {best.what}. Leave it out, or record it again."]
     parts = []
     for k in odd:
         loops, balance = _ratio(fit.trials[k].loops), _ratio(fit.trials[k].balance)
         parts.append(f"{names[k]} ({loops:.3g} in its loops, {balance:.3g} in its balance)")
-    out.append(
+    return [
         f"No calibration explains {'; '.join(parts)}: chi2/n is 1 where robots, payload and noise are all there is, "
         f"and {rules.MISFIT} at most. Something else acts on these robots, most in {names[worst]}; the numbers are not "
         "to be trusted before mocobot diagnose has named it."
-    )
-    return out
+    ]
 
 
 def _ratio(part: Quadratic) -> float:
     return part.c / max(1, part.count)
+
+
+def _suffices(fit: Fit, change: Change) -> bool:
+    """Whether nothing would be left, or next to nothing of much: what is large is not quite linear."""
+    total, count = sum(trial.all.c for trial in fit.trials), sum(trial.all.count for trial in fit.trials)
+    left = total - change.drop
+    return left < rules.MISFIT * count or left - count < (1.0 - rules.SUFFICES) * (total - count)
 
 
 def _worth(fit: Fit, change: Change) -> float:
