@@ -80,13 +80,16 @@ def calibrate(
         shared.append(_start(estimate_payload(members, "auto", compare_masses=True, withhold=False), members))
     say("calibration")
     units = ArmUnit(design, np.zeros((N, COUNT))) if robots is None else robots.units
-    sensing = Sensing.of([*recordings, *free])
+    sensing = Sensing.of_each([*recordings, *free])
     labels = list(groups)
     rows = [_rows(recording) for recording in recordings]
     payload_of = [labels.index(recording.metadata.payload) for recording in recordings]
-    trials = [Trial(r, k, sensing) for r, k in zip(rows, payload_of, strict=True)]
+    trials = [Trial(r, k, s) for r, k, s in zip(rows, payload_of, sensing, strict=False)]
     bases = [_start_bases(r, units, shared[k]) for r, k in zip(rows, payload_of, strict=True)]
-    alone = [AloneEquations.of(_rows(recording), sensing) for recording in free]
+    alone = [
+        AloneEquations.of(_rows(recording), its)
+        for recording, its in zip(free, sensing[len(recordings) :], strict=True)
+    ]
     start = Unknowns(units, tuple(shared), tuple(bases))
     weights = _weights(known_mass or {}, labels)
     try:

@@ -23,12 +23,15 @@ STILL_HZ = 2.0
 SETTLING_S, SHORTEST_HOLD_S = 0.4, 1.0
 """Left out at both ends of a hold, and the least that must be left of it. Chosen: twice what ``STILL_HZ`` takes."""
 BESIDE_S = 0.5
-"""Least time between a row in motion and a rest. Chosen: nine tenths of a row's weight lie within it."""
+"""Least time between a row in motion and a rest. Chosen: 98 % of a row's weight lie within it."""
 SHORTEST_PERIOD_S, PERIODS, REPEATED = 1.0, 20, 0.2
 """Period of a motion that repeats, the number of them looked at, and the least share of readings that are the same
-again. Chosen: motion that does not repeat gives less than a hundredth."""
+again. Chosen: random motion has less than a thousandth."""
 NOISE_ABOVE_HZ = 25.0
 """Above it a signal is noise. Measured: commanded motion ends at 5 Hz."""
+PASSED = 0.17
+"""Frequency, over the rate of the samples, up to which a conversion leaves everything. Derived: its low-pass
+filter's passband ends at 0.18."""
 DITHER = 0.35
 """White noise, in steps, from which on rounding errors of neighbouring samples are independent. Derived: their
 correlation is exp(-4 pi^2 0.35^2), below one percent."""
@@ -43,7 +46,7 @@ BLOCK_ROWS = 512
 COARSE_ROWS = 250
 """Rows that the first steps take, evenly from all trials. Chosen: the way to the solution needs no more."""
 MAX_STEPS = 12
-"""Gauss-Newton steps. Measured: teams off by three times the prior needed five."""
+"""Gauss-Newton steps. Chosen: forty teams of the prior's spread needed six at most."""
 COARSE = 0.5
 """Largest step of any unknown, in posterior standard errors, that ends those on few rows. Chosen."""
 CONVERGED = 0.02

@@ -21,18 +21,32 @@ class Sensing:
 
     Attributes:
         step: rounding step, 0 for a continuous channel [rad, N m].
-        sigma: standard deviation of white noise of a reading before rounding [rad, N m].
+        sigma: standard deviation of white noise of a sample before rounding [rad, N m].
+        share: samples over readings, shape (N, 1) or 1: white errors of several readings that went into a sample, or
+            of one that went into several, have this share of their variance, as far as frequencies in a row go.
     """
 
     step: Array
     sigma: Array
+    share: Array | float = 1.0
 
     @classmethod
     def of(cls, recordings: Sequence[Recording]) -> Sensing:
-        """Resolution of the sensors behind some recordings of the same robots."""
+        """Resolution of the sensors behind some recordings of the same robots, read and converted alike."""
         step = np.median([_steps(recording) for recording in recordings], axis=0)
         white = np.sqrt(np.mean([_white(recording) ** 2 for recording in recordings], axis=0))
-        return cls(step, np.sqrt(np.maximum(white**2 - step**2 / 12.0, 0.0)))
+        share = np.mean([_share(recording) for recording in recordings], axis=0)
+        return cls(step, np.sqrt(np.maximum(white**2 - share * step**2 / 12.0, 0.0)), share)
+
+    @classmethod
+    def of_each(cls, recordings: Sequence[Recording]) -> list[Sensing]:
+        """The same for each, from all that were read and converted alike."""
+        rates = [tuple(np.round(_share(recording).ravel(), 3)) for recording in recordings]
+        found = {
+            rate: cls.of([one for one, its in zip(recordings, rates, strict=True) if its == rate])
+            for rate in set(rates)
+        }
+        return [found[rate] for rate in rates]
 
     def variances(self, rows: Rows) -> tuple[Array, Array]:
         """Variance of one sample in motion, and of a row's mean in a hold, shape (n, N, 9) each.
@@ -44,13 +58,13 @@ class Sensing:
         floor = floor**2 * rows.rate_hz / rules.FLOOR_HZ
         rounding, noise = self.step**2 / 12.0, self.sigma**2
         step = np.maximum(self.step, 1e-300)
-        dithered = self.sigma > rules.DITHER * step
-        # Samples that count in a row in motion: those of a white signal.
-        samples = 1.0 / rows.gain[0, 0]
+        dithered = self.sigma > rules.DITHER * step * np.sqrt(self.share)
+        # Readings that count in a row in motion: those of a white signal.
+        samples = 1.0 / rows.gain[0, 0] / self.share
         way = np.concatenate([rows.travel, np.full((*rows.travel.shape[:2], 3), np.inf)], axis=2)
         independent = np.clip(1.0 + way / step, 1.0, samples)
         repeats = np.where(dithered, 1.0, rows.repeats * samples / independent)
-        moving = noise + rounding * repeats + floor
+        moving = noise + rounding * self.share * repeats + floor
         long = np.maximum(rows.length, 1)[:, None, None]
         lasting = np.clip(1.0 + way / step, 1.0, long)
         lasting[..., 6:] = 1.0
@@ -69,11 +83,27 @@ def _steps(recording: Recording) -> Array:
     return np.apply_along_axis(rounding_step, 0, _columns(recording))
 
 
+def _share(recording: Recording) -> Array:
+    """Rate of the samples over that of each robot's readings, shape (N, 1)."""
+    told, rate = recording.metadata.sampling, recording.metadata.rate_hz
+    if told is None:
+        return np.ones((recording.metadata.robots, 1))
+    return np.array([[rate / one.native_hz] for one in told])
+
+
 def _white(recording: Recording) -> Array:
-    """Standard deviation of all that is white in a reading, rounding included, shape (N, 9)."""
-    rate = recording.metadata.rate_hz
-    high = min(rules.NOISE_ABOVE_HZ, 0.4 * rate)
-    band = butter(4, high, btype="high", fs=rate, output="sos")
+    """Standard deviation of all that is white in a sample, rounding included, shape (N, 9).
+
+    As it is told by what lies above all motion; of samples that were converted little is left there, and it is told by
+    the highest frequencies that a conversion lets pass.
+    """
+    told, rate = recording.metadata.sampling, recording.metadata.rate_hz
+    if told is None:
+        edges: tuple[float, ...] = (min(rules.NOISE_ABOVE_HZ, 0.4 * rate),)
+    else:
+        top = min(rules.PASSED * rate, 0.35 * min(one.native_hz for one in told))
+        edges = 0.6 * top, top
+    band = butter(4, edges if told else edges[0], btype="band" if told else "high", fs=rate, output="sos")
     left = sosfiltfilt(band, _columns(recording), axis=0)
     impulse = np.zeros(2 * round(2.0 * rate) + 1)
     impulse[len(impulse) // 2] = 1.0
