@@ -126,6 +126,8 @@ class Rows:
         shared: columns of the unknowns of all trials, shape (n, C, s).
         causes: one array per candidate, what one unit of each parameter adds, shape (n, C, k).
         time: of every row [s], shape (n,).
+        moving: number of leading rows that follow each other at one rate; the rest stand alone. None for all.
+        groups: which channels may have noise of one power, a number from 0 for each; None for all.
     """
 
     name: str
@@ -134,6 +136,8 @@ class Rows:
     shared: Array
     causes: Sequence[Array]
     time: Array
+    moving: int | None = None
+    groups: Sequence[int] | None = None
 
 
 @dataclass(frozen=True)

@@ -270,3 +270,38 @@ PLAY_HZ = 60.0
 """Cut-off of these sides. Chosen."""
 PLAY_STEPS = 3.0
 """Of the encoder, below which a play is rounding, which has a hysteresis of its own. Chosen."""
+
+# Inference: what is learnt from the data, and with what priors.
+
+CELL_BANDS = 6
+"""Octaves of frequency in which the noise has powers of its own, of every group of channels and trial. Chosen."""
+POWER_NUMBERS = 20.0
+"""Numbers that the prior of a power counts for, at 1: whitening is right to 30 % without data. Chosen."""
+SPREAD_NUMBERS = 2.0
+"""Numbers that the tolerance counts for when a kind's spread is learnt. Chosen: two robots' worth."""
+MOST_SPREAD = 1e3
+"""Of a kind over its tolerance. Chosen: an encoder's zero of 6 deg."""
+LEAST_SLAB = 4.0
+"""Size of what counts as a fault over the tolerance, at least. Chosen."""
+LEARN_ROUNDS, LEARN_NATS = 30, 0.05
+"""Steps of powers and spreads at most, and the gain of evidence below which they have settled. Chosen."""
+FLAT_SHARE = 1e-10
+"""Information that shared unknowns have beforehand, over that of the data: none, but what is undecidable stays put."""
+PRIOR_ODDS = 0.05
+"""Of any cause of the catalogue being there, at all its places together. Chosen: one in a team, of twenty causes."""
+SLAB_OCTAVES = 10.0
+"""In which the size of a fault is equally likely. Chosen: from the tolerance to a thousand times that."""
+INTERVALS = 1000.0
+"""At which an event may be. Derived: about so many are searched."""
+LOOKED_AT_NATS = 0.0
+"""Log odds in the scan, from which a candidate is looked at closely. Derived: below, it is likelier not to be there."""
+WORST_EVENTS = 3
+"""Intervals looked at closely. Chosen."""
+NAMED_NATS = 3.0
+"""Log odds from which a cause is named. Derived: a false alarm costs as much as twenty misses, ln 20."""
+EXCHANGES = 4
+"""Rounds in which causes are exchanged and taken away after one was added. Chosen."""
+DIVERGED_NATS = 50.0
+"""Fall of the evidence from which a Gauss-Newton step is not taken. Chosen."""
+SETTLED_SE = 0.05
+"""Standard errors: a value that moves less has settled. Chosen."""

@@ -78,7 +78,7 @@ def responses(
         jobs: parallel processes.
         progress: called with 1 for every simulated trial.
     """
-    trials = range(len(problem.rows))
+    trials = problem.trials
     tasks = []
     for free in hypotheses:
         for t in trials:

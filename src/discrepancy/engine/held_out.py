@@ -24,8 +24,8 @@ def held_out_gains(problem: Problem, free: Sequence[int], index: int) -> list[fl
     transient = problem.candidates[index].transient
     if transient:
         return _interleaved(problem, free, index, transient.trial)
-    trials = range(len(problem.rows))
-    if len(problem.rows) < 2:
+    trials = problem.trials
+    if len(problem.raw) < 2:
         return []
     gains = []
     for t in trials:
@@ -41,7 +41,7 @@ def shares(problem: Problem, causes: Sequence[int]) -> list[tuple[float, float |
     Both are shares of the misfit of the nominal model, in which nothing is off, so they add up to what all causes
     remove together. The room for improvement ends where the causes and every tolerance together leave the data.
     """
-    trials, steps = range(len(problem.rows)), [list(causes[:k]) for k in range(len(causes) + 1)]
+    trials, steps = problem.trials, [list(causes[:k]) for k in range(len(causes) + 1)]
     full = Fit.of(problem, causes)
     floor = sum(full.held_out(t) for t in trials)
     in_sample = _parts([Fit.of(problem, step, background=False).misfit for step in steps], floor)

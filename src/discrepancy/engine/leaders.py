@@ -158,7 +158,7 @@ def with_transient(rig: Rig, fit: Fit) -> Fit:
     """The same fit with the best transient among the problem's candidates; as it is where there is none."""
     best: tuple[float, Problem] | None = None
     problem = fit.problem
-    for candidate in rig.transients([fit.remaining(t) for t in range(len(problem.rows))]):
+    for candidate in rig.transients([fit.remaining(t) for t in problem.trials]):
         if any(c.transient and c.transient == candidate.transient for c in problem.candidates):
             continue
         wider = problem.extended(candidate, rig.columns(candidate))

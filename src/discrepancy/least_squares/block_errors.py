@@ -29,7 +29,8 @@ def block_covariance(fit: Fit, rows_per_block: int) -> Array:
 
 def block_scores(fit: Fit, rows_per_block: int) -> Iterator[Array]:
     """Score of every block: its columns times what the fit leaves in it, one number per column in the fit."""
-    for t, rows in enumerate(fit.problem.rows):
+    for t in fit.problem.trials:
+        rows = fit.problem.rows(t)
         left = fit.remaining(t)
         count = max(1, round(len(rows) / rows_per_block))
         for part in np.array_split(np.arange(len(rows)), count):

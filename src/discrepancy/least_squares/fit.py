@@ -77,7 +77,7 @@ class Fit:
         held: Sequence[int] = (),
     ) -> Fit:
         """The same for the Gram matrix of any of the problem's rows; candidates in ``held`` are not in the model."""
-        prior = np.concatenate([np.zeros(problem.shared), problem.tolerant.astype(float)])
+        prior = np.concatenate([np.zeros(problem.shared), problem.tolerant / problem.spread**2])
         used = np.concatenate([np.ones(problem.shared, dtype=bool), problem.tolerant & background])
         for index in held:
             used[problem.spans[index]] = False
@@ -110,9 +110,11 @@ class Fit:
         return [(candidates[i], self.part(i)[0] * candidates[i].units) for i in self.free]
 
     @property
-    def inflation(self) -> float:
-        """By which the noise's variance looks larger than believed, at least 1; clean data count as believed."""
-        return max(1.0, self.misfit / (rules.CLEAN_CHI2_PER_N * self.problem.samples))
+    def chi2(self) -> float:
+        """Chi-square of all trials with the noise as whitened, and of the tolerances in use."""
+        x = np.append(-self.coefficients, 1.0)
+        left = sum(float(np.einsum("i,kij,j->", x, grams, x)) for grams in self.problem.cell_grams)
+        return left + self.strain[0]
 
     def at(self, index: int) -> NDArray[np.intp]:
         """Where one candidate's parameters are in the solution, shape (k,); it must be in the model."""
@@ -132,8 +134,9 @@ class Fit:
         for index in self.free:
             prior[self.problem.spans[index]] = False
         at = prior[self.used]
-        value = float(np.sum(self.solution[at] ** 2))
-        freedom = float(np.sum(1.0 - np.minimum(np.diag(self.covariance)[at], 1.0)))
+        spread = np.concatenate([np.ones(self.problem.shared), self.problem.spread])[self.used][at]
+        value = float(np.sum((self.solution[at] / spread) ** 2))
+        freedom = float(np.sum(1.0 - np.minimum(np.diag(self.covariance)[at] / spread**2, 1.0)))
         return value, freedom, log10_survival(value, max(freedom, 1e-9))
 
     def held_out(self, trial: int) -> float:
@@ -154,7 +157,8 @@ class Fit:
 
     def remaining(self, trial: int) -> Array:
         """Whitened residual that the solution leaves in one trial, shape (n, C)."""
-        return self.problem.rows[trial] @ np.append(-self.coefficients, 1.0)
+        left = self.problem.raw[trial] @ np.append(-self.coefficients, 1.0)
+        return project(left[..., None], self.problem.explicable[trial])[..., 0]
 
     def evidence(self, inflation: float = 1.0) -> list[Evidence]:
         """Evidence of every candidate that is not free yet, undecidable ones left out.
@@ -167,7 +171,7 @@ class Fit:
 
     def evidence_of(self, index: int, inflation: float = 1.0) -> Evidence | None:
         """Evidence of one candidate; None if it is free already or undecidable."""
-        return None if index in self.free else self._judged(index, self._told(index), inflation)
+        return None if index in self.free else self._judged(index, self.told(index), inflation)
 
     def evidence_with(self, index: int, columns: Sequence[Array], inflation: float = 1.0) -> Evidence | None:
         """Evidence of a candidate that is not in the model, if its columns were others, shape (n, C, k) per trial.
@@ -175,28 +179,29 @@ class Fit:
         The same as that of ``Problem.with_columns``, without changing the problem.
         """
         units = self.problem.candidates[index].units
-        return self._judged(index, self._told_by([new * units for new in columns]), inflation)
+        return self._judged(index, self.told_by([new * units for new in columns]), inflation)
 
     def fall_with(self, columns: Sequence[Array]) -> float:
         """How much chi-square falls with further columns, shape (n, C, k) per trial, whose values are free."""
-        lam, _, z = visible(*self._told_by(columns))
+        lam, _, z = visible(*self.told_by(columns))
         return float(np.sum(z**2 / lam))
 
     def solution_with(self, columns: Sequence[Array]) -> tuple[Array, Array]:
         """Values (k,) and covariance (k, k) of further columns, shape (n, C, k) per trial, beside all in the model."""
-        information, score = self._told_by(columns)
+        information, score = self.told_by(columns)
         covariance = flat_inverse(information)
         return covariance @ score, covariance
 
-    def _told_by(self, columns: Sequence[Array]) -> tuple[Array, Array]:
+    def told_by(self, columns: Sequence[Array]) -> tuple[Array, Array]:
         """Information about the values of further columns given all in the model, and their score vector."""
         k = columns[0].shape[2]
         information, edge = np.zeros((k, k)), np.zeros((self.gram.shape[0], k))
-        for rows, explicable, new in zip(self.problem.rows, self.problem.explicable, columns, strict=True):
+        for t, new in enumerate(columns):
             if new.any():  # a transient is in one trial only
-                own = project(new, explicable)
-                information += gram_of(own, own)
-                edge += gram_of(rows, own)
+                own = self.problem.spectrum(t, new)
+                weighted = own * self.problem.weights[t]
+                information += gram_of(weighted, own)
+                edge += gram_of(self.problem.spectra[t], weighted)
         cross = edge[self.used].T
         return information - cross @ self.covariance @ cross.T, edge[-1] - cross @ self.solution
 
@@ -211,19 +216,20 @@ class Fit:
         """
         out = []
         for index, candidate in enumerate(self.problem.candidates):
-            lam, V, _ = visible(*self._told(index))
+            lam, V, _ = visible(*self.told(index))
             weight = lam / (1.0 + lam) if self.problem.has_tolerance(index) else lam
             power = np.einsum("ik,k,ik->i", V, weight, V)
             size = np.sqrt(gain / np.maximum(power, 1e-300))
             out.append(np.where(power > 0, candidate.units * size, np.inf))
         return out
 
-    def _told(self, index: int) -> tuple[Array, Array]:
+    def told(self, index: int) -> tuple[Array, Array]:
         """Information about a candidate given all else in the model, and its score vector."""
         if self.problem.has_tolerance(index):
             values, covariance = self.part(index)
             inverse = np.linalg.inv(covariance)
-            return inverse - np.eye(len(values)), inverse @ values
+            own = np.diag(self.problem.spread[self.problem.columns_of(index)] ** -2.0)
+            return inverse - own, inverse @ values
         span = self.problem.spans[index]
         cross = self.gram[span][:, self.used]
         information = self.gram[span, span] - cross @ self.covariance @ cross.T

@@ -1,82 +1,138 @@
-"""All trials as one linear problem: Gram matrices, tolerances as priors, evidence of every candidate."""
+"""All trials as one linear problem: Gram matrices by cell of noise, spreads as priors."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.least_squares.cells import Cells
 from discrepancy.least_squares.gram import gram_of, orthonormal, project
 from discrepancy.rig import Candidate, Rows
 from estimator.arrays import Array
+
+Key = tuple[str, int | None, int | None]
 
 
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Rows of all trials, with the trial's own unknowns projected out and without.
 
-    Columns are [shared | every candidate, in units of its tolerance | residual].
+    Columns are [shared | every candidate, in units of its tolerance | residual]. Noise and priors are normal; how
+    strong they are is not known beforehand: the noise has a power per cell, tolerances a factor per kind.
 
     Attributes:
         candidates: the candidates of the columns.
         raw: rows per trial, shape (n, C, columns).
-        rows: the same without what the trial's own unknowns can explain.
+        spectra: the same without what the trial's own unknowns can explain, in the cells' cosine transform.
         local: columns of the trial's own unknowns, shape (n, C, l).
         explicable: orthonormal columns that span the same.
-        grams: Gram matrices of ``rows``, shape (trials, columns, columns).
+        cells: of every trial.
+        cell_grams: Gram matrices of ``spectra`` over every cell of a trial, shape (K, columns, columns) each.
+        power: variance of the noise in every cell of a trial, shape (K,) each; 1 as whitened.
         shared: number of shared unknowns.
         spans: columns of every candidate.
-        tolerant: which candidate columns have a tolerance, shape (all candidate columns,).
+        tolerant: which candidate columns have a tolerance and are no event, shape (all candidate columns,).
+        spread: standard deviation of the candidates' parameters in units, shape (all candidate columns,).
+        opened: number of unknowns of every trial that causes have left open, and what they cost [nats], by cause.
     """
 
     candidates: tuple[Candidate, ...]
     raw: tuple[Array, ...]
-    rows: tuple[Array, ...]
+    spectra: tuple[Array, ...]
     local: tuple[Array, ...]
     explicable: tuple[Array, ...]
-    grams: Array
+    cells: tuple[Cells, ...]
+    cell_grams: tuple[Array, ...]
+    power: tuple[Array, ...]
     shared: int
     spans: tuple[slice, ...]
     tolerant: NDArray[np.bool_]
+    spread: Array
+    opened: Mapping[Key, tuple[tuple[int, ...], float]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, trials: Sequence[Rows], candidates: Sequence[Candidate]) -> Problem:
         """Assemble the problem; columns become unit parameters by the candidates' units."""
         units = [c.units for c in candidates]
-        raw = []
+        raw, cells = [], []
         for trial in trials:
             parts = [trial.shared, *(a * u for a, u in zip(trial.causes, units, strict=True))]
             raw.append(np.concatenate([*parts, trial.residual[..., None]], axis=2))
-        return cls._from(candidates, raw, [trial.local for trial in trials], trials[0].shared.shape[2])
-
-    @classmethod
-    def _from(
-        cls, candidates: Sequence[Candidate], raw: Sequence[Array], local: Sequence[Array], shared: int
-    ) -> Problem:
-        spans, at = [], shared
+            cells.append(Cells.of(*trial.residual.shape, trial.moving, trial.groups))
+        shared, spans, at = trials[0].shared.shape[2], [], trials[0].shared.shape[2]
         for candidate in candidates:
             spans.append(slice(at, at + len(candidate.parameters)))
             at += len(candidate.parameters)
-        tolerant = np.array([p.tolerance > 0 for c in candidates for p in c.parameters], dtype=bool)
+        tolerant = np.array([x for c in candidates for x in _tolerant(c)], dtype=bool)
+        power = tuple(np.ones(len(c.sizes)) for c in cells)
+        spread = np.ones(len(tolerant))
+        own = [trial.local for trial in trials]
+        return cls._from(candidates, raw, own, cells, power, shared, spans, tolerant, spread)
+
+    @classmethod
+    def _from(
+        cls, candidates: Sequence[Candidate], raw: Sequence[Array], local: Sequence[Array], cells: Sequence[Cells],
+        power: tuple[Array, ...], shared: int, spans: Sequence[slice], tolerant: NDArray[np.bool_], spread: Array,
+    ) -> Problem:  # fmt: skip
         explicable = tuple(orthonormal(own) for own in local)
-        rows = [project(x, own) for x, own in zip(raw, explicable, strict=True)]
-        grams = np.array([gram_of(r, r) for r in rows])
+        spectra = tuple(c.spectrum(project(x, own)) for x, own, c in zip(raw, explicable, cells, strict=True))
+        grams = tuple(c.grams(x, x) for x, c in zip(spectra, cells, strict=True))
         return cls(
-            tuple(candidates), tuple(raw), tuple(rows), tuple(local), explicable, grams, shared, tuple(spans),
-            tolerant,
+            tuple(candidates), tuple(raw), spectra, tuple(local), explicable, tuple(cells), grams, power, shared,
+            tuple(spans), tolerant, spread,
         )  # fmt: skip
 
     @property
     def samples(self) -> int:
         """Number of whitened residuals in all trials."""
-        return sum(r.shape[0] * r.shape[1] for r in self.rows)
+        return sum(r.shape[0] * r.shape[1] for r in self.raw)
+
+    @property
+    def trials(self) -> range:
+        """Indices of the trials."""
+        return range(len(self.raw))
+
+    @cached_property
+    def grams(self) -> Array:
+        """Gram matrices of every trial, every cell over its power, shape (trials, columns, columns)."""
+        pairs = zip(self.power, self.cell_grams, strict=True)
+        return np.array([np.tensordot(1.0 / power, grams, 1) for power, grams in pairs])
+
+    @cached_property
+    def weights(self) -> list[Array]:
+        """One over the power of every number, shape (n, C, 1) per trial."""
+        return [(1.0 / p)[c.index][..., None] for p, c in zip(self.power, self.cells, strict=True)]
+
+    @property
+    def as_whitened(self) -> Problem:
+        """With noise of unit power and tolerances as given."""
+        power = tuple(np.ones_like(p) for p in self.power)
+        return replace(self, power=power, spread=np.ones_like(self.spread))
+
+    def with_noise(self, power: Sequence[Array], spread: Array) -> Problem:
+        """With noise of other powers, and other spreads."""
+        return replace(self, power=tuple(power), spread=spread)
+
+    def rows(self, trial: int) -> Array:
+        """Rows without what the trial's own unknowns can explain, in time, shape (n, C, columns)."""
+        return project(self.raw[trial], self.explicable[trial])
+
+    def spectrum(self, trial: int, columns: Array) -> Array:
+        """Further columns, shape (n, C, k), without what the trial's own unknowns can explain, in the transform."""
+        return self.cells[trial].spectrum(project(columns, self.explicable[trial]))
 
     def has_tolerance(self, index: int) -> bool:
         """Whether a candidate has a tolerance; a cause has one for all of its parameters or for none."""
+        return bool(self.tolerant[self.columns_of(index)].all())
+
+    def columns_of(self, index: int) -> slice:
+        """A candidate's columns among those of all candidates."""
         span = self.spans[index]
-        return bool(self.tolerant[span.start - self.shared : span.stop - self.shared].all())
+        return slice(span.start - self.shared, span.stop - self.shared)
 
     def index_of(self, candidate: Candidate) -> int | None:
         """Where a candidate of the same cause and place (and interval) is, or None."""
@@ -97,22 +153,85 @@ class Problem:
         return self._with(self.spans[index].start, [c * candidate.units for c in columns], candidates)
 
     def _with(self, start: int, columns: Sequence[Array], candidates: tuple[Candidate, ...]) -> Problem:
-        raw, rows, grams = [], [], self.grams.copy()
+        raw, spectra, grams = [], [], []
         for t, new in enumerate(columns):
             at = slice(start, start + new.shape[2])
             raw.append(self.raw[t].copy())
-            rows.append(self.rows[t].copy())
-            raw[t][..., at], rows[t][..., at] = new, project(new, self.explicable[t])
-            edge = gram_of(rows[t], rows[t][..., at])
-            grams[t][:, at], grams[t][at] = edge, edge.T
-        return replace(self, candidates=candidates, raw=tuple(raw), rows=tuple(rows), grams=grams)
+            spectra.append(self.spectra[t].copy())
+            grams.append(self.cell_grams[t].copy())
+            raw[t][..., at], spectra[t][..., at] = new, self.spectrum(t, new)
+            edge = self.cells[t].grams(spectra[t], spectra[t][..., at])
+            grams[t][:, :, at], grams[t][:, at] = edge, np.swapaxes(edge, 1, 2)
+        parts: Mapping[str, tuple[Array, ...]] = {
+            "raw": tuple(raw), "spectra": tuple(spectra), "cell_grams": tuple(grams)
+        }  # fmt: skip
+        return replace(self, candidates=candidates, **parts)
 
-    def with_unknowns(self, unknowns: Sequence[Array]) -> Problem:
-        """The problem with further unknowns of every trial, shape (n, C, k) each."""
-        if not any(u.shape[2] for u in unknowns):
+    def with_unknowns(self, key: Key, unknowns: Sequence[Array], size: float) -> Problem:
+        """The problem with what a cause leaves open in every trial.
+
+        It costs what normal unknowns of such a size would: the data that they take up speak for nothing else.
+
+        Args:
+            key: of the cause.
+            unknowns: columns, shape (n, C, k) per trial.
+            size: standard deviation of their values.
+        """
+        if key in self.opened or not any(u.shape[2] for u in unknowns):
             return self
-        local = [np.concatenate([a, b], axis=2) for a, b in zip(self.local, unknowns, strict=True)]
-        return Problem._from(self.candidates, self.raw, local, self.shared)
+        spectra, grams, explicable, price = [], [], [], 0.0
+        for t, new in enumerate(unknowns):
+            own = orthonormal(project(new, self.explicable[t]))
+            if own.shape[2] == 0:
+                spectra.append(self.spectra[t])
+                grams.append(self.cell_grams[t])
+                explicable.append(self.explicable[t])
+                continue
+            size_squared = size**2 * np.linalg.svd(project(new, self.explicable[t]).reshape(own[..., 0].size, -1), compute_uv=False) ** 2
+            price += 0.5 * float(np.sum(np.log1p(size_squared)))
+            cells = self.cells[t]
+            along = cells.spectrum(own)
+            shares = gram_of(along, self.spectra[t])  # the transform is orthonormal
+            spectra.append(self.spectra[t] - along @ shares)
+            edge = cells.grams(along, self.spectra[t])
+            inside = np.einsum("kij,jl->kil", cells.grams(along, along), shares, optimize=True)
+            cross = np.einsum("ji,kjl->kil", shares, edge - 0.5 * inside, optimize=True)
+            grams.append(self.cell_grams[t] - cross - np.swapaxes(cross, 1, 2))
+            explicable.append(np.concatenate([self.explicable[t], own], axis=2))
+        return replace(
+            self,
+            spectra=tuple(spectra),
+            cell_grams=tuple(grams),
+            explicable=tuple(explicable),
+            local=tuple(np.concatenate([a, b], axis=2) for a, b in zip(self.local, unknowns, strict=True)),
+            opened={**self.opened, key: (tuple(u.shape[2] for u in unknowns), price)},
+        )
+
+    def without_unknowns(self, keep: Collection[Key]) -> Problem:
+        """The problem without what causes other than those to keep leave open."""
+        if all(key in keep for key in self.opened):
+            return self
+        starts = [own.shape[2] - sum(counts[t] for counts, _ in self.opened.values()) for t, own in enumerate(self.local)]
+        local = [own[..., :start] for own, start in zip(self.local, starts, strict=True)]
+        opened = {}
+        for key, (counts, price) in self.opened.items():
+            if key in keep:
+                opened[key] = counts, price
+                local = [
+                    np.concatenate([a, own[..., start : start + count]], axis=2)
+                    for a, own, start, count in zip(local, self.local, starts, counts, strict=True)
+                ]
+            starts = [start + count for start, count in zip(starts, counts, strict=True)]
+        again = Problem._from(
+            self.candidates, self.raw, local, self.cells, self.power, self.shared, self.spans, self.tolerant,
+            self.spread,
+        )  # fmt: skip
+        return replace(again, opened=opened)
+
+    @property
+    def price(self) -> float:
+        """What all that causes leave open costs [nats]."""
+        return sum(price for _, price in self.opened.values())
 
     def extended(self, candidate: Candidate, columns: Sequence[Array]) -> Problem:
         """The problem with one candidate more."""
@@ -121,9 +240,17 @@ class Problem:
         wider = replace(
             self,
             raw=tuple(np.insert(x, place, 0.0, axis=2) for x in self.raw),
-            rows=tuple(np.insert(x, place, 0.0, axis=2) for x in self.rows),
-            grams=np.insert(np.insert(self.grams, place, 0.0, axis=1), place, 0.0, axis=2),
+            spectra=tuple(np.insert(x, place, 0.0, axis=2) for x in self.spectra),
+            cell_grams=tuple(
+                np.insert(np.insert(x, place, 0.0, axis=1), place, 0.0, axis=2) for x in self.cell_grams
+            ),
             spans=(*self.spans, slice(start, start + count)),
-            tolerant=np.append(self.tolerant, [p.tolerance > 0 for p in candidate.parameters]).astype(bool),
+            tolerant=np.append(self.tolerant, _tolerant(candidate)).astype(bool),
+            spread=np.append(self.spread, np.ones(count)),
         )
         return wider._with(start, [c * candidate.units for c in columns], (*self.candidates, candidate))
+
+
+def _tolerant(candidate: Candidate) -> list[bool]:
+    """Whether each parameter has a tolerance; an event is there or not."""
+    return [parameter.tolerance > 0 and candidate.transient is None for parameter in candidate.parameters]

@@ -110,6 +110,11 @@ class TeamRig(Rig):
         out += [Channel(f"force {a}", "balance", None, "N") for a in "xyz"]
         return out + [Channel(f"moment {a}", "balance", None, "N m") for a in "xyz"]
 
+    @property
+    def _groups(self) -> list[int]:
+        """Every robot's loop is a group of channels, and so are the forces and the moments, shape (C,)."""
+        return [k // 6 for k in range(6 * (self.robots - 1))] + [self.robots - 1] * 3 + [self.robots] * 3
+
     def candidates(self) -> list[Candidate]:
         """Every cause of the catalogue at every place; transients come from ``transients``."""
         found = every_candidate(self.robots, self.tolerances, self.excluded)
@@ -197,6 +202,8 @@ class TeamRig(Rig):
                 self.whitening[t](linear.by_shared),
                 [self._columns(t, candidate) for candidate in candidates],
                 linear.reduction.time,
+                linear.reduction.moving,
+                self._groups,
             )
             for t, linear in enumerate(self.linear)
         ]

@@ -1,0 +1,142 @@
+"""Which causes could be added to a hypothesis: each at its best shape, the likeliest first."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discrepancy import rules
+from discrepancy.engine.best_shape import nearest_shape
+from discrepancy.engine.hypothesis import Hypothesis
+from discrepancy.engine.scan import Scanned, scan, score_with
+from discrepancy.least_squares.fit import Fit
+from discrepancy.least_squares.problem import Key, Problem
+from discrepancy.rig import Candidate, Rig
+
+
+def proposals(
+    rig: Rig, base: Hypothesis, barred: Collection[Key] = (), leaders: int = rules.LEADERS
+) -> list[Hypothesis]:
+    """Hypotheses with one cause more, the likeliest first; the added one is the last of its ``free``.
+
+    Args:
+        rig: for columns of other shapes.
+        base: what is there already.
+        barred: causes at places that are not to be added.
+        leaders: how many of the scan are looked at closely.
+    """
+    fit = base.fit
+    # One fault among healthy ones looks like a scatter of all, until it is taken out.
+    held = replace(base.problem, spread=np.where(base.problem.tolerant, 1.0, base.problem.spread))
+    found: dict[int | None, Scanned] = {item.index: item for item in scan(fit)}
+    for item in scan(Fit.of(held, base.free)) if np.any(base.problem.spread > 1.0) else ():
+        if item.score > found[item.index].score:
+            found[item.index] = item
+    ranked = [item for item in found.values() if item.candidate.key not in barred]
+    ranked = [_in_best_shape(rig, fit, item) for item in ranked]
+    ranked += _events(rig, fit)
+    ranked.sort(key=lambda item: -item.score)
+    likely = []
+    for item in _chosen(ranked, leaders):
+        new = _sharpened(rig, base, item)
+        if new is not None and new.possible(rig, new.free[-1]):
+            likely.append(new)
+    return sorted(likely, key=lambda new: -new.score)
+
+
+def _chosen(ranked: Sequence[Scanned], leaders: int) -> list[Scanned]:
+    """The likeliest of all, and of every other cause that may be there its likeliest place."""
+    likely = [item for item in ranked if item.score > rules.LOOKED_AT_NATS]
+    chosen, kinds = likely[:leaders], {item.candidate.cause for item in likely[:leaders]}
+    for item in likely[leaders:]:
+        if item.candidate.cause not in kinds:
+            kinds.add(item.candidate.cause)
+            chosen.append(item)
+    return chosen[: 2 * leaders]
+
+
+def _in_best_shape(rig: Rig, fit: Fit, item: Scanned) -> Scanned:
+    """An event without a tolerance in the shape that tells most: in another it may not be seen at all."""
+    if item.index is None or fit.problem.has_tolerance(item.index):
+        return item
+    best = item
+    for shape in rig.refinements(item.candidate):
+        columns = tuple(rig.columns(shape))
+        score = score_with(fit, shape, columns)
+        if score > best.score:
+            best = Scanned(item.index, shape, score, columns)
+    return best
+
+
+def _events(rig: Rig, fit: Fit) -> list[Scanned]:
+    """What acts for a while, at the intervals where what is left is worst."""
+    known = {(c.cause, c.transient) for c in fit.problem.candidates if c.transient}
+    found = []
+    for candidate in rig.transients([fit.remaining(t) for t in fit.problem.trials]):
+        if (candidate.cause, candidate.transient) not in known:
+            columns = tuple(rig.columns(candidate))
+            found.append(Scanned(None, candidate, score_with(fit, candidate, columns), columns))
+    return sorted(found, key=lambda item: -item.score)[: rules.WORST_EVENTS]
+
+
+def _sharpened(rig: Rig, base: Hypothesis, item: Scanned) -> Hypothesis | None:
+    """A candidate beside what is there, in its best shape and with what it leaves open where that pays."""
+    shaped = _best_shape(rig, base, item)
+    problem, index = _with(rig, base.problem, shaped, item)
+    new = Hypothesis.of(problem, [*base.free, index])
+    if shaped.transient:
+        return new
+    unknowns = rig.unknowns(shaped)
+    if any(u.shape[2] for u in unknowns):
+        size = abs(float(new.fit.part(index)[0][0] * shaped.units[0]))
+        opened = problem.with_unknowns(shaped.key, unknowns, size)
+        other = Hypothesis.of(replace(opened, power=new.problem.power, spread=new.problem.spread), new.free)
+        if other.score > new.score:
+            return other
+    return new
+
+
+def _with(rig: Rig, problem: Problem, shaped: Candidate, item: Scanned) -> tuple[Problem, int]:
+    """The problem with a candidate in a shape, and which candidate it is."""
+    if item.index is None:
+        return problem.extended(shaped, rig.columns(shaped)), len(problem.candidates)
+    if shaped is problem.candidates[item.index]:
+        return problem, item.index
+    return problem.with_columns(item.index, shaped, rig.columns(shaped)), item.index
+
+
+def _best_shape(rig: Rig, base: Hypothesis, item: Scanned) -> Candidate:
+    """The shape that the data make likeliest, ever finer around the best."""
+    problem, fit, spike = base.problem, base.fit, 0.0
+    if item.index is not None and problem.has_tolerance(item.index):
+        # What it would add to a model without it: no need to build the problem anew for every shape.
+        fit = Fit.of(problem, base.free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
+        spike = float(problem.spread[problem.columns_of(item.index)][0])
+    start = item.candidate
+    shapes = [*rig.refinements(start)]
+    if not shapes:
+        return start
+    best, score = start, score_with(fit, start, rig.columns(start), spike)
+    for _ in range(rules.FINER_ROUNDS + 1):
+        last = best
+        for shape in shapes:
+            judged = score_with(fit, shape, rig.columns(shape), spike)
+            if judged > score:
+                best, score = shape, judged
+        if best is last and best is not start:
+            break
+        shapes = rig.refinements(best, finer=True)
+        if not shapes:
+            break
+    for _ in range(rules.POLISH_ROUNDS if rig.steps(best) else 0):
+        values = fit.solution_with([c * best.units for c in rig.columns(best)])[0] * best.units
+        nearer = nearest_shape(rig, fit, best, values)
+        judged = score_with(fit, nearer, rig.columns(nearer), spike)
+        if judged <= score:
+            break
+        best, score = nearer, judged
+    return best
+
+

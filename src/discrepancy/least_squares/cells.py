@@ -1,0 +1,65 @@
+"""Cells: a residual's numbers by group of channels and by frequency; the noise of each cell has a power of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.fft import dct
+
+from discrepancy import rules
+from estimator.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Cells:
+    """How one trial's rows fall into cells, by the cosine transform of those that follow each other.
+
+    That transform is orthonormal, so white rows stay white; what varies smoothly in time is in few of its numbers. A
+    stationary process adds to the power of the noise, by frequency: it needs no more than one number per cell.
+
+    Attributes:
+        moving: number of leading rows that follow each other; the rest stand alone.
+        index: cell of every number, shape (n, C).
+        sizes: numbers in every cell, shape (K,).
+    """
+
+    moving: int
+    index: NDArray[np.intp]
+    sizes: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, rows: int, channels: int, moving: int | None = None, groups: Sequence[int] | None = None) -> Cells:
+        """Cells of a trial: octaves of frequency, and rows that stand alone, of every group of channels.
+
+        Args:
+            rows, channels: n, C.
+            moving: leading rows that follow each other; None for all.
+            groups: group of every channel, from 0; None for one group.
+        """
+        moving = rows if moving is None else moving
+        share = (np.arange(rows) + 0.5) / max(moving, 1)  # of the highest frequency
+        band = np.clip(rules.CELL_BANDS - 1 + np.floor(np.log2(share)) + 1, 0, rules.CELL_BANDS - 1).astype(np.intp)
+        band[moving:] = rules.CELL_BANDS
+        group = np.zeros(channels, dtype=np.intp) if groups is None else np.asarray(groups, dtype=np.intp)
+        index = band[:, None] + (rules.CELL_BANDS + 1) * group[None, :]
+        count = (rules.CELL_BANDS + 1) * (int(group.max(initial=0)) + 1)
+        return cls(moving, index, np.bincount(index.ravel(), minlength=count))
+
+    def spectrum(self, x: Array) -> Array:
+        """Rows in cosine transform, shape (n, C, ...) -> the same."""
+        out = np.array(x, dtype=np.float64)
+        if self.moving:
+            out[: self.moving] = dct(out[: self.moving], axis=0, norm="ortho")
+        return out
+
+    def grams(self, a: Array, b: Array) -> Array:
+        """a^T b over the numbers of every cell, shapes (n, C, k), (n, C, l) -> (K, k, l)."""
+        a, b, index = a.reshape(-1, a.shape[2]), b.reshape(-1, b.shape[2]), self.index.ravel()
+        out = np.zeros((len(self.sizes), a.shape[1], b.shape[1]))
+        for cell in np.flatnonzero(self.sizes):
+            at = index == cell
+            out[cell] = a[at].T @ b[at]
+        return out
