@@ -163,6 +163,8 @@ WORST_INTERVALS = 2
 """Per trial that become candidates, of those durations; the axis' too. Chosen."""
 TEAM_SHORTEST_REST_S = 0.15
 """Rests for which friction is left open. Chosen."""
+REST_RAD_PER_S, REST_NM_PER_S = 1e-3, 0.2
+"""Below which a joint, or a spring's torque, rests and its friction is noise. Chosen: as of the causes."""
 REST_KNOTS_S = 0.5
 """Between knots of friction at rest, which follows the load. Chosen."""
 PLAY_KNOTS_S = 0.2
@@ -277,14 +279,17 @@ CELL_BANDS = 6
 """Octaves of frequency in which the noise has powers of its own, of every group of channels and trial. Chosen."""
 POWER_NUMBERS = 20.0
 """Numbers that the prior of a power counts for, at 1: whitening is right to 30 % without data. Chosen."""
-SPREAD_NUMBERS = 2.0
-"""Numbers that the tolerance counts for when a kind's spread is learnt. Chosen: two robots' worth."""
+SPREAD_NUMBERS = 4.0
+"""Numbers that the tolerance counts for when a kind's spread is learnt. Chosen: that a kind scatters is no likelier
+beforehand than that one of its places is at fault."""
 MOST_SPREAD = 1e3
 """Of a kind over its tolerance. Chosen: an encoder's zero of 6 deg."""
 LEAST_SLAB = 4.0
 """Size of what counts as a fault over the tolerance, at least. Chosen."""
 LEARN_ROUNDS, LEARN_NATS = 30, 0.05
 """Steps of powers and spreads at most, and the gain of evidence below which they have settled. Chosen."""
+LEAST_POWER = 0.5
+"""Of a cell over that of its whitening. Chosen: whitening takes some noise of healthy robots to be larger than it is."""
 FLAT_SHARE = 1e-10
 """Information that shared unknowns have beforehand, over that of the data: none, but what is undecidable stays put."""
 PRIOR_ODDS = 0.05
@@ -293,8 +298,8 @@ SLAB_OCTAVES = 10.0
 """In which the size of a fault is equally likely. Chosen: from the tolerance to a thousand times that."""
 INTERVALS = 1000.0
 """At which an event may be. Derived: about so many are searched."""
-LOOKED_AT_NATS = 0.0
-"""Log odds in the scan, from which a candidate is looked at closely. Derived: below, it is likelier not to be there."""
+LOOKED_AT_NATS = -5.0
+"""Log odds in the scan, from which a candidate is looked at closely. Chosen: what it leaves open may make up for it."""
 WORST_EVENTS = 3
 """Intervals looked at closely. Chosen."""
 NAMED_NATS = 3.0
@@ -305,3 +310,19 @@ DIVERGED_NATS = 50.0
 """Fall of the evidence from which a Gauss-Newton step is not taken. Chosen."""
 SETTLED_SE = 0.05
 """Standard errors: a value that moves less has settled. Chosen."""
+CELL_NATS = 4.0
+"""What a process of its own in a cell costs. Chosen: about a hundred cells are looked at, ln 100."""
+UNLISTED_NATS = 30.0
+"""Of all such processes, from which what is left is not noise. Chosen."""
+LAW_SHARE = 0.2
+"""Standard deviation of what the law of a cause that is there leaves of its trace, in amplitude. Chosen."""
+LISTED_ODDS = 4.0
+"""That a cause is one of the catalogue rather than an unlisted one that looks like it. Chosen."""
+LAW_ERROR_SHARE = 0.02
+"""By which the law of a cause puts its size off; part of every standard error. Chosen."""
+LEAST_PROBABILITY = 0.5
+"""From which a cause is named; below, it is a suspicion. Derived: it is then likelier than all else together."""
+SCATTER_FACTOR = 3.0
+"""Spread of a kind over its tolerance, from which a team is said to be off in it. Chosen."""
+CONTRADICTED = 0.5
+"""By which causes that make the closed loop's response worse lose probability. Chosen: as likely wrong as not."""

@@ -1,51 +1,72 @@
-"""What a search found: causes with their values, and the misfit without and with them."""
+"""What a search found: causes with their values and probabilities, and the misfit without and with them."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from discrepancy import rules
-from discrepancy.least_squares.evidence import Evidence
+from discrepancy.engine.best_shape import covariance_with_shape
+from discrepancy.engine.held_out import held_out_gains, shares
+from discrepancy.engine.hypothesis import Hypothesis
+from discrepancy.engine.learn import worth_a_spread
+from discrepancy.engine.probability import probability
+from discrepancy.engine.remainder import share_left, unlisted_nats
+from discrepancy.engine.search import Rival, Searched
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate
+from discrepancy.rig import Candidate, Rig
 from estimator.arrays import Array
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Named:
-    """A candidate that the data speak for, and why.
+class Found:
+    """A cause that is there, and why.
 
     Attributes:
         index: which candidate of the problem.
         candidate: what and where, with its best shape.
-        evidence: when it was chosen.
-        rivals: other candidates then, best first, with the gap of their score [nats].
-        folds: gain of chi-square on every trial when fitted to the others.
-    """
-
-    index: int
-    candidate: Candidate
-    evidence: Evidence
-    rivals: tuple[tuple[Candidate, float], ...]
-    folds: tuple[float, ...]
-
-
-@dataclass(frozen=True, eq=False, kw_only=True)
-class Found(Named):
-    """A named cause with what the last fit says of it.
-
-    Attributes:
+        probability: that it is what and where it is said to be.
+        over_nothing: by how much it is likelier than nothing in its place [nats].
+        share_left: see ``remainder.share_left``.
+        rivals: what else could be in its place, the likeliest first, and by how much it is less likely [nats].
         values: its parameters, in their own units, shape (k,).
         covariance: of the values and of what is determined of its shape (see ``best_shape``), in their own units.
+        folds: gain of chi-square on every trial when fitted to the others.
         in_sample, held_out: share of the nominal model's misfit that it removes beyond the causes before it (see
             ``held_out.shares``).
     """
 
+    index: int
+    candidate: Candidate
+    probability: float
+    over_nothing: float
+    share_left: float
+    rivals: tuple[tuple[Candidate, float], ...]
     values: Array
     covariance: Array
+    folds: tuple[float, ...]
     in_sample: float
     held_out: float | None
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """A kind of which healthy ones, too, are off by more than its tolerance, at all places alike.
+
+    Attributes:
+        candidate: one of the kind, for its words and units.
+        factor: their spread over the tolerance.
+        places: how many there are.
+        nats: by how much that is likelier than the tolerance.
+    """
+
+    candidate: Candidate
+    factor: float
+    places: int
+    nats: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -54,28 +75,39 @@ class Explanation:
 
     Attributes:
         found: causes in the order of discovery.
-        rejected: significant candidates that held-out trials did not confirm.
+        suspected: causes that were found with a probability too small to name them.
+        scatter: kinds that are off everywhere, the farthest first.
+        hypothesis: all causes that were found, and the noise and spreads beside them.
+        nothing: the same with no cause.
         nominal: misfit of the nominal model, nothing off.
         before, after: misfit with tolerances alone, and with the causes as well.
         plain: misfit with the causes and no tolerances.
-        fit: the last fit.
+        unlisted_nats: see ``remainder.unlisted_nats``.
         shared, local: displacements of the unknowns with the causes in the model.
     """
 
     found: tuple[Found, ...]
-    rejected: tuple[Candidate, ...]
+    suspected: tuple[Found, ...]
+    scatter: tuple[Scatter, ...]
+    hypothesis: Hypothesis
+    nothing: Hypothesis
     nominal: float
     before: float
     after: float
     plain: float
-    fit: Fit
+    unlisted_nats: float
     shared: Array
     local: tuple[Array, ...]
 
     @property
     def problem(self) -> Problem:
-        """The last problem, with the causes' shapes and residual."""
-        return self.fit.problem
+        """The problem with the causes' shapes and residual, and with the noise and spreads beside them."""
+        return self.hypothesis.problem
+
+    @property
+    def fit(self) -> Fit:
+        """The fit with all causes that were found."""
+        return self.hypothesis.fit
 
     @property
     def samples(self) -> int:
@@ -90,6 +122,73 @@ class Explanation:
 
     @property
     def clean(self) -> bool:
-        """Whether what is left is noise, and tolerances used as they usually are."""
-        noise = self.after <= rules.CLEAN_CHI2_PER_N * self.samples
-        return noise and self.fit.strain[2] > rules.SIGNIFICANT_LOG10_P
+        """Whether what is left is noise."""
+        return self.after <= rules.CLEAN_CHI2_PER_N * self.samples and self.unlisted_nats < rules.UNLISTED_NATS
+
+
+def explain(rig: Rig, searched: Searched) -> Explanation:
+    """Values, probabilities and worth of what a search found."""
+    best, nothing = searched.best, searched.nothing
+    problem = best.problem.as_whitened
+    found, removed = [], shares(problem, best.free)
+    for index, rivals, (in_sample, held_out) in zip(best.free, searched.rivals, removed, strict=True):
+        found.append(_found(rig, best, index, rivals, in_sample, held_out))
+    named = tuple(item for item in found if item.probability >= rules.LEAST_PROBABILITY)
+    start = nothing.problem.as_whitened
+    return Explanation(
+        found=named,
+        suspected=tuple(item for item in found if item.probability < rules.LEAST_PROBABILITY),
+        scatter=scatter_of(best),
+        hypothesis=best,
+        nothing=nothing,
+        nominal=Fit.of(start, background=False).misfit,
+        before=nothing.fit.chi2,
+        after=best.fit.chi2,
+        plain=Fit.of(problem, best.free, background=False).misfit,
+        unlisted_nats=unlisted_nats(best),
+        shared=-best.fit.shared,
+        local=tuple(-best.fit.local(t)[: rig.local_unknowns] for t in best.problem.trials),
+    )
+
+
+def _found(
+    rig: Rig, best: Hypothesis, index: int, rivals: Sequence[Rival], in_sample: float, held_out: float | None
+) -> Found:
+    candidate = best.problem.candidates[index]
+    left = share_left(best, index)
+    values, _ = best.fit.part(index)
+    nothing = next((rival.gap for rival in rivals if rival.candidate is None), np.inf)
+    others = [(rival.candidate, rival.gap) for rival in rivals if rival.candidate is not None]
+    # The same event in another interval is no other cause.
+    others = [(c, gap) for c, gap in others if c.transient is None or c.cause != candidate.cause]
+    law = np.concatenate([values * candidate.units, np.zeros(len(rig.steps(candidate)))])
+    return Found(
+        index=index,
+        candidate=candidate,
+        probability=probability([*(gap for _, gap in others), nothing], left),
+        over_nothing=float(nothing),
+        share_left=left,
+        rivals=tuple(others),
+        values=values * candidate.units,
+        covariance=covariance_with_shape(rig, best.fit, index) + rules.LAW_ERROR_SHARE**2 * np.diag(law**2),
+        folds=tuple(held_out_gains(best.problem, [i for i in best.free if i != index], index)),
+        in_sample=in_sample,
+        held_out=held_out,
+    )
+
+
+def scatter_of(hypothesis: Hypothesis) -> tuple[Scatter, ...]:
+    """Kinds whose spread the data want beyond their tolerance."""
+    problem, out, seen = hypothesis.problem, [], set()
+    for index, candidate in enumerate(problem.candidates):
+        if index in hypothesis.free or not problem.has_tolerance(index) or candidate.cause in seen:
+            continue
+        seen.add(candidate.cause)
+        factor = float(problem.spread[problem.columns_of(index)][0])
+        if factor < rules.SCATTER_FACTOR:
+            continue
+        nats = worth_a_spread(hypothesis.learnt, candidate.cause)
+        places = sum(c.cause == candidate.cause for c in problem.candidates)
+        if nats > rules.NAMED_NATS:
+            out.append(Scatter(candidate, factor, places, nats))
+    return tuple(sorted(out, key=lambda item: -item.factor))

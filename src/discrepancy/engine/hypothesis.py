@@ -6,8 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from discrepancy.engine.learn import Learnt, learnt
 from discrepancy.engine.prior import log_prior_odds
+from discrepancy.engine.scan import log_evidence_of
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
@@ -52,7 +55,16 @@ class Hypothesis:
     def score(self) -> float:
         """Log posterior probability, up to what all hypotheses have in common [nats]."""
         odds = sum(log_prior_odds(self.problem, candidate) for candidate in self.causes)
-        return self.learnt.log_evidence + odds
+        return self.learnt.log_evidence + odds - sum(self._tolerated(i) for i in self.free)
+
+    def _tolerated(self, index: int) -> float:
+        """What an event of its tolerance would explain, which is none [nats]."""
+        candidate = self.problem.candidates[index]
+        if candidate.transient is None or not candidate.parameters[0].tolerance:
+            return 0.0
+        values, covariance = self.fit.part(index)
+        information = np.linalg.inv(covariance)
+        return log_evidence_of(information, information @ values, 1.0)
 
     def without(self, index: int) -> Hypothesis:
         """The hypothesis that one of the causes is not there."""

@@ -102,14 +102,15 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[Array, list[Array], _
         group[problem.shared + at] = len(names)
         names.append(at)
         least.append(1.0)
-        most.append(rules.MOST_SPREAD)
+        # One of a kind cannot scatter: it is off or not.
+        most.append(rules.MOST_SPREAD if len(members) > 1 else 1.0)
         weight.append(rules.SPREAD_NUMBERS)
         own.append(False)
     for index in free:
         at = np.r_[problem.columns_of(index)]
         group[problem.shared + at] = len(names)
         names.append(at)
-        least.append(rules.LEAST_SLAB if problem.has_tolerance(index) else 0.0)
+        least.append(rules.LEAST_SLAB if problem.candidates[index].parameters[0].tolerance else 0.0)
         most.append(np.inf)
         weight.append(0.0)
         own.append(True)
@@ -154,7 +155,7 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
     variance = np.bincount(parts.group[~shared], np.diag(covariance)[~shared], minlength=len(spread))
     told = np.clip(numbers - variance / spread**2, 1e-6, None)
     spread_next = np.sqrt((squares + parts.weight) / (told + parts.weight))
-    return evidence, np.maximum(power_next, 1.0), np.clip(spread_next, parts.least, parts.most)
+    return evidence, np.maximum(power_next, rules.LEAST_POWER), np.clip(spread_next, parts.least, parts.most)
 
 
 def worth_a_spread(one: Learnt, kind: str) -> float:

@@ -77,7 +77,8 @@ def _events(rig: Rig, fit: Fit) -> list[Scanned]:
     for candidate in rig.transients([fit.remaining(t) for t in fit.problem.trials]):
         if (candidate.cause, candidate.transient) not in known:
             columns = tuple(rig.columns(candidate))
-            found.append(Scanned(None, candidate, score_with(fit, candidate, columns), columns))
+            score = score_with(fit, candidate, columns, 1.0 if candidate.parameters[0].tolerance else 0.0)
+            found.append(Scanned(None, candidate, score, columns))
     return sorted(found, key=lambda item: -item.score)[: rules.WORST_EVENTS]
 
 
@@ -86,16 +87,28 @@ def _sharpened(rig: Rig, base: Hypothesis, item: Scanned) -> Hypothesis | None:
     shaped = _best_shape(rig, base, item)
     problem, index = _with(rig, base.problem, shaped, item)
     new = Hypothesis.of(problem, [*base.free, index])
-    if shaped.transient:
-        return new
+    return new if shaped.transient else _opened(rig, base, problem, new)
+
+
+def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hypothesis:
+    """With what the added cause leaves open, where that is likelier: a healthy one leaves it open, too, but less."""
+    index = new.free[-1]
+    shaped = problem.candidates[index]
     unknowns = rig.unknowns(shaped)
-    if any(u.shape[2] for u in unknowns):
-        size = abs(float(new.fit.part(index)[0][0] * shaped.units[0]))
-        opened = problem.with_unknowns(shaped.key, unknowns, size)
-        other = Hypothesis.of(replace(opened, power=new.problem.power, spread=new.problem.spread), new.free)
-        if other.score > new.score:
-            return other
-    return new
+    if not any(u.shape[2] for u in unknowns):
+        return new
+    healthy, allowance = shaped.parameters[0].tolerance, 0.0
+    size = abs(float(new.fit.part(index)[0][0] * shaped.units[0]))
+    if healthy:
+        spared = base.problem.with_unknowns(shaped.key, unknowns, healthy)
+        allowance = max(0.0, Hypothesis.of(spared, base.free).score - base.score)
+    start = problem.with_noise(new.problem.power, new.problem.spread)
+    for _ in range(2):
+        # Its size is found with them, and is theirs.
+        opened = start.with_unknowns(shaped.key, unknowns, max(size, healthy), allowance)
+        other = Hypothesis.of(opened, new.free)
+        size = abs(float(other.fit.part(index)[0][0] * shaped.units[0]))
+    return other if other.score > new.score else new
 
 
 def _with(rig: Rig, problem: Problem, shaped: Candidate, item: Scanned) -> tuple[Problem, int]:
@@ -115,6 +128,8 @@ def _best_shape(rig: Rig, base: Hypothesis, item: Scanned) -> Candidate:
         fit = Fit.of(problem, base.free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
         spike = float(problem.spread[problem.columns_of(item.index)][0])
     start = item.candidate
+    if start.transient and start.parameters[0].tolerance:
+        spike = 1.0
     shapes = [*rig.refinements(start)]
     if not shapes:
         return start

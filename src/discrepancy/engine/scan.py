@@ -62,9 +62,7 @@ def log_bayes_factor(information: Array, score: Array, spike: float) -> float:
         score: its score vector, shape (k,).
         spike: spread of a healthy one; 0 where it has none.
     """
-    eigenvalues, vectors = np.linalg.eigh(information)
-    keep = eigenvalues > rules.LEAST_INFORMATION
-    lam, z = eigenvalues[keep], vectors[:, keep].T @ score
+    lam, z = _visible(information, score)
     if not len(lam):
         return -np.inf
     best = np.sqrt(np.mean((z / lam) ** 2))
@@ -72,6 +70,18 @@ def log_bayes_factor(information: Array, score: Array, spike: float) -> float:
     if spike > 0:
         slabs = np.maximum(slabs, rules.LEAST_SLAB * spike)
     return max(_log_evidence(lam, z, slab) for slab in slabs) - _log_evidence(lam, z, spike)
+
+
+def log_evidence_of(information: Array, score: Array, spread: float) -> float:
+    """Of values that are normal with a spread, over none: arguments as of ``log_bayes_factor``."""
+    return _log_evidence(*_visible(information, score), spread)
+
+
+def _visible(information: Array, score: Array) -> tuple[Array, Array]:
+    """Information along the directions that the data see, and the score along them."""
+    eigenvalues, vectors = np.linalg.eigh(information)
+    keep = eigenvalues > rules.LEAST_INFORMATION
+    return eigenvalues[keep], vectors[:, keep].T @ score
 
 
 def _log_evidence(lam: Array, z: Array, spread: float) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.least_squares.evidence import Evidence, log10_survival, visible
-from discrepancy.least_squares.gram import flat_inverse, gram_of, project
+from discrepancy.least_squares.gram import flat_inverse, gram_of
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate
 from estimator.arrays import Array
@@ -150,15 +150,20 @@ class Fit:
 
     def local(self, trial: int) -> Array:
         """Values of a trial's own unknowns that go with the solution, shape (l,)."""
-        columns = self.problem.local[trial]
+        own = self.problem.local[trial]
         left = self.problem.raw[trial] @ np.append(-self.coefficients, 1.0)
-        flat = columns.reshape(left.size, columns.shape[2])
-        return np.asarray(np.linalg.lstsq(flat, left.ravel(), rcond=None)[0], dtype=np.float64)
+        # What causes leave open has unit size: so many rows more.
+        opened = [each[trial].columns for each in self.problem.opened.values()]
+        columns = np.concatenate([own, *opened], axis=2).reshape(left.size, -1)
+        more = np.eye(columns.shape[1])[own.shape[2] :]
+        right = np.append(left.ravel(), np.zeros(len(more)))
+        values = np.linalg.lstsq(np.vstack([columns, more]), right, rcond=None)[0]
+        return np.asarray(values[: own.shape[2]], dtype=np.float64)
 
     def remaining(self, trial: int) -> Array:
         """Whitened residual that the solution leaves in one trial, shape (n, C)."""
         left = self.problem.raw[trial] @ np.append(-self.coefficients, 1.0)
-        return project(left[..., None], self.problem.explicable[trial])[..., 0]
+        return self.problem.without_own(trial, left[..., None])[..., 0]
 
     def evidence(self, inflation: float = 1.0) -> list[Evidence]:
         """Evidence of every candidate that is not free yet, undecidable ones left out.

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from discrepancy.least_squares.cells import Cells
 from discrepancy.least_squares.gram import gram_of, orthonormal, project
+from discrepancy.least_squares.opened import Opened, through
 from discrepancy.rig import Candidate, Rows
 from estimator.arrays import Array
 
@@ -37,7 +38,7 @@ class Problem:
         spans: columns of every candidate.
         tolerant: which candidate columns have a tolerance and are no event, shape (all candidate columns,).
         spread: standard deviation of the candidates' parameters in units, shape (all candidate columns,).
-        opened: number of unknowns of every trial that causes have left open, and what they cost [nats], by cause.
+        opened: what causes leave open in every trial, by cause.
     """
 
     candidates: tuple[Candidate, ...]
@@ -52,7 +53,7 @@ class Problem:
     spans: tuple[slice, ...]
     tolerant: NDArray[np.bool_]
     spread: Array
-    opened: Mapping[Key, tuple[tuple[int, ...], float]] = field(default_factory=dict)
+    opened: Mapping[Key, tuple[Opened, ...]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, trials: Sequence[Rows], candidates: Sequence[Candidate]) -> Problem:
@@ -119,11 +120,15 @@ class Problem:
 
     def rows(self, trial: int) -> Array:
         """Rows without what the trial's own unknowns can explain, in time, shape (n, C, columns)."""
-        return project(self.raw[trial], self.explicable[trial])
+        return self.without_own(trial, self.raw[trial])
+
+    def without_own(self, trial: int, x: Array) -> Array:
+        """Rows without what the trial's own unknowns, and those that causes leave open, can explain, (n, C, k)."""
+        return through([each[trial] for each in self.opened.values()], project(x, self.explicable[trial]))
 
     def spectrum(self, trial: int, columns: Array) -> Array:
         """Further columns, shape (n, C, k), without what the trial's own unknowns can explain, in the transform."""
-        return self.cells[trial].spectrum(project(columns, self.explicable[trial]))
+        return self.cells[trial].spectrum(self.without_own(trial, columns))
 
     def has_tolerance(self, index: int) -> bool:
         """Whether a candidate has a tolerance; a cause has one for all of its parameters or for none."""
@@ -167,71 +172,55 @@ class Problem:
         }  # fmt: skip
         return replace(self, candidates=candidates, **parts)
 
-    def with_unknowns(self, key: Key, unknowns: Sequence[Array], size: float) -> Problem:
+    def with_unknowns(
+        self, key: Key, unknowns: Sequence[Array], size: float, allowance: float = 0.0
+    ) -> Problem:
         """The problem with what a cause leaves open in every trial.
-
-        It costs what normal unknowns of such a size would: the data that they take up speak for nothing else.
 
         Args:
             key: of the cause.
             unknowns: columns, shape (n, C, k) per trial.
             size: standard deviation of their values.
+            allowance: what a healthy one would explain with them, which is part of their price [nats].
         """
         if key in self.opened or not any(u.shape[2] for u in unknowns):
             return self
-        spectra, grams, explicable, price = [], [], [], 0.0
-        for t, new in enumerate(unknowns):
-            own = orthonormal(project(new, self.explicable[t]))
-            if own.shape[2] == 0:
-                spectra.append(self.spectra[t])
-                grams.append(self.cell_grams[t])
-                explicable.append(self.explicable[t])
+        own = [Opened.of(self.without_own(t, u), size) for t, u in enumerate(unknowns)]
+        own[0] = replace(own[0], allowance=allowance)
+        spectra, grams = [], []
+        for one, cells, old, gram in zip(own, self.cells, self.spectra, self.cell_grams, strict=True):
+            if not len(one.shrink):
+                spectra.append(old)
+                grams.append(gram)
                 continue
-            size_squared = size**2 * np.linalg.svd(project(new, self.explicable[t]).reshape(own[..., 0].size, -1), compute_uv=False) ** 2
-            price += 0.5 * float(np.sum(np.log1p(size_squared)))
-            cells = self.cells[t]
-            along = cells.spectrum(own)
-            shares = gram_of(along, self.spectra[t])  # the transform is orthonormal
-            spectra.append(self.spectra[t] - along @ shares)
-            edge = cells.grams(along, self.spectra[t])
-            inside = np.einsum("kij,jl->kil", cells.grams(along, along), shares, optimize=True)
+            along = cells.spectrum(one.basis)
+            shares = one.shrink[:, None] * gram_of(along, old)  # the transform is orthonormal
+            spectra.append(old - along @ shares)
+            edge = cells.grams(along, old)
+            inside = cells.grams(along, along) @ shares
             cross = np.einsum("ji,kjl->kil", shares, edge - 0.5 * inside, optimize=True)
-            grams.append(self.cell_grams[t] - cross - np.swapaxes(cross, 1, 2))
-            explicable.append(np.concatenate([self.explicable[t], own], axis=2))
+            grams.append(gram - cross - np.swapaxes(cross, 1, 2))
         return replace(
-            self,
-            spectra=tuple(spectra),
-            cell_grams=tuple(grams),
-            explicable=tuple(explicable),
-            local=tuple(np.concatenate([a, b], axis=2) for a, b in zip(self.local, unknowns, strict=True)),
-            opened={**self.opened, key: (tuple(u.shape[2] for u in unknowns), price)},
+            self, spectra=tuple(spectra), cell_grams=tuple(grams), opened={**self.opened, key: tuple(own)}
         )
 
     def without_unknowns(self, keep: Collection[Key]) -> Problem:
         """The problem without what causes other than those to keep leave open."""
         if all(key in keep for key in self.opened):
             return self
-        starts = [own.shape[2] - sum(counts[t] for counts, _ in self.opened.values()) for t, own in enumerate(self.local)]
-        local = [own[..., :start] for own, start in zip(self.local, starts, strict=True)]
-        opened = {}
-        for key, (counts, price) in self.opened.items():
-            if key in keep:
-                opened[key] = counts, price
-                local = [
-                    np.concatenate([a, own[..., start : start + count]], axis=2)
-                    for a, own, start, count in zip(local, self.local, starts, counts, strict=True)
-                ]
-            starts = [start + count for start, count in zip(starts, counts, strict=True)]
         again = Problem._from(
-            self.candidates, self.raw, local, self.cells, self.power, self.shared, self.spans, self.tolerant,
+            self.candidates, self.raw, self.local, self.cells, self.power, self.shared, self.spans, self.tolerant,
             self.spread,
         )  # fmt: skip
-        return replace(again, opened=opened)
+        for key, own in self.opened.items():
+            if key in keep:
+                again = again.with_unknowns(key, [one.columns for one in own], 1.0, own[0].allowance)
+        return again
 
     @property
     def price(self) -> float:
         """What all that causes leave open costs [nats]."""
-        return sum(price for _, price in self.opened.values())
+        return sum(one.price + one.allowance for own in self.opened.values() for one in own)
 
     def extended(self, candidate: Candidate, columns: Sequence[Array]) -> Problem:
         """The problem with one candidate more."""

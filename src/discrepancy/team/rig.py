@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -59,6 +59,7 @@ class TeamRig(Rig):
         whitening: of every trial.
         tolerances: standard deviations by cause and parameter.
         excluded: causes left out of the catalogue.
+        kept: whitened columns of shapes that are asked for again and again.
     """
 
     recordings: tuple[Recording, ...]
@@ -68,6 +69,7 @@ class TeamRig(Rig):
     whitening: tuple[Whitening, ...]
     tolerances: Mapping[str, Mapping[str, float]]
     excluded: frozenset[str]
+    kept: dict[tuple[Any, ...], Array] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(
@@ -85,7 +87,7 @@ class TeamRig(Rig):
                 be excluded does not exist.
         """
         left_out = excluded_from(CAUSES, excluded)
-        noise, linear, whitening = linearised_trials(recordings, estimate, jobs)
+        noise, linear, whitening = linearised_trials(recordings, estimate, tolerances, jobs)
         return cls(tuple(recordings), estimate, noise, linear, whitening, tolerances, left_out)
 
     @property
@@ -134,7 +136,14 @@ class TeamRig(Rig):
             return np.zeros((*linear.residual.shape, len(candidate.parameters)))
         cause = CAUSES[candidate.cause]
         robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-        return self.whitening[trial](cause.columns(linear, robot, joint, candidate.shape))
+        again = candidate.transient is None and len(cause.shapes) > 1 and candidate.shape in cause.shapes
+        key = (trial, *candidate.key, *candidate.shape.items())
+        if again and key in self.kept:
+            return self.kept[key]
+        columns = self.whitening[trial](cause.columns(linear, robot, joint, candidate.shape))
+        if again:
+            self.kept[key] = columns
+        return columns
 
     def effect_parameters(
         self, candidate: Candidate, values: Array, covariance: Array

@@ -11,6 +11,7 @@ from discrepancy.least_squares.whitening import Whitening
 from discrepancy.team.linear.adjust import TorqueNoise, with_adjusted_torques
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.rest import Resting, Tolerances
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear, filtered, linearise
 from estimator.arm.arms import Arms
@@ -42,7 +43,7 @@ def start_shared(estimate: PayloadEstimate) -> Shared:
 
 
 def linearised_trials(
-    recordings: Sequence[Recording], estimate: PayloadEstimate, jobs: int = 1
+    recordings: Sequence[Recording], estimate: PayloadEstimate, tolerances: Tolerances, jobs: int = 1
 ) -> tuple[Noise, tuple[TrialLinear, ...], tuple[Whitening, ...]]:
     """The sensors' noise, and every trial linearised around the best unknowns, with its whitening.
 
@@ -61,7 +62,8 @@ def linearised_trials(
     run = Parallel(n_jobs=jobs, prefer="processes" if jobs > 1 else "threads")
     tasks = [(s, b, r, k) for k, (s, b, r) in enumerate(zip(signals, bases, reductions, strict=True))]
     linear, whitening, torque_noise = zip(
-        *run(delayed(linearised)(s, shared, b, arms, r, noise, k) for s, b, r, k in tasks), strict=True
+        *run(delayed(linearised)(s, shared, b, arms, r, noise, k, tolerances) for s, b, r, k in tasks),
+        strict=True,
     )
     for _ in range(2):
         shared, bases = gauss_newton(linear, whitening)
@@ -83,12 +85,16 @@ def linearised(
     reduction: Reduction,
     noise: Noise,
     k: int,
+    tolerances: Tolerances,
 ) -> tuple[TrialLinear, Whitening, TorqueNoise]:
-    """One trial's linearisation, and what the sensors' noise leaves in its rows; k is its number."""
+    """One trial's linearisation, and what noise and friction at rest leave in its rows; k is its number."""
     linear = linearise(signals, shared, bases, arms, reduction, full=True)
     draws, torques = noise_rows(linear, noise, np.random.default_rng([rules.NOISE_SEED, k]))
+    rng, resting = np.random.default_rng([rules.NOISE_SEED, k, 1]), Resting(linear, tolerances)
+    torque_noise = TorqueNoise.of(draws, torques, reduction.moving)
+    draws = draws + np.array([resting(rng) for _ in draws])
     moving = reduction.moving
-    return linear, Whitening.of(draws, moving, uneven=True), TorqueNoise.of(draws, torques, moving)
+    return linear, Whitening.of(draws, moving, uneven=True), torque_noise
 
 
 def exact_residual(signals: Signals, shared: Shared, bases: Bases, arms: Arms, reduction: Reduction) -> Array:
