@@ -40,7 +40,8 @@ def proposals(
     ranked.sort(key=lambda item: -item.score)
     likely = []
     for item in _chosen(ranked, leaders):
-        new = _sharpened(rig, base, item)
+        near = item.score > ranked[0].score - rules.CLOSE_NATS
+        new = _sharpened(rig, base, item, near=near)
         if new is not None and new.possible(rig, new.free[-1]):
             likely.append(new)
     return sorted(likely, key=lambda new: -new.score)
@@ -82,9 +83,9 @@ def _events(rig: Rig, fit: Fit) -> list[Scanned]:
     return sorted(found, key=lambda item: -item.score)[: rules.WORST_EVENTS]
 
 
-def _sharpened(rig: Rig, base: Hypothesis, item: Scanned) -> Hypothesis | None:
-    """A candidate beside what is there, in its best shape and with what it leaves open where that pays."""
-    shaped = _best_shape(rig, base, item)
+def _sharpened(rig: Rig, base: Hypothesis, item: Scanned, *, near: bool) -> Hypothesis | None:
+    """A candidate beside what is there, in its best shape where it is near the likeliest, and with what it opens."""
+    shaped = _best_shape(rig, base, item) if near else item.candidate
     problem, index = _with(rig, base.problem, shaped, item)
     new = Hypothesis.of(problem, [*base.free, index])
     return new if shaped.transient else _opened(rig, base, problem, new)

@@ -39,7 +39,9 @@ from discrepancy.team.imitators import wrong_torques
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.start import exact_residual, linearised_trials
 from discrepancy.team.linear.trial_linear import TrialLinear
+from discrepancy.team.origin import origin_of
 from discrepancy.team.undecidable import statements
+from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
@@ -59,6 +61,8 @@ class TeamRig(Rig):
         whitening: of every trial.
         tolerances: standard deviations by cause and parameter.
         excluded: causes left out of the catalogue.
+        found: the robots as the recordings themselves show them, around which all is linear; None where the
+            recordings' own are near enough.
         kept: whitened columns of shapes that are asked for again and again.
     """
 
@@ -69,6 +73,7 @@ class TeamRig(Rig):
     whitening: tuple[Whitening, ...]
     tolerances: Mapping[str, Mapping[str, float]]
     excluded: frozenset[str]
+    found: ArmUnit | None = None
     kept: dict[tuple[Any, ...], Array] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -79,8 +84,18 @@ class TeamRig(Rig):
         tolerances: Mapping[str, Mapping[str, float]],
         excluded: Sequence[str] = (),
         jobs: int = 1,
+        found: ArmUnit | None = None,
     ) -> TeamRig:
         """Linearise recordings around their estimate.
+
+        Args:
+            recordings: trials of one payload; with ``found`` in their metadata where that is given.
+            estimate: of them.
+            tolerances: standard deviations by cause and parameter.
+            excluded: causes left out.
+            jobs: parallel processes.
+            found: the robots as these recordings themselves show them: what is linear is their deviation from there,
+                but what is tolerated is that from the design.
 
         Raises:
             InputError: the recordings do not determine the grasps, the mass and the centre of mass, or a cause to
@@ -88,7 +103,7 @@ class TeamRig(Rig):
         """
         left_out = excluded_from(CAUSES, excluded)
         noise, linear, whitening = linearised_trials(recordings, estimate, tolerances, jobs)
-        return cls(tuple(recordings), estimate, noise, linear, whitening, tolerances, left_out)
+        return cls(tuple(recordings), estimate, noise, linear, whitening, tolerances, left_out, found)
 
     @property
     def trials(self) -> Sequence[str]:
@@ -176,7 +191,7 @@ class TeamRig(Rig):
         that cannot be simulated. It carries the recording and numbers only, so that processes can take it.
         """
         linear = self.linear[trial]
-        effects = [self.effect(candidate, values) for candidate, values in active]
+        effects = [self.effect(candidate, self._beyond(candidate, values)) for candidate, values in active]
         if any(effect is None for effect in effects):
             return impossible
         return partial(
@@ -203,40 +218,60 @@ class TeamRig(Rig):
         return out
 
     def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
-        return [
-            Rows(
-                self.recordings[t].name,
-                self.whitening[t](linear.residual),
-                self.whitening[t](np.concatenate([linear.by_bases, linear.by_clocks], axis=2)),
-                self.whitening[t](linear.by_shared),
-                [self._columns(t, candidate) for candidate in candidates],
-                linear.reduction.time,
-                linear.reduction.moving,
-                self._groups,
+        out = []
+        for t, linear in enumerate(self.linear):
+            causes = [self._columns(t, candidate) for candidate in candidates]
+            residual = self.whitening[t](linear.residual)
+            for candidate, columns in zip(candidates, causes, strict=True):
+                residual += self._at_origin(candidate, columns)
+            out.append(
+                Rows(
+                    self.recordings[t].name,
+                    residual,
+                    self.whitening[t](np.concatenate([linear.by_bases, linear.by_clocks], axis=2)),
+                    self.whitening[t](linear.by_shared),
+                    causes,
+                    linear.reduction.time,
+                    linear.reduction.moving,
+                    self._groups,
+                )
             )
-            for t, linear in enumerate(self.linear)
-        ]
+        return out
+
+    def _at_origin(self, candidate: Candidate, columns: Array) -> Array | float:
+        """What the robots, as they were found, take out of the residual: values are counted from the design."""
+        origin = origin_of(candidate, self.found)
+        return 0.0 if origin is None else columns @ origin
+
+    def _beyond(self, candidate: Candidate, values: Array) -> Array:
+        """Values beyond what the robots, as they were found, have already."""
+        origin = origin_of(candidate, self.found)
+        return values if origin is None else values - origin
 
     def residual(
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
     ) -> list[Array]:
-        out = []
+        out, there = [], [candidate.key for candidate, _ in active]
+        others = [c for c in self.candidates() if origin_of(c, self.found) is not None and c.key not in there]
         for t, (linear, x) in enumerate(zip(self.linear, local, strict=True)):
             signals, modelled = linear.signals, np.zeros_like(linear.residual)
             for candidate, values in active:
                 if not candidate.acts_in(t):
                     continue
-                cause = CAUSES[candidate.cause]
+                cause, beyond = CAUSES[candidate.cause], self._beyond(candidate, values)
                 robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-                corrected = cause.undo(signals, linear, robot, joint, values, candidate.shape)
+                corrected = cause.undo(signals, linear, robot, joint, beyond, candidate.shape)
                 if corrected is None:
-                    modelled += cause.columns(linear, robot, joint, candidate.shape) @ values
+                    modelled += cause.columns(linear, robot, joint, candidate.shape) @ beyond
                 else:
                     signals = corrected
             residual = exact_residual(
                 signals, linear.shared.moved(shared), linear.bases.moved(x), linear.arms, linear.reduction
             )
-            out.append(self.whitening[t](residual - modelled))
+            left = self.whitening[t](residual - modelled)
+            for candidate in others:
+                left += self._at_origin(candidate, self._columns(t, candidate))
+            out.append(left)
         return out
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
@@ -280,7 +315,9 @@ class TeamRig(Rig):
             InputError: the folder cannot be written, or a cause has values that no effect can have.
         """
         effects = [
-            named_effect(found.candidate, self.effect(found.candidate, found.values))
+            named_effect(
+                found.candidate, self.effect(found.candidate, self._beyond(found.candidate, found.values))
+            )
             for found in explanation.found
         ]
         fit = Fit.of(explanation.problem, explanation.fit.free, background=False)
