@@ -13,12 +13,7 @@ from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.traces import traces
 from discrepancy.team.words import TeamWords
-from estimator.arm.unit import ArmUnit
-from estimator.calibrate.calibrate import calibrate
-from estimator.calibrate.outcome.apply import calibrated
-from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
-from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 
 
@@ -52,31 +47,12 @@ def diagnose_team(
     estimate = estimate_payload(recordings, compare_masses=True, withhold=False)
     check_estimate(estimate)
     known = read_tolerances(None) if tolerances is None else tolerances
-    robots = None
-    if estimate.contradicts:
-        say("calibrate")
-        recordings, estimate, robots = as_found(recordings, estimate)
     say("linearise")
-    rig = TeamRig.of(recordings, estimate, known, excluded, jobs, robots)
+    rig = TeamRig.of(recordings, estimate, known, excluded, jobs)
     found = diagnose(rig, closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated)
-    payload = estimates(rig, found.explanation)
-    return Diagnosed(rig, found, TeamWords(), partial(traces, rig, found.explanation), payload)
-
-
-def as_found(
-    recordings: Sequence[Recording], estimate: PayloadEstimate
-) -> tuple[Sequence[Recording], PayloadEstimate, ArmUnit | None]:
-    """Recordings and estimate with the robots that they themselves show; as they are where they show none.
-
-    Robots far from their design are far from where columns are straight lines. A calibration starts there, too, and
-    finds where they are; whether they may be there is for the diagnosis to say.
-    """
-    try:
-        found = calibrate(recordings)
-    except InputError:
-        return recordings, estimate, None
-    moved = [calibrated(recording, found) for recording in recordings]
-    return moved, estimate_payload(moved, compare_masses=True, withhold=False), found.units
+    assert isinstance(found.rig, TeamRig)
+    payload = estimates(found.rig, found.explanation)
+    return Diagnosed(found.rig, found, TeamWords(), partial(traces, found.rig, found.explanation), payload)
 
 
 def against_truth(found: Diagnosed, truth: Mapping[str, Any]) -> Diagnosed:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discrepancy.rig import Candidate
-from estimator.arm.unit import ArmUnit
+from estimator.arm.unit import AT, ArmUnit
 from estimator.arrays import Array
 
 _GROUPS: dict[str, tuple[str, ...]] = {
@@ -19,17 +20,23 @@ _GROUPS: dict[str, tuple[str, ...]] = {
 """Groups of ``ArmUnit.x`` that hold a cause's parameters, in their order."""
 
 
-def origin_of(candidate: Candidate, units: ArmUnit | None) -> Array | None:
-    """Values of a candidate's parameters at which robots stand, shape (k,), in their own units; None where all is 0.
-
-    Args:
-        candidate: of a team's catalogue.
-        units: the robots, ``x`` of shape (N, COUNT); None for robots as designed.
-    """
+def places_of(candidate: Candidate) -> tuple[int, NDArray[np.intp]] | None:
+    """Where a candidate's parameters are in ``ArmUnit.x`` of a team: the robot's row, columns; None where nowhere."""
     groups = _GROUPS.get(candidate.cause)
-    if units is None or groups is None or candidate.transient is not None:
+    if groups is None or candidate.transient is not None:
         return None
     robot = (candidate.robot or 1) - 1
     if candidate.joint is None:
-        return np.asarray(units.of(groups[0])[robot], dtype=np.float64)
-    return np.array([units.of(group)[robot, candidate.joint - 1] for group in groups])
+        return robot, np.arange(AT[groups[0]].start, AT[groups[0]].stop)
+    return robot, np.array([AT[group].start + candidate.joint - 1 for group in groups])
+
+
+def origin_of(candidate: Candidate, origin: ArmUnit | None) -> Array | None:
+    """Values of a candidate's parameters where all is linear, shape (k,), in their own units; None where all is 0.
+
+    Args:
+        candidate: of a team's catalogue.
+        origin: how far the robots are there from where they were believed to be, ``x`` of shape (N, COUNT).
+    """
+    place = places_of(candidate)
+    return None if origin is None or place is None else np.asarray(origin.x[place], dtype=np.float64)
