@@ -288,6 +288,8 @@ MOST_SPREAD = 1e3
 """Of a kind over its tolerance. Chosen: an encoder's zero of 6 deg."""
 LEAST_SLAB = 4.0
 """Size of what counts as a fault over the tolerance, at least. Chosen."""
+LEAST_SIZE = 1e-6
+"""Of a cause without a tolerance over its typical size. Derived: not to divide by nought."""
 LEARN_ROUNDS, LEARN_NATS = 30, 0.05
 """Steps of powers and spreads at most, and the gain of evidence below which they have settled. Chosen."""
 LEAST_POWER = 0.5
@@ -318,6 +320,8 @@ UNLISTED_NATS = 30.0
 """Of all such processes, from which what is left is not noise. Chosen."""
 LAW_SHARE = 0.2
 """Standard deviation of what the law of a cause that is there leaves of its trace, in amplitude. Chosen."""
+EMPS_LAW_SHARE = 1.0
+"""The same for what lasts on the axis. Chosen: its first recording leaves four times the noise whatever is named."""
 LISTED_ODDS = 4.0
 """That a cause is one of the catalogue rather than an unlisted one that looks like it. Chosen."""
 LAW_ERROR_SHARE = 0.02
@@ -332,3 +336,7 @@ STRAIGHT_CHI2_PER_N = 0.01
 """What curvature adds to chi-square, from which all is linearised again. Chosen: a hundredth of the noise."""
 BASE_ROUNDS = 4
 """Linearisations at most. Measured: robots 1 deg off take two."""
+DOUBTFUL = 2
+LITTLE_SHARE = 0.05
+"""Causes in a row that are less likely than not when they are added, and the share of what is left (in nats) that they
+explain at most, after which no more are looked for. Chosen: one may become likely beside the next."""

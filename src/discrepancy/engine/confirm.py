@@ -123,7 +123,7 @@ def confirm(
 
 def _exchanged(rig: Rig, explanation: Explanation, problem: Problem, winner: _Swap) -> Explanation:
     """The explanation with the rival in the cause's place."""
-    best = exact(rig, Hypothesis.of(problem, winner.free), explanation.nothing)
+    best = exact(rig, Hypothesis.of(problem, winner.free, explanation.hypothesis.allowed), explanation.nothing)
     rivals = []
     for index in winner.free:
         (old,) = [f for f in explanation.found if f.index == (winner.cause.index if index == winner.index else index)]

@@ -110,7 +110,7 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[Array, list[Array], _
         at = np.r_[problem.columns_of(index)]
         group[problem.shared + at] = len(names)
         names.append(at)
-        least.append(rules.LEAST_SLAB if problem.candidates[index].parameters[0].tolerance else 0.0)
+        least.append(rules.LEAST_SLAB if problem.candidates[index].parameters[0].tolerance else rules.LEAST_SIZE)
         most.append(np.inf)
         weight.append(0.0)
         own.append(True)
@@ -134,9 +134,9 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
         prior = np.where(shared, rules.FLAT_SHARE * np.diag(H), np.append(spread, 1.0)[parts.group] ** -2.0)
     H = H + np.diag(np.maximum(prior, 1e-300))
     scale = 1.0 / np.sqrt(np.diag(H))
-    factor = cholesky(H * np.outer(scale, scale), lower=True)
-    solution = scale * cho_solve((factor, True), scale * b)
-    inverse = dpotri(factor, lower=1)[0]
+    factor = cholesky(H * np.outer(scale, scale), lower=True) if len(H) else H
+    solution = scale * cho_solve((factor, True), scale * b) if len(H) else b
+    inverse = dpotri(factor, lower=1)[0] if len(H) else H
     inverse = np.tril(inverse) + np.tril(inverse, -1).T
     covariance = inverse * np.outer(scale, scale)
     log_det = 2.0 * float(np.sum(np.log(np.diag(factor)) - np.log(scale)))

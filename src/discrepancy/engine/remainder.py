@@ -17,6 +17,12 @@ def left_in_cells(hypothesis: Hypothesis) -> tuple[Array, Array]:
     return np.concatenate(left), np.concatenate([cells.sizes for cells in problem.cells]).astype(float)
 
 
+def nats_left(hypothesis: Hypothesis) -> float:
+    """What an explanation of all that is left would gain: half the log of every number's power."""
+    pairs = zip(hypothesis.problem.power, hypothesis.problem.cells, strict=True)
+    return sum(0.5 * float(cells.sizes @ np.log(np.maximum(power, 1.0))) for power, cells in pairs)
+
+
 def unlisted_nats(hypothesis: Hypothesis) -> float:
     """By how many nats a process of its own in every cell is likelier than clean noise; each has to pay for itself.
 

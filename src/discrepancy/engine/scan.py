@@ -72,11 +72,6 @@ def log_bayes_factor(information: Array, score: Array, spike: float) -> float:
     return max(_log_evidence(lam, z, slab) for slab in slabs) - _log_evidence(lam, z, spike)
 
 
-def log_evidence_of(information: Array, score: Array, spread: float) -> float:
-    """Of values that are normal with a spread, over none: arguments as of ``log_bayes_factor``."""
-    return _log_evidence(*_visible(information, score), spread)
-
-
 def _visible(information: Array, score: Array) -> tuple[Array, Array]:
     """Information along the directions that the data see, and the score along them."""
     eigenvalues, vectors = np.linalg.eigh(information)
