@@ -14,8 +14,6 @@ LEAST_INFORMATION = 1e-3
 SIGNIFICANT_LOG10_P = -6.0
 """To be looked at at all; also: tolerances strained more than that are no explanation. Chosen, so that the best of a
 hundred candidates (of a thousand intervals, for a push) is by chance once in ten thousand recordings."""
-INTERVALS_LOG10 = 3.0
-"""What a transient pays for the intervals searched. Derived: about a thousand of them."""
 CLEAN_CHI2_PER_N = 1.15
 """Nothing is left to explain below that. Measured: clean teams leave 1.02 to 1.08, tolerances in use up to 1.13."""
 NOTICED_CHI2 = 38.0
@@ -39,65 +37,31 @@ SHRINKAGE_SHARE = 0.05
 
 # Search: which candidates are compared, how their shapes are sharpened.
 
-MOST_CAUSES = 3
-"""Chosen; docs/diagnosis/method.md, 'Search'."""
-EMPS_MOST_CAUSES = 10
-"""The nominal axis is a bare mass without friction of any kind. Chosen; the benchmark's first recording takes eight."""
-MOST_REJECTED = 4
-"""Candidates that held-out trials may reject before the search ends. Chosen."""
+MOST_CAUSES = 12
+"""Of one verdict. Chosen: no more than a guard; the benchmark's first axis takes eight."""
 LEADERS = 8
-"""Significant candidates that are sharpened and compared. Chosen."""
+"""Candidates of a scan that are looked at closely, and as many more that are the likeliest of their cause. Chosen."""
 FINER_ROUNDS = 4
 """Refinements of a shape around the best so far. Chosen."""
 POLISH_ROUNDS = 3
 """Gauss-Newton steps of a shape after the grid. Chosen."""
 REFIT_ROUNDS = 3
 """Gauss-Newton steps of causes and unknowns with exact residuals. Chosen."""
-DIVERGED_RATIO = 1.5
-"""Misfit over the last one from which such a step is not taken. Chosen."""
-RIVAL_SHARE = 0.5
-"""A rival explains at least this share of what the best does. Chosen."""
-
-# Worth: is a further cause named beside others?
-
-NEXT_SHARE = 0.25
-"""Share of what those before it left that it must take away. Chosen; docs/diagnosis/method.md, 'Search'."""
-LOOK_ALIKE_GROWTH = 10.0
-"""Growth of a named cause's standard error beside it from which the two are the same. Chosen, after friction had been
-divided among parallel gimbal axes (docs/diagnosis/validation.md, 'Verdicts', 10 times)."""
-
-# Held out: does a cause help where it was not fitted?
-
-SUPPORTING_TRIALS = 2
-"""That it must help, when fitted to the others. Chosen: one may be chance, and more need not show the cause."""
-AGAINST_SHARE = 1.0 / 3.0
-"""What it harms over what it helps, at most. Chosen, after a count of trials had lost a hardening that two saw."""
-INTERLEAVED_BLOCKS = 4
-"""In which a transient's own trial is split, as nothing else shows it. Chosen."""
-SHORT_ROWS = 24
-"""A transient of fewer (2 s of a team) cannot be split; its evidence has to do. Chosen: blocks of three rows."""
-INSIDE_SHARE = 0.1
-"""Of its largest row: rows that a transient reaches; a trial's own unknowns spread a trace everywhere. Chosen."""
 
 # Verdict and closed loop.
 
 RESPONSE_SHARE = 0.8
 """Of the response's excess error that causes must remove, or what is left of a visible one is said beside the verdict.
 Chosen."""
-LEAST_SHARE = 0.3
-"""Causes that explain less of a large misfit, of rows or closed loop, are no explanation. Chosen."""
-MOST_BELIEVED = 2
-"""More causes at one robot, or of so few families, imitate another. Chosen; docs/diagnosis/method.md, 'Verdict'."""
 CLOSE_NATS = 20.0
-"""Rivals that the rows put closer are simulated, too. Chosen: simulations cost most of the time."""
+"""Shapes are sharpened of candidates that a scan puts closer to its likeliest. Chosen: it costs time."""
 AMBIGUOUS_NATS = CLOSE_NATS / 4.0
-"""Rivals that the rows put closer, and the closed loop does not part, cannot be told from a cause. Chosen."""
+"""Rivals that the rows put closer are simulated; what the closed loop does not part either, cannot be told from a cause.
+Chosen."""
 MARGIN_SHARE = 0.02
 """Simulations whose chi-square differs by less are equally good. Chosen."""
 VISIBLE_CHI2_PER_N = 3.0
-"""Of the nominal closed loop, from which causes have to improve it. Chosen."""
-WINNING_SHARE = 0.5
-"""Of the trials that a rival must do better in to replace a cause. Chosen: most trials, not one by much."""
+"""Of the closed loop, from which something is said of it beside the verdict. Chosen."""
 
 # A team: what is accepted.
 
