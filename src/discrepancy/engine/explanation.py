@@ -29,6 +29,7 @@ class Found:
         index: which candidate of the problem.
         candidate: what and where, with its best shape.
         probability: that it is what and where it is said to be.
+        probability_alike: that it is this or one of the rivals that cannot be told from it.
         over_nothing: by how much it is likelier than nothing in its place [nats].
         share_left: see ``remainder.share_left``.
         rivals: what else could be in its place, the likeliest first, and by how much it is less likely [nats].
@@ -42,6 +43,7 @@ class Found:
     index: int
     candidate: Candidate
     probability: float
+    probability_alike: float
     over_nothing: float
     share_left: float
     rivals: tuple[tuple[Candidate, float], ...]
@@ -131,7 +133,7 @@ def explain(searched: Searched) -> Explanation:
     rig, best, nothing = searched.rig, searched.best, searched.nothing
     rivals = dict(zip(best.free, searched.rivals, strict=True))
     found = [_found(rig, best, index, rivals[index]) for index in best.free]
-    suspected = [item for item in found if item.probability < rules.LEAST_PROBABILITY]
+    suspected = [item for item in found if item.probability_alike < rules.LEAST_PROBABILITY]
     for item in suspected:
         # What is less likely than not takes no part in what is said of the others.
         best = best.without(item.index)
@@ -165,10 +167,12 @@ def _found(rig: Rig, best: Hypothesis, index: int, rivals: Sequence[Rival]) -> F
     others = [(rival.candidate, rival.gap) for rival in rivals if rival.candidate is not None]
     # The same event in another interval is no other cause.
     others = [(c, gap) for c, gap in others if c.transient is None or c.cause != candidate.cause]
+    gaps, law = [gap for _, gap in others], rig.law_share(candidate)
     return Found(
         index=index,
         candidate=candidate,
-        probability=probability([*(gap for _, gap in others), nothing], left, rig.law_share(candidate)),
+        probability=probability([*gaps, nothing], left, law),
+        probability_alike=probability([*(g for g in gaps if g >= rules.AMBIGUOUS_NATS), nothing], left, law),
         over_nothing=float(nothing),
         share_left=left,
         rivals=tuple(others),
