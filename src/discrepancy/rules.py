@@ -56,7 +56,7 @@ Chosen."""
 CLOSE_NATS = 20.0
 """Shapes are sharpened of candidates that a scan puts closer to its likeliest. Chosen: it costs time."""
 AMBIGUOUS_NATS = CLOSE_NATS / 4.0
-"""Rivals that the rows put closer are simulated; what the closed loop does not part either, cannot be told from a cause.
+"""Rivals that the rows put closer are simulated; what the closed loop does not part either cannot be told apart.
 Chosen."""
 MARGIN_SHARE = 0.02
 """Simulations whose chi-square differs by less are equally good. Chosen."""
@@ -257,7 +257,7 @@ LEAST_SIZE = 1e-6
 LEARN_ROUNDS, LEARN_NATS = 30, 0.05
 """Steps of powers and spreads at most, and the gain of evidence below which they have settled. Chosen."""
 LEAST_POWER = 0.5
-"""Of a cell over that of its whitening. Chosen: whitening takes some noise of healthy robots to be larger than it is."""
+"""Of a cell over that of its whitening. Chosen: some noise of healthy robots is drawn larger than it is."""
 FLAT_SHARE = 1e-10
 """Information that shared unknowns have beforehand, over that of the data: none, but what is undecidable stays put."""
 PRIOR_ODDS = 0.05
@@ -280,7 +280,7 @@ SETTLED_SE = 0.05
 """Standard errors: a value that moves less has settled. Chosen."""
 CELL_NATS = 4.0
 """What a process of its own in a cell costs. Chosen: about a hundred cells are looked at, ln 100."""
-UNLISTED_NATS = 30.0
+UNLISTED_NATS = 60.0
 """Of all such processes, from which what is left is not noise. Chosen."""
 LAW_SHARE = 0.2
 """Standard deviation of what the law of a cause that is there leaves of its trace, in amplitude. Chosen."""

@@ -126,11 +126,13 @@ def confirm(
         for item, others in zip(explanation.found, alternatives, strict=True)
     )
     explanation = replace(explanation, found=found)
-    return Confirmed(explanation, alternatives, Gain(before, after, len(rig.trials) > 1), contradicted, tuple(notes))
+    return Confirmed(
+        explanation, alternatives, Gain(before, after, len(rig.trials) > 1), contradicted, tuple(notes)
+    )
 
 
 def _decided(rig: Rig, found: Found, alternatives: Sequence[Alternative]) -> float:
-    """The probability of a cause with what the closed loop says of its rivals: that one is at least a look-alike away."""
+    """The probability of a cause once the closed loop has spoken: a rival that does worse there is no look-alike."""
     gaps = [
         other.evidence_gap
         if other.ambiguous or other.chi2_per_n is None
@@ -142,10 +144,16 @@ def _decided(rig: Rig, found: Found, alternatives: Sequence[Alternative]) -> flo
 
 def _exchanged(rig: Rig, explanation: Explanation, problem: Problem, winner: _Swap) -> Explanation:
     """The explanation with the rival in the cause's place."""
-    best = exact(rig, Hypothesis.of(problem, winner.free, explanation.hypothesis.allowed), explanation.nothing)
+    best = exact(
+        rig, Hypothesis.of(problem, winner.free, explanation.hypothesis.allowed), explanation.nothing
+    )
     rivals = []
     for index in winner.free:
-        (old,) = [f for f in explanation.found if f.index == (winner.cause.index if index == winner.index else index)]
+        (old,) = [
+            f
+            for f in explanation.found
+            if f.index == (winner.cause.index if index == winner.index else index)
+        ]
         own = [Rival(c, gap) for c, gap in old.rivals]
         if index == winner.index:
             # The closed loop has decided between these two.
@@ -183,5 +191,3 @@ def labels(found: Iterable[Found]) -> str:
     """Causes and their places, as a sentence begins."""
     text = ", ".join(item.candidate.label for item in found)
     return text[:1].upper() + text[1:]
-
-

@@ -125,7 +125,9 @@ class Explanation:
     @property
     def clean(self) -> bool:
         """Whether what is left is noise."""
-        return self.after <= rules.CLEAN_CHI2_PER_N * self.samples and self.unlisted_nats < rules.UNLISTED_NATS
+        return (
+            self.after <= rules.CLEAN_CHI2_PER_N * self.samples and self.unlisted_nats < rules.UNLISTED_NATS
+        )
 
 
 def explain(searched: Searched) -> Explanation:

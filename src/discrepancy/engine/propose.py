@@ -167,5 +167,3 @@ def _best_shape(rig: Rig, base: Hypothesis, item: Scanned) -> Candidate:
             break
         best, score = nearer, judged
     return best
-
-

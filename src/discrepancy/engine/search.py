@@ -94,9 +94,7 @@ def _based(rig: Rig, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
     return rig, nothing
 
 
-def _settled(
-    rig: Rig, best: Hypothesis, nothing: Hypothesis
-) -> tuple[Hypothesis, dict[int, list[Rival]]]:
+def _settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis, dict[int, list[Rival]]]:
     """Exchange and take away causes until none is likelier, and what could be there instead of each."""
     rivals: dict[int, list[Rival]] = {}
     for _ in range(rules.EXCHANGES):

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.causes.excluded import excluded_from
 from discrepancy import rules
+from discrepancy.causes.excluded import excluded_from
 from discrepancy.engine.explanation import Explanation
 from discrepancy.engine.hypothesis import Hypothesis
 from discrepancy.least_squares.fit import Fit
@@ -136,7 +136,9 @@ class TeamRig(Rig):
         shared, off, count = self.linear[0].shared.moved(-fit.shared), 0.0, 0
         for t, (linear, recording) in enumerate(zip(self.linear, moved, strict=True)):
             bases = linear.bases.moved(-fit.local(t)[:own])
-            exact = exact_residual(Signals.of(recording), shared, bases, recording.metadata.arms, linear.reduction)
+            exact = exact_residual(
+                Signals.of(recording), shared, bases, recording.metadata.arms, linear.reduction
+            )
             raw = nothing.problem.raw[t]
             straight = raw[..., -1] - raw[..., : len(fit.shared)] @ fit.shared
             straight = straight - nothing.problem.local[t][..., :own] @ fit.local(t)[:own]
@@ -160,7 +162,9 @@ class TeamRig(Rig):
             if candidate.cause in sizes and nothing.problem.has_tolerance(index):
                 sizes[candidate.cause].append(abs(float(nothing.fit.part(index)[0][0])))
         # By the median, as one of them may be at fault; 0.67 is that of a normal one.
-        return {kind: max(1.0, float(np.median(each)) / 0.6745) if each else 1.0 for kind, each in sizes.items()}
+        return {
+            kind: max(1.0, float(np.median(each)) / 0.6745) if each else 1.0 for kind, each in sizes.items()
+        }
 
     @property
     def trials(self) -> Sequence[str]:
@@ -309,7 +313,9 @@ class TeamRig(Rig):
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
     ) -> list[Array]:
         out, there = [], [candidate.key for candidate, _ in active]
-        others = [c for c in self.candidates() if origin_of(c, self.origin) is not None and c.key not in there]
+        others = [
+            c for c in self.candidates() if origin_of(c, self.origin) is not None and c.key not in there
+        ]
         for t, (linear, x) in enumerate(zip(self.linear, local, strict=True)):
             signals, modelled = linear.signals, np.zeros_like(linear.residual)
             for candidate, values in active:
