@@ -40,7 +40,7 @@ from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.imitators import wrong_torques
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.start import exact_residual, linearised_trials, start_shared
+from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, start_shared
 from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.origin import origin_of, places_of
 from discrepancy.team.undecidable import statements
@@ -62,9 +62,8 @@ class TeamRig(Rig):
 
     Attributes:
         recordings: the trials.
-        noise: resolution of the sensors.
+        sensed: what noise leaves in the rows.
         linear: linearised trials.
-        whitening: of every trial.
         tolerances: standard deviations by cause and parameter.
         excluded: causes left out of the catalogue.
         origin: how far from the robots as they were believed to be all is linear; None for not at all.
@@ -74,9 +73,8 @@ class TeamRig(Rig):
     """
 
     recordings: tuple[Recording, ...]
-    noise: Noise
+    sensed: Sensed
     linear: tuple[TrialLinear, ...]
-    whitening: tuple[Whitening, ...]
     tolerances: Mapping[str, Mapping[str, float]]
     excluded: frozenset[str]
     origin: ArmUnit | None = None
@@ -112,13 +110,24 @@ class TeamRig(Rig):
         origin: ArmUnit | None,
         resting: Mapping[str, float],
         jobs: int,
+        sensed: Sensed | None = None,
     ) -> TeamRig:
         limits = {
             cause: {name: resting[cause] * value for name, value in tolerances.get(cause, {}).items()}
             for cause in resting
         }
-        noise, linear, whitening = linearised_trials(recordings, shared, limits, jobs)
-        return cls(tuple(recordings), noise, linear, whitening, tolerances, excluded, origin, resting, jobs)
+        linear, known = linearised_trials(recordings, shared, limits, jobs, sensed)
+        return cls(tuple(recordings), known, linear, tolerances, excluded, origin, resting, jobs)
+
+    @property
+    def noise(self) -> Noise:
+        """Resolution of the sensors."""
+        return self.sensed.noise
+
+    @property
+    def whitening(self) -> tuple[Whitening, ...]:
+        """Of every trial."""
+        return self.sensed.whitening
 
     def relinearised(self, nothing: Hypothesis) -> TeamRig | None:
         """The rig at the robots as a fit with tolerances finds them, where straight columns do not reach that far."""
@@ -153,7 +162,9 @@ class TeamRig(Rig):
             return None
         before = np.zeros_like(beyond) if self.origin is None else self.origin.x
         origin = ArmUnit(units.design, before + beyond)
-        return self._at(moved, shared, self.tolerances, self.excluded, origin, resting, self.jobs)
+        sensed = self.sensed if same else None
+        resting = self.resting if same else resting
+        return self._at(moved, shared, self.tolerances, self.excluded, origin, resting, self.jobs, sensed)
 
     def _resting(self, nothing: Hypothesis) -> dict[str, float]:
         """Spread over its tolerance, at least 1, of each kind that leaves something open: noise of that size."""
