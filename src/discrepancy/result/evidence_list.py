@@ -1,50 +1,70 @@
 """The strongest candidates, with nothing named yet and with what is named in the model."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
+from discrepancy import rules
 from discrepancy.engine.explanation import Explanation
+from discrepancy.engine.prior import log_prior_odds
+from discrepancy.engine.scan import log_bayes_factor, score_of
 from discrepancy.least_squares.fit import Fit
+from discrepancy.least_squares.problem import Problem
 from discrepancy.result.read import kind_of, name_of
 from discrepancy.rig import Candidate
 
-LEAST_LOG10_P = -1e6
 MOST = 14
-BY_CHANCE = 28.0
-"""Gain of chi-square that one parameter reaches by chance with a probability of about 1e-6 or 1e-7."""
 
 
 def evidence_list(explanation: Explanation) -> dict[str, Any]:
     """Plain data: ``before`` and ``after`` (null where nothing is named), lists of the strongest first.
 
-    Each entry has cause, family, robot, joint, place, ``at`` (trial from 1 and start [s] of an event, else null), gain
-    (of chi-square if its parameters leave their tolerance) and log10_p (of as much by chance). ``by_chance`` is what
-    chance can do.
+    Each entry has cause, family, robot, joint, place, ``at`` (trial from 1 and start [s] of an event, else null),
+    ``nats`` (log Bayes factor: that it is off beyond the spread of its kind, over that it is not) and ``needed`` (as
+    many nats name it, by its prior odds).
     """
-    problem = explanation.problem
+    nothing, fit = explanation.nothing, explanation.fit
+    before = [*_listed(nothing.fit), *_events(explanation)]
     return {
-        "before": _strongest(explanation, Fit.of(problem)),
-        "after": _strongest(explanation, explanation.fit) if explanation.fit.free else None,
-        "by_chance": BY_CHANCE,
+        "before": _strongest(nothing.problem, before),
+        "after": _strongest(fit.problem, [*_listed(fit)]) if explanation.found else None,
     }
 
 
-def _strongest(explanation: Explanation, fit: Fit) -> list[dict[str, Any]]:
+def needed_nats(problem: Problem, candidate: Candidate) -> float:
+    """Log Bayes factor from which a candidate is named [nats]."""
+    return rules.NAMED_NATS - log_prior_odds(problem, candidate)
+
+
+def _listed(fit: Fit) -> Iterator[tuple[Candidate, float]]:
+    """Log Bayes factors of all candidates that are not in the model."""
+    for index, candidate in enumerate(fit.problem.candidates):
+        if index not in fit.free:
+            yield candidate, score_of(fit, index) - log_prior_odds(fit.problem, candidate)
+
+
+def _events(explanation: Explanation) -> Iterator[tuple[Candidate, float]]:
+    """The same of events that were found; the problem without causes does not have them."""
+    problem = explanation.problem
+    for index in explanation.fit.free:
+        candidate = problem.candidates[index]
+        if candidate.transient is not None:
+            told = explanation.nothing.fit.told_by([x[..., problem.spans[index]] for x in problem.raw])
+            yield candidate, log_bayes_factor(*told, 1.0 if candidate.parameters[0].tolerance else 0.0)
+
+
+def _strongest(problem: Problem, judged: Sequence[tuple[Candidate, float]]) -> list[dict[str, Any]]:
     out = []
-    for e in sorted(fit.evidence(fit.inflation), key=lambda e: -e.gain)[:MOST]:
-        candidate = explanation.problem.candidates[e.index]
-        at = candidate.transient
-        when = [at.trial + 1, float(at.start_s)] if at else None
-        told = {"at": when, "gain": float(e.gain), "log10_p": finite_log10_p(e.log10_p)}
-        out.append(place_of(candidate) | told)
+    for candidate, nats in sorted(judged, key=lambda pair: -pair[1])[:MOST]:
+        if nats > 0.0:
+            told = {"at": at_of(candidate), "nats": float(nats), "needed": needed_nats(problem, candidate)}
+            out.append(place_of(candidate) | told)
     return out
 
 
-def finite_log10_p(value: float) -> float:
-    """A logarithm of a probability that JSON can hold."""
-    return max(float(np.nan_to_num(value, nan=0.0)), LEAST_LOG10_P)
+def at_of(candidate: Candidate) -> list[float] | None:
+    """Trial (from 1) and start [s] of an event; None of what lasts."""
+    at = candidate.transient
+    return [at.trial + 1, float(at.start_s)] if at else None
 
 
 def place_of(candidate: Candidate) -> dict[str, Any]:
