@@ -1,32 +1,39 @@
 """The strongest candidates, with nothing named yet and with what is named in the model."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
+
+import numpy as np
 
 from discrepancy import rules
 from discrepancy.engine.explanation import Explanation
+from discrepancy.engine.hypothesis import Hypothesis
 from discrepancy.engine.prior import log_prior_odds
-from discrepancy.engine.scan import log_bayes_factor, score_of
+from discrepancy.engine.scan import scan
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.result.read import kind_of, name_of
 from discrepancy.rig import Candidate
 
-MOST = 14
+MOST, CLOSELY = 14, 16
+"""Candidates that are listed, and that are looked at for it."""
 
 
 def evidence_list(explanation: Explanation) -> dict[str, Any]:
     """Plain data: ``before`` and ``after`` (null where nothing is named), lists of the strongest first.
 
     Each entry has cause, family, robot, joint, place, ``at`` (trial from 1 and start [s] of an event, else null),
-    ``nats`` (log Bayes factor: that it is off beyond the spread of its kind, over that it is not) and ``needed`` (as
-    many nats name it, by its prior odds).
+    ``nats`` (log Bayes factor that it is there beside what is in the model, spreads and noise learnt anew with it) and
+    ``needed`` (as many nats name it, by its prior odds).
     """
-    nothing, fit = explanation.nothing, explanation.fit
-    before = [*_listed(nothing.fit), *_events(explanation)]
+    problem, named = _with_shapes(explanation)
+    nothing = explanation.nothing
+    if problem is not nothing.problem:
+        nothing = Hypothesis.of(problem, ())
     return {
-        "before": _strongest(nothing.problem, before),
-        "after": _strongest(fit.problem, [*_listed(fit)]) if explanation.found else None,
+        "before": _strongest(nothing, named),
+        "after": _strongest(explanation.hypothesis, {}) if explanation.found else None,
     }
 
 
@@ -35,30 +42,60 @@ def needed_nats(problem: Problem, candidate: Candidate) -> float:
     return rules.NAMED_NATS - log_prior_odds(problem, candidate)
 
 
-def _listed(fit: Fit) -> Iterator[tuple[Candidate, float]]:
-    """Log Bayes factors of all candidates that are not in the model."""
-    for index, candidate in enumerate(fit.problem.candidates):
-        if index not in fit.free:
-            yield candidate, score_of(fit, index) - log_prior_odds(fit.problem, candidate)
+def _with_shapes(explanation: Explanation) -> tuple[Problem, dict[int, Problem]]:
+    """The problem without causes, their columns in it as found; and for each cause with what it leaves open."""
+    best, problem, at = explanation.hypothesis, explanation.nothing.problem, []
+    for index in best.free:
+        candidate, span = best.problem.candidates[index], best.problem.spans[index]
+        columns = [x[..., span] / candidate.units for x in best.problem.raw]
+        known = problem.index_of(candidate)
+        at.append(len(problem.candidates) if known is None else known)
+        if known is None:
+            problem = problem.extended(candidate, columns)
+        elif problem.candidates[known] is not candidate:
+            problem = problem.with_columns(known, candidate, columns)
+    out = {}
+    for index, candidate in zip(at, best.causes, strict=True):
+        own = best.problem.opened.get(candidate.key)
+        left_open = [one.columns for one in own] if own else []
+        # What it leaves open has unit size already.
+        out[index] = problem.with_unknowns(candidate.key, left_open, 1.0, own[0].allowance if own else 0.0)
+    return problem, out
 
 
-def _events(explanation: Explanation) -> Iterator[tuple[Candidate, float]]:
-    """The same of events that were found; the problem without causes does not have them."""
-    problem = explanation.problem
-    for index in explanation.fit.free:
-        candidate = problem.candidates[index]
-        if candidate.transient is not None:
-            told = explanation.nothing.fit.told_by([x[..., problem.spans[index]] for x in problem.raw])
-            yield candidate, log_bayes_factor(*told, 1.0 if candidate.parameters[0].tolerance else 0.0)
-
-
-def _strongest(problem: Problem, judged: Sequence[tuple[Candidate, float]]) -> list[dict[str, Any]]:
+def _strongest(base: Hypothesis, named: Mapping[int, Problem]) -> list[dict[str, Any]]:
+    judged = [(nats(base, index, named.get(index)), index) for index in _looked_at(base, named)]
     out = []
-    for candidate, nats in sorted(judged, key=lambda pair: -pair[1])[:MOST]:
-        if nats > 0.0:
-            told = {"at": at_of(candidate), "nats": float(nats), "needed": needed_nats(problem, candidate)}
+    for value, index in sorted(judged, reverse=True)[:MOST]:
+        candidate = base.problem.candidates[index]
+        if value > 0.0:
+            told = {"at": at_of(candidate), "nats": value, "needed": needed_nats(base.problem, candidate)}
             out.append(place_of(candidate) | told)
     return out
+
+
+def _looked_at(base: Hypothesis, named: Mapping[int, Problem]) -> list[int]:
+    """What is named, and what the scan puts first: with spreads as learnt, or with tolerances."""
+    problem = base.problem
+    held = replace(problem, spread=np.where(problem.tolerant, 1.0, problem.spread))
+    score: dict[int, float] = {}
+    for item in (*scan(base.fit), *scan(Fit.of(held, base.free))):
+        if item.index is not None:
+            score[item.index] = max(item.score, score.get(item.index, -np.inf))
+    ranked = sorted(score, key=lambda index: -score[index])
+    return list(dict.fromkeys([*named, *ranked[:CLOSELY]]))
+
+
+def nats(base: Hypothesis, index: int, problem: Problem | None = None) -> float:
+    """Log Bayes factor that one candidate is there beside a hypothesis.
+
+    Args:
+        base: the hypothesis.
+        index: which of its problem's candidates.
+        problem: with what it leaves open, if it is not the hypothesis' own.
+    """
+    more = Hypothesis.of(problem or base.problem, (*base.free, index))
+    return float(more.score - base.score - log_prior_odds(base.problem, base.problem.candidates[index]))
 
 
 def at_of(candidate: Candidate) -> list[float] | None:

@@ -45,7 +45,7 @@ undecidable         list of {what, why, remedy}: what no recordings of this rig 
 detection_limits    list of {cause, kind, robot, joint, parameters: {name: size}}: what would have been noticed nine
                     times in ten; null where these recordings say nothing
 residual            {chi2_per_n, signature} of what the causes (with tolerances) leave, and
-    chi2_per_n_tolerated           with tolerances and no cause
+    chi2_per_n_tolerated           with no cause, and everything off as far as its kind scatters
     unlisted_nats                  by how much what is left is likelier something than clean noise
     nominal                        {chi2_per_n, signature} of the simulation as it is
 remains             sentences on what the verdict leaves open: misfit above clean, what is off everywhere, response

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from discrepancy.result.evidence_list import label, relation
 from discrepancy.result.plots_against import AFTER, BEFORE, log_scale, titled
@@ -31,12 +32,12 @@ def evidence_figure(values: Mapping[str, Any]) -> Figure:
         axis.set_title(f"when {title}", loc="left", fontsize=10)
     seen = [entry[key] for _, strongest in panels for entry in strongest for key in ("nats", "needed")]
     # Dots: bars would need a zero, which a log axis has not.
-    axes[0].set_xlim(0.6 * min(seen, default=1.0), 3.0 * max(seen, default=10.0))
+    axes[0].set_xlim(0.6, 3.0 * max(seen, default=10.0))
     shown = RELATIONS if values["causes"] else {"other": ("candidate", *RELATIONS["other"][1:])}
     handles = [axes[0].plot([], [], mark, color=colour)[0] for _, colour, mark in shown.values()]
     handles += axes[0].plot([], [], "|", color="black", markersize=12)
     words = [*(word for word, _, _ in shown.values()), "needed to be named"]
-    title = "Evidence: log Bayes factor that it is off beyond the spread of its kind"
+    title = "Evidence that a cause is there"
     return titled(figure, title, handles, words, len(words))
 
 
@@ -53,11 +54,13 @@ def _dots(axis: Axes, strongest: Sequence[Mapping[str, Any]], causes: Sequence[M
         axis.plot(entry["needed"], y, "|", color="black", markersize=12)
         axis.plot(entry["nats"], y, mark, color=colour, markersize=7)
         nats = f"{entry['nats']:.0f}" if entry["nats"] >= 100 else f"{entry['nats']:.3g}"
-        axis.annotate(nats, (entry["nats"], y), (8, 0), textcoords="offset points", va="center",
-                      fontsize=8)  # fmt: skip
+        right = entry["nats"] > entry["needed"]  # not where the mark of what is needed is
+        axis.annotate(nats, (entry["nats"], y), (8 if right else -8, 0), textcoords="offset points", va="center",
+                      ha="left" if right else "right", fontsize=8)  # fmt: skip
     axis.set_yticks(at, [label(entry) for entry in strongest], fontsize=9)
     axis.set_ylim(-0.7, max(len(strongest), 1) - 0.3)
-    axis.set_xlabel("evidence [nats]")
+    axis.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axis.set_xlabel("log Bayes factor [nats]")
     axis.grid(alpha=0.25)
     if not strongest:
         axis.text(0.5, 0.5, "nothing speaks for any cause", transform=axis.transAxes, ha="center", fontsize=9)

@@ -29,10 +29,15 @@ def remains(values: Values) -> list[str]:
             f"What remains is small (chi2/n {residual['chi2_per_n']:.3g}), but no noise (by "
             f"{residual['unlisted_nats']:.0f} nats): {residual['signature']['sentence'].rstrip('.')}."
         )
-    if values["scatter"] and values["verdict"] != "miscalibrated":
-        kinds = ", ".join(kind_of(entry) for entry in values["scatter"])
-        out.append(f"Besides, all places alike are off by more than their tolerances: {kinds}. {REMEDY}")
-    return out + _of_response(values)
+    return [*out, *of_scatter(values), *_of_response(values)]
+
+
+def of_scatter(values: Values) -> list[str]:
+    """A sentence on kinds that scatter, unless the verdict says so already."""
+    if not values["scatter"] or values["verdict"] == "miscalibrated":
+        return []
+    kinds = ", ".join(kind_of(entry) for entry in values["scatter"])
+    return [f"Besides, all places alike are off by more than their tolerances: {kinds}. {REMEDY}"]
 
 
 def _of_response(values: Values) -> list[str]:

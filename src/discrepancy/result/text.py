@@ -8,7 +8,7 @@ from discrepancy import rules
 from discrepancy.causes.units import Shown, one_each, parameter
 from discrepancy.result.evidence_list import label
 from discrepancy.result.read import kind_of, name_of
-from discrepancy.result.remains import remains
+from discrepancy.result.remains import of_scatter, remains
 from discrepancy.result.scatter import REMEDY, sizes_of
 from discrepancy.result.text_gain import gain_lines
 
@@ -72,9 +72,10 @@ def _verdict(values: Values) -> str:
     if values["verdict"] == "partly_explained":
         return f"PARTLY EXPLAINED. {named} That is not all. {open_}"
     said = f"UNEXPLAINED. {data[0].upper()}{data[1:]} and the simulation differ, and "
+    also = " ".join(of_scatter(values))
     if causes:
-        return f"{said}the catalogue's best explains little of it: {named}"
-    return f"{said}no cause of the catalogue explains it."
+        return f"{said}the catalogue's best explains little of it: {named} {also}"
+    return f"{said}no cause of the catalogue explains it. {also}"
 
 
 def _cause(cause: Values, *, further: bool) -> Iterable[str]:
@@ -85,7 +86,14 @@ def _cause(cause: Values, *, further: bool) -> Iterable[str]:
     if cause["folds"]:
         better = sum(gain > 0 for gain in cause["folds"])
         explained += f" (a gain on {better} of {len(cause['folds'])} folds)"
-    yield from _wrapped(f"Probability {probability_words(cause['probability'])}{_else(cause)}. {explained}.")
+    over = (
+        ""
+        if cause["over_nothing"] is None
+        else f", {cause['over_nothing']:.0f} nats over nothing in its place"
+    )
+    yield from _wrapped(
+        f"Probability {probability_words(cause['probability'])}{over}{_else(cause)}. {explained}."
+    )
     alike = [rival for rival in cause["alternatives"] if rival["ambiguous"]]
     ruled_out = [rival for rival in cause["alternatives"] if not rival["ambiguous"]]
     if alike:
@@ -125,9 +133,13 @@ def _scatter(values: Values) -> Iterable[str]:
         yield from ("", "[[Off at all places alike]]")
     for entry in values["scatter"]:
         yield from _wrapped(
-            f"{entry['kind']} ({entry['cause']}): {sizes_of(entry, 'spread')}, {entry['factor']:.2g} times the "
+            f"{entry['kind']} ({entry['cause']}): {sizes_of(entry, 'spread')}, {_times(entry['factor'])} times the "
             f"tolerance; likelier than it by {entry['nats']:.0f} nats."
         )
+
+
+def _times(factor: float) -> str:
+    return f"{factor:.0f}" if factor >= 10.0 else f"{factor:.1f}"
 
 
 def _rival(rival: Values) -> str:
@@ -140,8 +152,8 @@ def _residual(values: Values) -> Iterable[str]:
     residual = values["residual"]
     text = (
         f"chi2/n is {residual['nominal']['chi2_per_n']:.3g} as simulated, "
-        f"{residual['chi2_per_n_tolerated']:.3g} with everything a little off"
-        f"{', all places alike' if values['scatter'] else ', within tolerances'}"
+        f"{residual['chi2_per_n_tolerated']:.3g} with nothing named and everything a little off, as far as its kind "
+        "scatters"
     )
     if values["causes"] or values["suspected"]:
         text += f", {residual['chi2_per_n']:.3g} with what is {'named' if values['causes'] else 'suspected'}"

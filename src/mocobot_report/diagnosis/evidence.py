@@ -108,9 +108,9 @@ def _strongest_sections(book: Book, values: Values) -> list[Node]:
         if entries
     ]
     said = (
-        "How much likelier it is that a cause is off beyond the spread of its kind, for the strongest candidates. What "
-        "is there leaves a mark in its relatives, too. Rings: what it takes to be named. Both plots have the same "
-        "logarithmic scale."
+        "By how much the recordings are likelier if a cause is there besides what is in the model, in nats, for the "
+        "strongest candidates; what is there leaves a mark in its relatives, too. Rings: what it takes to be named. "
+        "Both plots have the same logarithmic scale."
     )
     return _section(book, "Evidence", said, charts)
 

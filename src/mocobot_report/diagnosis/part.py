@@ -107,11 +107,11 @@ def _tiles(values: Values) -> list[tuple[str, str, str]]:
         else:
             out.append(("named causes", str(len(named)), f"{len(held)} of them tested on held-out data"))
     elif values["scatter"]:
-        out.append(("misfit with all places off alike", plain(residual["chi2_per_n_tolerated"]), "chi²/n"))
+        out.append(("misfit with nothing named", plain(residual["chi2_per_n_tolerated"]), "chi²/n"))
         worst = values["scatter"][0]
         out.append((worst["kind"], f"{about(worst['factor'])} ×", "spread over its tolerance"))
     else:
-        out.append(("misfit within tolerances", plain(residual["chi2_per_n_tolerated"]), "chi²/n"))
+        out.append(("misfit with nothing named", plain(residual["chi2_per_n_tolerated"]), "chi²/n"))
     gain = values["gain"]
     if gain and gain["removed"] is not None and named:
         low, high = gain["removed"]["interval"]
