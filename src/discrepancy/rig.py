@@ -251,6 +251,10 @@ class Rig(ABC):
         """What recordings of this rig cannot decide, whatever the data: statements with a reason and a remedy."""
         return []
 
+    def relinearised(self, nothing: Any) -> Any:
+        """The same rig linear around where a fit (``engine.hypothesis.Hypothesis``) finds it; None where it is near."""
+        return None
+
     # The simulator.
 
     def can_resimulate(self) -> str | None:

@@ -164,6 +164,8 @@ REST_RAD_PER_S, REST_NM_PER_S = 1e-3, 0.2
 """Below which a joint, or a spring's torque, rests and its friction is noise. Chosen: as of the causes."""
 REST_KNOTS_S = 0.5
 """Between knots of friction at rest, which follows the load. Chosen."""
+PLAY_FORCE_N = 0.4
+"""Below which a payload may be anywhere in its play. Chosen."""
 PLAY_KNOTS_S = 0.2
 """Between knots of the travel that play leaves open at small forces. Chosen."""
 SLOSH_LENGTHS_M = (0.04, 1.0)
@@ -323,3 +325,7 @@ SCATTER_FACTOR = 3.0
 """Spread of a kind over its tolerance, from which a team is said to be off in it. Chosen."""
 CONTRADICTED = 0.5
 """By which causes that make the closed loop's response worse lose probability. Chosen: as likely wrong as not."""
+STRAIGHT_CHI2_PER_N = 0.01
+"""What curvature adds to chi-square, from which all is linearised again. Chosen: a hundredth of the noise."""
+BASE_ROUNDS = 4
+"""Linearisations at most. Measured: robots 1 deg off take two."""

@@ -123,7 +123,7 @@ def confirm(
 
 def _exchanged(rig: Rig, explanation: Explanation, problem: Problem, winner: _Swap) -> Explanation:
     """The explanation with the rival in the cause's place."""
-    best = exact(rig, Hypothesis.of(problem, winner.free))
+    best = exact(rig, Hypothesis.of(problem, winner.free), explanation.nothing)
     rivals = []
     for index in winner.free:
         (old,) = [f for f in explanation.found if f.index == (winner.cause.index if index == winner.index else index)]
@@ -133,7 +133,7 @@ def _exchanged(rig: Rig, explanation: Explanation, problem: Problem, winner: _Sw
             own = [Rival(winner.cause.candidate, rules.AMBIGUOUS_NATS)]
             own += [Rival(c, gap) for c, gap in old.rivals if c.key != winner.rival.key]
         rivals.append((*own, Rival(None, old.over_nothing)))
-    return explain(rig, Searched(explanation.nothing, best, tuple(rivals)))
+    return explain(Searched(rig, explanation.nothing, best, tuple(rivals)))
 
 
 def _alternative(rival: Candidate, gap: float, chi2_per_n: float | None, best: float) -> Alternative:

@@ -17,6 +17,7 @@ class Diagnosis:
     """The verdict and what it rests on.
 
     Attributes:
+        rig: what was diagnosed, linear around where it is.
         verdict: one of the five.
         explanation: the search's result, causes in the order of discovery.
         alternatives: per cause, its rivals.
@@ -25,6 +26,7 @@ class Diagnosis:
         notes: sentences about what the data could not decide or validate.
     """
 
+    rig: Rig
     verdict: Verdict
     explanation: Explanation
     alternatives: tuple[tuple[Alternative, ...], ...]
@@ -57,7 +59,8 @@ def diagnose(
         say: called with what is being done.
         simulated: called with 1 for every simulated trial.
     """
-    explanation = explain(rig, search(rig, most, progress=say))
+    searched = search(rig, most, progress=say)
+    rig, explanation = searched.rig, explain(searched)
     notes: list[str] = []
     why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"
     alternatives = tuple(not_simulated(found) for found in explanation.found)
@@ -87,4 +90,4 @@ def diagnose(
         )
     if len(rig.trials) == 1:
         notes.append("One trial only: nothing could be validated on data that was not used for the fit.")
-    return Diagnosis(verdict, explanation, alternatives, gain, why_not, tuple(notes))
+    return Diagnosis(rig, verdict, explanation, alternatives, gain, why_not, tuple(notes))

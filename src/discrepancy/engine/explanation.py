@@ -126,9 +126,9 @@ class Explanation:
         return self.after <= rules.CLEAN_CHI2_PER_N * self.samples and self.unlisted_nats < rules.UNLISTED_NATS
 
 
-def explain(rig: Rig, searched: Searched) -> Explanation:
+def explain(searched: Searched) -> Explanation:
     """Values, probabilities and worth of what a search found."""
-    best, nothing = searched.best, searched.nothing
+    rig, best, nothing = searched.rig, searched.best, searched.nothing
     problem = best.problem.as_whitened
     found, removed = [], shares(problem, best.free)
     for index, rivals, (in_sample, held_out) in zip(best.free, searched.rivals, removed, strict=True):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -40,6 +40,11 @@ class Hypothesis:
     def free(self) -> tuple[int, ...]:
         """Which of the problem's candidates are there."""
         return self.learnt.free
+
+    def less(self, allowance: float) -> Hypothesis:
+        """The same with so much less evidence for the cause that was added last, which leaves something open [nats]."""
+        problem = self.problem.with_allowance(self.causes[-1].key, allowance)
+        return Hypothesis(replace(self.learnt, problem=problem, log_evidence=self.learnt.log_evidence - allowance))
 
     @property
     def causes(self) -> list[Candidate]:

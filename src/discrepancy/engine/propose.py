@@ -10,6 +10,7 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.engine.best_shape import nearest_shape
 from discrepancy.engine.hypothesis import Hypothesis
+from discrepancy.engine.imitation import imitated
 from discrepancy.engine.scan import Scanned, scan, score_with
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Key, Problem
@@ -40,8 +41,9 @@ def proposals(
     ranked.sort(key=lambda item: -item.score)
     likely = []
     for item in _chosen(ranked, leaders):
-        new = _sharpened(rig, base, item)
-        if new is not None and new.possible(rig, new.free[-1]):
+        near = item.score > ranked[0].score - rules.CLOSE_NATS
+        new = _sharpened(rig, base, item, near=near)
+        if new.possible(rig, new.free[-1]) and not imitated(rig, base, new.causes[-1]):
             likely.append(new)
     return sorted(likely, key=lambda new: -new.score)
 
@@ -82,33 +84,35 @@ def _events(rig: Rig, fit: Fit) -> list[Scanned]:
     return sorted(found, key=lambda item: -item.score)[: rules.WORST_EVENTS]
 
 
-def _sharpened(rig: Rig, base: Hypothesis, item: Scanned) -> Hypothesis | None:
-    """A candidate beside what is there, in its best shape and with what it leaves open where that pays."""
-    shaped = _best_shape(rig, base, item)
+def _sharpened(rig: Rig, base: Hypothesis, item: Scanned, *, near: bool) -> Hypothesis:
+    """A candidate beside what is there, in its best shape where it is near the likeliest, and with what it opens."""
+    shaped = _best_shape(rig, base, item) if near else item.candidate
     problem, index = _with(rig, base.problem, shaped, item)
     new = Hypothesis.of(problem, [*base.free, index])
     return new if shaped.transient else _opened(rig, base, problem, new)
 
 
 def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hypothesis:
-    """With what the added cause leaves open, where that is likelier: a healthy one leaves it open, too, but less."""
+    """With what the added cause leaves open, where that is likelier.
+
+    What is open explains some of what healthy ones leave, too; that much is not to the cause's credit.
+    """
     index = new.free[-1]
     shaped = problem.candidates[index]
     unknowns = rig.unknowns(shaped)
     if not any(u.shape[2] for u in unknowns):
         return new
-    healthy, allowance = shaped.parameters[0].tolerance, 0.0
     size = abs(float(new.fit.part(index)[0][0] * shaped.units[0]))
-    if healthy:
-        spared = base.problem.with_unknowns(shaped.key, unknowns, healthy)
-        allowance = max(0.0, Hypothesis.of(spared, base.free).score - base.score)
     start = problem.with_noise(new.problem.power, new.problem.spread)
     for _ in range(2):
         # Its size is found with them, and is theirs.
-        opened = start.with_unknowns(shaped.key, unknowns, max(size, healthy), allowance)
+        opened = start.with_unknowns(shaped.key, unknowns, max(size, shaped.parameters[0].tolerance))
         other = Hypothesis.of(opened, new.free)
         size = abs(float(other.fit.part(index)[0][0] * shaped.units[0]))
-    return other if other.score > new.score else new
+    if other.score <= new.score:
+        return new
+    healthy = Hypothesis.of(opened, base.free)
+    return other.less(max(0.0, healthy.score - base.score))
 
 
 def _with(rig: Rig, problem: Problem, shaped: Candidate, item: Scanned) -> tuple[Problem, int]:

@@ -34,8 +34,10 @@ class Searched:
         nothing: the hypothesis that nothing is there beyond its kind's spread.
         best: the likeliest.
         rivals: of every cause of the best, the likeliest first.
+        rig: the rig, linear around where the search found it.
     """
 
+    rig: Rig
     nothing: Hypothesis
     best: Hypothesis
     rivals: tuple[tuple[Rival, ...], ...]
@@ -52,22 +54,36 @@ def search(
         progress: called with what is being done.
     """
     say = progress or (lambda what: None)
-    candidates = rig.candidates()
-    say("columns")
-    problem = Problem.of(rig.rows(candidates), candidates)
+    rig, nothing = _based(rig, say)
     say("scan")
-    nothing = best = Hypothesis.of(problem, ())
+    best = nothing
     rivals: dict[int, list[Rival]] = {}
     while len(best.free) < most:
         added = next(iter(proposals(rig, best)), None)
         if added is None or added.score - best.score < rules.NAMED_NATS:
             break
         say(f"refit {added.causes[-1].label}")
-        best, rivals = _settled(rig, exact(rig, added))
-    return Searched(nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free))
+        best, rivals = _settled(rig, exact(rig, added, nothing), nothing)
+    return Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free))
 
 
-def _settled(rig: Rig, best: Hypothesis) -> tuple[Hypothesis, dict[int, list[Rival]]]:
+def _based(rig: Rig, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
+    """The rig linear around where it is, and the hypothesis that nothing is there beyond its kind's spread."""
+    for left in reversed(range(rules.BASE_ROUNDS)):
+        say("columns")
+        candidates = rig.candidates()
+        nothing = Hypothesis.of(Problem.of(rig.rows(candidates), candidates), ())
+        moved = rig.relinearised(nothing) if left else None
+        if moved is None:
+            break
+        say("linearise")
+        rig = moved
+    return rig, nothing
+
+
+def _settled(
+    rig: Rig, best: Hypothesis, nothing: Hypothesis
+) -> tuple[Hypothesis, dict[int, list[Rival]]]:
     """Exchange and take away causes until none is likelier, and what could be there instead of each."""
     rivals: dict[int, list[Rival]] = {}
     for _ in range(rules.EXCHANGES):
@@ -75,13 +91,13 @@ def _settled(rig: Rig, best: Hypothesis) -> tuple[Hypothesis, dict[int, list[Riv
         for index in best.free:
             less = best.without(index)
             if best.score - less.score < rules.NAMED_NATS:
-                best, changed = exact(rig, less), True
+                best, changed = exact(rig, less, nothing), True
                 break
             others = proposals(rig, less, [best.problem.candidates[index].key])
             rivals[index] = [Rival(h.causes[-1], best.score - h.score) for h in others]
             rivals[index].append(Rival(None, best.score - less.score))
             if others and others[0].score > best.score:
-                other = exact(rig, others[0])
+                other = exact(rig, others[0], nothing)
                 if other.score > best.score:
                     best, changed = other, True
                     break

@@ -204,6 +204,11 @@ class Problem:
             self, spectra=tuple(spectra), cell_grams=tuple(grams), opened={**self.opened, key: tuple(own)}
         )
 
+    def with_allowance(self, key: Key, allowance: float) -> Problem:
+        """The problem with so much of the evidence not to the credit of a cause that leaves something open [nats]."""
+        first, *others = self.opened[key]
+        return replace(self, opened={**self.opened, key: (replace(first, allowance=allowance), *others)})
+
     def without_unknowns(self, keep: Collection[Key]) -> Problem:
         """The problem without what causes other than those to keep leave open."""
         if all(key in keep for key in self.opened):

@@ -46,12 +46,13 @@ def diagnose_team(
     say("estimate")
     estimate = estimate_payload(recordings, compare_masses=True, withhold=False)
     check_estimate(estimate)
-    say("linearise")
     known = read_tolerances(None) if tolerances is None else tolerances
+    say("linearise")
     rig = TeamRig.of(recordings, estimate, known, excluded, jobs)
     found = diagnose(rig, closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated)
-    payload = estimates(rig, found.explanation)
-    return Diagnosed(rig, found, TeamWords(), partial(traces, rig, found.explanation), payload)
+    assert isinstance(found.rig, TeamRig)
+    payload = estimates(found.rig, found.explanation)
+    return Diagnosed(found.rig, found, TeamWords(), partial(traces, found.rig, found.explanation), payload)
 
 
 def against_truth(found: Diagnosed, truth: Mapping[str, Any]) -> Diagnosed:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from discrepancy.causes.excluded import excluded_from
+from discrepancy import rules
 from discrepancy.engine.explanation import Explanation
+from discrepancy.engine.hypothesis import Hypothesis
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rig, Rows
@@ -37,14 +39,21 @@ from discrepancy.team.closed_loop import (
 from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.imitators import wrong_torques
 from discrepancy.team.linear.noise import Noise
-from discrepancy.team.linear.start import exact_residual, linearised_trials
+from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.start import exact_residual, linearised_trials, start_shared
 from discrepancy.team.linear.trial_linear import TrialLinear
+from discrepancy.team.origin import origin_of, places_of
 from discrepancy.team.undecidable import statements
+from estimator.arm.unit import COUNT, ArmUnit
 from estimator.arrays import Array
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
+from estimator.rigid_team.residual import Shared
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.extended.extended import write_extended
+
+HEALTHY = {"joint_friction": 1.0, "gimbal_friction": 1.0, "sea_hysteresis": 1.0, "grasp_play": 1.0}
+"""Kinds that leave something open even where they are within their tolerances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,22 +62,26 @@ class TeamRig(Rig):
 
     Attributes:
         recordings: the trials.
-        estimate: what the estimator makes of them.
         noise: resolution of the sensors.
         linear: linearised trials.
         whitening: of every trial.
         tolerances: standard deviations by cause and parameter.
         excluded: causes left out of the catalogue.
+        origin: how far from the robots as they were believed to be all is linear; None for not at all.
+        resting: spread over its tolerance of each kind that leaves something open, such as friction at rest: noise.
+        jobs: parallel processes.
         kept: whitened columns of shapes that are asked for again and again.
     """
 
     recordings: tuple[Recording, ...]
-    estimate: PayloadEstimate
     noise: Noise
     linear: tuple[TrialLinear, ...]
     whitening: tuple[Whitening, ...]
     tolerances: Mapping[str, Mapping[str, float]]
     excluded: frozenset[str]
+    origin: ArmUnit | None = None
+    resting: Mapping[str, float] = field(default_factory=dict)
+    jobs: int = 1
     kept: dict[tuple[Any, ...], Array] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -87,8 +100,67 @@ class TeamRig(Rig):
                 be excluded does not exist.
         """
         left_out = excluded_from(CAUSES, excluded)
-        noise, linear, whitening = linearised_trials(recordings, estimate, tolerances, jobs)
-        return cls(tuple(recordings), estimate, noise, linear, whitening, tolerances, left_out)
+        return cls._at(recordings, start_shared(estimate), tolerances, left_out, None, HEALTHY, jobs)
+
+    @classmethod
+    def _at(
+        cls,
+        recordings: Sequence[Recording],
+        shared: Shared,
+        tolerances: Mapping[str, Mapping[str, float]],
+        excluded: frozenset[str],
+        origin: ArmUnit | None,
+        resting: Mapping[str, float],
+        jobs: int,
+    ) -> TeamRig:
+        limits = {
+            cause: {name: resting[cause] * value for name, value in tolerances.get(cause, {}).items()}
+            for cause in resting
+        }
+        noise, linear, whitening = linearised_trials(recordings, shared, limits, jobs)
+        return cls(tuple(recordings), noise, linear, whitening, tolerances, excluded, origin, resting, jobs)
+
+    def relinearised(self, nothing: Hypothesis) -> TeamRig | None:
+        """The rig at the robots as a fit with tolerances finds them, where straight columns do not reach that far."""
+        candidates, fit, own = self.candidates(), nothing.fit, self.local_unknowns
+        known = self.linear[0].arms if isinstance(self.linear[0].arms, ArmUnit) else None
+        x = np.zeros((self.robots, COUNT)) if known is None else known.x.copy()
+        beyond = np.zeros_like(x)
+        for index, candidate in enumerate(candidates):
+            place = places_of(candidate)
+            if place is not None:
+                values = fit.part(index)[0] * candidate.units
+                beyond[place] = self._beyond(candidate, values)
+        units = ArmUnit(self.linear[0].design, x + beyond)
+        moved = [replace(r, metadata=replace(r.metadata, units=units)) for r in self.recordings]
+        shared, off, count = self.linear[0].shared.moved(-fit.shared), 0.0, 0
+        for t, (linear, recording) in enumerate(zip(self.linear, moved, strict=True)):
+            bases = linear.bases.moved(-fit.local(t)[:own])
+            exact = exact_residual(Signals.of(recording), shared, bases, recording.metadata.arms, linear.reduction)
+            raw = nothing.problem.raw[t]
+            straight = raw[..., -1] - raw[..., : len(fit.shared)] @ fit.shared
+            straight = straight - nothing.problem.local[t][..., :own] @ fit.local(t)[:own]
+            for index, candidate in enumerate(candidates):
+                if places_of(candidate) is not None:
+                    straight = straight - raw[..., nothing.problem.spans[index]] @ fit.part(index)[0]
+            off += float(np.sum((self.whitening[t](exact) - straight) ** 2))
+            count += straight.size
+        resting = self._resting(nothing)
+        same = all(0.5 < resting[kind] / self.resting[kind] < 2.0 for kind in resting)
+        if off / count < rules.STRAIGHT_CHI2_PER_N and same:
+            return None
+        before = np.zeros_like(beyond) if self.origin is None else self.origin.x
+        origin = ArmUnit(units.design, before + beyond)
+        return self._at(moved, shared, self.tolerances, self.excluded, origin, resting, self.jobs)
+
+    def _resting(self, nothing: Hypothesis) -> dict[str, float]:
+        """Spread over its tolerance, at least 1, of each kind that leaves something open: noise of that size."""
+        sizes: dict[str, list[float]] = {kind: [] for kind in HEALTHY}
+        for index, candidate in enumerate(nothing.problem.candidates):
+            if candidate.cause in sizes and nothing.problem.has_tolerance(index):
+                sizes[candidate.cause].append(abs(float(nothing.fit.part(index)[0][0])))
+        # By the median, as one of them may be at fault; 0.67 is that of a normal one.
+        return {kind: max(1.0, float(np.median(each)) / 0.6745) if each else 1.0 for kind, each in sizes.items()}
 
     @property
     def trials(self) -> Sequence[str]:
@@ -176,7 +248,7 @@ class TeamRig(Rig):
         that cannot be simulated. It carries the recording and numbers only, so that processes can take it.
         """
         linear = self.linear[trial]
-        effects = [self.effect(candidate, values) for candidate, values in active]
+        effects = [self.effect(candidate, self._beyond(candidate, values)) for candidate, values in active]
         if any(effect is None for effect in effects):
             return impossible
         return partial(
@@ -203,40 +275,60 @@ class TeamRig(Rig):
         return out
 
     def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
-        return [
-            Rows(
-                self.recordings[t].name,
-                self.whitening[t](linear.residual),
-                self.whitening[t](np.concatenate([linear.by_bases, linear.by_clocks], axis=2)),
-                self.whitening[t](linear.by_shared),
-                [self._columns(t, candidate) for candidate in candidates],
-                linear.reduction.time,
-                linear.reduction.moving,
-                self._groups,
+        out = []
+        for t, linear in enumerate(self.linear):
+            causes = [self._columns(t, candidate) for candidate in candidates]
+            residual = self.whitening[t](linear.residual)
+            for candidate, columns in zip(candidates, causes, strict=True):
+                residual += self._at_origin(candidate, columns)
+            out.append(
+                Rows(
+                    self.recordings[t].name,
+                    residual,
+                    self.whitening[t](np.concatenate([linear.by_bases, linear.by_clocks], axis=2)),
+                    self.whitening[t](linear.by_shared),
+                    causes,
+                    linear.reduction.time,
+                    linear.reduction.moving,
+                    self._groups,
+                )
             )
-            for t, linear in enumerate(self.linear)
-        ]
+        return out
+
+    def _at_origin(self, candidate: Candidate, columns: Array) -> Array | float:
+        """What the robots, as they were found, take out of the residual: values are counted from the design."""
+        origin = origin_of(candidate, self.origin)
+        return 0.0 if origin is None else columns @ origin
+
+    def _beyond(self, candidate: Candidate, values: Array) -> Array:
+        """Values beyond what the robots, as they were found, have already."""
+        origin = origin_of(candidate, self.origin)
+        return values if origin is None else values - origin
 
     def residual(
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
     ) -> list[Array]:
-        out = []
+        out, there = [], [candidate.key for candidate, _ in active]
+        others = [c for c in self.candidates() if origin_of(c, self.origin) is not None and c.key not in there]
         for t, (linear, x) in enumerate(zip(self.linear, local, strict=True)):
             signals, modelled = linear.signals, np.zeros_like(linear.residual)
             for candidate, values in active:
                 if not candidate.acts_in(t):
                     continue
-                cause = CAUSES[candidate.cause]
+                cause, beyond = CAUSES[candidate.cause], self._beyond(candidate, values)
                 robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-                corrected = cause.undo(signals, linear, robot, joint, values, candidate.shape)
+                corrected = cause.undo(signals, linear, robot, joint, beyond, candidate.shape)
                 if corrected is None:
-                    modelled += cause.columns(linear, robot, joint, candidate.shape) @ values
+                    modelled += cause.columns(linear, robot, joint, candidate.shape) @ beyond
                 else:
                     signals = corrected
             residual = exact_residual(
                 signals, linear.shared.moved(shared), linear.bases.moved(x), linear.arms, linear.reduction
             )
-            out.append(self.whitening[t](residual - modelled))
+            left = self.whitening[t](residual - modelled)
+            for candidate in others:
+                left += self._at_origin(candidate, self._columns(t, candidate))
+            out.append(left)
         return out
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
@@ -280,7 +372,9 @@ class TeamRig(Rig):
             InputError: the folder cannot be written, or a cause has values that no effect can have.
         """
         effects = [
-            named_effect(found.candidate, self.effect(found.candidate, found.values))
+            named_effect(
+                found.candidate, self.effect(found.candidate, self._beyond(found.candidate, found.values))
+            )
             for found in explanation.found
         ]
         fit = Fit.of(explanation.problem, explanation.fit.free, background=False)

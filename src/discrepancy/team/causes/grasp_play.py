@@ -18,7 +18,7 @@ class GraspPlay(Cause):
     parameters = ("play_m",)
     tolerances = (3e-6,)
     at = "grasp"
-    shapes = ({"force_N": 0.4},)
+    shapes = ({"force_N": rules.PLAY_FORCE_N},)
     positive = ("play_m",)
     separate = "Internal forces of both signs at rest separate play from flexibility."
 

@@ -1,4 +1,4 @@
-"""Friction at rest, within its tolerance: what it may do to a healthy team's rows."""
+"""Friction at rest and play between its ends, within their tolerances: what they may do to a healthy team's rows."""
 
 from __future__ import annotations
 
@@ -37,6 +37,7 @@ class Resting:
             )
         }
         slow = {"phi": rules.REST_RAD_PER_S, "theta": rules.REST_RAD_PER_S, "tau": rules.REST_NM_PER_S}
+        self._play_m = tolerances.get("grasp_play", {}).get("play_m", 0.0)
         self._rests = {moves: _numbered(trial.signals, moves, slow[moves]) for moves in self._limit_Nm}
 
     def __call__(self, rng: np.random.Generator) -> Array:
@@ -53,7 +54,20 @@ class Resting:
                 axes_T = np.swapaxes(rate_matrix(trial.s[:, i, THETA]), -1, -2)
                 moment += np.linalg.solve(axes_T, gimbal[:, i, :, None])[..., 0] @ trial.shared.grasps.R_1i[i].T
             rows += trial.of_wrench(np.zeros_like(moment), moment)
+        if self._play_m:
+            for i in range(trial.robots):
+                offset = np.einsum("qij,qj->qi", trial.data.R_bi[:, i], self._between(i, rng))
+                rows += trial.of_pose(i, None, offset @ trial.bases.R[i].T)
         return rows
+
+    def _between(self, robot: int, rng: np.random.Generator) -> Array:
+        """Place in a grasp's play along the axes of {i} [m] while the force leaves it open, shape (Q, 3); else 0."""
+        trial = self._trial
+        time = trial.signals.time
+        knots = np.arange(time[0], time[-1] + rules.PLAY_KNOTS_S, rules.PLAY_KNOTS_S)
+        anywhere = [np.interp(time, knots, rng.standard_normal(len(knots))) for _ in range(3)]
+        between = np.abs(trial.data.wrench[:, robot, 3:]) < rules.PLAY_FORCE_N
+        return np.asarray(self._play_m * np.stack(anywhere, axis=1) * between)
 
     def _torque(self, moves: str, rng: np.random.Generator) -> Array:
         """Torque at rest [N m], shape (Q, N, 3); 0 in motion."""

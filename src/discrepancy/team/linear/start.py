@@ -43,14 +43,13 @@ def start_shared(estimate: PayloadEstimate) -> Shared:
 
 
 def linearised_trials(
-    recordings: Sequence[Recording], estimate: PayloadEstimate, tolerances: Tolerances, jobs: int = 1
+    recordings: Sequence[Recording], shared: Shared, tolerances: Tolerances, jobs: int = 1
 ) -> tuple[Noise, tuple[TrialLinear, ...], tuple[Whitening, ...]]:
     """The sensors' noise, and every trial linearised around the best unknowns, with its whitening.
 
     Raises:
-        InputError: the recordings do not determine the grasps, the mass and the centre of mass, or one is too short.
+        InputError: a recording is too short.
     """
-    shared = start_shared(estimate)
     arms = recordings[0].metadata.arms
     signals = [Signals.of(recording) for recording in recordings]
     noise = Noise.of(signals)
