@@ -29,7 +29,7 @@ def scatter_to_dict(item: Scatter) -> dict[str, Any]:
 def _sentence(entry: Mapping[str, Any]) -> str:
     kind = kind_of(entry)
     return (
-        f"{kind[:1].upper()}{kind[1:]} scatters by {sizes_of(entry, 'spread')} over {entry['places']} places "
+        f"{kind[:1].upper()}{kind[1:]}: a spread of {sizes_of(entry, 'spread')} over {entry['places']} places "
         f"(tolerance {sizes_of(entry, 'tolerance')})."
     )
 

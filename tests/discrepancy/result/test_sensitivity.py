@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from discrepancy import rules
-from discrepancy.engine.explanation import Explanation, explain
+from discrepancy.engine.diagnose import diagnose
+from discrepancy.engine.explanation import Explanation
 from discrepancy.engine.hypothesis import Hypothesis
-from discrepancy.engine.search import search
 from discrepancy.result.evidence_list import nats, needed_nats
 from discrepancy.result.sensitivity import blind_spots, detection_limits
 from fake_rig import CATALOGUE, FakeRig, cause
@@ -17,7 +17,7 @@ SEVERAL = tuple(cause(f"kind {k % 2}", robot=1 + k // 2) for k in range(8))
 
 
 def explained(rig: FakeRig) -> Explanation:
-    return explain(rig, search(rig))
+    return diagnose(rig).explanation
 
 
 @pytest.mark.parametrize("catalogue", [CATALOGUE, SEVERAL], ids=["one of a kind", "four of a kind"])
