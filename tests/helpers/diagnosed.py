@@ -23,8 +23,8 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     Provenance may be there: commands add it.
     """
     assert set(values) - {"provenance"} == {
-        "format", "version", "recordings", "verdict", "causes", "suspected", "scatter", "evidence", "gain", "not_simulated",
-        "undecidable", "detection_limits", "residual", "remains", "notes",
+        "format", "version", "recordings", "verdict", "causes", "suspected", "scatter", "evidence", "gain",
+        "not_simulated", "undecidable", "detection_limits", "residual", "remains", "notes",
     }  # fmt: skip
     assert (values["format"], values["version"]) == ("mocobot-diagnosis", 2)
     assert values["verdict"] in VERDICTS
@@ -49,7 +49,13 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
         assert cause["probability"] + sum(others) == pytest.approx(1.0)
         assert min(others) >= 0.0
         for rival in cause["alternatives"]:
-            assert set(rival) == PLACE | {"probability", "evidence_gap", "chi2_per_n", "ambiguous", "separate"}
+            assert set(rival) == PLACE | {
+                "probability",
+                "evidence_gap",
+                "chi2_per_n",
+                "ambiguous",
+                "separate",
+            }
             _check_place(rival)
             assert isinstance(rival["ambiguous"], bool)
     for entry in values["suspected"]:
@@ -134,7 +140,9 @@ def _limit(
 
 def scattered() -> dict[str, Any]:
     """An entry of ``scatter``, made up."""
-    zero = Candidate("theta_zero", "gimbal_zero", 1, 1, (Parameter("zero_rad", 1e-4, 1e-4),), title="zero of {gimbal axis}")
+    zero = Candidate(
+        "theta_zero", "gimbal_zero", 1, 1, (Parameter("zero_rad", 1e-4, 1e-4),), title="zero of {gimbal axis}"
+    )
     return scatter_to_dict(Scatter(zero, 52.0, 9, 140.0))
 
 
@@ -171,7 +179,14 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
         "shape": {},
         "separate": "A known weight separates them.",
         "alternatives": [
-            {**rival, "probability": 0.1, "evidence_gap": 2.0, "chi2_per_n": 1.01, "ambiguous": True, "separate": ""}
+            {
+                **rival,
+                "probability": 0.1,
+                "evidence_gap": 2.0,
+                "chi2_per_n": 1.01,
+                "ambiguous": True,
+                "separate": "",
+            }
         ],
     }
     before = dict.fromkeys(sorted(RESPONSE), 0.01) | {"chi2_per_n": 90.0}

@@ -7,7 +7,7 @@ from discrepancy.causes.units import one_each, parameter
 from discrepancy.engine.explanation import Scatter
 from discrepancy.result.read import kind_of
 
-REMEDY = "`mocobot calibrate` finds the robots as they are; diagnose again with what it writes, as `--calibration`."
+REMEDY = '"mocobot calibrate" finds the robots as they are; diagnose again with what it writes.'
 
 
 def scatter_to_dict(item: Scatter) -> dict[str, Any]:

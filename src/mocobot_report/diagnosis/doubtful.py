@@ -30,8 +30,8 @@ def _scatter(values: Values) -> Node:
     rows: list[list[Entry]] = [
         [
             cause_name(entry["kind"], entry["cause"]),
-            tidy(sizes_of(entry, "spread")),
-            tidy(sizes_of(entry, "tolerance")),
+            tidy(sizes_of(entry, "spread"), inside=True),
+            tidy(sizes_of(entry, "tolerance"), inside=True),
             Num(about(entry["factor"])),
             Num(str(entry["places"])),
             value(entry["nats"]),

@@ -67,8 +67,11 @@ def test_what_is_off_everywhere_is_told_once(verdict: str) -> None:
     told = "all places alike are off by more than their tolerances: zero of a gimbal axis."
     assert any(told in said for said in remains(values)) == (verdict == "explained")
     text = words(format_diagnosis(values))
-    assert text.count("`mocobot calibrate`") == 1
-    assert "zero of a gimbal axis (theta_zero): 5.2 mrad, 52 times the tolerance; likelier than it by 140 nats." in text
+    assert text.count('"mocobot calibrate"') == 1
+    assert (
+        "zero of a gimbal axis (theta_zero): 5.2 mrad, 52 times the tolerance; likelier than it by 140 nats."
+        in text
+    )
 
 
 def test_every_verdict_has_its_colour() -> None:
