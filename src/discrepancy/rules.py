@@ -11,13 +11,10 @@ COMPLEXITY = 1.6
 """Penalty per parameter and ln n on the scale of chi-square. Chosen: stricter than the 1 of Schwarz's criterion."""
 LEAST_INFORMATION = 1e-3
 """Inverse variance (in units of tolerance) below which a direction is undecidable. Chosen."""
-SIGNIFICANT_LOG10_P = -6.0
-"""To be looked at at all; also: tolerances strained more than that are no explanation. Chosen, so that the best of a
-hundred candidates (of a thousand intervals, for a push) is by chance once in ten thousand recordings."""
 CLEAN_CHI2_PER_N = 1.15
 """Nothing is left to explain below that. Measured: clean teams leave 1.02 to 1.08, tolerances in use up to 1.13."""
-NOTICED_CHI2 = 38.0
-"""Expected gain found nine times in ten. Derived: (sqrt(23.9) + 1.28)^2, 23.9 being chi-square at p = 1e-6."""
+NOTICED_SE = 1.2816
+"""Standard errors by which noise lessens a value one time in ten. Derived: a quantile of the normal distribution."""
 ABSURD_UNITS = 1e3
 """A detection limit of so many tolerances (or typical sizes) is none. Chosen."""
 
