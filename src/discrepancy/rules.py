@@ -7,8 +7,6 @@ What one cause alone has (tolerances, typical sizes, grids of its shapes) is in 
 
 # Evidence: what the data say about one candidate.
 
-COMPLEXITY = 1.6
-"""Penalty per parameter and ln n on the scale of chi-square. Chosen: stricter than the 1 of Schwarz's criterion."""
 LEAST_INFORMATION = 1e-3
 """Inverse variance (in units of tolerance) below which a direction is undecidable. Chosen."""
 CLEAN_CHI2_PER_N = 1.15
