@@ -45,8 +45,17 @@ BLOCK_ROWS = 512
 """Rows whose derivatives are held at a time. Chosen; the result does not depend on it."""
 COARSE_ROWS = 250
 """Rows that the first steps take, evenly from all trials. Chosen: the way to the solution needs no more."""
-MAX_STEPS = 12
-"""Gauss-Newton steps. Chosen: forty teams of the prior's spread needed six at most."""
+MAX_STEPS, MAX_COARSE_STEPS = 40, 30
+"""Steps in all, and on few rows. Chosen: forty teams of the prior's spread needed six at most."""
+LEAST_DAMPING, DAMPING = 1e-3, 10.0
+"""Share of the diagonal that damps a step after one that went up, and by how much it then grows and falls. Chosen, as
+in Marquardt's paper."""
+RISE = 0.01
+"""Rise of the sum of squares that a step may still make, for rows' noise is each point's own. Chosen: whole steps of
+teams that fit made none; a whole step between two teams made it ten times larger and more."""
+FLAT = 0.01
+"""Share of the sum of squares by which a damped step must lower it, or the descent ends. Chosen: recordings of other
+robots than the rest's leave a valley whose floor falls by a thousandth a step."""
 COARSE = 0.5
 """Largest step of any unknown, in posterior standard errors, that ends those on few rows. Chosen."""
 CONVERGED = 0.02
