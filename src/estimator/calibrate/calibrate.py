@@ -13,7 +13,7 @@ from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, 
 from estimator.calibrate.equations.alone import AloneEquations
 from estimator.calibrate.equations.level import corrected
 from estimator.calibrate.equations.rows import Rows
-from estimator.calibrate.equations.sensing import Sensing
+from estimator.calibrate.equations.sensing import Resolution, Sensing
 from estimator.calibrate.findings import findings
 from estimator.calibrate.fit import Fit, fit
 from estimator.calibrate.held_out import held_out
@@ -83,7 +83,7 @@ def calibrate(
         shared.append(_start(estimate_payload(members, "auto", compare_masses=True, withhold=False), members))
     say("calibration")
     units = ArmUnit(design, np.zeros((N, COUNT))) if robots is None else robots.units
-    sensing = Sensing.of_each([*recordings, *free])
+    sensing = Sensing.of_each([Resolution.of(recording) for recording in (*recordings, *free)])
     labels = list(groups)
     rows = [_rows(recording) for recording in recordings]
     payload_of = [labels.index(recording.metadata.payload) for recording in recordings]

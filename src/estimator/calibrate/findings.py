@@ -46,11 +46,7 @@ def findings(fit: Fit, given: Given, names: Sequence[str]) -> list[str]:
         given: what it was made from.
         names: of the recordings with a payload.
     """
-    odd = [
-        k
-        for k, trial in enumerate(fit.trials)
-        if _ratio(trial.loops) > rules.MISFIT or _ratio(trial.balance) > rules.MISFIT
-    ]
+    odd = [k for k, trial in enumerate(fit.trials) if trial.loops.misfits or trial.balance.misfits]
     if not odd:
         return [] if fit.converged else [_unsettled(names)]
     if fit.converged:  # elsewhere, derivatives say nothing of what would explain it
@@ -74,17 +70,13 @@ def _unexplained(fit: Fit, odd: Sequence[int], names: Sequence[str]) -> str:
     worst = max(odd, key=lambda k: fit.trials[k].all.c)
     parts = []
     for k in odd:
-        loops, balance = _ratio(fit.trials[k].loops), _ratio(fit.trials[k].balance)
+        loops, balance = fit.trials[k].loops.ratio, fit.trials[k].balance.ratio
         parts.append(f"{names[k]} ({loops:.3g} in its loops, {balance:.3g} in its balance)")
     return (
         f"No calibration explains {'; '.join(parts)}: chi2/n is 1 where robots, payload and noise are all there is, "
         f"and {rules.MISFIT} at most. Something else acts on these robots, most in {names[worst]}; the numbers are not "
         "to be trusted before mocobot diagnose has named it."
     )
-
-
-def _ratio(part: Quadratic) -> float:
-    return part.c / max(1, part.count)
 
 
 def _suffices(fit: Fit, change: Change) -> bool:

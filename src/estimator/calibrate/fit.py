@@ -62,6 +62,8 @@ def fit(
     alone: Sequence[AloneEquations] = (),
     known_mass: Sequence[KnownMass] = (),
     robots: Calibration | None = None,
+    *,
+    held: bool = False,
 ) -> Fit:
     """Calibrate.
 
@@ -72,6 +74,8 @@ def fit(
         alone: recordings of unloaded arms.
         known_mass: weighed payloads; with one, the common spring scale is free.
         robots: an earlier calibration, whose robots are held; their errors go on to the rest.
+        held: the robots are those of the start and have no errors (``prior`` has no spread): a third quicker, and
+            trials know nothing of them.
     """
     layout = Layout(len(start.units.x), len(start.carried), len(trials))
     of_units = (
@@ -82,7 +86,7 @@ def fit(
     basis = np.asarray(block_diag(of_units, np.eye(layout.size - len(of_units))))
     information = np.zeros(basis.shape[1])
     information[: of_units.shape[1]] = 1.0
-    problem = Problem(trials, alone, known_mass, prior, layout, basis, information)
+    problem = Problem(trials, alone, known_mass, prior, layout, basis, information, held=held)
     descent = Descent(problem)
     point, steps, settled = problem.at(start, np.zeros(basis.shape[1]), split=True), 0, False
     before = _with_robots_held(point, layout)
@@ -90,7 +94,7 @@ def fit(
         H, g = problem.normal(point)
         dz, covariance_z = solved(H, g)
         # Where much is left that no calibration explains, steps are small against what is left.
-        left = max(1.0, np.sqrt(point.value / point.count))
+        left = max(1.0, np.sqrt(point.value / point.rows))
         size = float(np.max(np.abs(dz) / np.sqrt(np.diag(covariance_z)))) / left
         if problem.complete:
             settled = size < rules.CONVERGED

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from estimator.calibrate import rules
 from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.equations.alone import AloneEquations
 from estimator.calibrate.fit import fit
@@ -47,7 +46,7 @@ class Given:
         except (InputError, np.linalg.LinAlgError):
             return False
         parts = [part for trial in found.trials for part in (trial.loops, trial.balance)]
-        return found.converged and all(part.c < rules.MISFIT * max(1, part.count) for part in parts)
+        return found.converged and not any(part.misfits for part in parts)
 
 
 def contradicting(given: Given, names: Sequence[str]) -> str | None:

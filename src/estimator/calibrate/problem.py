@@ -50,11 +50,11 @@ class Trial:
     payload: int
     sensing: Sensing
 
-    def blocks(self, every: int = 1) -> list[TrialEquations]:
-        """Its equations in blocks, of every so-and-so-many-th row."""
+    def blocks(self, every: int = 1, *, held: bool = False) -> list[TrialEquations]:
+        """Its equations in blocks, of every so-and-so-many-th row; robots ``held`` need no derivatives."""
         chosen = np.arange(0, len(self.rows.time), every)
         parts = np.array_split(chosen, max(1, -(-len(chosen) // rules.BLOCK_ROWS)))
-        return [TrialEquations.of(self.rows.take(part), self.sensing) for part in parts]
+        return [TrialEquations.of(self.rows.take(part), self.sensing, held=held) for part in parts]
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ class Point(NamedTuple):
         trials, alone, known: its parts.
         H, g: normal equations of all unknowns without the prior, shapes (K, K) and (K,).
         value: chi2 of all rows, and of the prior.
-        count: rows, and coordinates that have a prior.
+        rows: how many there are, and coordinates that have a prior.
     """
 
     unknowns: Unknowns
@@ -90,7 +90,7 @@ class Point(NamedTuple):
     H: Array
     g: Array
     value: float
-    count: int
+    rows: int
 
 
 class Problem:
@@ -112,19 +112,21 @@ class Problem:
         layout: Layout,
         basis: Array,
         information: Array,
+        *,
+        held: bool = False,
     ) -> None:
-        """On every so-and-so-many-th row, ``rules.COARSE_ROWS`` in all."""
+        """On every so-and-so-many-th row, ``rules.COARSE_ROWS`` in all; ``held`` as ``fit`` has it."""
         self.layout, self.basis, self.prior = layout, basis, information
         self._trials, self._alone, self._known = trials, alone, known_mass
-        self._spread = prior
+        self._spread, self._held = prior, held
         every = max(1, sum(len(trial.rows.time) for trial in trials) // rules.COARSE_ROWS)
         self.complete = every == 1
-        self._blocks = _blocks(trials, prior, every)
+        self._blocks = _blocks(trials, prior, every, held=held)
 
     def on_all_rows(self, point: Point, dz: Array) -> Point:
         """A step, and every row from there on."""
         self.complete = True
-        self._blocks = _blocks(self._trials, self._spread, 1)
+        self._blocks = _blocks(self._trials, self._spread, 1, held=self._held)
         return self.moved(point, dz)
 
     def at(self, unknowns: Unknowns, z: Array, *, split: bool = False) -> Point:
@@ -200,26 +202,29 @@ class _Block:
         return rowed
 
 
-def _blocks(trials: Sequence[Trial], prior: Prior, every: int) -> list[list[_Block]]:
+def _blocks(trials: Sequence[Trial], prior: Prior, every: int, *, held: bool) -> list[list[_Block]]:
     """Rows of all trials.
 
     A common scale of springs and arm masses that are each free are told apart by what lies within the errors of
     derivatives at a row's mean signals (2 % at most): a step of Gauss-Newton then covers a fifth of the way.
     """
     averaged = every == 1 and prior.arm_mass_ratio > 0.0
-    return [[_Block(equations, averaged) for equations in trial.blocks(every)] for trial in trials]
+    return [[_Block(equations, averaged) for equations in trial.blocks(every, held=held)] for trial in trials]
 
 
 def _trial_fit(
     k: int, trial: Trial, blocks: Sequence[_Block], at: Unknowns, layout: Layout, *, split: bool
 ) -> TrialFit:
     """A trial at some unknowns; loops and balance apart only where asked."""
-    index = np.r_[layout.of_units, layout.of_payload(trial.payload), layout.of_trial(k)]
+    held = all(block.equations.held for block in blocks)
+    of_units = slice(0, 0) if held else layout.of_units
+    index = np.r_[of_units, layout.of_payload(trial.payload), layout.of_trial(k)]
     sums: list[Quadratic | None] = [None, None, None]
     for block in blocks:
         rowed = block.at(at.units, at.carried[trial.payload], at.bases[k])
         n, C = rowed.residual.shape
-        J = np.concatenate([rowed.by_units.reshape(n, C, -1), rowed.by_carried, rowed.by_bases], axis=2)
+        by_units = rowed.by_units.reshape(n, C, -1)[..., of_units]
+        J = np.concatenate([by_units, rowed.by_carried, rowed.by_bases], axis=2)
         kinds = (slice(0, C), slice(0, C - 6), slice(C - 6, C))
         for kind, rows in enumerate(kinds if split else kinds[:1]):
             noise = rowed.scatter if kind else rowed.covariance

@@ -63,6 +63,9 @@ CONVERGED = 0.02
 MISFIT = 1.3
 """chi2/n of loops or balance of a recording above which no calibration explains it. Measured: below 1.1 on uncalibrated
 teams with nothing else wrong; what noise adds to it is 0.03."""
+MISFIT_SIGMAS = 4.0
+"""The same where rows are few, in standard deviations of chi2/n, which are sqrt(2/n). Chosen: a static trial of two
+robots has three dozen rows, and noise alone makes 1.3 of one in ten of them."""
 SUFFICES = 0.99
 """Share of a misfit that one change in one recording must explain to be named where it does not explain all. Measured:
 slips of 0.2 to 1 deg 0.9999 and more, by derivatives; the best change where a joint rubs in all recordings 0.07."""
