@@ -157,7 +157,8 @@ def _check_noise(found: Fit, names: Sequence[str]) -> None:
     if left:
         ratio, name, what = max(left)
         raise _CannotBe(
-            f"that leaves more than noise (chi2/n is {ratio:.3g} in the {what} of {name}), to which it is more sensitive"
+            f"that leaves more than noise, to which it is more sensitive (chi2/n is {ratio:.3g} in the {what} of "
+            f"{name})"
         )
     if not found.converged:
         raise _CannotBe("that does not settle")
