@@ -89,7 +89,8 @@ def test_robots_that_are_not_as_designed_leave_the_stages_as_they_were() -> None
     found, before = estimate(recordings), estimate_payload(recordings)
     assert (found.method, before.method) == ("joint", "joint")
     assert found.why_not_fit.startswith(
-        "Joint, and not in one fit of loops and balance: that leaves more than noise, to which it is more sensitive (chi2/n is "
+        "Joint, and not in one fit of loops and balance: that leaves more than noise, to which it is more sensitive "
+        "(chi2/n is "
     )
     assert replace(found, why_not_fit="").to_dict() == before.to_dict()
     assert found.why_not_fit in format_estimate(found)
