@@ -79,8 +79,8 @@ class Sensing:
         In motion a joint that makes few steps while a row is averaged has few independent rounding errors; at rest it
         has one, unless noise moves the reading to and fro.
         """
-        floor = np.repeat([rules.ANGLE_FLOOR_RAD, rules.ANGLE_FLOOR_RAD, rules.TORQUE_FLOOR_NM], 3)
-        floor = floor**2 * rows.rate_hz / rules.FLOOR_HZ
+        least = np.repeat([rules.PHI_FLOOR_RAD, rules.THETA_FLOOR_RAD, rules.TORQUE_FLOOR_NM], 3) ** 2
+        floor = least * rows.rate_hz / rules.FLOOR_HZ
         rounding, noise = self.step**2 / 12.0, self.sigma**2
         step = np.maximum(self.step, 1e-300)
         dithered = self.sigma > rules.DITHER * step * np.sqrt(self.share)
@@ -93,7 +93,7 @@ class Sensing:
         long = np.maximum(rows.length, 1)[:, None, None]
         lasting = np.clip(1.0 + way / step, 1.0, long)
         lasting[..., 6:] = 1.0
-        held = noise / long + rounding / np.where(dithered, long, lasting) + floor
+        held = noise / long + rounding / np.where(dithered, long, lasting) + rules.AT_REST**2 * least
         return moving, np.broadcast_to(held, moving.shape)
 
 
