@@ -268,6 +268,8 @@ INTERVALS = 1000.0
 """At which an event may be. Derived: about so many are searched."""
 LOOKED_AT_NATS = -5.0
 """Log odds in the scan, from which a candidate is looked at closely. Chosen: what it leaves open may make up for it."""
+HELD_FACTOR = 1.5
+"""Spread of a kind from which it is scanned within its tolerance, too. Chosen."""
 WORST_EVENTS = 3
 """Intervals looked at closely. Chosen."""
 NAMED_NATS = 3.0
