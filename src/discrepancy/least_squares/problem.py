@@ -189,7 +189,7 @@ class Problem:
         """
         if key in self.opened or not any(u.shape[2] for u in unknowns):
             return self
-        own = [Opened.of(self.without_own(t, u), size) for t, u in enumerate(unknowns)]
+        own = [Opened.of(u, size, self.without_own(t, u)) for t, u in enumerate(unknowns)]
         spectra, grams = [], []
         for one, cells, old, gram in zip(own, self.cells, self.spectra, self.cell_grams, strict=True):
             if not len(one.shrink):

@@ -22,7 +22,9 @@ CANDIDATES = (
 )
 
 
-def random_rows(rng, trials=3, n=40, channels=3, local=2, shared=2, candidates=CANDIDATES):
+def random_rows(
+    rng, trials=3, n=40, channels=3, local=2, shared=2, candidates=CANDIDATES, moving=None, groups=None
+):
     out = []
     for t in range(trials):
         out.append(
@@ -33,6 +35,8 @@ def random_rows(rng, trials=3, n=40, channels=3, local=2, shared=2, candidates=C
                 rng.standard_normal((n, channels, shared)),
                 [0.5 * rng.standard_normal((n, channels, len(c.parameters))) for c in candidates],
                 np.arange(n) / 10.0,
+                moving,
+                groups,
             )
         )
     return out
@@ -53,8 +57,33 @@ class Solution:
     data_misfit: list
 
 
-def brute(rows, candidates, free=(), trials=None, background=True, fixed=None):
-    """Augmented least squares with every trial's own unknowns as columns and every tolerance as a row."""
+def cosines(n, moving=None):
+    """The orthonormal cosine transform of the first ``moving`` of n rows, written out, shape (n, n)."""
+    m = n if moving is None else moving
+    k, i = np.mgrid[:m, :m]
+    out = np.eye(n)
+    out[:m, :m] = np.sqrt(2.0 / m) * np.cos(np.pi * k * (i + 0.5) / m)
+    out[0, :m] = np.sqrt(1.0 / m)
+    return out
+
+
+def noise_covariance(row, power):
+    """Covariance of a trial's rows, numbers in the order of ``ravel``, from variances in the transform (n, C)."""
+    n, channels = row.residual.shape
+    D = cosines(n, row.moving)
+    K = np.zeros((n, channels, n, channels))
+    for c in range(channels):
+        K[:, c, :, c] = D.T @ (power[:, c, None] * D)
+    return K.reshape(n * channels, n * channels)
+
+
+def brute(rows, candidates, free=(), trials=None, background=True, fixed=None, noise=None, spread=None):
+    """Augmented least squares with every trial's own unknowns as columns and every tolerance as a row.
+
+    Args:
+        noise: covariance of every trial's noise, (n C, n C); None for white noise.
+        spread: of every column of the candidates over its unit; None for 1.
+    """
     trials = range(len(rows)) if trials is None else trials
     used = []
     for index, c in enumerate(candidates):
@@ -78,10 +107,16 @@ def brute(rows, candidates, free=(), trials=None, background=True, fixed=None):
         if fixed is not None:
             index, values = fixed
             b -= (r.causes[index] @ (candidates[index].units * values)).ravel()
+        if noise is not None:
+            root = np.linalg.cholesky(noise[t])
+            A, b = np.linalg.solve(root, A), np.linalg.solve(root, b)
         blocks.append(A)
         right.append(b)
     data, b = np.concatenate(blocks), np.concatenate(right)
     prior = np.eye(width)[[shared + at for at, entry in enumerate(used) if entry[3]]]
+    if spread is not None:
+        first = np.cumsum([0, *(len(c.parameters) for c in candidates)])
+        prior /= np.array([spread[first[i] + k] for i, k, _, tight in used if tight])[:, None]
     x = np.linalg.lstsq(np.vstack([data, prior]), np.append(b, np.zeros(len(prior))), rcond=1e-12)[0]
     misfits = [float(np.sum((v - A @ x) ** 2)) for A, v in zip(blocks, right, strict=True)]
     causes = {}

@@ -7,7 +7,7 @@ from scipy.stats import chi2, kstest, ncx2
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Transient
-from linear_problem import CANDIDATES, brute, candidate, random_rows, with_residuals
+from linear_problem import CANDIDATES, brute, candidate, noise_covariance, random_rows, with_residuals
 
 
 @pytest.fixture
@@ -29,7 +29,9 @@ def same_fit(fit, expected):
 
 def same_problem(a, b):
     np.testing.assert_allclose(a.grams, b.grams, rtol=1e-9, atol=1e-9)
-    for x, y in zip(a.rows + a.raw + a.local, b.rows + b.raw + b.local, strict=True):
+    for x, y in zip(a.cell_grams, b.cell_grams, strict=True):
+        np.testing.assert_allclose(x, y, rtol=1e-9, atol=1e-9)
+    for x, y in zip(a.spectra + a.raw + a.local, b.spectra + b.raw + b.local, strict=True):
         np.testing.assert_allclose(x, y, rtol=1e-9, atol=1e-10)
     assert a.spans == b.spans
     assert a.shared == b.shared
@@ -94,6 +96,68 @@ def test_fixed_values_take_a_candidate_out_of_the_fit(rows):
     best = Fit.of(problem, [4], background=False)
     held = Fit.of(problem, [], fixed=(4, best.part(4)[0]), background=False)
     assert held.misfit == pytest.approx(best.misfit)
+
+
+def drawn_noise(rng, problem):
+    """Another power in every cell, another spread of every column with a tolerance."""
+    power = [rng.uniform(0.5, 4.0, len(p)) for p in problem.power]
+    return problem.with_noise(power, np.where(problem.tolerant, rng.uniform(1.0, 5.0, problem.spread.shape), 1.0))
+
+
+@pytest.mark.parametrize("free", [(), (1,), (3, 2)])
+@pytest.mark.parametrize("trials", [None, [2, 0]])
+def test_powers_and_spreads_are_those_of_generalised_least_squares(rng, free, trials):
+    """Noise that is neither white nor of one size, two rows that stand alone, two groups of channels."""
+    rows = random_rows(rng, n=22, local=0, moving=20, groups=[0, 0, 1])
+    problem = drawn_noise(rng, Problem.of(rows, CANDIDATES))
+    noise = [
+        noise_covariance(r, p[c.index]) for r, p, c in zip(rows, problem.power, problem.cells, strict=True)
+    ]
+    expected = brute(rows, CANDIDATES, free, trials, noise=noise, spread=problem.spread)
+    same_fit(Fit.of(problem, free, trials), expected)
+
+
+def test_covariance_with_powers_and_spreads(rng):
+    rows = random_rows(rng, n=22, local=0, moving=20, groups=[0, 0, 1])
+    problem = drawn_noise(rng, Problem.of(rows, CANDIDATES))
+    fit, H = Fit.of(problem, [1]), np.diag([0.0, 0.0, *problem.spread**-2.0])
+    H[3:5, 3:5] = 0.0
+    keep = np.r_[:5, 6:9]
+    H = H[np.ix_([*range(5), 6, 7, 8], [*range(5), 6, 7, 8])]
+    for t, r in enumerate(rows):
+        A = problem.raw[t][..., keep].reshape(r.residual.size, -1)
+        H += A.T @ np.linalg.solve(noise_covariance(r, problem.power[t][problem.cells[t].index]), A)
+    np.testing.assert_allclose(fit.covariance, np.linalg.inv(H), rtol=1e-7, atol=1e-12)
+
+
+def test_further_columns_are_weighed_as_those_of_the_problem(rng, rows):
+    """What a candidate's own columns tell beside all else, with powers and spreads, equals what the problem says."""
+    problem = drawn_noise(rng, Problem.of(rows, CANDIDATES))
+    fit = Fit.of(problem, [0])
+    own = [r.causes[2] * CANDIDATES[2].units for r in rows]
+    for got, expected in zip(fit.told_by(own), fit.told(2), strict=True):
+        np.testing.assert_allclose(got, expected, rtol=1e-8)
+
+
+def test_tolerance_that_is_known_tells_nothing_of_itself(rng, rows):
+    """Information without the prior is the same whatever the prior's spread, if all else stays."""
+    problem = Problem.of(rows, CANDIDATES)
+    wide = problem.spread.copy()
+    wide[problem.columns_of(1)] = 7.0
+    for got, expected in zip(
+        Fit.of(problem.with_noise(problem.power, wide)).told(1), Fit.of(problem).told(1), strict=True
+    ):
+        np.testing.assert_allclose(got, expected, rtol=1e-7)
+
+
+def test_chi2_is_of_the_noise_as_whitened(rng):
+    """Whatever powers the fit used: squares of what it leaves, and of the tolerances in their spreads."""
+    rows = random_rows(rng, n=22, local=0)
+    problem = drawn_noise(rng, Problem.of(rows, CANDIDATES))
+    fit = Fit.of(problem, [2])
+    left = sum(float(np.sum(fit.remaining(t) ** 2)) for t in problem.trials)
+    values = np.concatenate([fit.part(i)[0] / problem.spread[problem.columns_of(i)] for i in (0, 1, 3)])
+    assert fit.chi2 == pytest.approx(left + np.sum(values**2))
 
 
 @pytest.mark.parametrize("free", [(), (0,), (4,)])
@@ -162,11 +226,6 @@ def test_changing_a_problem_equals_building_it_anew(rng, rows):
 
     added = [_with_causes(r, [*r.causes, c]) for r, c in zip(rows, columns, strict=True)]
     same_problem(problem.extended(other, columns), Problem.of(added, (*CANDIDATES, other)))
-
-    more = [rng.standard_normal((*r.residual.shape, 3)) for r in rows]
-    wider = [_with_local(r, np.concatenate([r.local, m], axis=2)) for r, m in zip(rows, more, strict=True)]
-    same_problem(problem.with_unknowns(more), Problem.of(wider, CANDIDATES))
-    assert problem.with_unknowns([m[..., :0] for m in more]) is problem
 
 
 def _with_causes(row, causes):
