@@ -1,5 +1,7 @@
 """What the diagnosis needs to know of a rig: rows, unknowns, causes, and how to resimulate it."""
 
+from __future__ import annotations
+
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -9,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from discrepancy import rules
 from estimator.arrays import Array
 
 
@@ -79,6 +82,13 @@ class Candidate:
     def acts_in(self, trial: int) -> bool:
         """Whether it can act in a trial (index from 0)."""
         return self.transient is None or self.transient.trial == trial
+
+    def overlaps(self, other: Candidate) -> bool:
+        """Whether both are events of one cause that act at the same time."""
+        a, b = self.transient, other.transient
+        if a is None or b is None or self.cause != other.cause or a.trial != b.trial:
+            return False
+        return max(a.start_s, b.start_s) < min(a.start_s + a.duration_s, b.start_s + b.duration_s)
 
     @property
     def units(self) -> Array:
@@ -227,6 +237,10 @@ class Rig(ABC):
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         """Whether such values can be: no negative mass, stiffness or friction beyond the errors."""
         return True
+
+    def law_share(self, candidate: Candidate) -> float:
+        """Amplitude that the law of a cause leaves of its trace where it is there: a standard deviation."""
+        return rules.LAW_SHARE
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Causes that act for a while in one trial only, where the whitened residuals (n, C) are worst."""

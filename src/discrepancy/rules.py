@@ -11,8 +11,6 @@ COMPLEXITY = 1.6
 """Penalty per parameter and ln n on the scale of chi-square. Chosen: stricter than the 1 of Schwarz's criterion."""
 LEAST_INFORMATION = 1e-3
 """Inverse variance (in units of tolerance) below which a direction is undecidable. Chosen."""
-INTERVALS_LOG10 = 3.0
-"""What a transient pays for the intervals searched. Derived: about a thousand of them."""
 CLEAN_CHI2_PER_N = 1.15
 """Nothing is left to explain below that. Measured: clean teams leave 1.02 to 1.08, tolerances in use up to 1.13."""
 NOTICED_SE = 1.2816
@@ -36,65 +34,31 @@ SHRINKAGE_SHARE = 0.05
 
 # Search: which candidates are compared, how their shapes are sharpened.
 
-MOST_CAUSES = 3
-"""Chosen; docs/diagnosis/method.md, 'Search'."""
-EMPS_MOST_CAUSES = 10
-"""The nominal axis is a bare mass without friction of any kind. Chosen; the benchmark's first recording takes eight."""
-MOST_REJECTED = 4
-"""Candidates that held-out trials may reject before the search ends. Chosen."""
+MOST_CAUSES = 12
+"""Of one verdict. Chosen: no more than a guard; the benchmark's first axis takes eight."""
 LEADERS = 8
-"""Significant candidates that are sharpened and compared. Chosen."""
+"""Candidates of a scan that are looked at closely, and as many more that are the likeliest of their cause. Chosen."""
 FINER_ROUNDS = 4
 """Refinements of a shape around the best so far. Chosen."""
 POLISH_ROUNDS = 3
 """Gauss-Newton steps of a shape after the grid. Chosen."""
 REFIT_ROUNDS = 3
 """Gauss-Newton steps of causes and unknowns with exact residuals. Chosen."""
-DIVERGED_RATIO = 1.5
-"""Misfit over the last one from which such a step is not taken. Chosen."""
-RIVAL_SHARE = 0.5
-"""A rival explains at least this share of what the best does. Chosen."""
-
-# Worth: is a further cause named beside others?
-
-NEXT_SHARE = 0.25
-"""Share of what those before it left that it must take away. Chosen; docs/diagnosis/method.md, 'Search'."""
-LOOK_ALIKE_GROWTH = 10.0
-"""Growth of a named cause's standard error beside it from which the two are the same. Chosen, after friction had been
-divided among parallel gimbal axes (docs/diagnosis/validation.md, 'Verdicts', 10 times)."""
-
-# Held out: does a cause help where it was not fitted?
-
-SUPPORTING_TRIALS = 2
-"""That it must help, when fitted to the others. Chosen: one may be chance, and more need not show the cause."""
-AGAINST_SHARE = 1.0 / 3.0
-"""What it harms over what it helps, at most. Chosen, after a count of trials had lost a hardening that two saw."""
-INTERLEAVED_BLOCKS = 4
-"""In which a transient's own trial is split, as nothing else shows it. Chosen."""
-SHORT_ROWS = 24
-"""A transient of fewer (2 s of a team) cannot be split; its evidence has to do. Chosen: blocks of three rows."""
-INSIDE_SHARE = 0.1
-"""Of its largest row: rows that a transient reaches; a trial's own unknowns spread a trace everywhere. Chosen."""
 
 # Verdict and closed loop.
 
 RESPONSE_SHARE = 0.8
 """Of the response's excess error that causes must remove, or what is left of a visible one is said beside the verdict.
 Chosen."""
-LEAST_SHARE = 0.3
-"""Causes that explain less of a large misfit, of rows or closed loop, are no explanation. Chosen."""
-MOST_BELIEVED = 2
-"""More causes at one robot, or of so few families, imitate another. Chosen; docs/diagnosis/method.md, 'Verdict'."""
 CLOSE_NATS = 20.0
-"""Rivals that the rows put closer are simulated, too. Chosen: simulations cost most of the time."""
+"""Shapes are sharpened of candidates that a scan puts closer to its likeliest. Chosen: it costs time."""
 AMBIGUOUS_NATS = CLOSE_NATS / 4.0
-"""Rivals that the rows put closer, and the closed loop does not part, cannot be told from a cause. Chosen."""
+"""Rivals that the rows put closer are simulated; what the closed loop does not part either cannot be told apart.
+Chosen."""
 MARGIN_SHARE = 0.02
 """Simulations whose chi-square differs by less are equally good. Chosen."""
 VISIBLE_CHI2_PER_N = 3.0
-"""Of the nominal closed loop, from which causes have to improve it. Chosen."""
-WINNING_SHARE = 0.5
-"""Of the trials that a rival must do better in to replace a cause. Chosen: most trials, not one by much."""
+"""Of the closed loop, from which something is said of it beside the verdict. Chosen."""
 
 # A team: what is accepted.
 
@@ -285,10 +249,12 @@ MOST_SPREAD = 1e3
 """Of a kind over its tolerance. Chosen: an encoder's zero of 6 deg."""
 LEAST_SLAB = 4.0
 """Size of what counts as a fault over the tolerance, at least. Chosen."""
+LEAST_SIZE = 1e-6
+"""Of a cause without a tolerance over its typical size. Derived: not to divide by nought."""
 LEARN_ROUNDS, LEARN_NATS = 30, 0.05
 """Steps of powers and spreads at most, and the gain of evidence below which they have settled. Chosen."""
 LEAST_POWER = 0.5
-"""Of a cell over that of its whitening. Chosen: whitening takes some noise of healthy robots to be larger than it is."""
+"""Of a cell over that of its whitening. Chosen: some noise of healthy robots is drawn larger than it is."""
 FLAT_SHARE = 1e-10
 """Information that shared unknowns have beforehand, over that of the data: none, but what is undecidable stays put."""
 PRIOR_ODDS = 0.05
@@ -311,10 +277,12 @@ SETTLED_SE = 0.05
 """Standard errors: a value that moves less has settled. Chosen."""
 CELL_NATS = 4.0
 """What a process of its own in a cell costs. Chosen: about a hundred cells are looked at, ln 100."""
-UNLISTED_NATS = 30.0
+UNLISTED_NATS = 60.0
 """Of all such processes, from which what is left is not noise. Chosen."""
 LAW_SHARE = 0.2
 """Standard deviation of what the law of a cause that is there leaves of its trace, in amplitude. Chosen."""
+EMPS_LAW_SHARE = 1.0
+"""The same for what lasts on the axis. Chosen: its first recording leaves four times the noise whatever is named."""
 LISTED_ODDS = 4.0
 """That a cause is one of the catalogue rather than an unlisted one that looks like it. Chosen."""
 LAW_ERROR_SHARE = 0.02
@@ -329,3 +297,7 @@ STRAIGHT_CHI2_PER_N = 0.01
 """What curvature adds to chi-square, from which all is linearised again. Chosen: a hundredth of the noise."""
 BASE_ROUNDS = 4
 """Linearisations at most. Measured: robots 1 deg off take two."""
+DOUBTFUL = 2
+LITTLE_SHARE = 0.05
+"""Causes in a row that are less likely than not when they are added, and the share of what is left (in nats) that they
+explain at most, after which no more are looked for. Chosen: one may become likely beside the next."""

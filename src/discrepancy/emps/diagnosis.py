@@ -61,9 +61,7 @@ def diagnose_axis(
         rig: the recording.
         closed_loop, jobs, say, simulated: as of ``diagnose``.
     """
-    found = diagnose(
-        rig, closed_loop=closed_loop, most=rules.EMPS_MOST_CAUSES, jobs=jobs, say=say, simulated=simulated
-    )
+    found = diagnose(rig, closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated)
     explanation = with_block_errors(found.explanation, block_rows(rig))
     notes = (*rig.log.notes, *found.notes, _noise(rig), *_loop(rig, found.explanation))
     return replace(found, explanation=explanation, notes=notes)

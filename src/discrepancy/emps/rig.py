@@ -158,6 +158,10 @@ class EmpsRig(Rig):
             out = [r - x * candidate.acts_in(t) for t, (r, x) in enumerate(zip(out, taken, strict=True))]
         return out
 
+    def law_share(self, candidate: Candidate) -> float:
+        """A real axis: noise is what differs between its cycles, and every law leaves more than that."""
+        return rules.LAW_SHARE if candidate.transient else rules.EMPS_LAW_SHARE
+
     def unknowns(self, candidate: Candidate) -> list[Array]:
         """Dry friction at rest, whitened columns (n, 2, k) of every block."""
         rests = CAUSES[candidate.cause].rests(self.signals, candidate.shape)

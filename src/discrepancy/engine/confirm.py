@@ -1,6 +1,6 @@
 """The causes in the closed loop: recorded commands simulated again, a test that the rows know nothing of."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,6 +9,7 @@ from discrepancy import rules
 from discrepancy.engine.explanation import Explanation, Found, explain
 from discrepancy.engine.gain import Gain, mean_chi2, responses
 from discrepancy.engine.hypothesis import Hypothesis
+from discrepancy.engine.probability import probability
 from discrepancy.engine.refit import exact
 from discrepancy.engine.search import Rival, Searched
 from discrepancy.least_squares.problem import Problem
@@ -107,26 +108,52 @@ def confirm(
             else "cannot be simulated with the recorded commands"
         )
         notes.append(f"{labels(explanation.found)}: {loop}, which speaks against it.")
-        found = tuple(
-            replace(item, probability=item.probability * rules.CONTRADICTED) for item in explanation.found
-        )
-        explanation = replace(explanation, found=found)
+    place = {winner.index: winner.cause.index} if winner else {}
     alternatives = tuple(
         tuple(
-            _alternative(c, gap, tried.get((winner.cause.index if winner and found.index == winner.index else found.index, c.key)), best)
-            for c, gap in found.rivals
+            _alternative(c, gap, tried.get((place.get(item.index, item.index), c.key)), best)
+            for c, gap in item.rivals
         )
-        for found in explanation.found
-    )  # fmt: skip
-    return Confirmed(explanation, alternatives, Gain(before, after, len(rig.trials) > 1), contradicted, tuple(notes))
+        for item in explanation.found
+    )
+    weight = rules.CONTRADICTED if contradicted else 1.0
+    found = tuple(
+        replace(
+            item,
+            probability=weight * _decided(rig, item, others),
+            probability_alike=weight * item.probability_alike,
+        )
+        for item, others in zip(explanation.found, alternatives, strict=True)
+    )
+    explanation = replace(explanation, found=found)
+    return Confirmed(
+        explanation, alternatives, Gain(before, after, len(rig.trials) > 1), contradicted, tuple(notes)
+    )
+
+
+def _decided(rig: Rig, found: Found, alternatives: Sequence[Alternative]) -> float:
+    """The probability of a cause once the closed loop has spoken: a rival that does worse there is no look-alike."""
+    gaps = [
+        other.evidence_gap
+        if other.ambiguous or other.chi2_per_n is None
+        else max(other.evidence_gap, rules.AMBIGUOUS_NATS)
+        for other in alternatives
+    ]
+    return probability([*gaps, found.over_nothing], found.share_left, rig.law_share(found.candidate))
 
 
 def _exchanged(rig: Rig, explanation: Explanation, problem: Problem, winner: _Swap) -> Explanation:
     """The explanation with the rival in the cause's place."""
-    best = exact(rig, Hypothesis.of(problem, winner.free), explanation.nothing)
+    best = exact(
+        rig, Hypothesis.of(problem, winner.free, explanation.hypothesis.allowed), explanation.nothing
+    )
     rivals = []
     for index in winner.free:
-        (old,) = [f for f in explanation.found if f.index == (winner.cause.index if index == winner.index else index)]
+        (old,) = [
+            f
+            for f in explanation.found
+            if f.index == (winner.cause.index if index == winner.index else index)
+        ]
         own = [Rival(c, gap) for c, gap in old.rivals]
         if index == winner.index:
             # The closed loop has decided between these two.
@@ -164,5 +191,3 @@ def labels(found: Iterable[Found]) -> str:
     """Causes and their places, as a sentence begins."""
     text = ", ".join(item.candidate.label for item in found)
     return text[:1].upper() + text[1:]
-
-

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,7 @@ class Found:
         index: which candidate of the problem.
         candidate: what and where, with its best shape.
         probability: that it is what and where it is said to be.
+        probability_alike: that it is this or one of the rivals that cannot be told from it.
         over_nothing: by how much it is likelier than nothing in its place [nats].
         share_left: see ``remainder.share_left``.
         rivals: what else could be in its place, the likeliest first, and by how much it is less likely [nats].
@@ -42,6 +43,7 @@ class Found:
     index: int
     candidate: Candidate
     probability: float
+    probability_alike: float
     over_nothing: float
     share_left: float
     rivals: tuple[tuple[Candidate, float], ...]
@@ -123,25 +125,34 @@ class Explanation:
     @property
     def clean(self) -> bool:
         """Whether what is left is noise."""
-        return self.after <= rules.CLEAN_CHI2_PER_N * self.samples and self.unlisted_nats < rules.UNLISTED_NATS
+        return (
+            self.after <= rules.CLEAN_CHI2_PER_N * self.samples and self.unlisted_nats < rules.UNLISTED_NATS
+        )
 
 
 def explain(searched: Searched) -> Explanation:
     """Values, probabilities and worth of what a search found."""
     rig, best, nothing = searched.rig, searched.best, searched.nothing
+    rivals = dict(zip(best.free, searched.rivals, strict=True))
+    found = [_found(rig, best, index, rivals[index]) for index in best.free]
+    suspected = [item for item in found if item.probability_alike < rules.LEAST_PROBABILITY]
+    for item in suspected:
+        # What is less likely than not takes no part in what is said of the others.
+        best = best.without(item.index)
+    found = [replace(item, **_values(rig, best, item.index)) for item in found if item not in suspected]
     problem = best.problem.as_whitened
-    found, removed = [], shares(problem, best.free)
-    for index, rivals, (in_sample, held_out) in zip(best.free, searched.rivals, removed, strict=True):
-        found.append(_found(rig, best, index, rivals, in_sample, held_out))
-    named = tuple(item for item in found if item.probability >= rules.LEAST_PROBABILITY)
-    start = nothing.problem.as_whitened
+    removed = shares(problem, best.free)
+    found = [
+        replace(item, in_sample=in_sample, held_out=held_out)
+        for item, (in_sample, held_out) in zip(found, removed, strict=True)
+    ]
     return Explanation(
-        found=named,
-        suspected=tuple(item for item in found if item.probability < rules.LEAST_PROBABILITY),
+        found=tuple(found),
+        suspected=tuple(suspected),
         scatter=scatter_of(best),
         hypothesis=best,
         nothing=nothing,
-        nominal=Fit.of(start, background=False).misfit,
+        nominal=Fit.of(nothing.problem.as_whitened, background=False).misfit,
         before=nothing.fit.chi2,
         after=best.fit.chi2,
         plain=Fit.of(problem, best.free, background=False).misfit,
@@ -151,30 +162,36 @@ def explain(searched: Searched) -> Explanation:
     )
 
 
-def _found(
-    rig: Rig, best: Hypothesis, index: int, rivals: Sequence[Rival], in_sample: float, held_out: float | None
-) -> Found:
+def _found(rig: Rig, best: Hypothesis, index: int, rivals: Sequence[Rival]) -> Found:
     candidate = best.problem.candidates[index]
     left = share_left(best, index)
-    values, _ = best.fit.part(index)
     nothing = next((rival.gap for rival in rivals if rival.candidate is None), np.inf)
     others = [(rival.candidate, rival.gap) for rival in rivals if rival.candidate is not None]
     # The same event in another interval is no other cause.
     others = [(c, gap) for c, gap in others if c.transient is None or c.cause != candidate.cause]
-    law = np.concatenate([values * candidate.units, np.zeros(len(rig.steps(candidate)))])
+    gaps, law = [gap for _, gap in others], rig.law_share(candidate)
     return Found(
         index=index,
         candidate=candidate,
-        probability=probability([*(gap for _, gap in others), nothing], left),
+        probability=probability([*gaps, nothing], left, law),
+        probability_alike=probability([*(g for g in gaps if g >= rules.AMBIGUOUS_NATS), nothing], left, law),
         over_nothing=float(nothing),
         share_left=left,
         rivals=tuple(others),
-        values=values * candidate.units,
-        covariance=covariance_with_shape(rig, best.fit, index) + rules.LAW_ERROR_SHARE**2 * np.diag(law**2),
+        **_values(rig, best, index),
         folds=tuple(held_out_gains(best.problem, [i for i in best.free if i != index], index)),
-        in_sample=in_sample,
-        held_out=held_out,
+        in_sample=0.0,
+        held_out=None,
     )
+
+
+def _values(rig: Rig, best: Hypothesis, index: int) -> dict[str, Array]:
+    """Values of a cause, and their covariance with what its law may put them off."""
+    candidate = best.problem.candidates[index]
+    values = best.fit.part(index)[0] * candidate.units
+    law = np.concatenate([values, np.zeros(len(rig.steps(candidate)))])
+    covariance = covariance_with_shape(rig, best.fit, index) + rules.LAW_ERROR_SHARE**2 * np.diag(law**2)
+    return {"values": values, "covariance": covariance}
 
 
 def scatter_of(hypothesis: Hypothesis) -> tuple[Scatter, ...]:

@@ -62,7 +62,7 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
         free: candidates that are there.
         rounds: largest number of steps.
     """
-    used, names, parts = _parts(problem, free)
+    names, parts = _parts(problem, free)
     power = np.concatenate([p[c.sizes > 0] for p, c in zip(problem.power, problem.cells, strict=True)])
     start = np.array([np.sqrt(np.mean(problem.spread[at] ** 2)) for at in names])
     spread = np.clip(start, parts.least, parts.most)
@@ -85,7 +85,7 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
     return Learnt(problem.with_noise(found, spreads), tuple(free), evidence)
 
 
-def _parts(problem: Problem, free: Sequence[int]) -> tuple[Array, list[Array], _Parts]:
+def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Array], _Parts]:
     count = problem.shared + len(problem.tolerant)
     group = np.full(count, -2)
     group[: problem.shared] = -1
@@ -110,19 +110,23 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[Array, list[Array], _
         at = np.r_[problem.columns_of(index)]
         group[problem.shared + at] = len(names)
         names.append(at)
-        least.append(rules.LEAST_SLAB if problem.candidates[index].parameters[0].tolerance else 0.0)
+        least.append(
+            rules.LEAST_SLAB if problem.candidates[index].parameters[0].tolerance else rules.LEAST_SIZE
+        )
         most.append(np.inf)
         weight.append(0.0)
         own.append(True)
     used = np.flatnonzero(group > -2)
     both = np.append(used, count)
-    grams = [g[c.sizes > 0][:, both][:, :, both] for g, c in zip(problem.cell_grams, problem.cells, strict=True)]
+    grams = [
+        g[c.sizes > 0][:, both][:, :, both] for g, c in zip(problem.cell_grams, problem.cells, strict=True)
+    ]
     sizes = [c.sizes[c.sizes > 0] for c in problem.cells]
     parts = _Parts(
         np.concatenate(grams), np.concatenate(sizes).astype(float), group[used], np.array(least), np.array(most),
         np.array(weight), np.array(own, dtype=bool),
     )  # fmt: skip
-    return used, names, parts
+    return names, parts
 
 
 def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Array]:
@@ -134,14 +138,16 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
         prior = np.where(shared, rules.FLAT_SHARE * np.diag(H), np.append(spread, 1.0)[parts.group] ** -2.0)
     H = H + np.diag(np.maximum(prior, 1e-300))
     scale = 1.0 / np.sqrt(np.diag(H))
-    factor = cholesky(H * np.outer(scale, scale), lower=True)
-    solution = scale * cho_solve((factor, True), scale * b)
-    inverse = dpotri(factor, lower=1)[0]
+    factor = cholesky(H * np.outer(scale, scale), lower=True) if len(H) else H
+    solution = scale * cho_solve((factor, True), scale * b) if len(H) else b
+    inverse = dpotri(factor, lower=1)[0] if len(H) else H
     inverse = np.tril(inverse) + np.tril(inverse, -1).T
     covariance = inverse * np.outer(scale, scale)
     log_det = 2.0 * float(np.sum(np.log(np.diag(factor)) - np.log(scale)))
     numbers = np.bincount(parts.group[~shared], minlength=len(spread)).astype(float)
-    evidence = -0.5 * (float(c - b @ solution) + log_det) - float(numbers @ np.log(np.maximum(spread, 1e-300)))
+    evidence = -0.5 * (float(c - b @ solution) + log_det) - float(
+        numbers @ np.log(np.maximum(spread, 1e-300))
+    )
     evidence -= 0.5 * float(parts.sizes @ np.log(power))
     evidence -= 0.5 * rules.POWER_NUMBERS * float(np.sum(np.log(power) + 1.0 / power - 1.0))
     evidence -= 0.5 * float(parts.weight @ (2.0 * np.log(spread) + spread**-2.0 - 1.0))
@@ -166,7 +172,7 @@ def worth_a_spread(one: Learnt, kind: str) -> float:
         if candidate.cause == kind and index not in one.free and problem.has_tolerance(index):
             spread[problem.columns_of(index)] = 1.0
     held = replace(problem, spread=spread)
-    used, names, parts = _parts(held, one.free)
+    names, parts = _parts(held, one.free)
     power = np.concatenate([p[c.sizes > 0] for p, c in zip(held.power, held.cells, strict=True)])
     values = np.array([np.sqrt(np.mean(spread[at] ** 2)) for at in names])
     return one.log_evidence + held.price - _step(parts, power, values)[0]

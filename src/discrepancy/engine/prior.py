@@ -16,5 +16,7 @@ def log_prior_odds(problem: Problem, candidate: Candidate) -> float:
     if candidate.transient is not None:
         places = rules.INTERVALS
     else:
-        places = sum(other.cause == candidate.cause and other.transient is None for other in problem.candidates)
+        places = sum(
+            other.cause == candidate.cause and other.transient is None for other in problem.candidates
+        )
     return float(np.log(rules.PRIOR_ODDS / max(places, 1) / rules.SLAB_OCTAVES))

@@ -18,7 +18,7 @@ from discrepancy.rig import Candidate, Rig
 
 
 def proposals(
-    rig: Rig, base: Hypothesis, barred: Collection[Key] = (), leaders: int = rules.LEADERS
+    rig: Rig, base: Hypothesis, barred: Collection[Key] = (), *, events: bool = True
 ) -> list[Hypothesis]:
     """Hypotheses with one cause more, the likeliest first; the added one is the last of its ``free``.
 
@@ -26,7 +26,7 @@ def proposals(
         rig: for columns of other shapes.
         base: what is there already.
         barred: causes at places that are not to be added.
-        leaders: how many of the scan are looked at closely.
+        events: whether to look for what acts for a while, too.
     """
     fit = base.fit
     # One fault among healthy ones looks like a scatter of all, until it is taken out.
@@ -37,10 +37,10 @@ def proposals(
             found[item.index] = item
     ranked = [item for item in found.values() if item.candidate.key not in barred]
     ranked = [_in_best_shape(rig, fit, item) for item in ranked]
-    ranked += _events(rig, fit)
+    ranked += _events(rig, fit) if events else []
     ranked.sort(key=lambda item: -item.score)
     likely = []
-    for item in _chosen(ranked, leaders):
+    for item in _chosen(ranked, rules.LEADERS):
         near = item.score > ranked[0].score - rules.CLOSE_NATS
         new = _sharpened(rig, base, item, near=near)
         if new.possible(rig, new.free[-1]) and not imitated(rig, base, new.causes[-1]):
@@ -74,10 +74,11 @@ def _in_best_shape(rig: Rig, fit: Fit, item: Scanned) -> Scanned:
 
 def _events(rig: Rig, fit: Fit) -> list[Scanned]:
     """What acts for a while, at the intervals where what is left is worst."""
-    known = {(c.cause, c.transient) for c in fit.problem.candidates if c.transient}
+    there = [fit.problem.candidates[i] for i in fit.free]
     found = []
     for candidate in rig.transients([fit.remaining(t) for t in fit.problem.trials]):
-        if (candidate.cause, candidate.transient) not in known:
+        # What is left of an event that is there is its form, and no other event.
+        if not any(candidate.overlaps(other) for other in there):
             columns = tuple(rig.columns(candidate))
             score = score_with(fit, candidate, columns, 1.0 if candidate.parameters[0].tolerance else 0.0)
             found.append(Scanned(None, candidate, score, columns))
@@ -88,8 +89,17 @@ def _sharpened(rig: Rig, base: Hypothesis, item: Scanned, *, near: bool) -> Hypo
     """A candidate beside what is there, in its best shape where it is near the likeliest, and with what it opens."""
     shaped = _best_shape(rig, base, item) if near else item.candidate
     problem, index = _with(rig, base.problem, shaped, item)
-    new = Hypothesis.of(problem, [*base.free, index])
-    return new if shaped.transient else _opened(rig, base, problem, new)
+    new = Hypothesis.of(problem, [*base.free, index], base.allowed)
+    return _beyond_tolerance(base, problem, new) if shaped.transient else _opened(rig, base, problem, new)
+
+
+def _beyond_tolerance(base: Hypothesis, problem: Problem, new: Hypothesis) -> Hypothesis:
+    """An event without the credit for what one within its tolerance, which is none, would explain."""
+    index = new.free[-1]
+    if not problem.candidates[index].parameters[0].tolerance:
+        return new
+    healthy = Hypothesis.of(problem.tolerating(index), base.free, base.allowed)
+    return replace(new, allowed={**new.allowed, index: max(0.0, healthy.score - base.score)})
 
 
 def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hypothesis:
@@ -107,12 +117,12 @@ def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hy
     for _ in range(2):
         # Its size is found with them, and is theirs.
         opened = start.with_unknowns(shaped.key, unknowns, max(size, shaped.parameters[0].tolerance))
-        other = Hypothesis.of(opened, new.free)
+        other = Hypothesis.of(opened, new.free, base.allowed)
         size = abs(float(other.fit.part(index)[0][0] * shaped.units[0]))
     if other.score <= new.score:
         return new
-    healthy = Hypothesis.of(opened, base.free)
-    return other.less(max(0.0, healthy.score - base.score))
+    healthy = Hypothesis.of(opened, base.free, base.allowed)
+    return replace(other, allowed={**base.allowed, index: max(0.0, healthy.score - base.score)})
 
 
 def _with(rig: Rig, problem: Problem, shaped: Candidate, item: Scanned) -> tuple[Problem, int]:
@@ -157,5 +167,3 @@ def _best_shape(rig: Rig, base: Hypothesis, item: Scanned) -> Candidate:
             break
         best, score = nearer, judged
     return best
-
-

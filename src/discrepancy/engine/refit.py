@@ -37,7 +37,7 @@ def exact(
             for i in hypothesis.free:
                 total += raw[..., fit.problem.spans[i]] @ fit.part(i)[0]
             back.append(total)
-        new = Hypothesis.of(fit.problem.with_residual(back), hypothesis.free)
+        new = Hypothesis.of(fit.problem.with_residual(back), hypothesis.free, hypothesis.allowed)
         if new.learnt.log_evidence < hypothesis.learnt.log_evidence - rules.DIVERGED_NATS:
             break  # it diverges: the linear answer is the better one
         moved = np.abs(new.fit.solution - fit.solution) / np.sqrt(np.diag(new.fit.covariance))

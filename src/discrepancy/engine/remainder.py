@@ -10,11 +10,17 @@ from estimator.arrays import Array
 
 
 def left_in_cells(hypothesis: Hypothesis) -> tuple[Array, Array]:
-    """Sum of squares that the hypothesis leaves in every cell, and the cell's numbers, of all trials one after another."""
+    """Sum of squares that the hypothesis leaves in every cell of all trials, and the numbers in it."""
     problem = hypothesis.problem
     x = np.append(-hypothesis.fit.coefficients, 1.0)
     left = [np.einsum("i,kij,j->k", x, grams, x, optimize=True) for grams in problem.cell_grams]
     return np.concatenate(left), np.concatenate([cells.sizes for cells in problem.cells]).astype(float)
+
+
+def nats_left(hypothesis: Hypothesis) -> float:
+    """What an explanation of all that is left would gain: half the log of every number's power."""
+    pairs = zip(hypothesis.problem.power, hypothesis.problem.cells, strict=True)
+    return sum(0.5 * float(cells.sizes @ np.log(np.maximum(power, 1.0))) for power, cells in pairs)
 
 
 def unlisted_nats(hypothesis: Hypothesis) -> float:
@@ -37,7 +43,9 @@ def share_left(hypothesis: Hypothesis, index: int) -> float:
     """
     problem, span = hypothesis.problem, hypothesis.problem.spans[index]
     values = hypothesis.fit.part(index)[0]
-    trace = np.concatenate([np.einsum("i,kij,j->k", values, g[:, span, span], values) for g in problem.cell_grams])
+    trace = np.concatenate(
+        [np.einsum("i,kij,j->k", values, g[:, span, span], values) for g in problem.cell_grams]
+    )
     left, sizes = left_in_cells(hypothesis)
     excess = np.maximum(left - rules.CLEAN_CHI2_PER_N * sizes, 0.0)
     shares = excess / np.maximum(excess + trace, 1e-300)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from discrepancy import rules
-from discrepancy.least_squares.fit import Fit
 from discrepancy.engine.prior import log_prior_odds
+from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Candidate
 from estimator.arrays import Array
 
@@ -70,11 +70,6 @@ def log_bayes_factor(information: Array, score: Array, spike: float) -> float:
     if spike > 0:
         slabs = np.maximum(slabs, rules.LEAST_SLAB * spike)
     return max(_log_evidence(lam, z, slab) for slab in slabs) - _log_evidence(lam, z, spike)
-
-
-def log_evidence_of(information: Array, score: Array, spread: float) -> float:
-    """Of values that are normal with a spread, over none: arguments as of ``log_bayes_factor``."""
-    return _log_evidence(*_visible(information, score), spread)
 
 
 def _visible(information: Array, score: Array) -> tuple[Array, Array]:

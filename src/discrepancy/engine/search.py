@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 from discrepancy import rules
 from discrepancy.engine.hypothesis import Hypothesis
+from discrepancy.engine.probability import probability
 from discrepancy.engine.propose import proposals
 from discrepancy.engine.refit import exact
+from discrepancy.engine.remainder import nats_left, share_left
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
 
@@ -58,13 +60,24 @@ def search(
     say("scan")
     best = nothing
     rivals: dict[int, list[Rival]] = {}
-    while len(best.free) < most:
+    doubtful = 0
+    while len(best.free) < most and doubtful < rules.DOUBTFUL:
         added = next(iter(proposals(rig, best)), None)
         if added is None or added.score - best.score < rules.NAMED_NATS:
             break
         say(f"refit {added.causes[-1].label}")
+        little = added.score - best.score < rules.LITTLE_SHARE * nats_left(best)
         best, rivals = _settled(rig, exact(rig, added, nothing), nothing)
+        last = best.free[-1] if best.free else None
+        likely = last is None or _law_holds(rig, best, last)
+        doubtful = doubtful + 1 if little and not likely else 0
     return Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free))
+
+
+def _law_holds(rig: Rig, hypothesis: Hypothesis, index: int) -> bool:
+    """Whether a cause is likelier than something unlisted that looks like it."""
+    share = rig.law_share(hypothesis.problem.candidates[index])
+    return probability([], share_left(hypothesis, index), share) >= rules.LEAST_PROBABILITY
 
 
 def _based(rig: Rig, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
@@ -81,9 +94,7 @@ def _based(rig: Rig, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
     return rig, nothing
 
 
-def _settled(
-    rig: Rig, best: Hypothesis, nothing: Hypothesis
-) -> tuple[Hypothesis, dict[int, list[Rival]]]:
+def _settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis, dict[int, list[Rival]]]:
     """Exchange and take away causes until none is likelier, and what could be there instead of each."""
     rivals: dict[int, list[Rival]] = {}
     for _ in range(rules.EXCHANGES):
@@ -93,7 +104,8 @@ def _settled(
             if best.score - less.score < rules.NAMED_NATS:
                 best, changed = exact(rig, less, nothing), True
                 break
-            others = proposals(rig, less, [best.problem.candidates[index].key])
+            candidate = best.problem.candidates[index]
+            others = proposals(rig, less, [candidate.key], events=candidate.transient is None)
             rivals[index] = [Rival(h.causes[-1], best.score - h.score) for h in others]
             rivals[index].append(Rival(None, best.score - less.score))
             if others and others[0].score > best.score:

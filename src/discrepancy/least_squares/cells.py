@@ -31,7 +31,9 @@ class Cells:
     sizes: NDArray[np.intp]
 
     @classmethod
-    def of(cls, rows: int, channels: int, moving: int | None = None, groups: Sequence[int] | None = None) -> Cells:
+    def of(
+        cls, rows: int, channels: int, moving: int | None = None, groups: Sequence[int] | None = None
+    ) -> Cells:
         """Cells of a trial: octaves of frequency, and rows that stand alone, of every group of channels.
 
         Args:
@@ -41,7 +43,9 @@ class Cells:
         """
         moving = rows if moving is None else moving
         share = (np.arange(rows) + 0.5) / max(moving, 1)  # of the highest frequency
-        band = np.clip(rules.CELL_BANDS - 1 + np.floor(np.log2(share)) + 1, 0, rules.CELL_BANDS - 1).astype(np.intp)
+        band = np.clip(rules.CELL_BANDS - 1 + np.floor(np.log2(share)) + 1, 0, rules.CELL_BANDS - 1).astype(
+            np.intp
+        )
         band[moving:] = rules.CELL_BANDS
         group = np.zeros(channels, dtype=np.intp) if groups is None else np.asarray(groups, dtype=np.intp)
         index = band[:, None] + (rules.CELL_BANDS + 1) * group[None, :]

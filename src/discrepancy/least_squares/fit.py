@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy import rules
 from discrepancy.least_squares.evidence import Evidence, log10_survival, visible
 from discrepancy.least_squares.gram import flat_inverse, gram_of
 from discrepancy.least_squares.problem import Problem

@@ -22,14 +22,12 @@ class Opened:
         basis: Q, shape (n, C, r).
         shrink: f, shape (r,).
         price: log sqrt det of the covariance [nats].
-        allowance: what a healthy one would explain with such unknowns of its own size [nats].
     """
 
     columns: Array
     basis: Array
     shrink: Array
     price: float
-    allowance: float = 0.0
 
     @classmethod
     def of(cls, columns: Array, size: float) -> Opened:

@@ -108,6 +108,12 @@ class Problem:
         """One over the power of every number, shape (n, C, 1) per trial."""
         return [(1.0 / p)[c.index][..., None] for p, c in zip(self.power, self.cells, strict=True)]
 
+    def tolerating(self, index: int) -> Problem:
+        """With an event in the model that is within its tolerance."""
+        tolerant = self.tolerant.copy()
+        tolerant[self.columns_of(index)] = True
+        return replace(self, tolerant=tolerant)
+
     @property
     def as_whitened(self) -> Problem:
         """With noise of unit power and tolerances as given."""
@@ -172,21 +178,17 @@ class Problem:
         }  # fmt: skip
         return replace(self, candidates=candidates, **parts)
 
-    def with_unknowns(
-        self, key: Key, unknowns: Sequence[Array], size: float, allowance: float = 0.0
-    ) -> Problem:
+    def with_unknowns(self, key: Key, unknowns: Sequence[Array], size: float) -> Problem:
         """The problem with what a cause leaves open in every trial.
 
         Args:
             key: of the cause.
             unknowns: columns, shape (n, C, k) per trial.
             size: standard deviation of their values.
-            allowance: what a healthy one would explain with them, which is part of their price [nats].
         """
         if key in self.opened or not any(u.shape[2] for u in unknowns):
             return self
         own = [Opened.of(self.without_own(t, u), size) for t, u in enumerate(unknowns)]
-        own[0] = replace(own[0], allowance=allowance)
         spectra, grams = [], []
         for one, cells, old, gram in zip(own, self.cells, self.spectra, self.cell_grams, strict=True):
             if not len(one.shrink):
@@ -204,11 +206,6 @@ class Problem:
             self, spectra=tuple(spectra), cell_grams=tuple(grams), opened={**self.opened, key: tuple(own)}
         )
 
-    def with_allowance(self, key: Key, allowance: float) -> Problem:
-        """The problem with so much of the evidence not to the credit of a cause that leaves something open [nats]."""
-        first, *others = self.opened[key]
-        return replace(self, opened={**self.opened, key: (replace(first, allowance=allowance), *others)})
-
     def without_unknowns(self, keep: Collection[Key]) -> Problem:
         """The problem without what causes other than those to keep leave open."""
         if all(key in keep for key in self.opened):
@@ -219,13 +216,13 @@ class Problem:
         )  # fmt: skip
         for key, own in self.opened.items():
             if key in keep:
-                again = again.with_unknowns(key, [one.columns for one in own], 1.0, own[0].allowance)
+                again = again.with_unknowns(key, [one.columns for one in own], 1.0)
         return again
 
     @property
     def price(self) -> float:
         """What all that causes leave open costs [nats]."""
-        return sum(one.price + one.allowance for own in self.opened.values() for one in own)
+        return sum(one.price for own in self.opened.values() for one in own)
 
     def extended(self, candidate: Candidate, columns: Sequence[Array]) -> Problem:
         """The problem with one candidate more."""

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.causes.excluded import excluded_from
 from discrepancy import rules
+from discrepancy.causes.excluded import excluded_from
 from discrepancy.engine.explanation import Explanation
 from discrepancy.engine.hypothesis import Hypothesis
 from discrepancy.least_squares.fit import Fit
@@ -40,7 +40,7 @@ from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.imitators import wrong_torques
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.start import exact_residual, linearised_trials, start_shared
+from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, start_shared
 from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.origin import origin_of, places_of
 from discrepancy.team.undecidable import statements
@@ -62,9 +62,8 @@ class TeamRig(Rig):
 
     Attributes:
         recordings: the trials.
-        noise: resolution of the sensors.
+        sensed: what noise leaves in the rows.
         linear: linearised trials.
-        whitening: of every trial.
         tolerances: standard deviations by cause and parameter.
         excluded: causes left out of the catalogue.
         origin: how far from the robots as they were believed to be all is linear; None for not at all.
@@ -74,9 +73,8 @@ class TeamRig(Rig):
     """
 
     recordings: tuple[Recording, ...]
-    noise: Noise
+    sensed: Sensed
     linear: tuple[TrialLinear, ...]
-    whitening: tuple[Whitening, ...]
     tolerances: Mapping[str, Mapping[str, float]]
     excluded: frozenset[str]
     origin: ArmUnit | None = None
@@ -112,13 +110,24 @@ class TeamRig(Rig):
         origin: ArmUnit | None,
         resting: Mapping[str, float],
         jobs: int,
+        sensed: Sensed | None = None,
     ) -> TeamRig:
         limits = {
             cause: {name: resting[cause] * value for name, value in tolerances.get(cause, {}).items()}
             for cause in resting
         }
-        noise, linear, whitening = linearised_trials(recordings, shared, limits, jobs)
-        return cls(tuple(recordings), noise, linear, whitening, tolerances, excluded, origin, resting, jobs)
+        linear, known = linearised_trials(recordings, shared, limits, jobs, sensed)
+        return cls(tuple(recordings), known, linear, tolerances, excluded, origin, resting, jobs)
+
+    @property
+    def noise(self) -> Noise:
+        """Resolution of the sensors."""
+        return self.sensed.noise
+
+    @property
+    def whitening(self) -> tuple[Whitening, ...]:
+        """Of every trial."""
+        return self.sensed.whitening
 
     def relinearised(self, nothing: Hypothesis) -> TeamRig | None:
         """The rig at the robots as a fit with tolerances finds them, where straight columns do not reach that far."""
@@ -136,7 +145,9 @@ class TeamRig(Rig):
         shared, off, count = self.linear[0].shared.moved(-fit.shared), 0.0, 0
         for t, (linear, recording) in enumerate(zip(self.linear, moved, strict=True)):
             bases = linear.bases.moved(-fit.local(t)[:own])
-            exact = exact_residual(Signals.of(recording), shared, bases, recording.metadata.arms, linear.reduction)
+            exact = exact_residual(
+                Signals.of(recording), shared, bases, recording.metadata.arms, linear.reduction
+            )
             raw = nothing.problem.raw[t]
             straight = raw[..., -1] - raw[..., : len(fit.shared)] @ fit.shared
             straight = straight - nothing.problem.local[t][..., :own] @ fit.local(t)[:own]
@@ -151,7 +162,9 @@ class TeamRig(Rig):
             return None
         before = np.zeros_like(beyond) if self.origin is None else self.origin.x
         origin = ArmUnit(units.design, before + beyond)
-        return self._at(moved, shared, self.tolerances, self.excluded, origin, resting, self.jobs)
+        sensed = self.sensed if same else None
+        resting = self.resting if same else resting
+        return self._at(moved, shared, self.tolerances, self.excluded, origin, resting, self.jobs, sensed)
 
     def _resting(self, nothing: Hypothesis) -> dict[str, float]:
         """Spread over its tolerance, at least 1, of each kind that leaves something open: noise of that size."""
@@ -160,7 +173,9 @@ class TeamRig(Rig):
             if candidate.cause in sizes and nothing.problem.has_tolerance(index):
                 sizes[candidate.cause].append(abs(float(nothing.fit.part(index)[0][0])))
         # By the median, as one of them may be at fault; 0.67 is that of a normal one.
-        return {kind: max(1.0, float(np.median(each)) / 0.6745) if each else 1.0 for kind, each in sizes.items()}
+        return {
+            kind: max(1.0, float(np.median(each)) / 0.6745) if each else 1.0 for kind, each in sizes.items()
+        }
 
     @property
     def trials(self) -> Sequence[str]:
@@ -309,7 +324,9 @@ class TeamRig(Rig):
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
     ) -> list[Array]:
         out, there = [], [candidate.key for candidate, _ in active]
-        others = [c for c in self.candidates() if origin_of(c, self.origin) is not None and c.key not in there]
+        others = [
+            c for c in self.candidates() if origin_of(c, self.origin) is not None and c.key not in there
+        ]
         for t, (linear, x) in enumerate(zip(self.linear, local, strict=True)):
             signals, modelled = linear.signals, np.zeros_like(linear.residual)
             for candidate, values in active:

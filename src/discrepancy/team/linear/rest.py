@@ -52,7 +52,9 @@ class Resting:
             moment = np.zeros((len(gimbal), 3))
             for i in range(trial.robots):
                 axes_T = np.swapaxes(rate_matrix(trial.s[:, i, THETA]), -1, -2)
-                moment += np.linalg.solve(axes_T, gimbal[:, i, :, None])[..., 0] @ trial.shared.grasps.R_1i[i].T
+                moment += (
+                    np.linalg.solve(axes_T, gimbal[:, i, :, None])[..., 0] @ trial.shared.grasps.R_1i[i].T
+                )
             rows += trial.of_wrench(np.zeros_like(moment), moment)
         if self._play_m:
             for i in range(trial.robots):

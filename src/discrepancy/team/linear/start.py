@@ -1,7 +1,8 @@
 """The unknowns before any cause: from the estimate, then Gauss-Newton on the whitened residual."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -42,58 +43,78 @@ def start_shared(estimate: PayloadEstimate) -> Shared:
     return Shared(grasps, np.concatenate([[mass.mass], mass.mass * c, inertia_parameters(about_1)]))
 
 
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """What noise leaves in the rows of some trials.
+
+    Attributes:
+        noise: resolution of the sensors.
+        whitening: of every trial.
+        torques: what it leaves of the torques, of every trial.
+    """
+
+    noise: Noise
+    whitening: tuple[Whitening, ...]
+    torques: tuple[TorqueNoise, ...]
+
+
 def linearised_trials(
-    recordings: Sequence[Recording], shared: Shared, tolerances: Tolerances, jobs: int = 1
-) -> tuple[Noise, tuple[TrialLinear, ...], tuple[Whitening, ...]]:
-    """The sensors' noise, and every trial linearised around the best unknowns, with its whitening.
+    recordings: Sequence[Recording],
+    shared: Shared,
+    tolerances: Tolerances,
+    jobs: int = 1,
+    sensed: Sensed | None = None,
+) -> tuple[tuple[TrialLinear, ...], Sensed]:
+    """Every trial linearised around the best unknowns, and what noise and friction at rest leave in its rows.
+
+    Args:
+        recordings: the trials.
+        shared: unknowns to start from.
+        tolerances: standard deviations by cause and parameter.
+        jobs: parallel processes.
+        sensed: what noise leaves, where that is known already.
 
     Raises:
         InputError: a recording is too short.
     """
     arms = recordings[0].metadata.arms
     signals = [Signals.of(recording) for recording in recordings]
-    noise = Noise.of(signals)
+    noise = Noise.of(signals) if sensed is None else sensed.noise
     reductions = [Reduction.of(s) for s in signals]
     for recording, reduction in zip(recordings, reductions, strict=True):
         if len(reduction.time) < 4:
             raise InputError(f"{recording.name}: too short to diagnose")
     bases = [start_bases(*poses(s.phi[s.keep], s.theta[s.keep], arms), shared) for s in signals]
     run = Parallel(n_jobs=jobs, prefer="processes" if jobs > 1 else "threads")
-    tasks = [(s, b, r, k) for k, (s, b, r) in enumerate(zip(signals, bases, reductions, strict=True))]
-    linear, whitening, torque_noise = zip(
-        *run(delayed(linearised)(s, shared, b, arms, r, noise, k, tolerances) for s, b, r, k in tasks),
-        strict=True,
-    )
+    tasks = zip(signals, bases, reductions, strict=True)
+    each = run(delayed(linearise)(s, shared, b, arms, r, full=True) for s, b, r in tasks)
+    linear = tuple(cast("list[TrialLinear]", each))
+    if sensed is None:
+        left = run(delayed(what_noise_leaves)(t, noise, k, tolerances) for k, t in enumerate(linear))
+        whitening, torques = zip(*cast("list[tuple[Whitening, TorqueNoise]]", left), strict=True)
+        sensed = Sensed(noise, tuple(whitening), tuple(torques))
     for _ in range(2):
-        shared, bases = gauss_newton(linear, whitening)
+        shared, bases = gauss_newton(linear, sensed.whitening)
         linear = tuple(
             replace(
                 t, shared=shared, bases=b, residual=exact_residual(t.signals, shared, b, arms, t.reduction)
             )
             for t, b in zip(linear, bases, strict=True)
         )
-    pairs = zip(linear, torque_noise, strict=True)
-    return noise, tuple(with_adjusted_torques(*pair) for pair in pairs), tuple(whitening)
+    pairs = zip(linear, sensed.torques, strict=True)
+    return tuple(with_adjusted_torques(*pair) for pair in pairs), sensed
 
 
-def linearised(
-    signals: Signals,
-    shared: Shared,
-    bases: Bases,
-    arms: Arms,
-    reduction: Reduction,
-    noise: Noise,
-    k: int,
-    tolerances: Tolerances,
-) -> tuple[TrialLinear, Whitening, TorqueNoise]:
-    """One trial's linearisation, and what noise and friction at rest leave in its rows; k is its number."""
-    linear = linearise(signals, shared, bases, arms, reduction, full=True)
-    draws, torques = noise_rows(linear, noise, np.random.default_rng([rules.NOISE_SEED, k]))
-    rng, resting = np.random.default_rng([rules.NOISE_SEED, k, 1]), Resting(linear, tolerances)
-    torque_noise = TorqueNoise.of(draws, torques, reduction.moving)
+def what_noise_leaves(
+    trial: TrialLinear, noise: Noise, k: int, tolerances: Tolerances
+) -> tuple[Whitening, TorqueNoise]:
+    """What noise and friction at rest leave in the rows of trial number k, and noise of its torques."""
+    draws, torques = noise_rows(trial, noise, np.random.default_rng([rules.NOISE_SEED, k]))
+    rng, resting = np.random.default_rng([rules.NOISE_SEED, k, 1]), Resting(trial, tolerances)
+    moving = trial.reduction.moving
+    torque_noise = TorqueNoise.of(draws, torques, moving)
     draws = draws + np.array([resting(rng) for _ in draws])
-    moving = reduction.moving
-    return linear, Whitening.of(draws, moving, uneven=True), torque_noise
+    return Whitening.of(draws, moving, uneven=True), torque_noise
 
 
 def exact_residual(signals: Signals, shared: Shared, bases: Bases, arms: Arms, reduction: Reduction) -> Array:
