@@ -89,6 +89,7 @@ class TeamController:
         sensors: timing faults; only the torque's lag reaches the controller.
         feed_forward: F_ff of every robot in its {b} [N], shape (N, 3), held from the start; None to take it up.
         sensed: filled with what the sensors see, (phi, theta, torque) of one tick per row, shape (T, N, 3, 3).
+        qpos: what the sensors see in place of ``data.qpos``, kept up to date by whoever gives it; shape (nq,).
 
     Raises:
         InputError: ``as_built`` or ``feed_forward`` does not match the number of robots.
@@ -104,10 +105,11 @@ class TeamController:
         sensors: SensorEffects | None = None,
         feed_forward: Array | None = None,
         sensed: Array | None = None,
+        qpos: Array | None = None,
     ) -> None:
         units = units_of(as_built, index.robots)
         phi_zero = np.array([unit.phi_zero_rad for unit in units])
-        self._qpos, self._ctrl = data.qpos, data.ctrl
+        self._qpos, self._ctrl = data.qpos if qpos is None else qpos, data.ctrl
         # (N, 4, leg or gimbal axis)
         self._address = np.stack(
             [index.motor_qpos, index.spring_qpos, index.actuator, index.gimbal_qpos], axis=1
