@@ -20,7 +20,7 @@ from sealed import store
 from sealed.backgrounds import Background
 from sealed.campaign import diagnose_all, simulate_all
 from sealed.sets import TIMESTEP_S, Kind, SealedSet, plan
-from sealed.tables import tables
+from sealed.tables import misses, tables
 
 MIXED: tuple[Kind, ...] = (
     "clean", "single", "forms", "single", "pairs", "single", "clean", "single", "forms", "single",
@@ -47,6 +47,7 @@ class Options:
         closed_loop: run the recorded commands again.
         keep: keep the recordings of diagnosed sets.
         tables: print the tables of the results instead.
+        misses: print every set that is not wholly right instead.
         list: print what the sets are instead.
     """
 
@@ -64,6 +65,7 @@ class Options:
     closed_loop: bool = True
     keep: bool = True
     tables: bool = False
+    misses: bool = False
     list: bool = False
 
 
@@ -85,6 +87,9 @@ def main(options: Options) -> None:
     """Run, or print what was run."""
     if options.tables:
         print(tables(store.read(options.out / f"{options.label}.jsonl")))
+        return
+    if options.misses:
+        print(misses(store.read(options.out / f"{options.label}.jsonl")))
         return
     requests = planned(options)
     if options.list:
