@@ -14,6 +14,7 @@ from sealed.backgrounds import SPREAD_IN_UNCALIBRATED, Background, limit_over_no
 from sealed.forms.base import Form
 from sealed.forms.pushes import HalfSinePush, RampPush, in_every_trial
 from sealed.ground import Ground
+from sealed.limits import LIMITS
 from sealed.registry import FORMS, LISTED, UNLISTED
 
 SIZES = (2.0, 20.0)
@@ -23,8 +24,9 @@ MOST: dict[str, float] = {
     "base_compliance": 40.0, "grasp_flex": 25.0, "grasp_play": 20.0, "sea_bias": 50.0, "sea_scale": 40.0,
     "sea_hardening": 25.0, "sea_hysteresis": 30.0, "joint_friction": 40.0, "gimbal_friction": 25.0,
     "torque_skew": 15.0, "torque_lag": 5.0, "clock_delay": 40.0,
-    "second_order_torque_lag": 5.0, "single_torque_lag": 5.0, "turning_grasp": 15.0, "slow_grasp": 25.0,
-    "soft_play": 20.0,
+    "second_order_torque_lag": 5.0, "single_torque_lag": 5.0, "turning_grasp": 15.0, "slow_grasp": 20.0,
+    "soft_play": 20.0, "bouc_wen_spring": 12.0, "driven_lugre": 40.0, "driven_dahl": 40.0, "gimbal_lugre": 25.0,
+    "gimbal_dahl": 25.0, "slow_base_compliance": 40.0, "late_creep": 100.0, "cubic_spring": 20.0,
 }  # fmt: skip
 """Largest size over the limit within tolerances with which a trial runs: a torque loop with 9 ms of lag does not."""
 
@@ -36,8 +38,11 @@ def largest(name: str, background: Background) -> float:
 
 def over_nominal(name: str, background: Background) -> float:
     """Detection limit of a cause or form in a background over that within tolerances."""
-    answer = FORMS[name].answer if name in FORMS else name
-    return limit_over_nominal(answer, background) if answer in CAUSES else 1.0
+    if name == "pushes":
+        return 1.0
+    if name in FORMS:
+        return LIMITS[name][background] / LIMITS[name]["x1"]
+    return limit_over_nominal(name, background)
 
 
 def possible(names: Sequence[str], background: Background, least: float = SIZES[0]) -> list[str]:
@@ -58,12 +63,12 @@ def draw(
     """One effect of ``factor`` times the limit of its background; ``pushes`` are one in every trial that moves."""
     if name == "pushes":
         kind = RampPush if rng.uniform() < 0.5 else HalfSinePush
-        return list(in_every_trial(kind, factor * kind.limit, ground, rng))
-    factor *= over_nominal(name, background)
+        return list(in_every_trial(kind, factor * LIMITS[kind.cause][background], ground, rng))
     if name in EFFECTS:
+        factor *= limit_over_nominal(name, background)
         return [draw_effect(name, factor, HiddenGround(ground.robots, ground.p_1c, ground.moving), rng)]
     form = FORMS[name]
-    return [form.drawn(factor * form.limit, ground, _place(form, ground, rng), rng)]
+    return [form.drawn(factor * LIMITS[name][background], ground, _place(form, ground, rng), rng)]
 
 
 def _place(form: type[Form], ground: Ground, rng: np.random.Generator) -> dict[str, int]:

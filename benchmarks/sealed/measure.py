@@ -109,9 +109,11 @@ class Bench:
             ridge = np.concatenate([priors**-2.0, np.zeros(self.columns.shape[1] - len(priors))])
             left = _left(self.columns, ridge, trace)
             if event is not None:
-                left -= _left(
-                    np.hstack([self.columns, event]), np.append(ridge, [0.0] * event.shape[1]), trace
-                )
+                columns, held = event
+                both, none = np.hstack([self.columns, columns]), np.zeros(columns.shape[1])
+                if held:
+                    left = _left(both, np.concatenate([ridge, none + 1.0]), trace)
+                left -= _left(both, np.concatenate([ridge, none]), trace)
             elif span is not None:
                 ridge[span] = 0.0
                 left -= _left(self.columns, ridge, trace)

@@ -22,13 +22,11 @@ class Form(Effect):
 
     Attributes:
         answer: the cause of the diagnosis' catalogue that is right; None for a law that nobody has listed.
-        limit: size at the detection limit among robots within their tolerances, of the parameter called ``size``.
-        size: the parameter that makes it larger, which its trace is proportional to as long as it is small.
+        size: the parameter that makes it larger; its trace is proportional to it as long as it is small.
     """
 
     answer: ClassVar[str | None] = None
     size: ClassVar[str]
-    limit: ClassVar[float]
 
     @classmethod
     def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:

@@ -36,7 +36,6 @@ class PayloadCable(Form):
 
     answer = "tether"
     size = "stiffness_N_per_m"
-    limit = 2.0
     on_payload = True
     ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4), "length_m": (0.0, 100.0)}
     stiffness_N_per_m: float
@@ -79,7 +78,6 @@ class RobotCable(Form):
 
     answer = "tether"
     size = "stiffness_N_per_m"
-    limit = 2.0
     ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4), "length_m": (0.0, 100.0)}
     robot: int
     stiffness_N_per_m: float

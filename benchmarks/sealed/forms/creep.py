@@ -23,7 +23,6 @@ class LateCreep(Form):
 
     answer = "base_creep"
     size = "speed_mps"
-    limit = 4e-7
     ranges: ClassVar = {"speed_mps": (0.0, 1e-2), "start_s": (0.0, 1e6)}
     robot: int
     speed_mps: float

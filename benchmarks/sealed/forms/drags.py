@@ -20,7 +20,6 @@ class TurningDrag(Form):
 
     answer = "drag"
     size = "coefficient_Ns_per_m"
-    limit = 0.33
     on_payload = True
     ranges: ClassVar = {"coefficient_Ns_per_m": (0.0, 1e3), "reach_m": (0.0, 10.0)}
     coefficient_Ns_per_m: float
@@ -44,7 +43,6 @@ class QuadraticDrag(Form):
 
     answer = "drag"
     size = "coefficient_Ns2_per_m2"
-    limit = 3.3
     on_payload = True
     ranges: ClassVar = {"coefficient_Ns2_per_m2": (0.0, 1e4), "reach_m": (0.0, 10.0)}
     coefficient_Ns2_per_m2: float

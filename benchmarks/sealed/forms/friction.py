@@ -61,7 +61,6 @@ class DrivenLugre(_Lugre):
 
     answer = "joint_friction"
     kind = "driven"
-    limit = 0.012
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,6 @@ class GimbalLugre(_Lugre):
 
     answer = "gimbal_friction"
     kind = "gimbal"
-    limit = 0.017
 
 
 @dataclass(frozen=True)
@@ -111,7 +109,6 @@ class DrivenDahl(_Dahl):
 
     answer = "joint_friction"
     kind = "driven"
-    limit = 0.012
 
 
 @dataclass(frozen=True)
@@ -120,4 +117,3 @@ class GimbalDahl(_Dahl):
 
     answer = "gimbal_friction"
     kind = "gimbal"
-    limit = 0.017

@@ -44,7 +44,6 @@ class SlowBaseCompliance(Form):
 
     answer = "base_compliance"
     size = "compliance_m_per_N"
-    limit = 7.1e-7
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-2), "relaxation_s": (0.02, 10.0)}
     robot: int
     compliance_m_per_N: float
@@ -69,7 +68,6 @@ class SlowGrasp(Form):
 
     answer = "grasp_flex"
     size = "compliance_m_per_N"
-    limit = 7.1e-7
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-3), "relaxation_s": (0.02, 10.0)}
     on_payload = True
     robot: int
@@ -96,7 +94,6 @@ class TurningGrasp(Form):
 
     answer = "grasp_flex"
     size = "compliance_m_per_N"
-    limit = 7.1e-7
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-3), "reach_m": (0.0, 10.0)}
     on_payload = True
     robot: int
@@ -140,7 +137,6 @@ class SoftPlay(Form):
 
     answer = "grasp_play"
     size = "play_m"
-    limit = 1.9e-5
     ranges: ClassVar = {
         "play_m": (0.0, 5e-3),
         "contact_m_per_N": (1e-9, 1e-4),

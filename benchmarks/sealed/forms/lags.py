@@ -36,7 +36,6 @@ class SecondOrderTorqueLag(Form):
 
     answer = "torque_lag"
     size = "time_constant_s"
-    limit = 8.9e-4
     ranges: ClassVar = {"time_constant_s": (1e-5, 1.0), "damping_ratio": (0.1, 5.0)}
     robot: int
     time_constant_s: float
@@ -59,7 +58,6 @@ class SingleTorqueLag(Form):
 
     answer = "torque_lag"
     size = "time_constant_s"
-    limit = 1.2e-3
     ranges: ClassVar = {"time_constant_s": (1e-5, 1.0), "damping_ratio": (0.1, 50.0)}
     robot: int
     joint: int

@@ -19,7 +19,6 @@ class MassDrift(Form):
 
     answer = "payload_mass"
     size = "rate_kgps"
-    limit = 1e-4
     on_payload = True
     ranges: ClassVar = {"rate_kgps": (-0.1, 0.1)}
     rate_kgps: float
@@ -38,7 +37,6 @@ class MassOfTrials(Form):
 
     answer = "payload_mass"
     size = "more_kg"
-    limit = 5e-3
     on_payload = True
     ranges: ClassVar = {"more_kg": (-10.0, 10.0)}
     trial: int

@@ -23,8 +23,6 @@ class DoublePendulum(Form):
 
     answer = "slosh"
     size = "mass_kg"
-    limit = 1.0
-    """Over that of one pendulum of the upper length."""
     on_payload = True
     ranges: ClassVar = {
         "mass_kg": (0.0, 100.0), "length_m": (0.01, 10.0), "lower_share": (0.0, 0.45), "lower_length_m": (0.01, 10.0),
@@ -84,7 +82,6 @@ class UnequalPendulum(Form):
 
     answer = "slosh"
     size = "mass_kg"
-    limit = 1.0
     on_payload = True
     ranges: ClassVar = {
         "mass_kg": (0.0, 100.0), "length_m": (0.01, 10.0), "ratio": (0.1, 1.0), "damping_ratio": (0.0, 10.0),

@@ -22,7 +22,6 @@ class _ShapedPush(Form):
 
     answer = "push"
     size = "peak_N"
-    limit = 0.16
     on_payload = True
     repeats = True
     ranges: ClassVar = {

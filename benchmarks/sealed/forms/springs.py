@@ -21,7 +21,6 @@ class BoucWenSpring(Form):
 
     answer = "sea_hysteresis"
     size = "force_Nm"
-    limit = 0.012
     ranges: ClassVar = {
         "force_Nm": (0.0, 20.0), "yield_rad": (1e-5, 0.1), "beta": (0.5, 1.0), "exponent": (1.0, 5.0),
     }  # fmt: skip

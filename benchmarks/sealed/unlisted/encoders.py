@@ -73,7 +73,6 @@ class EccentricPhi(_Eccentric):
 
     angle = "phi"
     times = 1
-    limit = 1.5e-3
 
 
 @dataclass(frozen=True)
@@ -82,7 +81,6 @@ class EccentricTheta(_Eccentric):
 
     angle = "theta"
     times = 1
-    limit = 1.5e-3
 
 
 @dataclass(frozen=True)
@@ -91,7 +89,6 @@ class CyclicPhi(_Eccentric):
 
     angle = "phi"
     times = 16
-    limit = 5e-4
 
 
 @dataclass(frozen=True)
@@ -100,7 +97,6 @@ class EncoderBacklash(_AngleReading):
 
     angle = "phi"
     size = "half_width_rad"
-    limit = 4e-4
     ranges: ClassVar = {"half_width_rad": (0.0, 0.1)}
     half_width_rad: float
 
@@ -127,7 +123,6 @@ class SoftEncoderMount(_AngleReading):
 
     angle = "phi"
     size = "rad_per_Nm"
-    limit = 1.5e-4
     ranges: ClassVar = {"rad_per_Nm": (-0.1, 0.1)}
     rad_per_Nm: float
 
@@ -148,7 +143,6 @@ class SlippingZero(_AngleReading):
 
     angle = "theta"
     size = "rate_radps"
-    limit = 3e-5
     ranges: ClassVar = {"rate_radps": (-0.1, 0.1)}
     rate_radps: float
 

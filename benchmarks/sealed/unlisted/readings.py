@@ -47,7 +47,6 @@ class CrossTalk(_TorqueReading):
     """A torque sensor that also feels its neighbour's load."""
 
     size = "share"
-    limit = 0.005
     ranges: ClassVar = {"share": (-0.9, 0.9)}
     neighbour: float
     share: float
@@ -70,7 +69,6 @@ class WarmingScale(_TorqueReading):
     """Its scale drifts while the electronics warm up, in every trial anew."""
 
     size = "scale"
-    limit = 0.01
     ranges: ClassVar = {"scale": (-0.9, 0.9), "time_s": (0.1, 1e4)}
     scale: float
     time_s: float
@@ -91,7 +89,6 @@ class WarmingZero(_TorqueReading):
     """Its zero drifts with the temperature, in every trial anew."""
 
     size = "zero_Nm"
-    limit = 0.02
     ranges: ClassVar = {"zero_Nm": (-20.0, 20.0), "time_s": (0.1, 1e4)}
     zero_Nm: float
     time_s: float
@@ -114,7 +111,6 @@ class Saturation(_TorqueReading):
     """Above a knee it passes a part of the torque only: an amplifier near its end."""
 
     size = "lost_share"
-    limit = 0.03
     ranges: ClassVar = {"knee_Nm": (0.0, 20.0), "lost_share": (0.0, 1.0)}
     knee_Nm: float
     lost_share: float
@@ -139,7 +135,6 @@ class QuadraticReading(_TorqueReading):
     """Its scale grows with the load: a bridge that is not linear."""
 
     size = "per_Nm"
-    limit = 1.5e-3
     ranges: ClassVar = {"per_Nm": (-0.05, 0.05)}
     per_Nm: float
 
@@ -159,7 +154,6 @@ class AngleInTorque(_TorqueReading):
     """It feels where the joint stands: a cable that pulls at the sensor, once a turn."""
 
     size = "amplitude_Nm"
-    limit = 0.03
     ranges: ClassVar = {"amplitude_Nm": (0.0, 20.0)}
     amplitude_Nm: float
     times: float
@@ -183,7 +177,6 @@ class TorqueBacklash(_TorqueReading):
     """It moves only once the torque has crossed a gap: a loose gauge."""
 
     size = "half_width_Nm"
-    limit = 0.015
     ranges: ClassVar = {"half_width_Nm": (0.0, 5.0)}
     half_width_Nm: float
 
@@ -208,7 +201,6 @@ class TorqueHum(_TorqueReading):
     """A hum of one frequency on it, out of step with the motion."""
 
     size = "amplitude_Nm"
-    limit = 0.02
     ranges: ClassVar = {"amplitude_Nm": (0.0, 20.0), "frequency_hz": (0.01, 500.0)}
     amplitude_Nm: float
     frequency_hz: float

@@ -45,7 +45,6 @@ class Cogging(_Torque):
 
     kind = "driven"
     size = "amplitude_Nm"
-    limit = 0.03
     ranges: ClassVar = {"amplitude_Nm": (0.0, 20.0)}
     amplitude_Nm: float
     times: float
@@ -70,7 +69,6 @@ class CubicSpring(_Torque):
 
     kind = "gimbal"
     size = "cubic_Nm_per_rad3"
-    limit = 60.0
     ranges: ClassVar = {"cubic_Nm_per_rad3": (0.0, 1e5)}
     cubic_Nm_per_rad3: float
 
@@ -91,7 +89,6 @@ class CableSpring(_Torque):
 
     kind = "gimbal"
     size = "stiffness_Nm_per_rad"
-    limit = 0.3
     ranges: ClassVar = {"stiffness_Nm_per_rad": (0.0, 1e4)}
     stiffness_Nm_per_rad: float
     rest_rad: float
@@ -114,7 +111,6 @@ class DoorCloser(_Torque):
 
     kind = "driven"
     size = "damping_Nms_per_rad"
-    limit = 0.03
     ranges: ClassVar = {"damping_Nms_per_rad": (0.0, 100.0)}
     damping_Nms_per_rad: float
 

@@ -59,7 +59,6 @@ class GrowingPush(_Force):
     """It grows from nothing through every trial."""
 
     size = "rate_Nps"
-    limit = 4e-3
     ranges: ClassVar = {"rate_Nps": (0.0, 10.0)}
     rate_Nps: float = 0.0
 
@@ -79,7 +78,6 @@ class Shaker(_Force):
     """Something unbalanced that turns on the payload."""
 
     size = "amplitude_N"
-    limit = 0.03
     ranges: ClassVar = {"amplitude_N": (0.0, 1e3), "frequency_hz": (0.05, 200.0)}
     amplitude_N: float = 0.0
     frequency_hz: float = 1.0
@@ -100,7 +98,6 @@ class Gyroscope(Form):
     """Something that spins in the payload: a moment omega x h, with h fixed in the payload."""
 
     size = "spin_kgm2ps"
-    limit = 0.15
     on_payload = True
     ranges: ClassVar = {"spin_kgm2ps": (0.0, 1e3)}
     spin_kgm2ps: float
@@ -130,7 +127,6 @@ class ShiftingLoad(Form):
     """A mass on a slow spring in the payload: it shifts sideways as the payload is tilted or hurried."""
 
     size = "mass_kg"
-    limit = 0.02
     on_payload = True
     ranges: ClassVar = {"mass_kg": (0.0, 100.0), "frequency_hz": (0.1, 100.0)}
     mass_kg: float
@@ -174,7 +170,6 @@ class SinkingBase(Form):
     """A base that sinks into the floor, fast at first, in every trial anew."""
 
     size = "depth_m"
-    limit = 1e-4
     ranges: ClassVar = {"depth_m": (0.0, 0.1), "time_s": (0.1, 1e4)}
     robot: int
     depth_m: float
