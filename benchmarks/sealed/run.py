@@ -39,6 +39,7 @@ class Options:
         out: where recordings and results go.
         jobs: processes.
         only: simulate or diagnose only.
+        kept: diagnose every set that is in the folder, whatever its seed.
         label: name of the results.
         background: the robots; drawn if not given.
         factors: sizes over the limit, in turn; drawn if none is given.
@@ -57,6 +58,7 @@ class Options:
     out: Path = Path("out/sealed")
     jobs: int = 1
     only: Literal["both", "simulate", "diagnose"] = "both"
+    kept: bool = False
     label: str = "results"
     background: Background | None = None
     factors: tuple[float, ...] = ()
@@ -91,7 +93,7 @@ def main(options: Options) -> None:
     if options.misses:
         print(misses(store.read(options.out / f"{options.label}.jsonl")))
         return
-    requests = planned(options)
+    requests = store.kept(options.out) if options.kept else planned(options)
     if options.list:
         print("\n".join(request.key for request in requests))
         return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any, Literal, get_args
 
@@ -96,12 +97,14 @@ def plan(
         drawn = BACKGROUNDS[seed // 2 % len(BACKGROUNDS)]
         payload = PAYLOADS[(seed + seed // (2 * len(BACKGROUNDS))) % len(PAYLOADS)]
     background = background or drawn
-    names = (name,) if name else _names(kind, background, rng, factor or SIZES[0])
+    names = (name,) if name else _names(kind, seed, background, rng, factor or SIZES[0])
     factors = tuple(factor or _size(one, background, rng) for one in names)
     return SealedSet(kind, seed, background, names, factors, payload, timestep_s=timestep_s)
 
 
-def _names(kind: Kind, background: Background, rng: np.random.Generator, least: float) -> tuple[str, ...]:
+def _names(
+    kind: Kind, seed: int, background: Background, rng: np.random.Generator, least: float
+) -> tuple[str, ...]:
     if kind == "clean":
         return ()
     if kind == "pushes":
@@ -114,13 +117,16 @@ def _names(kind: Kind, background: Background, rng: np.random.Generator, least: 
     while len(found) < several:
         # In sets of several, one in three has another form than the catalogue's.
         pool = pools.get(kind) or (OTHER if rng.uniform() < 1.0 / 3.0 else CATALOGUE)
-        pool = [
-            name
-            for name in possible(pool, background, least)
-            if family(name) not in [family(other) for other in found]
-        ]
-        found.append(str(rng.choice(pool)))
+        pool = possible(_in_turn(pool, seed + len(found)), background, least)
+        found.append(next(name for name in pool if family(name) not in [family(other) for other in found]))
     return tuple(found)
+
+
+def _in_turn(pool: Sequence[str], seed: int) -> list[str]:
+    """The pool in an order in which successive seeds begin with every one once, then again in another order."""
+    turn, at = divmod(seed, len(pool))
+    order = np.random.default_rng([turn, *b"turn"]).permutation(len(pool))
+    return [pool[k] for k in np.roll(order, -at)]
 
 
 def _size(name: str, background: Background, rng: np.random.Generator) -> float:

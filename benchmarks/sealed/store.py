@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from estimator.recording.parquet import write_recording
+from hidden.schedule import Schedule
 from sealed.sets import SealedSet, generate
 
 
@@ -38,6 +39,17 @@ def simulate(request: SealedSet, out: Path) -> dict[str, Any]:
     temporary.write_text(json.dumps(content, indent=1), encoding="utf-8")
     os.replace(temporary, here / "truth.json")  # last: a folder with a truth is complete
     return truth
+
+
+def kept(out: Path) -> list[SealedSet]:
+    """Every set that is there, whole, by seed."""
+    requests = []
+    for path in sorted((out / "sets").glob("*/truth.json")):
+        values = json.loads(path.read_text(encoding="utf-8"))["request"]
+        values["schedule"] = Schedule(**values["schedule"])
+        values |= {name: tuple(values[name]) for name in ("names", "factors")}
+        requests.append(SealedSet(**values))
+    return sorted(requests, key=lambda request: request.seed)
 
 
 def recordings_of(request: SealedSet, out: Path) -> list[Path]:
