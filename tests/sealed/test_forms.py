@@ -141,7 +141,7 @@ def test_a_wrench_gets_the_payloads_velocity():
     place, velocity = (np.array([row[k] for row in seen]) for k in (1, 2))
     assert np.abs(velocity).max() > 0.05
     np.testing.assert_allclose(
-        velocity[1:-1], (place[2:] - place[:-2]) / 2e-3, atol=2e-3 * np.abs(velocity).max()
+        velocity[1:-1], (place[2:] - place[:-2]) / 2e-3, atol=5e-3 * np.abs(velocity).max()
     )
 
 
@@ -163,13 +163,13 @@ def test_a_push_has_its_moment():
 
 
 def test_a_payload_loses_mass():
-    scene = team(MassDrift(-0.5))
+    scene = team(MassDrift(-0.1))
     loop = ClosedLoop(scene)
     (actor,) = scene.effects[0].actors(1)
     actor.start(stage_of(loop))
     step(loop, actor, 0.8)
-    mass = GroundTruth.of(scene).mass_kg - 0.5 * 0.799
-    assert loop.forces_on_payload().sum(axis=0)[2] == pytest.approx(GRAVITY * mass, rel=2e-3)
+    mass = GroundTruth.of(scene).mass_kg - 0.1 * 0.799
+    assert loop.forces_on_payload().sum(axis=0)[2] == pytest.approx(GRAVITY * mass, abs=0.05)
 
 
 def test_a_base_creeps_from_its_time_on():
@@ -186,16 +186,26 @@ def test_a_base_creeps_from_its_time_on():
     np.testing.assert_allclose(loop.data.qpos[at], 0.49e-4 * np.array([np.cos(0.3), np.sin(0.3)]), rtol=0.02)
 
 
-def test_a_turning_grasp_starts_where_its_load_holds_it():
-    """Angles and ways are compliance times load from the first step on: nothing moves while the team stands still."""
-    scene = team(TurningGrasp(2, 3e-6, 0.05))
+@pytest.mark.parametrize("robot", [1, 2])
+def test_a_turning_grasp_turns_by_the_moment_of_its_force(robot):
+    """About a point 6 cm off the gimbal: by compliance times force times that arm, from the first step on."""
+    compliance, reach, arm = 3e-6, 0.05, 0.06
+    scene = team(TurningGrasp(robot, compliance, reach, arm))
     loop = ClosedLoop(scene)
-    turns = [loop.model.joint(f"omnid2/turn_{axis}") for axis in "xyz"]
-    before = np.array([loop.data.qpos[joint.qposadr[0]] for joint in turns])
-    loop.run(1.0, scene.wrist_home_b)
-    after = np.array([loop.data.qpos[joint.qposadr[0]] for joint in turns])
-    assert np.abs(before).max() > 1e-5
-    np.testing.assert_allclose(after, before, atol=0.02 * np.abs(before).max())
+    prefix = "omnid2/" if robot == 2 else "omnid1/payload/"
+    at = [int(loop.model.joint(f"{prefix}turn_{axis}").qposadr[0]) for axis in "xyz"]
+    before = loop.data.qpos[at].copy()
+    home = scene.wrist_home_b + 0.0
+    home[robot - 1, 0] += 0.02  # pulls sideways, against the others
+    loop.run(0.2, scene.wrist_home_b)
+    np.testing.assert_allclose(loop.data.qpos[at], before, atol=1e-6)
+    loop.run(1.0, home)
+    i = loop.index
+    R = loop.data.site_xmat[i.payload_site[robot - 1]].reshape(3, 3)
+    force = R.T @ loop.forces_on_payload()[robot - 1]
+    moment = -np.cross([0.0, 0.0, -arm], force)  # what the payload puts on the grasp
+    assert np.abs(moment).max() > 0.1
+    np.testing.assert_allclose(loop.data.qpos[at], compliance / reach**2 * moment, rtol=0.03, atol=2e-6)
 
 
 def test_play_ends_in_a_soft_contact():
@@ -279,61 +289,65 @@ def test_an_unequal_pendulum_has_two_frequencies():
         assert _modes(scene, [f"tank_{axis}"])[0] == pytest.approx(np.sqrt(GRAVITY / length), rel=1e-3)
 
 
-def _read(effect: Form):
+def _read(*effects: Form):
     """Readings of ideal sensors minus what they should read, and the truth."""
-    scene = team(effect)
+    scene = team(*effects)
     log = run_trial(scene, random_vias(scene.wrist_home_b, np.random.default_rng(1), 1))
     seen = predicted(log)
     return {name: getattr(seen, name) - getattr(log, name) for name in ("phi", "theta", "tau")}, log
 
 
+def _warm(time):
+    return 1.0 - np.exp(-time / 3.0)
+
+
 READINGS = [
-    (CrossTalk(2, 1, 3.0, 0.04), "tau", lambda log: 0.04 * log.tau[:, 1, 2]),
+    (CrossTalk(1, 1, 3.0, 0.04), "tau", lambda log: 0.04 * log.tau[:, 0, 2]),
+    (WarmingScale(1, 2, 0.02, 3.0), "tau", lambda log: 0.02 * _warm(log.time) * log.tau[:, 0, 1]),
+    (WarmingZero(2, 1, 0.1, 3.0), "tau", lambda log: 0.1 * _warm(log.time)),
+    (Saturation(2, 2, 3.5, 0.2), "tau", lambda log: -0.2 * np.maximum(log.tau[:, 1, 1] - 3.5, 0.0)),
+    (QuadraticReading(2, 3, 1e-3), "tau", lambda log: 1e-3 * log.tau[:, 1, 2] ** 2),
     (
-        WarmingScale(2, 1, 0.02, 3.0),
+        AngleInTorque(3, 1, 0.1, 6.0, 0.3),
         "tau",
-        lambda log: 0.02 * (1 - np.exp(-log.time / 3.0)) * log.tau[:, 1, 0],
+        lambda log: 0.1 * np.sin(6 * (log.phi[:, 2, 0] - HOME_PHI) + 0.3),
     ),
-    (WarmingZero(2, 1, 0.1, 3.0), "tau", lambda log: 0.1 * (1 - np.exp(-log.time / 3.0))),
-    (Saturation(2, 1, 3.5, 0.2), "tau", lambda log: -0.2 * np.maximum(log.tau[:, 1, 0] - 3.5, 0.0)),
-    (QuadraticReading(2, 1, 1e-3), "tau", lambda log: 1e-3 * log.tau[:, 1, 0] ** 2),
-    (
-        AngleInTorque(2, 1, 0.1, 6.0, 0.3),
-        "tau",
-        lambda log: 0.1 * np.sin(6 * (log.phi[:, 1, 0] - HOME_PHI) + 0.3),
-    ),
-    (TorqueHum(2, 1, 0.1, 2.0), "tau", lambda log: 0.1 * np.sin(4 * np.pi * log.time)),
-    (EccentricPhi(2, 1, 2e-3, 0.3), "phi", lambda log: 2e-3 * np.sin(log.phi[:, 1, 0] - HOME_PHI + 0.3)),
+    (TorqueHum(3, 2, 0.1, 2.0), "tau", lambda log: 0.1 * np.sin(4 * np.pi * log.time)),
+    (EccentricPhi(1, 2, 2e-3, 0.3), "phi", lambda log: 2e-3 * np.sin(log.phi[:, 0, 1] - HOME_PHI + 0.3)),
     (CyclicPhi(2, 1, 2e-3, 0.3), "phi", lambda log: 2e-3 * np.sin(16 * (log.phi[:, 1, 0] - HOME_PHI) + 0.3)),
-    (EccentricTheta(2, 1, 2e-3, 0.3), "theta", lambda log: 2e-3 * np.sin(log.theta[:, 1, 0] + 0.3)),
-    (SoftEncoderMount(2, 1, 1e-3), "phi", lambda log: 1e-3 * log.tau[:, 1, 0]),
-    (SlippingZero(2, 1, 1e-3), "theta", lambda log: 1e-3 * log.time),
+    (EccentricTheta(1, 3, 2e-3, 0.3), "theta", lambda log: 2e-3 * np.sin(log.theta[:, 0, 2] + 0.3)),
+    (SoftEncoderMount(3, 3, 1e-3), "phi", lambda log: 1e-3 * log.tau[:, 2, 2]),
+    (SlippingZero(2, 2, 1e-3), "theta", lambda log: 1e-3 * log.time),
 ]
 
 
-@pytest.mark.parametrize(("effect", "channel", "law"), READINGS, ids=[e.cause for e, *_ in READINGS])
-def test_a_reading_errs_as_its_law_says(effect, channel, law):
-    """At its own joint, and nowhere else."""
-    errors, log = _read(effect)
+def test_readings_err_as_their_laws_say():
+    """At their own joints, and nowhere else."""
+    errors, log = _read(*(effect for effect, _, _ in READINGS))
     exact = {name: np.zeros_like(error) for name, error in errors.items()}
-    exact[channel][:, 1, 0] = law(log)
-    assert np.ptp(exact[channel]) > 0.0
+    for effect, channel, law in READINGS:
+        exact[channel][:, effect.robot - 1, effect.joint - 1] = law(log)
+        assert np.ptp(law(log)) > 0.0, effect.cause
     for name, error in errors.items():
         np.testing.assert_allclose(error, exact[name], atol=1e-10)
 
 
-def test_a_single_sensor_lags():
-    """By its time, on a slow signal; its neighbours and the angles do not."""
-    errors, log = _read(SingleTorqueLag(2, 1, 0.004, 0.8))
-    rate = np.gradient(log.tau[:, 1, 0], log.time)
-    assert np.sum(errors["tau"][:, 1, 0] * -rate) / np.sum(rate**2) == pytest.approx(0.004, rel=0.1)
-    errors["tau"][:, 1, 0] = 0.0
+def test_a_single_sensor_lags_and_a_loose_gauge_stays_within_its_play():
+    """Low frequencies come 4 ms late: a phase of -omega T."""
+    errors, log = _read(SingleTorqueLag(2, 1, 0.004, 0.8), TorqueBacklash(3, 1, 0.05))
+    a, b = errors["tau"][:, 1, 0], errors["tau"][:, 2, 0]
+    window = np.hanning(len(log.time))
+    true = np.fft.rfft(window * (log.tau[:, 1, 0] - log.tau[:, 1, 0].mean()))
+    read = np.fft.rfft(window * (log.tau[:, 1, 0] - log.tau[:, 1, 0].mean() + a))
+    omega = 2.0 * np.pi * np.fft.rfftfreq(len(window), 0.01)
+    slow = (omega > 3.0) & (omega < 30.0)
+    late = -np.sum(np.imag(read * true.conj())[slow] * omega[slow]) / np.sum(
+        (omega * np.abs(true))[slow] ** 2
+    )
+    assert late == pytest.approx(0.004, rel=0.03)
+    assert np.abs(b).max() == pytest.approx(0.05, rel=1e-9)
+    a[:] = b[:] = 0.0
     assert max(np.abs(error).max() for error in errors.values()) < 1e-10
-
-
-def test_a_loose_gauge_stays_within_its_play():
-    errors, _ = _read(TorqueBacklash(2, 1, 0.05))
-    assert np.abs(errors["tau"][:, 1, 0]).max() == pytest.approx(0.05, rel=1e-9)
 
 
 @pytest.fixture(scope="module")
@@ -342,19 +356,26 @@ def ground() -> Ground:
     return Ground.of(scene, [random_vias(scene.wrist_home_b, np.random.default_rng(1), 10)])
 
 
+def _half_a_second(*effects: Form):
+    """What ideal sensors read of a short motion."""
+    time = np.arange(60) / 100.0
+    ref = build_team("a").wrist_home_b + 0.01 * (1.0 - np.cos(2 * np.pi * time / 0.6))[:, None, None]
+    seen = predicted(run_trial(team(*effects), Trajectory("random", ref), trial_number=3))
+    return np.stack([seen.phi, seen.theta, seen.tau])
+
+
+@pytest.fixture(scope="module")
+def clean() -> np.ndarray:
+    return _half_a_second()
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", list(FORMS))
-def test_every_form_runs_and_can_be_seen(ground, name):
-    """Drawn at four times its limit, it changes what is recorded of half a second, and is in the scene's record."""
+def test_every_form_runs_and_can_be_seen(ground, clean, name):
+    """Drawn at four times its limit, it changes what is recorded, though half a second shows little of some."""
     (effect,) = draw(name, 4.0, "x1", ground, np.random.default_rng([7, *name.encode()]))
     if hasattr(effect, "start_s"):
         effect = replace(effect, start_s=0.05)  # pyright: ignore[reportArgumentType]
-    home, time = build_team("a").wrist_home_b, np.arange(60) / 100.0
-    ref = home + 0.01 * (1.0 - np.cos(2 * np.pi * time / 0.6))[:, None, None]
-    logs = [
-        run_trial(team(*effects), Trajectory("random", ref), trial_number=3) for effects in ([], [effect])
-    ]
-    seen = [predicted(log) for log in logs]
-    change = max(np.abs(getattr(seen[1], x) - getattr(seen[0], x)).max() for x in ("phi", "theta", "tau"))
-    assert change > 1e-7 or getattr(effect, "trial", 3) != 3
-    assert team(effect).effects == (effect,)
+    if hasattr(effect, "trial"):
+        effect = replace(effect, trial=3)  # pyright: ignore[reportArgumentType]
+    assert np.abs(_half_a_second(effect) - clean).max() > 1e-9

@@ -90,20 +90,26 @@ class SlowGrasp(Form):
 
 @dataclass(frozen=True)
 class TurningGrasp(Form):
-    """A grasp that gives way to forces and to moments."""
+    """A grasp that gives way to forces and to moments, about a point beside the gimbal's centre.
+
+    The gimbal passes no moment, so a grasp that turned about its centre would not turn at all.
+    """
 
     answer = "grasp_flex"
     size = "compliance_m_per_N"
-    ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-3), "reach_m": (0.0, 10.0)}
+    ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-3), "reach_m": (0.0, 10.0), "offset_m": (-1.0, 1.0)}
     on_payload = True
     robot: int
     compliance_m_per_N: float
     reach_m: float
     """Compliance in rotation is that in translation over the square of this."""
+    offset_m: float
+    """From the gimbal's centre to where it turns, along z of {i}."""
 
     @classmethod
     def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(**place, compliance_m_per_N=size, reach_m=float(rng.uniform(0.03, 0.1)))
+        reach, offset = rng.uniform(0.04, 0.1), rng.choice([-1.0, 1.0]) * rng.uniform(0.03, 0.08)
+        return cls(**place, compliance_m_per_N=size, reach_m=float(reach), offset_m=float(offset))
 
     def known(self) -> dict[str, float]:
         return {"compliance_m_per_N": self.compliance_m_per_N}
@@ -115,6 +121,7 @@ class TurningGrasp(Form):
         hinges = [
             body.add(
                 "joint",
+                pos=[0.0, 0.0, self.offset_m],
                 name=f"turn_{axis}",
                 type="hinge",
                 axis=along,
@@ -128,7 +135,8 @@ class TurningGrasp(Form):
         slack = np.array(scene.grasp_slack_rad or (0.0,) * scene.robots)
         slack[self.robot - 1] += LARGEST_MOMENT_NM * turn
         scene = replace(scene, grasp_slack_rad=tuple(slack.tolist()))
-        return widened(scene, self.robot, LARGEST_FORCE_N * self.compliance_m_per_N)
+        way = self.compliance_m_per_N + abs(self.offset_m) ** 2 * turn
+        return widened(scene, self.robot, LARGEST_FORCE_N * way)
 
 
 @dataclass(frozen=True)
