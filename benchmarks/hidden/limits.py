@@ -26,6 +26,7 @@ LIMITS: dict[str, dict[str, float]] = {
     "gimbal_friction": {"coulomb_Nm": 0.017, "viscous_Nms_per_rad": 0.038},
     "torque_skew": {"delay_s": 8.9e-4},
     "torque_lag": {"time_constant_s": 8.9e-4},
+    "sensor_lag": {"time_constant_s": 9.0e-4},
     "clock_delay": {"delay_s": 7.6e-5},
     "tether": {"force_x_N": 0.047, "force_y_N": 0.062, "force_z_N": 0.10, "stiffness_N_per_m": 0.15},
     "push": {"force_x_N": 0.13, "force_y_N": 0.13, "force_z_N": 0.14},

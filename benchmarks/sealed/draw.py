@@ -23,7 +23,7 @@ MOST: dict[str, float] = {
     "phi_zero": 60.0, "theta_zero": 80.0, "link_length": 40.0, "base_tilt": 40.0, "base_creep": 100.0,
     "base_compliance": 40.0, "grasp_flex": 25.0, "grasp_play": 20.0, "sea_bias": 50.0, "sea_scale": 40.0,
     "sea_hardening": 25.0, "sea_hysteresis": 30.0, "joint_friction": 40.0, "gimbal_friction": 25.0,
-    "torque_skew": 15.0, "torque_lag": 5.0, "clock_delay": 40.0,
+    "torque_skew": 15.0, "torque_lag": 5.0, "sensor_lag": 5.0, "clock_delay": 40.0,
     "second_order_torque_lag": 5.0, "single_torque_lag": 5.0, "turning_grasp": 15.0, "slow_grasp": 20.0,
     "soft_play": 20.0, "bouc_wen_spring": 12.0, "driven_lugre": 40.0, "driven_dahl": 40.0, "gimbal_lugre": 25.0,
     "gimbal_dahl": 25.0, "slow_base_compliance": 40.0, "late_creep": 100.0, "cubic_spring": 20.0,

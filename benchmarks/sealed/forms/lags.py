@@ -9,8 +9,8 @@ from typing import ClassVar
 import numpy as np
 
 from mocobot_sim.trial.actors import Reader
+from mocobot_sim.trial.readings import Misreading, RobotReadings
 from sealed.forms.base import Form, Place
-from sealed.forms.parts import Misreading, RobotReadings
 from sealed.ground import Ground
 from sealed.laws.lag import SecondOrderLag
 
@@ -56,7 +56,7 @@ class SecondOrderTorqueLag(Form):
 class SingleTorqueLag(Form):
     """One torque sensor alone: first order (no damping ratio is then of use) or second."""
 
-    answer = "torque_lag"
+    answer = "sensor_lag"
     size = "time_constant_s"
     ranges: ClassVar = {"time_constant_s": (1e-5, 1.0), "damping_ratio": (0.1, 50.0)}
     robot: int

@@ -10,8 +10,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from mocobot_sim.trial.actors import Reader
+from mocobot_sim.trial.readings import Misreading, RobotReadings
 from sealed.forms.base import Form, Place
-from sealed.forms.parts import Misreading, RobotReadings
 from sealed.ground import Ground
 from sealed.laws.hysteresis import Play
 

@@ -145,7 +145,7 @@ class TeamController:
                 raise InputError(f"feed-forward is not {index.robots} x 3 finite forces; it must be, in N")
             self._state[:, 4] = feed_forward
         lag = (sensors or SensorEffects()).of("torque_lag_s", index.robots)
-        self._lag = np.array([_lag_filter(time_constant, 1.0 / gains.rate_hz) for time_constant in lag])
+        self._lag = np.array([lag_filter(time_constant, 1.0 / gains.rate_hz) for time_constant in lag])
         self._home = home_phi(design)
         self._sensed = np.empty((1, index.robots, 3, 3)) if sensed is None else sensed
         self._keep = sensed is not None
@@ -191,7 +191,7 @@ def home_phi(design: OmnidDesign) -> float:
     return float(np.arctan2(height, -reach) - np.arccos(cosine))
 
 
-def _lag_filter(time_constant_s: float, period_s: float) -> tuple[float, float, float]:
+def lag_filter(time_constant_s: float, period_s: float) -> tuple[float, float, float]:
     """Coefficients of y = a y + b_old x_old + b_new x_new, exact for inputs that are straight between ticks.
 
     Without a lag y = x, and all are zero.

@@ -28,6 +28,7 @@ NAMES = (
     "gimbal_friction",
     "torque_skew",
     "torque_lag",
+    "sensor_lag",
     "clock_delay",
     "tether",
     "push",

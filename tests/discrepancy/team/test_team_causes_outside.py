@@ -80,9 +80,15 @@ def test_tether(case, motion, robot):
     np.testing.assert_allclose([physical[f"anchor_{a}_m"] for a in "xyz"], anchor)
 
 
-def test_drag(case, motion):
-    force = -5.0 * motion[2]
-    check_wrench(case, motion, "drag", 0, 0, {}, [5.0], force, np.cross(motion[0] @ COM, force))
+@pytest.mark.parametrize(("along", "turning"), [(5.0, 0.0), (0.0, 3.0), (5.0, 3.0)])
+def test_drag(case, motion, along, turning):
+    ahead, behind = (
+        Rotation.from_euler("xyz", case.path(case.signals.time + h)[:, :3]) for h in (STEP_S, -STEP_S)
+    )
+    omega = (ahead * behind.inv()).as_rotvec() / (2.0 * STEP_S)  # world
+    force = -along * motion[2]
+    moment = np.cross(motion[0] @ COM, force) - turning * omega
+    check_wrench(case, motion, "drag", 0, 0, {}, [along, turning], force, moment)
 
 
 def test_push(case, motion):

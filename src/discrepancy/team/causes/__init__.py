@@ -19,6 +19,7 @@ NAMES = (
     "gimbal_friction",
     "torque_skew",
     "torque_lag",
+    "sensor_lag",
     "clock_delay",
     "grasp_flex",
     "grasp_play",
