@@ -29,6 +29,7 @@ LIMITS: dict[str, dict[str, float]] = {
     "sensor_lag": {"time_constant_s": 9.0e-4},
     "clock_delay": {"delay_s": 7.6e-5},
     "tether": {"force_x_N": 0.047, "force_y_N": 0.062, "force_z_N": 0.10, "stiffness_N_per_m": 0.15},
+    "payload_tether": {"force_x_N": 0.047, "force_y_N": 0.062, "force_z_N": 0.10, "stiffness_N_per_m": 0.15},
     "push": {"force_x_N": 0.13, "force_y_N": 0.13, "force_z_N": 0.14},
     "drag": {"coefficient_Ns_per_m": 0.33},
     "slosh": {"mass_kg": 3.4e-3},

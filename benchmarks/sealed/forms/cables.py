@@ -34,7 +34,7 @@ def _hang(
 class PayloadCable(Form):
     """From a point of the payload, given in {1}, to a point of the room, given in {1} as the payload rests at home."""
 
-    answer = "tether"
+    answer = "payload_tether"
     size = "stiffness_N_per_m"
     on_payload = True
     ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4), "length_m": (0.0, 100.0)}

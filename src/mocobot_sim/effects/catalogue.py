@@ -31,6 +31,7 @@ NAMES = (
     "sensor_lag",
     "clock_delay",
     "tether",
+    "payload_tether",
     "push",
     "drag",
     "slosh",

@@ -24,6 +24,7 @@ NAMES = (
     "grasp_flex",
     "grasp_play",
     "tether",
+    "payload_tether",
     "push",
     "drag",
     "slosh",
