@@ -58,6 +58,7 @@ class Bench:
         spans: where the columns of each cause are, by cause and place.
         priors: standard deviations of the causes' parameters, by background.
         weight: time of the campaign's trials over that of these.
+        schedule: what is simulated.
     """
 
     payload: str
@@ -68,11 +69,12 @@ class Bench:
     spans: dict[tuple, slice]
     priors: dict[Background, np.ndarray]
     weight: float
+    schedule: Schedule
 
     @classmethod
-    def of(cls, payload: str) -> Bench:
+    def of(cls, payload: str, schedule: Schedule = SHORT) -> Bench:
         """Simulate and linearise."""
-        schedule, seed = SHORT, SEED
+        seed = SEED
         team = build_team(payload)
         trajectories = schedule.trajectories(team, np.random.default_rng(seed))
         logs = _logs(payload, schedule, seed, [])
@@ -86,7 +88,7 @@ class Bench:
         spans = {c.key: slice(a, b) for c, a, b in zip(candidates, ends[:-1], ends[1:], strict=True)}
         priors = {k: np.concatenate([_priors(c, k) for c in candidates]) for k in BACKGROUNDS}
         columns = np.sqrt(weight) * _columns(rig, candidates)
-        bench = cls(payload, Ground.of(team, trajectories), rig, [], columns, spans, priors, weight)
+        bench = cls(payload, Ground.of(team, trajectories), rig, [], columns, spans, priors, weight, schedule)
         return replace(bench, clean=bench.rows(logs))
 
     def rows(self, logs: Sequence[TrialLog]) -> list[np.ndarray]:
@@ -98,18 +100,42 @@ class Bench:
             out.append(white(rows))
         return out
 
+    def trace(self, effects: Sequence[Effect]) -> np.ndarray:
+        """What effects change in the whitened rows of all trials, as many as the campaign has, in one vector."""
+        rows = self.rows(_logs(self.payload, self.schedule, SEED, effects))
+        change = np.concatenate([(a - b).ravel() for a, b in zip(rows, self.clean, strict=True)])
+        return np.sqrt(self.weight) * change
+
+    def fitted(self, effect: Effect) -> tuple[np.ndarray, float]:
+        """Values of an effect's own cause that fit its trace best, and the share of the trace that they leave.
+
+        Only unknowns that any recording has are fitted beside it.
+        """
+        trace, (span, event) = self.trace([effect]), self._answer(effect)
+        unknowns = self.columns[:, len(self.priors["x1"]) :]
+        if event is not None:
+            own, units = event[0], event[2]
+        else:
+            own = self.columns[:, span]
+            units = np.ones(own.shape[1])
+        both = np.hstack([own, unknowns])
+        scale = 1.0 / np.linalg.norm(both, axis=0)
+        values = np.linalg.lstsq(both * scale, trace, rcond=1e-9)[0] * scale
+        free = np.linalg.lstsq(unknowns * scale[own.shape[1] :], trace, rcond=1e-9)[0]
+        before = trace - unknowns @ (free * scale[own.shape[1] :])
+        left = trace - both @ values
+        return values[: own.shape[1]] * units, float(left @ left / (before @ before))
+
     def over_limit(self, effects: Sequence[Effect]) -> dict[Background, float]:
         """Size of effects over their detection limit, in every background; all have the answer of the first."""
-        rows = self.rows(_logs(self.payload, SHORT, SEED, effects))
-        trace = np.concatenate([(a - b).ravel() for a, b in zip(rows, self.clean, strict=True)])
-        trace = np.sqrt(self.weight) * trace
+        trace = self.trace(effects)
         span, event = self._answer(effects[0])
         out: dict[Background, float] = {}
         for background, priors in self.priors.items():
             ridge = np.concatenate([priors**-2.0, np.zeros(self.columns.shape[1] - len(priors))])
             left = _left(self.columns, ridge, trace)
             if event is not None:
-                columns, held = event
+                columns, held, _ = event
                 both, none = np.hstack([self.columns, columns]), np.zeros(columns.shape[1])
                 if held:
                     left = _left(both, np.concatenate([ridge, none + 1.0]), trace)
@@ -120,8 +146,8 @@ class Bench:
             out[background] = float(np.sqrt(max(left, 0.0) / GAIN))
         return out
 
-    def _answer(self, effect: Effect) -> tuple[slice | None, tuple[np.ndarray, bool] | None]:
-        """Where the columns of the right answer are, or those of an event, and whether it has a tolerance."""
+    def _answer(self, effect: Effect) -> tuple[slice | None, tuple[np.ndarray, bool, np.ndarray] | None]:
+        """Where the columns of the right answer are; or those of an event, whether it is tolerated, their units."""
         cause = effect.answer if isinstance(effect, Form) else effect.cause
         robot, joint = getattr(effect, "robot", None), getattr(effect, "joint", None)
         if cause not in CAUSES:
@@ -142,7 +168,11 @@ class Bench:
             shape = {name: getattr(effect, name) for name in event.shape if hasattr(effect, name)}
             event = replace(event, shape={**event.shape, **shape})
         columns = np.concatenate([c.reshape(-1, c.shape[2]) * event.units for c in self.rig.columns(event)])
-        return None, (np.sqrt(self.weight) * columns, all(p.tolerance > 0 for p in event.parameters))
+        return None, (
+            np.sqrt(self.weight) * columns,
+            all(p.tolerance > 0 for p in event.parameters),
+            event.units,
+        )
 
 
 def _left(columns: np.ndarray, ridge: np.ndarray, trace: np.ndarray) -> float:
