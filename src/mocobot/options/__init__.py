@@ -1,0 +1,19 @@
+"""Options of every command, as the command line shows them: data only, so that the help needs nothing else."""
+
+from mocobot.options.answers import Calibrate, Diagnose, Estimate
+from mocobot.options.logs import Convert, Inspect, Map
+from mocobot.options.results import Paper, Report
+from mocobot.options.simulation import Replay, Simulate
+
+__all__ = [
+    "Calibrate",
+    "Convert",
+    "Diagnose",
+    "Estimate",
+    "Inspect",
+    "Map",
+    "Paper",
+    "Replay",
+    "Report",
+    "Simulate",
+]

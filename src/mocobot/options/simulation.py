@@ -1,0 +1,59 @@
+"""Options of the commands that simulate, and of those that show what was simulated or measured."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+import tyro
+
+from mocobot.options.common import Calibrated, Force
+
+
+@dataclass(frozen=True)
+class Simulate:
+    """Simulate one trial and write its recording, with the ground truth in a sidecar."""
+
+    out: Annotated[Path, tyro.conf.arg(metavar="REC.parquet")]
+    """Recording to write; the truth goes beside it as REC.truth.json."""
+    force: Force = False
+    payload: str | None = None
+    """Payload configuration, or the path of a payload MJCF (body 'payload', sites grasp1 .. graspN); 'a' if neither
+    this nor a model is given."""
+    model: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Extended model to simulate in place of a payload on robots as designed."""
+    trajectory: Literal["random", "periodic", "static", "free"] = "random"
+    """Kind of motion; free: every arm alone, holding nothing."""
+    vias: int | None = None
+    """Vias of a random trial, or of a free one's fast part; 80 if not given."""
+    duration: float | None = None
+    """Length of a periodic motion [s]; 60 if not given."""
+    preset: str = "nominal"
+    """Sensors: ideal, nominal or uncalibrated."""
+    seed: int = 0
+    """Seed of trajectory, noise and calibration errors."""
+    level: Literal["joint", "wrist"] = "joint"
+    """What the file holds: driven angles and spring torques, or wrist positions and forces."""
+    robots: int | None = None
+    """Robots of a free trial; as many as the payload has grasps if not given."""
+
+
+@dataclass(frozen=True)
+class Replay:
+    """Watch recordings: the scene moving from the measured angles, estimate against truth, all signals (Rerun)."""
+
+    rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
+    """Recordings (Parquet); several are shown side by side."""
+    estimate: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
+    """Estimate to show, as `mocobot estimate --out` writes it; made from each recording if not given."""
+    calibration: Calibrated = None
+    truth: bool = False
+    """Show the truth beside each recording, too (REC.truth.json)."""
+    diagnosis: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Mark what a diagnosis names, as `mocobot diagnose --out` writes it."""
+    payload: Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE.xml")] = None
+    """Geometry of the payload; that of the recording's label, or bars between the grasps, if not given."""
+    save: Annotated[Path | None, tyro.conf.arg(metavar="OUT.rrd")] = None
+    """Write a file for the Rerun viewer instead of opening it."""
+    force: Force = False
+    web: bool = False
+    """Serve to a browser instead of opening the viewer."""
