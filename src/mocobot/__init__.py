@@ -41,6 +41,7 @@ if TYPE_CHECKING:
     from mocobot.api.replay import replay as replay
     from mocobot.api.simulation import SimulatedRecording as SimulatedRecording
     from mocobot.api.simulation import simulate as simulate
+    from mocobot.api.simulation import simulate_trials as simulate_trials
     from mocobot_sim.effects.base import Effect as Effect
     from mocobot_sim.effects.catalogue import EFFECTS as EFFECTS
     from mocobot_sim.effects.catalogue import apply_effects as apply_effects
@@ -66,7 +67,7 @@ _NAMES = {
     "mocobot.api.estimation": "Estimate estimate read_estimate",
     "mocobot.api.inspection": "Inspection inspect",
     "mocobot.api.replay": "replay",
-    "mocobot.api.simulation": "SimulatedRecording simulate",
+    "mocobot.api.simulation": "SimulatedRecording simulate simulate_trials",
     "mocobot_sim.effects.base": "Effect",
     "mocobot_sim.effects.catalogue": "EFFECTS apply_effects make_effect",
     "mocobot_sim.errors": "TrialError",

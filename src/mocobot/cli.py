@@ -24,6 +24,7 @@ COMMANDS = {
     "inspect": options.Inspect,
     "report": options.Report,
     "simulate": options.Simulate,
+    "effects": options.Effects,
 }
 """Options by command; ``mocobot.commands`` has a module of each name, whose ``run`` takes them."""
 NOT_GOOD, REFUSED, INTERRUPTED, CLOSED = 1, 2, 130, 141

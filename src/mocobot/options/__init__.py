@@ -3,12 +3,13 @@
 from mocobot.options.answers import Calibrate, Diagnose, Estimate
 from mocobot.options.logs import Convert, Inspect, Map
 from mocobot.options.results import Paper, Report
-from mocobot.options.simulation import Replay, Simulate
+from mocobot.options.simulation import Effects, Replay, Simulate
 
 __all__ = [
     "Calibrate",
     "Convert",
     "Diagnose",
+    "Effects",
     "Estimate",
     "Inspect",
     "Map",

@@ -10,17 +10,36 @@ from mocobot.options.common import Calibrated, Force
 
 
 @dataclass(frozen=True)
-class Simulate:
-    """Simulate one trial and write its recording, with the ground truth in a sidecar."""
+class Effects:
+    """List the physical effects that `simulate --effect` hides in a team: parameters, units and ranges."""
 
-    out: Annotated[Path, tyro.conf.arg(metavar="REC.parquet")]
+    name: Annotated[tyro.conf.Positional[tuple[str, ...]], tyro.conf.arg(metavar="NAME...")] = ()
+    """Effects to list; all if none is named."""
+
+
+@dataclass(frozen=True)
+class Simulate:
+    """Simulate one trial, or several of one team, and write recordings with the ground truth in sidecars."""
+
+    out: Annotated[Path | None, tyro.conf.arg(metavar="REC.parquet")] = None
     """Recording to write; the truth goes beside it as REC.truth.json."""
+    trials: Annotated[str | None, tyro.conf.arg(metavar="KIND,KIND,...")] = None
+    """Several trials of one team: random,random,periodic,static (needs --out-dir)."""
+    out_dir: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for several trials: trial1_random.parquet, ..., each with its truth."""
     force: Force = False
     payload: str | None = None
     """Payload configuration, or the path of a payload MJCF (body 'payload', sites grasp1 .. graspN); 'a' if neither
     this nor a model is given."""
     model: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
     """Extended model to simulate in place of a payload on robots as designed."""
+    effect: Annotated[
+        tuple[str, ...], tyro.conf.UseAppendAction, tyro.conf.arg(metavar="NAME:KEY=VALUE,...")
+    ] = ()
+    """Effect to hide in the team: joint_friction:robot=2,joint=1,coulomb=0.05. May be given several times; `mocobot
+    effects` lists them."""
+    units: Annotated[Path | None, tyro.conf.arg(metavar="TEAM.json")] = None
+    """How every robot deviates from its design, such as the truth of another trial; needs calibrated sensors."""
     trajectory: Literal["random", "periodic", "static", "free"] = "random"
     """Kind of motion; free: every arm alone, holding nothing."""
     vias: int | None = None
