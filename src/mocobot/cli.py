@@ -77,8 +77,21 @@ def _exit(sentence: str, code: int) -> NoReturn:
 def _run(arguments: Sequence[str]) -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):  # names may hold what the terminal cannot show
         sys.stdout.reconfigure(errors="backslashreplace")
+    if "--version" in arguments:
+        print(f"mocobot {_version()}")
+        return
     options = parse(COMMANDS, arguments)
     _command(options)(options)
+
+
+def _version() -> str:
+    """Of the installed package."""
+    from importlib.metadata import PackageNotFoundError, version  # 20 ms that nothing else needs
+
+    try:
+        return version("mocobot")
+    except PackageNotFoundError:
+        return "(not installed, run from its source)"
 
 
 def _command(parsed: Any) -> Callable[[Any], None]:
