@@ -26,7 +26,10 @@ COMMANDS = {
     "simulate": options.Simulate,
     "effects": options.Effects,
 }
-"""Options by command; ``mocobot.commands`` has a module of each name, whose ``run`` takes them."""
+"""Options by command; ``mocobot.commands`` has a module of each name, whose ``run`` takes them, and ``mocobot.checks``
+another, whose ``check`` refuses what it can before anything is loaded that takes time."""
+UNCHECKED = {"effects"}
+"""Commands with nothing to be refused so early."""
 NOT_GOOD, REFUSED, INTERRUPTED, CLOSED = 1, 2, 130, 141
 """Exit codes; the last two are 128 and the signal that other programs die of."""
 
@@ -81,7 +84,10 @@ def _run(arguments: Sequence[str]) -> None:
         print(f"mocobot {_version()}")
         return
     options = parse(COMMANDS, arguments)
-    _command(options)(options)
+    name = next(name for name, kind in COMMANDS.items() if isinstance(options, kind))
+    if name not in UNCHECKED:
+        import_module(f"mocobot.checks.{name}").check(options)
+    _command(name)(options)
 
 
 def _version() -> str:
@@ -94,9 +100,8 @@ def _version() -> str:
         return "(not installed, run from its source)"
 
 
-def _command(parsed: Any) -> Callable[[Any], None]:
-    """What runs the options: imported only now, for the help needs neither MuJoCo nor the estimator."""
-    name = next(name for name, kind in COMMANDS.items() if isinstance(parsed, kind))
+def _command(name: str) -> Callable[[Any], None]:
+    """What runs the options: imported only now, for neither the help nor a refusal needs MuJoCo or the estimator."""
     try:
         return import_module(f"mocobot.commands.{name}").run
     except (AttributeError, ImportError, RuntimeError) as error:

@@ -9,6 +9,7 @@ from estimator.errors import InputError
 from estimator.recording.metadata import FREE, Level
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
+from mocobot.api.fits import check_fits
 from mocobot.api.public import public
 from mocobot_sim.control.control import ControlGains
 from mocobot_sim.effects.base import Effect
@@ -187,16 +188,3 @@ def _simulated(
             public(SimulatedRecording, recording, metadata=metadata, truth=done.truth, log=done.log)
         )
     return recordings
-
-
-def check_fits(name: str, value: float | None, needed: tuple[str, ...], trajectories: Sequence[str]) -> None:
-    """Refuse a number that says nothing about any of the motions.
-
-    Raises:
-        InputError: it is given, and no trajectory is one of those that need it.
-    """
-    if value is not None and not set(needed) & set(trajectories):
-        given = "this one is" if len(trajectories) == 1 else "these are"
-        raise InputError(
-            f"{name} is for a {' or '.join(needed)} trajectory; {given} {', '.join(trajectories)}"
-        )

@@ -8,6 +8,9 @@ import tyro
 
 from mocobot.options.common import Calibrated, Force
 
+Kind = Literal["random", "periodic", "static", "free"]
+"""Of a trial."""
+
 
 @dataclass(frozen=True)
 class Effects:
@@ -40,7 +43,7 @@ class Simulate:
     effects` lists them."""
     units: Annotated[Path | None, tyro.conf.arg(metavar="TEAM.json")] = None
     """How every robot deviates from its design, such as the truth of another trial; needs calibrated sensors."""
-    trajectory: Literal["random", "periodic", "static", "free"] = "random"
+    trajectory: Kind = "random"
     """Kind of motion; free: every arm alone, holding nothing."""
     vias: int | None = None
     """Vias of a random trial, or of a free one's fast part; 80 if not given."""
