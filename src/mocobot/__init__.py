@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from mocobot.api.calibration import Calibration as Calibration
     from mocobot.api.calibration import calibrate as calibrate
     from mocobot.api.calibration import read_calibration as read_calibration
+    from mocobot.api.comparison import Comparison as Comparison
+    from mocobot.api.comparison import compare as compare
     from mocobot.api.conversion import Conversion as Conversion
     from mocobot.api.conversion import convert as convert
     from mocobot.api.conversion import convert_parts as convert_parts
@@ -62,6 +64,7 @@ _NAMES = {
     "estimator.recording.parquet": "read_recording write_recording",
     "mocobot": "bases emps guiding pictures robots trajectories",
     "mocobot.api.calibration": "Calibration calibrate read_calibration",
+    "mocobot.api.comparison": "Comparison compare",
     "mocobot.api.conversion": "Conversion convert convert_parts",
     "mocobot.api.diagnosis": "Cause Diagnosis diagnose",
     "mocobot.api.estimation": "Estimate estimate read_estimate",

@@ -23,6 +23,7 @@ COMMANDS = {
     "replay": options.Replay,
     "inspect": options.Inspect,
     "report": options.Report,
+    "compare": options.Compare,
     "simulate": options.Simulate,
     "effects": options.Effects,
 }

@@ -25,6 +25,7 @@ REFUSED = {
     "replay": "replay none.parquet --save rec.rrd",
     "inspect": "inspect none.csv",
     "report": "report none",
+    "compare": "compare none.json none.json",
     "simulate": "simulate --payload z --out rec.parquet",
 }
 """A mistake of every command that refuses something at once."""

@@ -2,11 +2,12 @@
 
 from mocobot.options.answers import Calibrate, Diagnose, Estimate
 from mocobot.options.logs import Convert, Inspect, Map
-from mocobot.options.results import Paper, Report
+from mocobot.options.results import Compare, Paper, Report
 from mocobot.options.simulation import Effects, Replay, Simulate
 
 __all__ = [
     "Calibrate",
+    "Compare",
     "Convert",
     "Diagnose",
     "Effects",

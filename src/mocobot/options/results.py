@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from mocobot.options.common import Force
+from mocobot.options.common import Flag, Force
 
 
 @dataclass(frozen=True)
@@ -41,3 +41,18 @@ class Report:
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.html")] = None
     """Page to write; DIR/report.html if not given."""
     force: Force = False
+
+
+@dataclass(frozen=True)
+class Compare:
+    """Compare two estimates, calibrations or diagnoses: what changed beyond its errors."""
+
+    a: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="A")]
+    """JSON file of an estimate, calibration or diagnosis, or the folder that holds it."""
+    b: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="B")]
+    """Another one of the same kind."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for comparison.json, report.txt and comparison.png."""
+    force: Force = False
+    strict: Flag = False
+    """Exit with 1 if something changed."""
