@@ -14,6 +14,7 @@ from mocobot.strict import NotGood
 from mocobot_sim.errors import TrialError
 
 COMMANDS = {
+    "watch": options.Watch,
     "paper": options.Paper,
     "estimate": options.Estimate,
     "calibrate": options.Calibrate,

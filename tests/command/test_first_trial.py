@@ -27,9 +27,9 @@ INSIDE = "cannot be written (.../rec.parquet is a file)"
 PAYLOADS, PRESETS = "the payloads are a, b, c, d", "the presets are ideal, nominal, uncalibrated"
 
 WORDS = {
-    "": "no command given; it must be one of paper, estimate, ...",
+    "": "no command given; it must be one of watch, paper, estimate, ...",
     "estimat rec.parquet": "there is no command 'estimat'; did you mean 'estimate'?",
-    "rec.parquet": "there is no command 'rec.parquet'; the commands are paper, estimate, ...",
+    "rec.parquet": "there is no command 'rec.parquet'; the commands are watch, paper, estimate, ...",
     "--colour red": "the command line has no option --colour; see mocobot --help",
     "estimate rec.parquet --metod joint": "estimate has no option --metod; did you mean --method?",
     "estimate rec.parquet --rec rec.parquet": "estimate has no option --rec; see mocobot estimate --help",

@@ -16,6 +16,7 @@ from mocobot.options.simulation import Kind
 ROOT = Path(__file__).resolve().parents[2]
 SLOW = {"numpy", "scipy", "pyarrow", "mujoco", "dm_control", "numba", "matplotlib", "plotly", "joblib"}
 REFUSED = {
+    "watch": "watch none.parquet",
     "paper": "paper --payload z",
     "estimate": "estimate none.parquet",
     "calibrate": "calibrate none.parquet",

@@ -1,6 +1,6 @@
 """Options of every command, as the command line shows them: data only, so that the help needs nothing else."""
 
-from mocobot.options.answers import Calibrate, Diagnose, Estimate
+from mocobot.options.answers import Calibrate, Diagnose, Estimate, Watch
 from mocobot.options.logs import Convert, Inspect, Map
 from mocobot.options.results import Compare, Paper, Report
 from mocobot.options.simulation import Effects, Replay, Simulate
@@ -18,4 +18,5 @@ __all__ = [
     "Replay",
     "Report",
     "Simulate",
+    "Watch",
 ]

@@ -86,3 +86,23 @@ class Diagnose:
     """Causes not to consider."""
     closed_loop: bool = True
     """Run the recorded commands again, without and with what is found."""
+
+
+@dataclass(frozen=True)
+class Watch:
+    """Look at recordings or logs once, and say what there is: inspect, convert, estimate, calibrate if the robots
+    contradict each other, diagnose, and make a page."""
+
+    rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
+    """Recordings (Parquet), or logs of any format that ``convert`` reads, all of one payload."""
+    map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
+    """Map of the logs that are no recordings; found out if not given."""
+    out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
+    """Folder for the page, and for all that it is made of."""
+    open: Flag = False
+    """Open the page in a browser; without --out it is in a temporary folder."""
+    force: Force = False
+    strict: Flag = False
+    """Exit with 1 if there is no estimate, or the verdict is neither consistent nor explained."""
+    jobs: int = 2
+    """Parallel processes."""
