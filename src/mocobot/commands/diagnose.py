@@ -20,6 +20,7 @@ from estimator.errors import InputError
 from estimator.files import whole_folder
 from estimator.recording.model import Recording
 from mocobot.api.given import Logs, Robots
+from mocobot.cluster import workers_of
 from mocobot.files.provenance import file_facts, provenance
 from mocobot.files.targets import calibration_file, map_file
 from mocobot.options import Diagnose
@@ -55,7 +56,7 @@ def run(options: Diagnose) -> None:
     with whole_folder(options.out) if options.out else nullcontext() as folder:
         data = rig.read(options.rec, logs, robots)
         made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
-        with stages() as (say, simulated):
+        with workers_of(options.scheduler), stages() as (say, simulated):
             found = rig.diagnose(
                 data, tolerances, options.exclude,
                 closed_loop=options.closed_loop, jobs=options.jobs, say=say, simulated=simulated,

@@ -8,10 +8,13 @@ from estimator.calibrate.json import calibration_to_dict
 from estimator.files import write_json, write_text
 from estimator.recording.parquet import write_recording
 from mocobot.checks.paper import SCORES
+from mocobot.cluster import workers_of
 from mocobot.files.provenance import NAME, folder_provenance, provenance
+from mocobot.files.resume import run_key
 from mocobot.options import Paper
 from mocobot.progress import share_bar
 from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
+from mocobot_sim.paper.store import Store
 from mocobot_sim.paper.text import format_summary, format_tables
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import sensor_preset
@@ -30,8 +33,9 @@ def run(options: Paper) -> None:
         options.payload, options.preset, options.trials, options.seed, staged_only=options.staged_only
     )
     start, made_with = time.perf_counter(), provenance("paper", asdict(options))
-    with share_bar("paper", "steps") as tell:
-        result = run_paper(plan, options.jobs, tell)
+    store = Store(options.out, run_key(asdict(plan)), force=options.force) if options.out else None
+    with workers_of(options.scheduler), share_bar("paper", "steps") as tell:
+        result = run_paper(plan, options.jobs, tell, store, remote=options.scheduler is not None)
     tables = f"{format_tables(result.scores)}\n\n{format_summary(result.scores)}"
     print(tables)
     print(f"\n{_summary(result)} Wall time {time.perf_counter() - start:.0f} s.")
@@ -40,6 +44,8 @@ def run(options: Paper) -> None:
         if options.recordings:
             written += _write_recordings(options.out / "recordings", plan, result)
         write_json(options.out / NAME, folder_provenance(made_with, options.out, written))
+        if store is not None:
+            store.drop()
         print(
             f"Written to {options.out}: paper.json, tables.txt, provenance.json, estimates, fits and plots."
         )

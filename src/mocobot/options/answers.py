@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from mocobot.options.common import Calibrated, Flag, Force
+from mocobot.options.common import Calibrated, Flag, Force, Scheduler
 
 
 @dataclass(frozen=True)
@@ -79,6 +79,7 @@ class Diagnose:
     """Exit with 1 if the verdict is neither consistent nor explained."""
     jobs: int = 2
     """Parallel processes."""
+    scheduler: Scheduler = None
     calibration: Calibrated = None
     tolerances: Annotated[Path | None, tyro.conf.arg(metavar="FILE.toml")] = None
     """How far a healthy robot may be off; see docs/diagnosis/guide.md."""

@@ -7,6 +7,13 @@ import tyro
 
 Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
 Force = Annotated[Flag, tyro.conf.arg(help="Replace what exists there; nothing is overwritten without it.")]
+Scheduler = Annotated[
+    str | None,
+    tyro.conf.arg(
+        metavar="tcp://HOST:PORT|FILE",
+        help="Run on the workers of a Dask scheduler, by its address or its scheduler file (docs/commands/cluster.md).",
+    ),
+]
 Calibrated = Annotated[
     Path | None,
     tyro.conf.arg(

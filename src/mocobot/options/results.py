@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from mocobot.options.common import Flag, Force
+from mocobot.options.common import Flag, Force, Scheduler
 
 
 @dataclass(frozen=True)
@@ -21,10 +21,11 @@ class Paper:
     """Random trials per payload; half as many are periodic."""
     jobs: int = 2
     """Parallel processes."""
+    scheduler: Scheduler = None
     seed: int = 0
     """Seed of trajectories, noise and calibration errors."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
-    """Folder for paper.json, tables.txt, the estimates and plots."""
+    """Folder for paper.json, tables.txt, the estimates and plots; a run that was interrupted goes on there."""
     force: Force = False
     recordings: bool = False
     """Write the recordings, too (needs --out)."""
