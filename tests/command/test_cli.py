@@ -7,6 +7,7 @@ import json
 import re
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -196,6 +197,12 @@ def test_help_of_the_installed_command() -> None:
     assert "usage: mocobot" in done.stdout
     assert all(name in done.stdout for name in COMMANDS)
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize("arguments", [("--version",), ("estimate", "--version")])
+def test_version(capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...]) -> None:
+    written = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]["version"]
+    assert run(capsys, *arguments) == (0, f"mocobot {written}\n", "")
 
 
 @pytest.mark.parametrize("name", COMMANDS)

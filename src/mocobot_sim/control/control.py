@@ -24,8 +24,6 @@ from estimator.arm.design import OmnidDesign
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.strict import is_number
-from mocobot_sim.control.kernel import update_team
-from mocobot_sim.control.kernel import wrist as wrist
 from mocobot_sim.scene.as_built import AsBuilt, units_of
 from mocobot_sim.scene.sensor_effects import SensorEffects
 from mocobot_sim.scene.team_index import TeamIndex
@@ -151,6 +149,9 @@ class TeamController:
         self._keep = sensed is not None
         self._take_up_ticks = round(gains.take_up_s * gains.rate_hz)
         self._tick = 0
+        from mocobot_sim.control.kernel import update_team  # numba takes half a second to load
+
+        self._update = update_team
 
     @property
     def feed_forward(self) -> Array:
@@ -171,7 +172,7 @@ class TeamController:
             ref_dot: their rates [m/s], shape (N, 3).
         """
         phase = 1 if self._tick < self._take_up_ticks and not self._given else 2
-        update_team(
+        self._update(
             self._qpos, self._ctrl, self._address, self._offset, self._constants, self._state,
             ref, ref_dot, self._tick == 0, phase == 1, self._lag, self._home,
             self._sensed[self._tick if self._keep else 0],
