@@ -10,7 +10,7 @@ FREE = {
     "discrepancy.emps.recording.axis_log": {"FIRST_GUESS_KG", "LIMIT_V"},  # the nominal axis
     "discrepancy.result.evidence_list": {"LEAST_LOG10_P", "MOST", "BY_CHANCE"},  # of JSON, and of a picture
     "discrepancy.result.read": {"VERSION"},
-    "discrepancy.result.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
+    "discrepancy.result.pictures.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
     "discrepancy.result.text": {"WIDTH"},
     "discrepancy.result.traces_file": {"VERSION"},
 }

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from discrepancy import rules
-from discrepancy.engine.hypothesis import Hypothesis
-from discrepancy.engine.probability import probability
-from discrepancy.engine.propose import proposals
-from discrepancy.engine.refit import exact
-from discrepancy.engine.remainder import nats_left, share_left
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.probability import probability
+from discrepancy.inference.propose import proposals
+from discrepancy.inference.refit import exact
+from discrepancy.inference.remainder import nats_left, share_left
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
 

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy import rules
-from discrepancy.engine.best_shape import nearest_shape
-from discrepancy.engine.hypothesis import Hypothesis
-from discrepancy.engine.imitation import imitated
-from discrepancy.engine.scan import Scanned, scan, score_of, score_with
+from discrepancy.inference.best_shape import nearest_shape
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.imitation import imitated
+from discrepancy.inference.scan import Scanned, scan, score_of, score_with
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Key, Problem
 from discrepancy.rig import Candidate, Rig
