@@ -259,7 +259,7 @@ LEARN_ROUNDS, LEARN_NATS = 30, 0.05
 LEAST_POWER = 0.5
 """Of a cell over that of its whitening. Chosen: some noise of healthy robots is drawn larger than it is."""
 FLAT_SHARE = 1e-10
-"""Information that shared unknowns have beforehand, over that of the data. Derived: none, but what is undecidable stays."""
+"""Information that shared unknowns have beforehand, over that of the data. Derived: as good as none."""
 PRIOR_ODDS = 0.05
 """Of any cause of the catalogue being there, at all its places together. Chosen: one in a team, of twenty causes."""
 SLAB_OCTAVES = 10.0
@@ -272,10 +272,12 @@ HELD_FACTOR = 1.5
 """Spread of a kind from which it is scanned within its tolerance, too. Chosen."""
 WORST_EVENTS = 3
 """Intervals looked at closely. Chosen."""
-NAMED_NATS = 3.0
-"""Log odds from which a cause is named. Derived: a false alarm costs as much as twenty misses, ln 20."""
+NAMED_NATS = 5.0
+"""Log odds from which a cause is named. Derived: a false alarm costs as much as 150 misses, ln 150."""
 EXCHANGES = 4
 """Rounds in which causes are exchanged and taken away after one was added. Chosen."""
+EXCHANGED_NATS = 1.0
+"""By which another cause, or another shape, must be likelier to be taken instead. Chosen: less is a matter of steps."""
 DIVERGED_NATS = 50.0
 """Fall of the evidence from which a Gauss-Newton step is not taken. Chosen."""
 SETTLED_SE = 0.05
