@@ -38,7 +38,9 @@ def test_rows_that_stand_alone_stay(rng):
     assert np.all(none.index == CELL_BANDS)
 
 
-@pytest.mark.parametrize(("moving", "groups"), [(None, None), (30, [0, 0, 1]), (0, [2, 0, 1]), (40, [1, 1, 0])])
+@pytest.mark.parametrize(
+    ("moving", "groups"), [(None, None), (30, [0, 0, 1]), (0, [2, 0, 1]), (40, [1, 1, 0])]
+)
 def test_gram_matrices_of_cells_add_up(rng, moving, groups):
     a, b = rng.standard_normal((40, 3, 4)), rng.standard_normal((40, 3, 2))
     cells = Cells.of(40, 3, moving, groups)

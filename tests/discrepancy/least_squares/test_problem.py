@@ -101,7 +101,9 @@ def test_fixed_values_take_a_candidate_out_of_the_fit(rows):
 def drawn_noise(rng, problem):
     """Another power in every cell, another spread of every column with a tolerance."""
     power = [rng.uniform(0.5, 4.0, len(p)) for p in problem.power]
-    return problem.with_noise(power, np.where(problem.tolerant, rng.uniform(1.0, 5.0, problem.spread.shape), 1.0))
+    return problem.with_noise(
+        power, np.where(problem.tolerant, rng.uniform(1.0, 5.0, problem.spread.shape), 1.0)
+    )
 
 
 @pytest.mark.parametrize("free", [(), (1,), (3, 2)])
