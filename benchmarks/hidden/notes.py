@@ -25,12 +25,13 @@ def failures(results: Iterable[Mapping[str, Any]]) -> str:
         for item in verdict["found"]:
             rivals = ", ".join(f"{_place(rival)} {rival['gap']:.1f}" for rival in item["rivals"])
             lines.append(
-                f"  found  {_item(item)} log10p {item['log10_p']:.1f} in {item['in_sample']:.2f} "
-                f"out {item['held_out']} rivals [{rivals}]"
+                f"  found  {_item(item)} P {item['probability']:.3f} left {item['share_left']:.2f} "
+                f"in {item['in_sample']:.2f} out {item['held_out']} rivals [{rivals}]"
             )
         lines.append(
             f"  chi2/n {verdict['before']:.3f} -> {verdict['after']:.3f}, explained {verdict['explained']:.2f}, "
-            f"rejected {verdict['rejected']}, {verdict['seconds']:.0f} s"
+            f"unlisted {verdict['unlisted_nats']:.1f} nats, suspected {verdict['suspected']}, scatter "
+            f"{verdict['scatter']}, {verdict['seconds']:.0f} s"
         )
         out.append("\n".join(lines))
     return "\n".join(out)

@@ -53,7 +53,8 @@ def _alarms(parts: Mapping[str, Sequence[Result]]) -> str:
             causes = Counter(item["cause"] for found in named for item in found)
             what = ", ".join(f"{cause} {n}" for cause, n in causes.items()) or "-"
             share = f"{100 * low:.0f} .. {100 * high:.0f} %"
-            rows.append([f"{part}, {preset} sensors", len(runs), alarms, share, what])
+            others = _counts(Counter(v for r in runs if (v := r["verdict"]["verdict"]) != "consistent"))
+            rows.append([f"{part}, {preset} sensors", len(runs), alarms, share, what, others])
     if runs := parts.get("logs", []):
         named = [r["verdict"]["found"] for r in runs]
         alarms = sum(r["verdict"]["verdict"] != "consistent" for r in runs)
@@ -68,8 +69,9 @@ def _alarms(parts: Mapping[str, Sequence[Result]]) -> str:
             f"{_counts(causes)}; chi2/n {left[0]:.2f} .. {left[-1]:.2f}; mass off by {rms:.2f} "
             f"standard errors rms in {len(off)}, {contradicting} said to contradict themselves"
         )
-        rows.append(["converted logs", len(runs), alarms, f"{100 * low:.0f} .. {100 * high:.0f} %", what])
-    return _markdown("False alarms", ["sets", "number", "something named", "95 % interval", "what"], rows)
+        rows.append(["converted logs", len(runs), alarms, f"{100 * low:.0f} .. {100 * high:.0f} %", what, ""])
+    header = ["sets", "number", "something named", "95 % interval", "what", "other verdicts than consistent"]
+    return _markdown("False alarms", header, rows)
 
 
 def interval(hits: int, of: int) -> tuple[float, float]:
@@ -165,6 +167,7 @@ VERDICTS = ("explained", "partly_explained", "unexplained")
 KINDS = (
     *(f"{verdict}, {where}" for where in ("in family", "outside") for verdict in VERDICTS),
     "none named, unexplained",
+    "none named, miscalibrated",
     "none named, consistent",
 )
 

@@ -37,7 +37,9 @@ def verdict_on(
     return {
         "verdict": diagnosis.verdict,
         "found": [_found(rig, *pair) for pair in zip(explanation.found, diagnosis.alternatives, strict=True)],
-        "rejected": [candidate.label for candidate in explanation.rejected],
+        "suspected": [[item.candidate.label, item.probability] for item in explanation.suspected],
+        "scatter": {item.candidate.cause: item.factor for item in explanation.scatter},
+        "unlisted_nats": explanation.unlisted_nats,
         "before": explanation.before / explanation.samples,
         "after": explanation.after / explanation.samples,
         "explained": explanation.explained,
@@ -70,7 +72,9 @@ def _found(rig: TeamRig, item: Found, rivals: Sequence[Alternative]) -> dict[str
         "parameters": {name: float(value) for name, value in values.items()},
         "standard_errors": {name: float(value) for name, value in errors.items()},
         "columns": [float(value) for value in item.values],
-        "log10_p": item.evidence.log10_p,
+        "probability": item.probability,
+        "over_nothing": item.over_nothing,
+        "share_left": item.share_left,
         "in_sample": item.in_sample,
         "held_out": item.held_out,
         "rivals": [

@@ -39,8 +39,7 @@ TERMS = (
          "has its grasp minus where the others have it."),
     Term("chi²/n, misfit", r"chi²/n|[Cc]hi-square|[Mm]isfit",
          "Differences between recording and model, each divided by what noise alone would make of it, squared; chi² is "
-         f"their sum, and chi²/n their mean. 1 is noise alone; up to {rules.CLEAN_CHI2_PER_N:g} counts as clean. The "
-         "gain of chi² is by how much it falls with one more cause in the model."),
+         f"their sum, and chi²/n their mean. 1 is noise alone; up to {rules.CLEAN_CHI2_PER_N:g} counts as clean."),
     Term("clean data, clean noise", r"[Cc]lean (?:data|noise)|× clean",
          "What these sensors would record if nothing were wrong: their noise and rounding alone."),
     Term("closed loop, response to the commands",
@@ -52,6 +51,9 @@ TERMS = (
          "much worse than another."),
     Term("Coulomb and viscous friction", r"\b[Cc]oulomb\b|\bviscous\b",
          "Coulomb friction has one size while something slides; viscous friction grows with the speed."),
+    Term("evidence", r"\b[Ee]vidence\b",
+         "By how much likelier the recordings are if something is there than if it is not, all sizes that it may have "
+         "taken together; in nats."),
     Term("excess error", r"[Ee]xcess error|error beyond noise",
          "The part of an error that noise does not explain: the root of chi²/n − 1."),
     Term("excitation", r"[Ee]xcitation|signal over noise",
@@ -64,6 +66,9 @@ TERMS = (
     Term("held out", r"[Hh]eld[- ]out|left out of the fit|not used for the fit",
          "Tried on trials that it was not fitted to. What only imitates one trial fails there."),
     Term("in sample", r"\bin sample\b", "Measured on the same trials that it was fitted to."),
+    Term("miscalibrated", r"\b[Mm]iscalibrated\b",
+         "All places of a kind, such as all encoder zeros, are off by more than the tolerance; no single one stands "
+         "out. The robots need a calibration, not a repair."),
     Term("nat", r"\bnats?\b",
          "A factor of e = 2.7 in likelihood: 5 nats are a factor of 150, 20 nats of 500 million. Rivals closer than "
          f"{rules.AMBIGUOUS_NATS:g} nats cannot be told apart."),
@@ -75,6 +80,10 @@ TERMS = (
          "wobbling, smallest first."),
     Term("prior", r"\b[Pp]riors?\b|as assumed beforehand",
          "How far robots may be off their design as far as is known before any recording: standard deviations."),
+    Term("probability of a cause", r"\b[Pp]robability\b",
+         "That this cause is at this place, and not a rival, nothing at all, or something that is not in the catalogue "
+         "and looks like it. It rests on the recordings, on what is as likely as what beforehand, and on how much of "
+         f"its trace the cause leaves. From {100 * rules.LEAST_PROBABILITY:g} % it is named."),
     Term("rank", r"\brank\b", "How many independent directions the data determine."),
     Term("residual", r"\b[Rr]esiduals?\b", "What is left when the model is taken from what was recorded."),
     Term("rms", r"\b[Rr]ms\b", "Root mean square, the usual size of something that varies about zero."),
@@ -82,11 +91,15 @@ TERMS = (
          "How far the simulation's closed chains opened: rods at their joints, grasps at the payload. Small ones mean "
          "that the simulated physics held."),
     Term("rotation vector", r"[Rr]otation vector", "Axis of a rotation times its angle."),
+    Term("spread of a kind", r"\b[Ss]pread\b|\bscatters?\b",
+         "Standard deviation, over all its places, of one kind of inaccuracy such as the encoder zeros; learnt from "
+         "the recordings, at least the tolerance. What is off by no more is not named."),
     Term("standard error", r"[Ss]tandard errors?",
          "How far a number would typically scatter if the experiment were repeated; two of three results lie within "
          "it. It comes from noise alone, not from wrong calibration."),
     Term("tolerance", r"\b[Tt]olerances?\b",
-         "How far a healthy robot may be from its drawing. Being slightly off within it is normal and never named."),
+         "How far a healthy robot is typically from its drawing, as assumed before any recording. Being slightly off "
+         "within it is normal and never named."),
     Term("whitened", r"\b[Ww]hitened\b",
          "Divided by the noise and freed of what noise repeats from sample to sample, so that every number of clean "
          "data is independent and has size 1."),

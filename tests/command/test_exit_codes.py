@@ -34,7 +34,8 @@ def test_a_log_that_is_ready_for_nothing(brief: Path, capsys: pytest.CaptureFixt
 
 
 @pytest.mark.parametrize(
-    ("verdict", "strict"), [("consistent", 0), ("explained", 0), ("partly_explained", 1), ("unexplained", 1)]
+    ("verdict", "strict"),
+    [("consistent", 0), ("miscalibrated", 1), ("explained", 0), ("partly_explained", 1), ("unexplained", 1)],
 )
 def test_a_verdict(
     brief: Path,

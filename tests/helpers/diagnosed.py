@@ -5,9 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from discrepancy.result.remains import remains
+import pytest
 
-VERDICTS = ("consistent", "explained", "partly_explained", "unexplained")
+from discrepancy.engine.explanation import Scatter
+from discrepancy.result.remains import remains
+from discrepancy.result.scatter import scatter_to_dict
+from discrepancy.rig import Candidate, Parameter
+
+VERDICTS = ("consistent", "miscalibrated", "explained", "partly_explained", "unexplained")
 PLACE = {"cause", "kind", "name", "family", "robot", "joint", "place"}
 RESPONSE = {f"{c}_{kind}" for c in ("phi", "theta", "tau") for kind in ("nrmse", "rms")} | {"chi2_per_n"}
 
@@ -18,15 +23,17 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     Provenance may be there: commands add it.
     """
     assert set(values) - {"provenance"} == {
-        "format", "version", "recordings", "verdict", "causes", "evidence", "rejected", "gain", "not_simulated",
-        "undecidable", "detection_limits", "residual", "remains", "notes",
+        "format", "version", "recordings", "verdict", "causes", "suspected", "scatter", "evidence", "gain",
+        "not_simulated", "undecidable", "detection_limits", "residual", "remains", "notes",
     }  # fmt: skip
-    assert (values["format"], values["version"]) == ("mocobot-diagnosis", 1)
+    assert (values["format"], values["version"]) == ("mocobot-diagnosis", 2)
     assert values["verdict"] in VERDICTS
-    assert bool(values["causes"]) == (values["verdict"] in ("explained", "partly_explained"))
+    if values["verdict"] != "unexplained":
+        assert bool(values["causes"]) == (values["verdict"] in ("explained", "partly_explained"))
     for cause in values["causes"]:
         assert set(cause) == PLACE | {
-            "sentence", "parameters", "explained", "log10_p", "folds", "shape", "separate", "alternatives"
+            "sentence", "parameters", "explained", "probability", "over_nothing", "share_left", "instead", "folds",
+            "shape", "separate", "alternatives",
         }  # fmt: skip
         _check_place(cause)
         assert cause["parameters"]
@@ -36,11 +43,33 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
             assert parameter["se"] is None or parameter["se"] > 0
         assert set(cause["explained"]) == {"in_sample", "held_out"}
         assert 0.0 <= cause["explained"]["in_sample"] <= 1.0
-        assert isinstance(cause["log10_p"], float)
+        assert cause["probability"] >= 0.5
+        assert set(cause["instead"]) == {"nothing", "unlisted"}
+        others = [*cause["instead"].values(), *(rival["probability"] for rival in cause["alternatives"])]
+        assert cause["probability"] + sum(others) == pytest.approx(1.0)
+        assert min(others) >= 0.0
         for rival in cause["alternatives"]:
-            assert set(rival) == PLACE | {"evidence_gap", "chi2_per_n", "ambiguous", "separate"}
+            assert set(rival) == PLACE | {
+                "probability",
+                "evidence_gap",
+                "chi2_per_n",
+                "ambiguous",
+                "separate",
+            }
             _check_place(rival)
             assert isinstance(rival["ambiguous"], bool)
+    for entry in values["suspected"]:
+        assert set(entry) == PLACE | {"at", "sentence", "probability", "over_nothing"}
+        _check_place(entry)
+        assert entry["probability"] < 0.5
+    assert values["scatter"] or values["verdict"] != "miscalibrated"
+    for entry in values["scatter"]:
+        assert set(entry) == {
+            "cause", "kind", "family", "sentence", "factor", "places", "spread", "tolerance", "nats"
+        }  # fmt: skip
+        assert entry["factor"] >= 3.0
+        for name, size in entry["spread"].items():
+            assert size == pytest.approx(entry["factor"] * entry["tolerance"][name])
     _check_gain(values["gain"], len(values["recordings"]), simulated=simulated)
     _check_evidence(values["evidence"], named=bool(values["causes"]))
     for entry in values["undecidable"]:
@@ -49,8 +78,7 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
         assert set(entry) == {"cause", "kind", "robot", "joint", "parameters"}
         assert all(size is None or size > 0 for size in entry["parameters"].values())
     residual = values["residual"]
-    assert set(residual) == {"chi2_per_n", "signature", "chi2_per_n_tolerated", "tolerances", "nominal"}
-    assert set(residual["tolerances"]) == {"chi2", "freedom", "log10_p"}
+    assert set(residual) == {"chi2_per_n", "signature", "chi2_per_n_tolerated", "unlisted_nats", "nominal"}
     assert {"chi2_per_n", "sentence", "kind", "trial"} <= set(residual["signature"])
     assert all(isinstance(note, str) for note in values["notes"])
     assert values["remains"] == remains(values)
@@ -67,14 +95,14 @@ def _check_place(values: dict[str, Any]) -> None:
 
 
 def _check_evidence(evidence: dict[str, Any], *, named: bool) -> None:
-    assert set(evidence) == {"before", "after", "by_chance"}
+    assert set(evidence) == {"before", "after"}
     assert (evidence["after"] is not None) == named
     for entries in (evidence["before"], evidence["after"] or []):
         for entry in entries:
-            assert set(entry) == PLACE | {"at", "gain", "log10_p"}
+            assert set(entry) == PLACE | {"at", "nats", "needed"}
             _check_place(entry)
-        gains = [entry["gain"] for entry in entries]
-        assert gains == sorted(gains, reverse=True)
+        nats = [entry["nats"] for entry in entries]
+        assert nats == sorted(nats, reverse=True)
 
 
 def _check_gain(gain: dict[str, Any], trials: int, *, simulated: bool) -> None:
@@ -110,6 +138,14 @@ def _limit(
     return {"cause": cause, "kind": kind, "robot": robot, "joint": joint, "parameters": sizes}
 
 
+def scattered() -> dict[str, Any]:
+    """An entry of ``scatter``, made up."""
+    zero = Candidate(
+        "theta_zero", "gimbal_zero", 1, 1, (Parameter("zero_rad", 1e-4, 1e-4),), title="zero of {gimbal axis}"
+    )
+    return scatter_to_dict(Scatter(zero, 52.0, 9, 140.0))
+
+
 def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
     """A diagnosis as ``diagnosis_to_dict`` gives it, made up."""
     place = {
@@ -135,12 +171,22 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
         "sentence": "Robot 2, joint 1: the torque sensor reads 0.0500 +- 0.0010 N m too much.",
         "parameters": {"bias_Nm": {"value": 0.05, "se": 0.001}},
         "explained": {"in_sample": 0.99, "held_out": 0.98},
-        "log10_p": -80.0,
+        "probability": 0.8,
+        "over_nothing": 180.0,
+        "share_left": 0.05,
+        "instead": {"nothing": 0.0, "unlisted": 0.1},
         "folds": [3.0, 4.0],
         "shape": {},
         "separate": "A known weight separates them.",
         "alternatives": [
-            {**rival, "evidence_gap": 2.0, "chi2_per_n": 1.01, "ambiguous": True, "separate": ""}
+            {
+                **rival,
+                "probability": 0.1,
+                "evidence_gap": 2.0,
+                "chi2_per_n": 1.01,
+                "ambiguous": True,
+                "separate": "",
+            }
         ],
     }
     before = dict.fromkeys(sorted(RESPONSE), 0.01) | {"chi2_per_n": 90.0}
@@ -153,14 +199,14 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
     trial = {"before": before, "after": after}
     values = {
         "format": "mocobot-diagnosis",
-        "version": 1,
+        "version": 2,
         "recordings": ["one", "two"],
         "verdict": verdict,
         "causes": [cause] if "explained" in verdict and verdict != "unexplained" else [],
         "evidence": {
             "before": [
-                {**place, "at": None, "gain": 400.0, "log10_p": -80.0},
-                {**rival, "at": None, "gain": 350.0, "log10_p": -70.0},
+                {**place, "at": None, "nats": 180.0, "needed": 10.5},
+                {**rival, "at": None, "nats": 150.0, "needed": 10.5},
                 {
                     "cause": "push",
                     "kind": "push on the payload",
@@ -170,16 +216,16 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
                     "joint": None,
                     "place": "payload",
                     "at": [2, 12.5],
-                    "gain": 3.0,
-                    "log10_p": -0.4,
+                    "nats": 1.4,
+                    "needed": 15.2,
                 },
             ],
             "after": None
-            if verdict in ("consistent", "unexplained")
-            else [{**rival, "at": None, "gain": 0.5, "log10_p": -0.3}],
-            "by_chance": 28.0,
+            if "explained" not in verdict or verdict == "unexplained"
+            else [{**rival, "at": None, "nats": 0.2, "needed": 10.5}],
         },
-        "rejected": [],
+        "suspected": [],
+        "scatter": [scattered()] if verdict == "miscalibrated" else [],
         "gain": {
             "held_out": {"before": before, "after": after},
             "units": {"phi": "rad", "theta": "rad", "tau": "N m"},
@@ -203,7 +249,7 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
             "chi2_per_n": 1.1,
             "signature": signature,
             "chi2_per_n_tolerated": 1.4,
-            "tolerances": {"chi2": 20.0, "freedom": 30.0, "log10_p": -0.1},
+            "unlisted_nats": 3.0,
             "nominal": {"chi2_per_n": 12.0, "signature": signature},
         },
         "notes": ["A note."],

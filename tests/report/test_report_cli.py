@@ -105,8 +105,8 @@ BROKEN = [
     (estimate_folder, edited("est.json", lambda v: v | {"version": 7}), ("est.json", "version 7", "reads version 1")),
     (estimate_folder, edited("est.json", without("mass")), ("est.json", "not a complete estimate")),
     (diagnosis_folder, cut(DIAGNOSIS), (DIAGNOSIS, "not valid JSON")),
-    (diagnosis_folder, edited(DIAGNOSIS, lambda v: v | {"version": 2}),
-     ("version 2", "reads version 1")),
+    (diagnosis_folder, edited(DIAGNOSIS, lambda v: v | {"version": 1}),
+     ("version 1", "reads version 2")),
     (diagnosis_folder, edited(DIAGNOSIS, lambda v: v | {"format": "x"}),
      ("not a diagnosis", "mocobot-diagnosis")),
     (diagnosis_folder, edited(DIAGNOSIS, lambda v: v | {"verdict": "guilty"}),
@@ -168,7 +168,7 @@ def test_nothing_of_others_is_overwritten(tmp_path: Path, capsys: pytest.Capture
     link.symlink_to(folder / "diagnosis.json")
     assert "exists; give --force" in refused(capsys, folder, "--out", link)
     assert theirs.read_text() == "<html>mine</html>"
-    assert json.loads((folder / "diagnosis.json").read_text())["version"] == 1
+    assert json.loads((folder / "diagnosis.json").read_text())["version"] == 2
 
 
 def test_page_lies_beside_what_it_is_of_when_diagnosed_again(tmp_path: Path) -> None:

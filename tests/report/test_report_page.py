@@ -419,12 +419,14 @@ def test_terms_are_explained_where_they_stand(pages: dict[str, Reader]) -> None:
 
 
 def test_evidence_is_dots_on_one_scale(pages: dict[str, Reader]) -> None:
-    """A bar would need a zero, which a logarithmic axis has not; what gains less than 1 is not drawn."""
-    shown = [b for b in pages["diagnosis"].blocks.values() if "gain of chi-square" in json.dumps(b)]
-    (before,) = shown  # with the cause in the model nothing is left that gains 1
+    """A bar would need a zero, which a logarithmic axis has not; what has less than 1 nat is not drawn."""
+    shown = [b for b in pages["diagnosis"].blocks.values() if "evidence [nats]" in json.dumps(b)]
+    (before,) = shown  # with the cause in the model nothing is left that has 1
     assert {trace["type"] for trace in before["data"]} == {"scatter"}
-    assert sorted(x for trace in before["data"] for x in trace["x"]) == [3.0, 350.0, 400.0]
-    assert before["layout"]["xaxis"]["range"][0] == pytest.approx(np.log10(3.0) - 0.15)
+    rings, *dots = before["data"]
+    assert rings["x"] == [10.5, 10.5, 15.2]
+    assert sorted(x for trace in dots for x in trace["x"]) == [1.4, 150.0, 180.0]
+    assert before["layout"]["xaxis"]["range"][0] == pytest.approx(np.log10(1.4) - 0.15)
 
 
 def test_one_plot_per_robot(pages: dict[str, Reader]) -> None:

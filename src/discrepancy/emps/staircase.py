@@ -95,7 +95,7 @@ def errors(rig: EmpsRig, models: Sequence[Active]) -> Errors:
 
 
 def _fitted(explanation: Explanation, free: Sequence[int], trials: Sequence[int]) -> Active:
-    return Fit.of(explanation.problem, free, trials, background=False).active
+    return Fit.of(explanation.problem.as_whitened, free, trials, background=False).active
 
 
 def format_staircase(steps: Sequence[Step], other: str | None = None) -> str:

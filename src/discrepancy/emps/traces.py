@@ -11,7 +11,7 @@ from discrepancy.result.traces import Trace
 def traces(rig: EmpsRig, explanation: Explanation) -> list[Trace]:
     """Residuals of every block: ``before`` as simulated, ``after`` with the named causes and tolerances."""
     fit, problem = explanation.fit, explanation.problem
-    nominal = Fit.of(problem, background=False)
+    nominal = Fit.of(explanation.nothing.problem.as_whitened, background=False)
     causes = [
         (candidate, fit.coefficients[span] * candidate.units)
         for candidate, span in zip(problem.candidates, problem.spans, strict=True)

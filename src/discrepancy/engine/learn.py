@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import cho_solve, cholesky
-from scipy.linalg.lapack import dpotri
+from numpy.typing import NDArray
+from scipy.linalg import cho_solve, cholesky, get_lapack_funcs
 
 from discrepancy import rules
 from discrepancy.least_squares.problem import Problem
 from estimator.arrays import Array
+
+Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +49,11 @@ class _Parts:
 
     grams: Array
     sizes: Array
-    group: Array
+    group: Indices
     least: Array
     most: Array
     weight: Array
-    own: Array
+    own: NDArray[np.bool_]
 
 
 def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN_ROUNDS) -> Learnt:
@@ -85,11 +87,11 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
     return Learnt(problem.with_noise(found, spreads), tuple(free), evidence)
 
 
-def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Array], _Parts]:
+def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts]:
     count = problem.shared + len(problem.tolerant)
     group = np.full(count, -2)
     group[: problem.shared] = -1
-    names: list[Array] = []
+    names: list[Indices] = []
     least, most, weight, own = [], [], [], []
     kinds: dict[str, list[int]] = {}
     for index, candidate in enumerate(problem.candidates):
@@ -140,7 +142,8 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
     scale = 1.0 / np.sqrt(np.diag(H))
     factor = cholesky(H * np.outer(scale, scale), lower=True) if len(H) else H
     solution = scale * cho_solve((factor, True), scale * b) if len(H) else b
-    inverse = dpotri(factor, lower=1)[0] if len(H) else H
+    (potri,) = get_lapack_funcs(("potri",), (factor,))
+    inverse = potri(factor, lower=1)[0] if len(H) else H
     inverse = np.tril(inverse) + np.tril(inverse, -1).T
     covariance = inverse * np.outer(scale, scale)
     log_det = 2.0 * float(np.sum(np.log(np.diag(factor)) - np.log(scale)))

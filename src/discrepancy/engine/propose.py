@@ -11,7 +11,7 @@ from discrepancy import rules
 from discrepancy.engine.best_shape import nearest_shape
 from discrepancy.engine.hypothesis import Hypothesis
 from discrepancy.engine.imitation import imitated
-from discrepancy.engine.scan import Scanned, scan, score_with
+from discrepancy.engine.scan import Scanned, scan, score_of, score_with
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Key, Problem
 from discrepancy.rig import Candidate, Rig
@@ -29,13 +29,7 @@ def proposals(
         events: whether to look for what acts for a while, too.
     """
     fit = base.fit
-    # One fault among healthy ones looks like a scatter of all, until it is taken out.
-    held = replace(base.problem, spread=np.where(base.problem.tolerant, 1.0, base.problem.spread))
-    found: dict[int | None, Scanned] = {item.index: item for item in scan(fit)}
-    for item in scan(Fit.of(held, base.free)) if np.any(base.problem.spread > 1.0) else ():
-        if item.score > found[item.index].score:
-            found[item.index] = item
-    ranked = [item for item in found.values() if item.candidate.key not in barred]
+    ranked = [item for item in _with_kinds_held(base) if item.candidate.key not in barred]
     ranked = [_in_best_shape(rig, fit, item) for item in ranked]
     ranked += _events(rig, fit) if events else []
     ranked.sort(key=lambda item: -item.score)
@@ -46,6 +40,26 @@ def proposals(
         if new.possible(rig, new.free[-1]) and not imitated(rig, base, new.causes[-1]):
             likely.append(new)
     return sorted(likely, key=lambda new: -new.score)
+
+
+def _with_kinds_held(base: Hypothesis) -> list[Scanned]:
+    """The scan; kinds that scatter also within their tolerance: one fault among healthy ones looks like a scatter."""
+    problem, found = base.problem, {item.index: item for item in scan(base.fit)}
+    kinds: dict[str, list[int]] = {}
+    for index, candidate in enumerate(problem.candidates):
+        if index not in base.free and problem.has_tolerance(index):
+            kinds.setdefault(candidate.cause, []).append(index)
+    for members in kinds.values():
+        if problem.spread[problem.columns_of(members[0])][0] > rules.HELD_FACTOR:
+            spread = problem.spread.copy()
+            for index in members:
+                spread[problem.columns_of(index)] = 1.0
+            fit = Fit.of(replace(problem, spread=spread), base.free)
+            for index in members:
+                score = score_of(fit, index)
+                if score > found[index].score:
+                    found[index] = Scanned(index, problem.candidates[index], score)
+    return list(found.values())
 
 
 def _chosen(ranked: Sequence[Scanned], leaders: int) -> list[Scanned]:
@@ -114,11 +128,11 @@ def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hy
         return new
     size = abs(float(new.fit.part(index)[0][0] * shaped.units[0]))
     start = problem.with_noise(new.problem.power, new.problem.spread)
-    for _ in range(2):
-        # Its size is found with them, and is theirs.
-        opened = start.with_unknowns(shaped.key, unknowns, max(size, shaped.parameters[0].tolerance))
-        other = Hypothesis.of(opened, new.free, base.allowed)
-        size = abs(float(other.fit.part(index)[0][0] * shaped.units[0]))
+    # Its size is found with them, and is theirs.
+    first = start.with_unknowns(shaped.key, unknowns, max(size, shaped.parameters[0].tolerance))
+    size = abs(float(Hypothesis.of(first, new.free, base.allowed).fit.part(index)[0][0] * shaped.units[0]))
+    opened = start.with_unknowns(shaped.key, unknowns, max(size, shaped.parameters[0].tolerance))
+    other = Hypothesis.of(opened, new.free, base.allowed)
     if other.score <= new.score:
         return new
     healthy = Hypothesis.of(opened, base.free, base.allowed)

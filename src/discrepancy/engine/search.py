@@ -82,16 +82,20 @@ def _law_holds(rig: Rig, hypothesis: Hypothesis, index: int) -> bool:
 
 def _based(rig: Rig, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
     """The rig linear around where it is, and the hypothesis that nothing is there beyond its kind's spread."""
-    for left in reversed(range(rules.BASE_ROUNDS)):
-        say("columns")
-        candidates = rig.candidates()
-        nothing = Hypothesis.of(Problem.of(rig.rows(candidates), candidates), ())
-        moved = rig.relinearised(nothing) if left else None
+    nothing = _nothing(rig, say)
+    for _ in range(rules.BASE_ROUNDS - 1):
+        moved = rig.relinearised(nothing)
         if moved is None:
             break
         say("linearise")
-        rig = moved
+        rig, nothing = moved, _nothing(moved, say)
     return rig, nothing
+
+
+def _nothing(rig: Rig, say: Callable[[str], object]) -> Hypothesis:
+    say("columns")
+    candidates = rig.candidates()
+    return Hypothesis.of(Problem.of(rig.rows(candidates), candidates), ())
 
 
 def _settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis, dict[int, list[Rival]]]:

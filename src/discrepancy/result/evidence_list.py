@@ -1,50 +1,107 @@
 """The strongest candidates, with nothing named yet and with what is named in the model."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.engine.explanation import Explanation
+from discrepancy.engine.hypothesis import Hypothesis
+from discrepancy.engine.prior import log_prior_odds
+from discrepancy.engine.scan import scan
 from discrepancy.least_squares.fit import Fit
+from discrepancy.least_squares.problem import Problem
 from discrepancy.result.read import kind_of, name_of
 from discrepancy.rig import Candidate
 
-LEAST_LOG10_P = -1e6
-MOST = 14
-BY_CHANCE = 28.0
-"""Gain of chi-square that one parameter reaches by chance with a probability of about 1e-6 or 1e-7."""
+MOST, CLOSELY = 14, 16
+"""Candidates that are listed, and that are looked at for it."""
 
 
 def evidence_list(explanation: Explanation) -> dict[str, Any]:
     """Plain data: ``before`` and ``after`` (null where nothing is named), lists of the strongest first.
 
-    Each entry has cause, family, robot, joint, place, ``at`` (trial from 1 and start [s] of an event, else null), gain
-    (of chi-square if its parameters leave their tolerance) and log10_p (of as much by chance). ``by_chance`` is what
-    chance can do.
+    Each entry has cause, family, robot, joint, place, ``at`` (trial from 1 and start [s] of an event, else null),
+    ``nats`` (log Bayes factor that it is there beside what is in the model, spreads and noise learnt anew with it) and
+    ``needed`` (as many nats name it, by its prior odds).
     """
-    problem = explanation.problem
+    problem, named = _with_shapes(explanation)
+    nothing = explanation.nothing
+    if problem is not nothing.problem:
+        nothing = Hypothesis.of(problem, ())
     return {
-        "before": _strongest(explanation, Fit.of(problem)),
-        "after": _strongest(explanation, explanation.fit) if explanation.fit.free else None,
-        "by_chance": BY_CHANCE,
+        "before": _strongest(nothing, named),
+        "after": _strongest(explanation.hypothesis, {}) if explanation.found else None,
     }
 
 
-def _strongest(explanation: Explanation, fit: Fit) -> list[dict[str, Any]]:
+def needed_nats(problem: Problem, candidate: Candidate) -> float:
+    """Log Bayes factor from which a candidate is named [nats]."""
+    return rules.NAMED_NATS - log_prior_odds(problem, candidate)
+
+
+def _with_shapes(explanation: Explanation) -> tuple[Problem, dict[int, Problem]]:
+    """The problem without causes, their columns in it as found; and for each cause with what it leaves open."""
+    best, problem, at = explanation.hypothesis, explanation.nothing.problem, []
+    for index in best.free:
+        candidate, span = best.problem.candidates[index], best.problem.spans[index]
+        columns = [x[..., span] / candidate.units for x in best.problem.raw]
+        known = problem.index_of(candidate)
+        at.append(len(problem.candidates) if known is None else known)
+        if known is None:
+            problem = problem.extended(candidate, columns)
+        elif problem.candidates[known] is not candidate:
+            problem = problem.with_columns(known, candidate, columns)
+    out = {}
+    for index, candidate in zip(at, best.causes, strict=True):
+        own = best.problem.opened.get(candidate.key)
+        left_open = [one.columns for one in own] if own else []
+        # What it leaves open has unit size already.
+        out[index] = problem.with_unknowns(candidate.key, left_open, 1.0)
+    return problem, out
+
+
+def _strongest(base: Hypothesis, named: Mapping[int, Problem]) -> list[dict[str, Any]]:
+    judged = [(nats(base, index, named.get(index)), index) for index in _looked_at(base, named)]
     out = []
-    for e in sorted(fit.evidence(fit.inflation), key=lambda e: -e.gain)[:MOST]:
-        candidate = explanation.problem.candidates[e.index]
-        at = candidate.transient
-        when = [at.trial + 1, float(at.start_s)] if at else None
-        told = {"at": when, "gain": float(e.gain), "log10_p": finite_log10_p(e.log10_p)}
-        out.append(place_of(candidate) | told)
+    for value, index in sorted(judged, reverse=True)[:MOST]:
+        candidate = base.problem.candidates[index]
+        if value > 0.0:
+            told = {"at": at_of(candidate), "nats": value, "needed": needed_nats(base.problem, candidate)}
+            out.append(place_of(candidate) | told)
     return out
 
 
-def finite_log10_p(value: float) -> float:
-    """A logarithm of a probability that JSON can hold."""
-    return max(float(np.nan_to_num(value, nan=0.0)), LEAST_LOG10_P)
+def _looked_at(base: Hypothesis, named: Mapping[int, Problem]) -> list[int]:
+    """What is named, and what the scan puts first: with spreads as learnt, or with tolerances."""
+    problem = base.problem
+    held = replace(problem, spread=np.where(problem.tolerant, 1.0, problem.spread))
+    score: dict[int, float] = {}
+    for item in (*scan(base.fit), *scan(Fit.of(held, base.free))):
+        if item.index is not None:
+            score[item.index] = max(item.score, score.get(item.index, -np.inf))
+    ranked = sorted(score, key=lambda index: -score[index])
+    return list(dict.fromkeys([*named, *ranked[:CLOSELY]]))
+
+
+def nats(base: Hypothesis, index: int, problem: Problem | None = None) -> float:
+    """Log Bayes factor that one candidate is there beside a hypothesis.
+
+    Args:
+        base: the hypothesis.
+        index: which of its problem's candidates.
+        problem: with what it leaves open, if it is not the hypothesis' own.
+    """
+    more = Hypothesis.of(problem or base.problem, (*base.free, index), base.allowed)
+    return float(more.score - base.score - log_prior_odds(base.problem, base.problem.candidates[index]))
+
+
+def at_of(candidate: Candidate) -> list[float] | None:
+    """Trial (from 1) and start [s] of an event; None of what lasts."""
+    at = candidate.transient
+    return [at.trial + 1, float(at.start_s)] if at else None
 
 
 def place_of(candidate: Candidate) -> dict[str, Any]:

@@ -1,25 +1,36 @@
 """JSON form of a diagnosis: plain types, no NaN, units in the keys; null is what could not be had.
 
-format, version     "mocobot-diagnosis", 1
+format, version     "mocobot-diagnosis", 2
 recordings          names of the trials
-verdict             "consistent", "explained", "partly_explained" or "unexplained"
+verdict             "consistent", "miscalibrated", "explained", "partly_explained" or "unexplained"
 causes              list, in the order of discovery, of
     cause, family, robot, joint    robot and joint from 1, or null
     kind, name, place, sentence    in words: the cause, the cause at its place, its place, what it does
     parameters                     {name: {value, se}}; se is null for what was chosen, not fitted
     explained                      {in_sample, held_out}: share of the nominal model's misfit that the cause removes
                                    beyond those before it; the shares add up to what all causes remove
-    log10_p                        of so much evidence in clean data
+    probability                    that it is this cause, at this place
+    over_nothing                   by how much it is likelier than nothing in its place [nats], or null
+    share_left                     where it acts, amplitude of what is left beyond noise over that of what it explains
+    instead                        {nothing, unlisted}: probabilities that nothing is there, or something that is not
+                                   in the catalogue and looks like it; with ``probability`` and those of the
+                                   alternatives they add up to 1
     folds                          gain of chi-square on every trial when fitted to the others
     shape                          numbers that change the cause's columns, such as a pendulum's length
     separate                       what would tell the cause from its look-alikes
-    alternatives                   list of {cause, kind, name, family, robot, joint, place, evidence_gap [nats],
-                                   chi2_per_n, ambiguous, separate}; chi2_per_n of its closed loop, or null
-evidence            the strongest candidates, see ``evidence_list``: {before, after, by_chance} with nothing named and
-                    with what is named (null), lists of {cause, kind, name, family, robot, joint, place, at, gain,
-                    log10_p}
-rejected            significant candidates that other trials did not confirm, or of which something simpler tells more:
-                    list of {cause, kind, name, family, robot, joint, place}
+    alternatives                   list of {cause, kind, name, family, robot, joint, place, probability,
+                                   evidence_gap [nats], chi2_per_n, ambiguous, separate}; the probability by the rows;
+                                   chi2_per_n of its closed loop, or null
+suspected           what would explain some of it, but is not probable enough to be named: list of {cause, kind, name,
+                    family, robot, joint, place, at, sentence, probability, over_nothing}
+scatter             kinds of which all places are off by more than the tolerance, the farthest first: list of
+    cause, kind, family, sentence
+    factor                         their spread over the tolerance
+    places                         how many there are
+    spread, tolerance              {name: size} of every parameter, standard deviations over the places
+    nats                           by how much the spread is likelier than the tolerance
+evidence            the strongest candidates, see ``evidence_list``: {before, after} with nothing found and with what
+                    is found (null), lists of {cause, kind, name, family, robot, joint, place, at, nats, needed}
 gain                null where the closed loop was not simulated and there is nothing to estimate, or
     held_out        {before, after}: {<channel>_nrmse, <channel>_rms, chi2_per_n}, means over trials, null if failed
     units           of the channels' rms
@@ -34,10 +45,10 @@ undecidable         list of {what, why, remedy}: what no recordings of this rig 
 detection_limits    list of {cause, kind, robot, joint, parameters: {name: size}}: what would have been noticed nine
                     times in ten; null where these recordings say nothing
 residual            {chi2_per_n, signature} of what the causes (with tolerances) leave, and
-    chi2_per_n_tolerated           with tolerances and no cause
-    tolerances                     {chi2, freedom, log10_p}: how hard they are used
+    chi2_per_n_tolerated           with no cause, and everything off as far as its kind scatters
+    unlisted_nats                  by how much what is left is likelier something than clean noise
     nominal                        {chi2_per_n, signature} of the simulation as it is
-remains             sentences on what the verdict leaves open: misfit above clean, strained tolerances, response
+remains             sentences on what the verdict leaves open: misfit above clean, what is off everywhere, response
 notes               sentences
 
 ``mocobot diagnose`` adds ``provenance``: versions, options and hashes of the files it was made from
@@ -52,12 +63,14 @@ import numpy as np
 from discrepancy.causes.words import Words
 from discrepancy.engine.confirm import Alternative
 from discrepancy.engine.diagnose import Diagnosis
-from discrepancy.engine.explanation import Explanation, Found
+from discrepancy.engine.explanation import Found
 from discrepancy.engine.gain import Gain, Response
 from discrepancy.least_squares.fit import Fit
-from discrepancy.result.evidence_list import evidence_list, finite_log10_p, place_of
+from discrepancy.result.evidence_list import at_of, evidence_list, place_of
+from discrepancy.result.instead import Instead
 from discrepancy.result.read import FORMAT, VERSION
 from discrepancy.result.remains import remains
+from discrepancy.result.scatter import scatter_to_dict
 from discrepancy.result.sensitivity import blind_spots, detection_limits
 from discrepancy.result.signature import signature
 from discrepancy.rig import Rig
@@ -75,7 +88,7 @@ def diagnosis_to_dict(
         estimates: what the rig estimates ``before`` and ``after``, plain JSON values; ``errors`` may lie beside them.
     """
     explanation = diagnosis.explanation
-    nominal = Fit.of(explanation.problem, background=False)
+    nominal = Fit.of(explanation.nothing.problem.as_whitened, background=False)
     gain = None if diagnosis.gain is None else _gain(diagnosis.gain, rig, words)
     if estimates is not None:
         gain = gain or {
@@ -98,8 +111,9 @@ def diagnosis_to_dict(
             _cause(found, alternatives, rig, words)
             for found, alternatives in zip(diagnosis.causes, diagnosis.alternatives, strict=True)
         ],
+        "suspected": [_suspected(found, rig, words) for found in explanation.suspected],
+        "scatter": [scatter_to_dict(item) for item in explanation.scatter],
         "evidence": evidence_list(explanation),
-        "rejected": [place_of(candidate) for candidate in explanation.rejected],
         "gain": gain,
         "not_simulated": diagnosis.not_simulated,
         "undecidable": [*rig.undecidable(), *blind_spots(explanation)],
@@ -108,7 +122,7 @@ def diagnosis_to_dict(
             "chi2_per_n": explanation.after / explanation.samples,
             "signature": plain(signature(rig, explanation.fit)),
             "chi2_per_n_tolerated": explanation.before / explanation.samples,
-            "tolerances": dict(zip(("chi2", "freedom", "log10_p"), _strain(explanation), strict=True)),
+            "unlisted_nats": float(explanation.unlisted_nats),
             "nominal": {
                 "chi2_per_n": nominal.misfit / explanation.samples,
                 "signature": plain(signature(rig, nominal)),
@@ -119,13 +133,8 @@ def diagnosis_to_dict(
     return values | {"remains": remains(values)}
 
 
-def _strain(explanation: Explanation) -> tuple[float, float, float]:
-    chi2, freedom, log10_p = explanation.fit.strain
-    return chi2, freedom, finite_log10_p(log10_p)
-
-
 def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: Words) -> dict[str, Any]:
-    candidate = found.candidate
+    candidate, instead = found.candidate, Instead.of(found)
     values, se = rig.effect_parameters(candidate, found.values, found.covariance)
     return {
         **place_of(candidate),
@@ -134,20 +143,35 @@ def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: W
             name: {"value": float(value), "se": _finite(se.get(name))} for name, value in values.items()
         },
         "explained": {"in_sample": found.in_sample, "held_out": found.held_out},
-        "log10_p": finite_log10_p(found.evidence.log10_p),
+        "probability": float(found.probability),
+        "over_nothing": _finite(found.over_nothing),
+        "share_left": float(found.share_left),
+        "instead": {"nothing": instead.nothing, "unlisted": instead.unlisted},
         "folds": [float(gain) for gain in found.folds],
         "shape": plain(dict(candidate.shape)),
         "separate": words.separate(candidate.cause),
         "alternatives": [
             {
                 **place_of(rival.candidate),
+                "probability": probability,
                 "evidence_gap": float(rival.evidence_gap),
                 "chi2_per_n": _finite(rival.chi2_per_n),
                 "ambiguous": bool(rival.ambiguous),
                 "separate": words.separate(rival.candidate.cause),
             }
-            for rival in alternatives
+            for rival, probability in zip(alternatives, instead.rivals, strict=True)
         ],
+    }
+
+
+def _suspected(found: Found, rig: Rig, words: Words) -> dict[str, Any]:
+    values, se = rig.effect_parameters(found.candidate, found.values, found.covariance)
+    return {
+        **place_of(found.candidate),
+        "at": at_of(found.candidate),
+        "sentence": words.describe(found.candidate, values, se),
+        "probability": float(found.probability),
+        "over_nothing": _finite(found.over_nothing),
     }
 
 

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter
 
 from discrepancy.result.evidence_list import label, relation
 from discrepancy.result.plots_against import AFTER, BEFORE, log_scale, titled
@@ -27,42 +28,42 @@ def evidence_figure(values: Mapping[str, Any]) -> Figure:
     figure = Figure(figsize=(7.5 * len(panels), 5.2), layout="constrained")
     axes = figure.subplots(1, len(panels), squeeze=False, sharex=True)[0]
     for axis, (title, strongest) in zip(axes, panels, strict=True):
-        _dots(axis, strongest, values["causes"], evidence["by_chance"])
+        _dots(axis, strongest, values["causes"])
         axis.set_title(f"when {title}", loc="left", fontsize=10)
-    seen = [evidence["by_chance"], *(entry["gain"] for _, strongest in panels for entry in strongest)]
-    axes[0].set_xlim(
-        0.6 * min(seen), 3.0 * max(seen)
-    )  # dots: bars would need a zero, which a log axis has not
-    if values["causes"]:
-        handles = [axes[0].plot([], [], mark, color=colour)[0] for _, colour, mark in RELATIONS.values()]
-        words = [word for word, _, _ in RELATIONS.values()]
-        figure.legend(handles, words, loc="outside upper right", ncols=3, frameon=False, fontsize=9)
-    figure.suptitle("Evidence: how much chi-square falls if the cause leaves its tolerance", x=0.01, ha="left",
-                    fontsize=11)  # fmt: skip
-    return figure
+    seen = [entry[key] for _, strongest in panels for entry in strongest for key in ("nats", "needed")]
+    # Dots: bars would need a zero, which a log axis has not.
+    axes[0].set_xlim(0.6, 3.0 * max(seen, default=10.0))
+    shown = RELATIONS if values["causes"] else {"other": ("candidate", *RELATIONS["other"][1:])}
+    handles = [axes[0].plot([], [], mark, color=colour)[0] for _, colour, mark in shown.values()]
+    handles += axes[0].plot([], [], "|", color="black", markersize=12)
+    words = [*(word for word, _, _ in shown.values()), "needed to be named"]
+    title = "Evidence that a cause is there"
+    return titled(figure, title, handles, words, len(words))
 
 
 def drawn(strongest: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Candidates with a gain of at least 1; less is nothing on a scale of multiples."""
-    return [entry for entry in strongest if entry["gain"] >= 1.0]
+    """Candidates with at least 1 nat; less is nothing on a scale of multiples."""
+    return [entry for entry in strongest if entry["nats"] >= 1.0]
 
 
-def _dots(
-    axis: Axes, strongest: Sequence[Mapping[str, Any]], causes: Sequence[Mapping[str, Any]], by_chance: float
-) -> None:
+def _dots(axis: Axes, strongest: Sequence[Mapping[str, Any]], causes: Sequence[Mapping[str, Any]]) -> None:
     at = list(range(len(strongest)))[::-1]
     axis.set_xscale("log")
     for y, entry in zip(at, strongest, strict=True):
         _, colour, mark = RELATIONS[relation(entry, causes)]
-        axis.plot(entry["gain"], y, mark, color=colour, markersize=7)
-        gain = f"{entry['gain']:.0f}" if entry["gain"] >= 100 else f"{entry['gain']:.3g}"
-        axis.annotate(gain, (entry["gain"], y), (8, 0), textcoords="offset points", va="center",
-                      fontsize=8)  # fmt: skip
+        axis.plot(entry["needed"], y, "|", color="black", markersize=12)
+        axis.plot(entry["nats"], y, mark, color=colour, markersize=7)
+        nats = f"{entry['nats']:.0f}" if entry["nats"] >= 100 else f"{entry['nats']:.3g}"
+        right = entry["nats"] > entry["needed"]  # not where the mark of what is needed is
+        axis.annotate(nats, (entry["nats"], y), (8 if right else -8, 0), textcoords="offset points", va="center",
+                      ha="left" if right else "right", fontsize=8)  # fmt: skip
     axis.set_yticks(at, [label(entry) for entry in strongest], fontsize=9)
     axis.set_ylim(-0.7, max(len(strongest), 1) - 0.3)
-    axis.axvline(by_chance, color="black", linewidth=0.8, linestyle="--")
-    axis.set_xlabel("gain of chi-square (dashed: what chance can do)")
+    axis.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    axis.set_xlabel("log Bayes factor [nats]")
     axis.grid(alpha=0.25)
+    if not strongest:
+        axis.text(0.5, 0.5, "nothing speaks for any cause", transform=axis.transAxes, ha="center", fontsize=9)
 
 
 def closed_loop_figure(values: Mapping[str, Any]) -> Figure | None:

@@ -8,9 +8,10 @@ from typing import Any
 from estimator.errors import InputError
 from estimator.strict import read_json
 
-FORMAT, VERSION, NAME = "mocobot-diagnosis", 1, "diagnosis.json"
+FORMAT, VERSION, NAME = "mocobot-diagnosis", 2, "diagnosis.json"
 VERDICTS = {
     "consistent": "Consistent",
+    "miscalibrated": "Miscalibrated",
     "explained": "Explained",
     "partly_explained": "Partly explained",
     "unexplained": "Unexplained",
@@ -103,10 +104,10 @@ def _cause(values: Mapping[str, Any]) -> NamedCause:
 
 
 def name_of(entry: Mapping[str, Any]) -> str:
-    """A cause at its place in words; an earlier version wrote none."""
-    return entry.get("name") or f"{kind_of(entry)} ({entry['place']})"
+    """A cause at its place in words."""
+    return entry["name"]
 
 
 def kind_of(entry: Mapping[str, Any]) -> str:
     """A cause in words, wherever it sits."""
-    return entry.get("kind") or entry["cause"].replace("_", " ")
+    return entry["kind"]

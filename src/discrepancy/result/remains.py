@@ -4,15 +4,17 @@ from collections.abc import Mapping
 from typing import Any
 
 from discrepancy import rules
+from discrepancy.result.read import kind_of
+from discrepancy.result.scatter import REMEDY
 
 Values = Mapping[str, Any]
 
 
 def remains(values: Values) -> list[str]:
-    """Sentences on the misfit, the tolerances and the response that are left; none where all is clean.
+    """Sentences on the misfit, on what is off everywhere and on the response that is left; none where all is clean.
 
     Args:
-        values: a diagnosis as ``discrepancy.result.json`` documents it, of this version or an earlier one.
+        values: a diagnosis as ``discrepancy.result.json`` documents it.
     """
     residual = values["residual"]
     out = []
@@ -22,13 +24,20 @@ def remains(values: Values) -> list[str]:
             f"A misfit of chi2/n {residual['chi2_per_n']:.3g} remains of {before:.3g}, where up to "
             f"{rules.CLEAN_CHI2_PER_N:g} is clean: {residual['signature']['sentence'].rstrip('.')}."
         )
-    strained = residual["tolerances"]["log10_p"]
-    if strained <= rules.SIGNIFICANT_LOG10_P:
+    elif residual["unlisted_nats"] >= rules.UNLISTED_NATS:
         out.append(
-            f"Tolerances are used harder than healthy robots use them (by chance once in 10^{-strained:.0f}), which is "
-            "no explanation."
+            f"What remains is small (chi2/n {residual['chi2_per_n']:.3g}), but no noise (by "
+            f"{residual['unlisted_nats']:.0f} nats): {residual['signature']['sentence'].rstrip('.')}."
         )
-    return out + _of_response(values)
+    return [*out, *of_scatter(values), *_of_response(values)]
+
+
+def of_scatter(values: Values) -> list[str]:
+    """A sentence on kinds that scatter, unless the verdict says so already."""
+    if not values["scatter"] or values["verdict"] == "miscalibrated":
+        return []
+    kinds = ", ".join(kind_of(entry) for entry in values["scatter"])
+    return [f"Besides, all places alike are off by more than their tolerances: {kinds}. {REMEDY}"]
 
 
 def _of_response(values: Values) -> list[str]:
@@ -38,12 +47,11 @@ def _of_response(values: Values) -> list[str]:
         return []
     left = f"{told['chi2_per_n']:.3g}"
     if not values["causes"]:
-        why = (
-            "tolerances, assumed or given, account for it, so nothing is named; but robots as designed do not answer "
-            "like these: calibrate them, or give narrower tolerances"
-            if values["verdict"] == "consistent"
-            else "nothing that is known accounts for it"
-        )
+        why = {
+            "consistent": "tolerances, assumed or given, account for it, so nothing is named; but robots as designed "
+            "do not answer like these: calibrate them, or give narrower tolerances",
+            "miscalibrated": "robots as designed do not answer like these",
+        }.get(values["verdict"], "nothing that is known accounts for it")
         return [
             f"The simulated response to the commands is off by chi2/n {left}, where noise alone leaves 1: {why}."
         ]

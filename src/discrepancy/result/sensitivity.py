@@ -7,13 +7,20 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.engine.explanation import Explanation
+from discrepancy.result.evidence_list import needed_nats
 from discrepancy.rig import Candidate
+from estimator.arrays import Array
+
+HALVINGS = 8
+"""Of the octave of a limit: to 0.3 %."""
+LEARNT = 2.0 ** np.arange(0.0, np.log2(rules.MOST_SPREAD), 0.25)
+"""Spreads that a kind may be taken to have, in units."""
 
 
 def detection_limits(explanation: Explanation) -> list[dict[str, Any]]:
     """Detection limit of every parameter at every place: {cause, kind, robot, joint, parameters: {name: size}}.
 
-    A size is None where the data say nothing about it. Causes that are named, and transients, are left out.
+    A size is None where the data say nothing about it. Causes that are found, and transients, are left out.
     """
     return [entry for _, entry in _judged(explanation)]
 
@@ -35,13 +42,83 @@ def blind_spots(explanation: Explanation) -> list[dict[str, Any]]:
 
 
 def _judged(explanation: Explanation) -> Iterator[tuple[Candidate, dict[str, Any]]]:
-    limits = explanation.fit.limits(rules.NOTICED_CHI2)
-    for index, (candidate, sizes) in enumerate(zip(explanation.problem.candidates, limits, strict=True)):
-        if index in explanation.fit.free or candidate.transient:
+    fit, problem = explanation.fit, explanation.problem
+    kinds: dict[str, list[int]] = {}
+    for index, candidate in enumerate(problem.candidates):
+        if index not in fit.free and not candidate.transient:
+            kinds.setdefault(candidate.cause, []).append(index)
+    for members in kinds.values():
+        told = [_along(*fit.told(index)) for index in members]
+        scatters = problem.has_tolerance(members[0]) and len(members) > 1
+        spreads = LEARNT if scatters else np.ones(1) if problem.has_tolerance(members[0]) else np.zeros(1)
+        healthy = np.array([_log_evidence(z, lam, spreads) for lam, z, _ in told])
+        prior = (
+            0.5 * rules.SPREAD_NUMBERS * (2.0 * np.log(spreads) + spreads**-2.0 - 1.0) if scatters else 0.0
+        )
+        for k, index in enumerate(members):
+            candidate, (lam, _, vectors) = problem.candidates[index], told[k]
+            rest = np.delete(healthy, k, axis=0).sum(axis=0) - prior
+            # Where all scatter, nothing small can stand out.
+            most = rules.ABSURD_UNITS * max(float(problem.spread[problem.columns_of(index)][0]), 1.0)
+            sizes = noticed(lam, vectors, spreads, rest, needed_nats(problem, candidate), most)
+            parameters = {
+                p.name: float(size * p.unit) if size < most else None
+                for p, size in zip(candidate.parameters, sizes, strict=True)
+            }
+            place = dict(zip(("cause", "robot", "joint"), candidate.key, strict=True))
+            yield candidate, {"kind": candidate.kind, **place, "parameters": parameters}
+
+
+def noticed(
+    lam: Array, vectors: Array, spreads: Array, rest: Array, needed: float, most: float = rules.ABSURD_UNITS
+) -> Array:
+    """Size of every parameter, each alone, whose log Bayes factor reaches ``needed`` nine times in ten.
+
+    A fault competes with a spread of the whole kind that is large enough to hold it.
+
+    Args:
+        lam, vectors: information about the parameters given all else, in units: what is visible of its eigenvalues (m,)
+            and eigenvectors, shape (k, m).
+        spreads: that the kind may have, in units, shape (s,).
+        rest: log evidence of each of them without this candidate, prior included, shape (s,).
+        needed: nats.
+        most: largest size that is sought.
+
+    Returns:
+        Sizes in units, shape (k,); infinite where no size does.
+    """
+    out = np.full(len(vectors), np.inf)
+    for k, along in enumerate(vectors):
+        known = float(along**2 @ lam)
+        if known < rules.LEAST_INFORMATION:
             continue
-        parameters = {
-            p.name: float(size) if size < rules.ABSURD_UNITS * p.unit else None
-            for p, size in zip(candidate.parameters, np.asarray(sizes), strict=True)
-        }
-        place = dict(zip(("cause", "robot", "joint"), candidate.key, strict=True))
-        yield candidate, {"kind": candidate.kind, **place, "parameters": parameters}
+
+        def reached(size: float, score: Array = lam * along) -> bool:
+            z = size * score
+            slabs = np.sqrt(np.mean((z / lam) ** 2)) * 2.0 ** np.arange(-2.0, 2.5)
+            if spreads[0] > 0.0:
+                slabs = np.maximum(slabs, rules.LEAST_SLAB)
+            there = rest.max() + _log_evidence(z, lam, slabs).max()
+            return there - (rest + _log_evidence(z, lam, spreads)).max() >= needed
+
+        low, high = 0.0, 2.0**-20
+        while high < 2.0 * most and not reached(high):
+            low, high = high, 2.0 * high
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if reached(middle) else (middle, high)
+        out[k] = high + rules.NOTICED_SE / np.sqrt(known)  # noise takes as much away one time in ten
+    return out
+
+
+def _along(information: Array, score: Array) -> tuple[Array, Array, Array]:
+    """What the data see of a candidate: eigenvalues of the information, the score along them, eigenvectors."""
+    lam, vectors = np.linalg.eigh(information)
+    keep = lam > rules.LEAST_INFORMATION
+    return lam[keep], vectors[:, keep].T @ score, vectors[:, keep]
+
+
+def _log_evidence(z: Array, lam: Array, spreads: Array) -> Array:
+    """Of values that are normal with each of some spreads, over none, shape (s,); see ``engine.scan``."""
+    square = np.asarray(spreads)[:, None] ** 2
+    return 0.5 * np.sum(z**2 * square / (1.0 + lam * square) - np.log1p(lam * square), axis=1)

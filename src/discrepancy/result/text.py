@@ -6,12 +6,18 @@ from typing import Any
 
 from discrepancy import rules
 from discrepancy.causes.units import Shown, one_each, parameter
+from discrepancy.result.evidence_list import label
 from discrepancy.result.read import kind_of, name_of
-from discrepancy.result.remains import remains
+from discrepancy.result.remains import of_scatter, remains
+from discrepancy.result.scatter import REMEDY, sizes_of
 from discrepancy.result.text_gain import gain_lines
 
 WIDTH = 100
 Values = Mapping[str, Any]
+NOTHING_WRONG_HERE = ("consistent", "miscalibrated")
+"""Verdicts with which no place stands out."""
+SAID = 0.001
+"""Probabilities below are not told."""
 
 
 def format_diagnosis(values: Values) -> str:
@@ -23,30 +29,25 @@ def format_diagnosis(values: Values) -> str:
     lines = list(_wrapped(_verdict(values), ""))
     for k, cause in enumerate(values["causes"], start=1):
         lines += ["", f"[[Cause {k}: {name_of(cause)} ({cause['cause']})]]", *_cause(cause, further=k > 1)]
-    lines += gain_lines(values)
+    lines += [*_suspected(values), *_scatter(values), *gain_lines(values)]
     notes = list(values["notes"])
     if values["not_simulated"] and not values["causes"]:
         notes.append(
             f"The closed loop was not simulated ({values['not_simulated']}), so what shows only in the response to "
             "the commands stays open."
         )
-    if values["rejected"]:
-        names = ", ".join(name_of(candidate) for candidate in values["rejected"])
-        notes.append(
-            f"Looked likely, but did not hold on other trials, or something simpler tells more: {names}."
-        )
     if notes:
         lines += ["", "[[Notes]]"]
         for note in notes:
             lines += _wrapped(note)
     lines += ["", "[[Residual]]", *(line for text in _residual(values) for line in _wrapped(text))]
-    if values["verdict"] == "consistent":
+    if values["verdict"] in NOTHING_WRONG_HERE:
         lines += [
             "",
             "[[What would have been noticed, nine times in ten]]",
             *_limits(values["detection_limits"]),
         ]
-    if values["verdict"] != "consistent":
+    else:
         lines += ["", "[[What such recordings cannot decide]]"]
         for entry in values["undecidable"]:
             lines += _wrapped(f"{entry['what']}: {entry['why']}; needs {entry['remedy']}.")
@@ -60,14 +61,21 @@ def _verdict(values: Values) -> str:
     open_ = " ".join(remains(values))
     if values["verdict"] == "consistent":
         return f"CONSISTENT. The simulation explains {data} within noise and tolerances; nothing is named. {open_}"
+    if values["verdict"] == "miscalibrated":
+        scatter = " ".join(entry["sentence"] for entry in values["scatter"])
+        return (
+            f"MISCALIBRATED. The robots of {data} are off by more than their tolerances, all places alike, so none is "
+            f"named. {scatter} {REMEDY} {open_}"
+        )
     if values["verdict"] == "explained":
         return f"EXPLAINED. {named} {open_}"
     if values["verdict"] == "partly_explained":
         return f"PARTLY EXPLAINED. {named} That is not all. {open_}"
     said = f"UNEXPLAINED. {data[0].upper()}{data[1:]} and the simulation differ, and "
+    also = " ".join(of_scatter(values))
     if causes:
-        return f"{said}the catalogue's best explains little of it: {named}"
-    return f"{said}no cause of the catalogue explains it."
+        return f"{said}the catalogue's best explains little of it: {named} {also}"
+    return f"{said}no cause of the catalogue explains it. {also}"
 
 
 def _cause(cause: Values, *, further: bool) -> Iterable[str]:
@@ -78,7 +86,14 @@ def _cause(cause: Values, *, further: bool) -> Iterable[str]:
     if cause["folds"]:
         better = sum(gain > 0 for gain in cause["folds"])
         explained += f" (a gain on {better} of {len(cause['folds'])} folds)"
-    yield from _wrapped(f"{explained}; probability by chance {_power(cause['log10_p'])}.")
+    over = (
+        ""
+        if cause["over_nothing"] is None
+        else f", {cause['over_nothing']:.0f} nats over nothing in its place"
+    )
+    yield from _wrapped(
+        f"Probability {probability_words(cause['probability'])}{over}{_else(cause)}. {explained}."
+    )
     alike = [rival for rival in cause["alternatives"] if rival["ambiguous"]]
     ruled_out = [rival for rival in cause["alternatives"] if not rival["ambiguous"]]
     if alike:
@@ -92,6 +107,41 @@ def _cause(cause: Values, *, further: bool) -> Iterable[str]:
         yield from _wrapped("No other cause comes near.")
 
 
+def _else(cause: Values) -> str:
+    """What else may be in its place, the likeliest first."""
+    instead = cause["instead"]
+    others = [(rival["probability"], name_of(rival)) for rival in cause["alternatives"]]
+    others += [
+        (instead["unlisted"], "something unlisted that looks like it"),
+        (instead["nothing"], "nothing"),
+    ]
+    likely = sorted((pair for pair in others if pair[0] >= SAID), key=lambda pair: -pair[0])[:4]
+    told = ", ".join(f"{name} ({probability_words(share)})" for share, name in likely)
+    return f"; else {told}" if told else ""
+
+
+def _suspected(values: Values) -> Iterable[str]:
+    if values["suspected"]:
+        yield from ("", "[[Suspected: too improbable to be named]]")
+    for entry in values["suspected"]:
+        chance = probability_words(entry["probability"])
+        yield from _wrapped(f"{label(entry)} ({entry['cause']}), probability {chance}: {entry['sentence']}")
+
+
+def _scatter(values: Values) -> Iterable[str]:
+    if values["scatter"]:
+        yield from ("", "[[Off at all places alike]]")
+    for entry in values["scatter"]:
+        yield from _wrapped(
+            f"{entry['kind']} ({entry['cause']}): {sizes_of(entry, 'spread')}, {_times(entry['factor'])} times the "
+            f"tolerance; likelier than it by {entry['nats']:.0f} nats."
+        )
+
+
+def _times(factor: float) -> str:
+    return f"{factor:.0f}" if factor >= 10.0 else f"{factor:.1f}"
+
+
 def _rival(rival: Values) -> str:
     loop = "" if rival["chi2_per_n"] is None else f", closed loop chi2/n {rival['chi2_per_n']:.3g}"
     gap = rival["evidence_gap"]
@@ -102,20 +152,15 @@ def _residual(values: Values) -> Iterable[str]:
     residual = values["residual"]
     text = (
         f"chi2/n is {residual['nominal']['chi2_per_n']:.3g} as simulated, "
-        f"{residual['chi2_per_n_tolerated']:.3g} with everything a little off, within tolerances"
+        f"{residual['chi2_per_n_tolerated']:.3g} with nothing named and everything a little off, as far as its kind "
+        "scatters"
     )
-    if values["causes"]:
-        text += f", {residual['chi2_per_n']:.3g} with what is named"
+    if values["causes"] or values["suspected"]:
+        text += f", {residual['chi2_per_n']:.3g} with what is {'named' if values['causes'] else 'suspected'}"
     yield f"{text} (up to {rules.CLEAN_CHI2_PER_N:g} counts as clean)."
-    tolerances = residual["tolerances"]
-    if values["verdict"] != "consistent" and tolerances["log10_p"] < rules.SIGNIFICANT_LOG10_P:
-        yield (
-            f"The tolerances are used harder than chance allows: chi2 {tolerances['chi2']:.0f} of "
-            f"{tolerances['freedom']:.0f} (probability {_power(tolerances['log10_p'])})."
-        )
     if values["verdict"] != "consistent":
         yield f"As simulated: {residual['nominal']['signature']['sentence']}"
-    if residual["chi2_per_n"] > rules.CLEAN_CHI2_PER_N:
+    if residual["chi2_per_n"] > rules.CLEAN_CHI2_PER_N or residual["unlisted_nats"] >= rules.UNLISTED_NATS:
         yield f"What is left: {residual['signature']['sentence']}"
 
 
@@ -149,8 +194,13 @@ def _percent(share: float) -> str:
     return f"{100 * share:.0f} %"
 
 
-def _power(log10_p: float) -> str:
-    return f"1e{log10_p:.0f}" if log10_p < -2 else f"{10**log10_p:.2g}"
+def probability_words(probability: float) -> str:
+    """``94 %``; more digits near 0 and 100 %."""
+    if probability > 1.0 - SAID:
+        return "above 99.9 %"
+    if probability < SAID:
+        return "below 0.1 %"
+    return f"{100 * probability:.{1 if probability < 0.095 or probability > 0.99 else 0}f} %"
 
 
 def _wrapped(text: str, indent: str = "    ") -> Sequence[str]:

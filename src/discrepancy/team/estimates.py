@@ -24,8 +24,12 @@ def estimates(rig: TeamRig, explanation: Explanation) -> dict[str, Estimate]:
         of ``p_1i_m`` [3] and ``R_1i_rotvec_deg`` [3].
     """
     out = {}
-    for name, free in (("before", ()), ("after", explanation.fit.free)):
-        fit = Fit.of(explanation.problem, free, background=False)
+    named = [found.index for found in explanation.found]
+    for name, hypothesis, free in (
+        ("before", explanation.nothing, []),
+        ("after", explanation.hypothesis, named),
+    ):
+        fit = Fit.of(hypothesis.problem.as_whitened, free, background=False)
         out[name] = to_dict(rig.linear[0].shared.moved(-fit.shared))
     return out
 

@@ -37,23 +37,20 @@ from discrepancy.team.closed_loop import (
     why_not,
 )
 from discrepancy.team.dependence import directions_of, quantities_of
+from discrepancy.team.elsewhere import HEALTHY, found_at, resting_of
 from discrepancy.team.imitators import wrong_torques
 from discrepancy.team.linear.noise import Noise
-from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, start_shared
 from discrepancy.team.linear.trial_linear import TrialLinear
-from discrepancy.team.origin import origin_of, places_of
+from discrepancy.team.origin import origin_of
 from discrepancy.team.undecidable import statements
-from estimator.arm.unit import COUNT, ArmUnit
+from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from estimator.rigid_team.residual import Shared
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.extended.extended import write_extended
-
-HEALTHY = {"joint_friction": 1.0, "gimbal_friction": 1.0, "sea_hysteresis": 1.0, "grasp_play": 1.0}
-"""Kinds that leave something open even where they are within their tolerances."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,51 +128,16 @@ class TeamRig(Rig):
 
     def relinearised(self, nothing: Hypothesis) -> TeamRig | None:
         """The rig at the robots as a fit with tolerances finds them, where straight columns do not reach that far."""
-        candidates, fit, own = self.candidates(), nothing.fit, self.local_unknowns
-        known = self.linear[0].arms if isinstance(self.linear[0].arms, ArmUnit) else None
-        x = np.zeros((self.robots, COUNT)) if known is None else known.x.copy()
-        beyond = np.zeros_like(x)
-        for index, candidate in enumerate(candidates):
-            place = places_of(candidate)
-            if place is not None:
-                values = fit.part(index)[0] * candidate.units
-                beyond[place] = self._beyond(candidate, values)
-        units = ArmUnit(self.linear[0].design, x + beyond)
-        moved = [replace(r, metadata=replace(r.metadata, units=units)) for r in self.recordings]
-        shared, off, count = self.linear[0].shared.moved(-fit.shared), 0.0, 0
-        for t, (linear, recording) in enumerate(zip(self.linear, moved, strict=True)):
-            bases = linear.bases.moved(-fit.local(t)[:own])
-            exact = exact_residual(
-                Signals.of(recording), shared, bases, recording.metadata.arms, linear.reduction
-            )
-            raw = nothing.problem.raw[t]
-            straight = raw[..., -1] - raw[..., : len(fit.shared)] @ fit.shared
-            straight = straight - nothing.problem.local[t][..., :own] @ fit.local(t)[:own]
-            for index, candidate in enumerate(candidates):
-                if places_of(candidate) is not None:
-                    straight = straight - raw[..., nothing.problem.spans[index]] @ fit.part(index)[0]
-            off += float(np.sum((self.whitening[t](exact) - straight) ** 2))
-            count += straight.size
-        resting = self._resting(nothing)
+        there = found_at(self.linear, self.whitening, nothing, self.origin)
+        resting = resting_of(nothing)
         same = all(0.5 < resting[kind] / self.resting[kind] < 2.0 for kind in resting)
-        if off / count < rules.STRAIGHT_CHI2_PER_N and same:
+        if there.curvature < rules.STRAIGHT_CHI2_PER_N and same:
             return None
-        before = np.zeros_like(beyond) if self.origin is None else self.origin.x
-        origin = ArmUnit(units.design, before + beyond)
-        sensed = self.sensed if same else None
-        resting = self.resting if same else resting
-        return self._at(moved, shared, self.tolerances, self.excluded, origin, resting, self.jobs, sensed)
-
-    def _resting(self, nothing: Hypothesis) -> dict[str, float]:
-        """Spread over its tolerance, at least 1, of each kind that leaves something open: noise of that size."""
-        sizes: dict[str, list[float]] = {kind: [] for kind in HEALTHY}
-        for index, candidate in enumerate(nothing.problem.candidates):
-            if candidate.cause in sizes and nothing.problem.has_tolerance(index):
-                sizes[candidate.cause].append(abs(float(nothing.fit.part(index)[0][0])))
-        # By the median, as one of them may be at fault; 0.67 is that of a normal one.
-        return {
-            kind: max(1.0, float(np.median(each)) / 0.6745) if each else 1.0 for kind, each in sizes.items()
-        }
+        moved = [replace(r, metadata=replace(r.metadata, units=there.units)) for r in self.recordings]
+        sensed, resting = (self.sensed, self.resting) if same else (None, resting)
+        return self._at(
+            moved, there.shared, self.tolerances, self.excluded, there.origin, resting, self.jobs, sensed
+        )
 
     @property
     def trials(self) -> Sequence[str]:

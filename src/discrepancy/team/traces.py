@@ -13,7 +13,8 @@ from estimator.arrays import Array
 
 def traces(rig: TeamRig, explanation: Explanation) -> list[Trace]:
     """Residuals of every trial: ``before`` as simulated, ``after`` with the named causes and tolerances."""
-    nominal, out = Fit.of(explanation.problem, background=False), []
+    nominal = Fit.of(explanation.nothing.problem.as_whitened, background=False)
+    out = []
     for t, (linear, white) in enumerate(zip(rig.linear, rig.whitening, strict=True)):
         before, after = nominal.remaining(t), explanation.fit.remaining(t)
         sigma = np.empty_like(before)

@@ -27,6 +27,7 @@ class Cause:
         sentence: what it does, with its numbers.
         parameters: values by name, units in the names; ``make_effect`` takes them.
         standard_errors: by the same names; None for what was chosen, not fitted.
+        probability: that it is this cause, at this place.
         in_sample: share of the nominal model's misfit that it removes beyond the causes before it.
         held_out: the same on trials left out of the fit, or None.
     """
@@ -37,6 +38,7 @@ class Cause:
     sentence: str
     parameters: Mapping[str, float]
     standard_errors: Mapping[str, float | None]
+    probability: float
     in_sample: float
     held_out: float | None
 
@@ -47,7 +49,7 @@ class Diagnosis(Diagnosed):
 
     @property
     def verdict(self) -> Verdict:
-        """``"consistent"``, ``"explained"``, ``"partly_explained"`` or ``"unexplained"``."""
+        """``"consistent"``, ``"miscalibrated"``, ``"explained"``, ``"partly_explained"`` or ``"unexplained"``."""
         return self.diagnosis.verdict
 
     @property
@@ -126,5 +128,5 @@ def _cause(values: Mapping[str, Any]) -> Cause:
         values["cause"], values["robot"], values["joint"], values["sentence"],
         {name: entry["value"] for name, entry in parameters.items()},
         {name: entry["se"] for name, entry in parameters.items()},
-        values["explained"]["in_sample"], values["explained"]["held_out"],
+        values["probability"], values["explained"]["in_sample"], values["explained"]["held_out"],
     )  # fmt: skip

@@ -6,6 +6,7 @@ from xml.etree import ElementTree
 
 from discrepancy.result.read import name_of
 from discrepancy.result.remains import remains
+from discrepancy.result.scatter import REMEDY
 from estimator.calibrate.calibration import Calibration
 from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.html import Child, Node, el
@@ -14,7 +15,7 @@ from mocobot_report.blocks.payload import distance, mass, moment, place
 from mocobot_report.blocks.prose import bullets, tidy
 from mocobot_report.blocks.tables import Entry, Num, measurement, quantity, table
 from mocobot_report.calibration.tables import deviation_tables, payload_table, trial_table
-from mocobot_report.diagnosis.keys import cause_name
+from mocobot_report.diagnosis.keys import cause_name, chance_of
 
 Values = Mapping[str, Any]
 STYLE = (
@@ -33,7 +34,8 @@ def estimate_html(estimate: PayloadEstimate) -> str:
     rows += [[quantity(f"distance p_1{j}"), distance(e, 1, j), "mm"] for j in range(2, e.robots + 1)]
     title = f"Payload ({e.payload})" if e.payload is not None else "Payload"
     said = f"{len(e.recordings)} recording{'s' * (len(e.recordings) != 1)}, {e.method}; p in {{1}}"
-    doubts = [*e.flags, *(f"Not determined: {weak}." for weak in e.undetermined)]
+    why = [e.why_not_fit] if e.why_not_fit else []
+    doubts = [*why, *e.flags, *(f"Not determined: {weak}." for weak in e.undetermined)]
     return _whole(
         table(title, ["", "value ± standard error", "unit"], rows, note=said),
         bullets(doubts) if doubts else None,
@@ -52,13 +54,14 @@ def calibration_html(calibration: Calibration) -> str:
 
 
 def diagnosis_html(values: Values) -> str:
-    """The verdict with the causes' sentences, their parameters, and the misfit before and after."""
+    """The verdict with the causes' sentences, probabilities and parameters, and the misfit before and after."""
     rows: list[list[Entry]] = []
     for cause in values["causes"]:
         for k, (name, entry) in enumerate(cause["parameters"].items()):
             rows.append(
                 [
                     cause_name(name_of(cause), cause["cause"]) if k == 0 else "",
+                    Num(chance_of(cause["probability"])) if k == 0 else "",
                     name,
                     measurement(entry["value"], entry["se"]),
                 ]
@@ -72,13 +75,16 @@ def diagnosis_html(values: Values) -> str:
         misfit.append(["excess error of the response removed", Num(percent(removed["share"]))])
     named = el("p", el("strong", values["verdict"].replace("_", " ").upper()))
     sentences = [tidy(cause["sentence"]) for cause in values["causes"]]
-    if not sentences and values["verdict"] != "consistent":
+    if values["verdict"] == "miscalibrated":
+        sentences = [tidy(text) for text in (*(entry["sentence"] for entry in values["scatter"]), REMEDY)]
+    elif not sentences and values["verdict"] != "consistent":
         sentences = [tidy(residual["nominal"]["signature"]["sentence"])]
     sentences += map(tidy, remains(values))
+    head = ["cause", "probability [%]", "parameter", "value ± standard error"]
     return _whole(
         named,
         bullets(sentences) if sentences else None,
-        table("Named causes", ["cause", "parameter", "value ± standard error"], rows) if rows else None,
+        table("Named causes", head, rows) if rows else None,
         table(
             "Misfit", ["", ""], misfit, note=f"of {len(values['recordings'])} trials; chi²/n of 1 is clean"
         ),

@@ -6,8 +6,6 @@ import re
 from estimator.numbers import decimals
 
 MINUS, PLUS_MINUS, NONE, THIN = "\u2212", "\u00b1", "\u2013", "\u00a0"
-LEAST_POWER = -999
-"""Power of ten below which a probability's size says no more."""
 SUPERSCRIPTS = str.maketrans(
     "-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"
 )
@@ -61,13 +59,6 @@ def about(value: float) -> str:
     """A ratio of two digits, thousands apart: ``53 000``."""
     rounded = float(f"{value:.1e}")
     return f"{rounded:,.0f}".replace(",", THIN) if rounded >= 10 else plain(value, 2)
-
-
-def power(log10: float) -> str:
-    """A probability given by its logarithm."""
-    if log10 < LEAST_POWER:
-        return f"< 10{str(LEAST_POWER).translate(SUPERSCRIPTS)}"
-    return plain(10.0**log10, 2) if log10 > -4 else f"10{str(round(log10)).translate(SUPERSCRIPTS)}"
 
 
 def size(count: int) -> str:

@@ -18,8 +18,8 @@ from mocobot_report.diagnosis.keys import CLEAN, misfits
 from mocobot_report.folder import Diagnosed
 
 Values = Mapping[str, Any]
-GAIN = "gain of chi-square"
-CHANCE = Key("", "what chance can do", "text", "dash")
+NATS = "evidence [nats]"
+NEEDED = Key("needed", "needed to be named", "text", "circle-open")
 RELATIONS = (
     Key("named", "named", "before", "square"),
     Key("family", "same family", "after", "circle"),
@@ -98,45 +98,38 @@ def _rows_chart(
 
 def _strongest_sections(book: Book, values: Values) -> list[Node]:
     """The evidence for the strongest candidates, before and after what is named is in the model."""
-    evidence = values.get("evidence")
-    if not isinstance(evidence, Mapping):  # a diagnosis of an earlier version
-        return []
+    evidence = values["evidence"]
     panels = {"Nothing is named yet": evidence["before"], "What is named is in the model": evidence["after"]}
     worth = {title: drawn(entries or []) for title, entries in panels.items()}
-    seen = [evidence["by_chance"], *(entry["gain"] for entries in worth.values() for entry in entries)]
+    seen = [entry[key] for entries in worth.values() for entry in entries for key in ("nats", "needed")]
     charts = [
-        _strongest(book, title, entries, values["causes"], evidence["by_chance"], log_axis(GAIN, seen))
+        _strongest(book, title, entries, values["causes"], log_axis(NATS, seen))
         for title, entries in worth.items()
         if entries
     ]
     said = (
-        "How much chi-square falls if a cause leaves its tolerance, for the strongest candidates. Chance can do what "
-        "is left of the dashed line. Both plots have the same logarithmic scale."
+        "By how much the recordings are likelier if a cause is there besides what is in the model, in nats, for the "
+        "strongest candidates; what is there leaves a mark in its relatives, too. Rings: what it takes to be named. "
+        "Both plots have the same logarithmic scale."
     )
     return _section(book, "Evidence", said, charts)
 
 
 def _strongest(
-    book: Book,
-    title: str,
-    entries: Sequence[Values],
-    causes: Sequence[Values],
-    by_chance: float,
-    across: Axis,
+    book: Book, title: str, entries: Sequence[Values], causes: Sequence[Values], across: Axis
 ) -> Node:
-    names, gains = [label(entry) for entry in entries], [entry["gain"] for entry in entries]
-    traces, keys = [], []
+    names, nats = [label(entry) for entry in entries], [entry["nats"] for entry in entries]
+    needed = [entry["needed"] for entry in entries]
+    rings = [f"{name}: named from {plain(n, 2)} nats" for name, n in zip(names, needed, strict=True)]
+    traces, keys = [dots(needed, range(len(names)), NEEDED, rings, size=7)], []
     for key in RELATIONS if causes else RELATIONS[-1:]:
         rows = [k for k, entry in enumerate(entries) if not causes or relation(entry, causes) == key.group]
         if rows:
             keys.append(key)
-            text = [
-                f"{names[k]}: gain {plain(gains[k])}, by chance 10^{entries[k]['log10_p']:.0f}" for k in rows
-            ]
-            traces.append(dots([gains[k] for k in rows], rows, key, text))
-    said = ", ".join(f"{name} {plain(gain)}" for name, gain in zip(names, gains, strict=True))
+            text = [f"{names[k]}: {plain(nats[k])} nats, named from {plain(needed[k], 2)}" for k in rows]
+            traces.append(dots([nats[k] for k in rows], rows, key, text))
+    said = ", ".join(f"{name} {plain(n)}" for name, n in zip(names, nats, strict=True))
     return _rows_chart(
-        book, title, traces, names, across,
-        f"{title}: gain of chi-square of the strongest candidates, {said}",
-        rule=by_chance, left_px=190, most=40, font_px=9, keys=[*keys, CHANCE] if causes else [CHANCE],
+        book, title, traces, names, across, f"{title}: evidence of the strongest candidates in nats, {said}",
+        left_px=190, most=40, font_px=9, keys=[*keys, NEEDED] if causes else [NEEDED],
     )  # fmt: skip

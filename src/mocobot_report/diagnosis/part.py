@@ -1,29 +1,29 @@
 """The part of the page on a diagnosis: verdict, causes, gain, and what the residual says."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from discrepancy.causes.units import one_each, parameter
-from discrepancy.result.read import VERDICTS, name_of, read_diagnosis
+from discrepancy.result.read import VERDICTS, read_diagnosis
 from discrepancy.result.remains import remains
+from discrepancy.result.scatter import REMEDY
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Node
-from mocobot_report.blocks.numbers import NONE, percent, plain, power, spelled
+from mocobot_report.blocks.numbers import about, percent, plain
 from mocobot_report.blocks.pictures import ASPECT
-from mocobot_report.blocks.prose import bullets, facts, folded, paragraph, tidy, tiles, verdict
+from mocobot_report.blocks.prose import bullets, paragraph, tidy, tiles, verdict
 from mocobot_report.blocks.sections import section
-from mocobot_report.blocks.tables import Entry, Num, measurement, table, value
 from mocobot_report.blocks.units import short_names
+from mocobot_report.diagnosis.causes import cause_tables
+from mocobot_report.diagnosis.doubtful import doubtful_sections
 from mocobot_report.diagnosis.evidence import evidence_sections
 from mocobot_report.diagnosis.gain import gain_section
-from mocobot_report.diagnosis.keys import cause_name
 from mocobot_report.diagnosis.residuals import residual_sections
 from mocobot_report.diagnosis.rest import rest_sections
 from mocobot_report.folder import Diagnosed
@@ -31,9 +31,13 @@ from mocobot_report.sources import sources
 from mocobot_view.pictures.shots import axis_shot, diagnosis_shot
 
 Values = Mapping[str, Any]
-KINDS = {"consistent": "good", "explained": "good", "partly_explained": "warn", "unexplained": "bad"}
+KINDS = {
+    "consistent": "good", "miscalibrated": "warn", "explained": "good", "partly_explained": "warn",
+    "unexplained": "bad",
+}  # fmt: skip
 MEANING = {
     "consistent": "The simulation explains the recordings within noise and tolerances; nothing is named.",
+    "miscalibrated": "The robots are off by more than their tolerances, all places alike, so none is named.",
     "explained": "The named causes explain what the simulation got wrong.",
     "partly_explained": "The named causes are there, but more than noise is left.",
     "unexplained": "Recordings and simulation differ, and no cause of the catalogue accounts for it.",
@@ -75,6 +79,8 @@ def answer(diagnosed: Diagnosed) -> list[Node]:
     said = None
     if values["causes"]:
         said = bullets([tidy(cause["sentence"]) for cause in values["causes"]])
+    elif values["verdict"] == "miscalibrated":
+        said = bullets([tidy(text) for text in (*(e["sentence"] for e in values["scatter"]), REMEDY)])
     elif values["verdict"] != "consistent":
         said = tidy(values["residual"]["nominal"]["signature"]["sentence"])
     left = remains(values)
@@ -92,13 +98,20 @@ def _tiles(values: Values) -> list[tuple[str, str, str]]:
         out.append(("misfit with the named causes", plain(residual["chi2_per_n"]), "chi²/n"))
         held = [c["explained"]["held_out"] for c in named if c["explained"]["held_out"] is not None]
         if len(named) == 1:
+            out.append(
+                ("probability", percent(named[0]["probability"]), "that it is this cause, at this place")
+            )
             text = "on trials not used for the fit" if held else "of the misfit, in sample; not validated"
             share = held[0] if held else named[0]["explained"]["in_sample"]
             out.append(("the cause explains", percent(share), text))
         else:
             out.append(("named causes", str(len(named)), f"{len(held)} of them tested on held-out data"))
+    elif values["scatter"]:
+        out.append(("misfit with nothing named", plain(residual["chi2_per_n_tolerated"]), "chi²/n"))
+        worst = values["scatter"][0]
+        out.append((worst["kind"], f"{about(worst['factor'])} ×", "spread over its tolerance"))
     else:
-        out.append(("misfit within tolerances", plain(residual["chi2_per_n_tolerated"]), "chi²/n"))
+        out.append(("misfit with nothing named", plain(residual["chi2_per_n_tolerated"]), "chi²/n"))
     gain = values["gain"]
     if gain and gain["removed"] is not None and named:
         low, high = gain["removed"]["interval"]
@@ -117,11 +130,13 @@ def sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
     picture = _picture(book, diagnosed)
     first = None
     if values["causes"]:
-        first = section(book, "Causes", picture, _causes(values))
+        first = section(book, "Causes", picture, cause_tables(values["causes"]))
     elif picture is not None:
         first = section(book, "The machine", picture)
     return [
-        *(node for node in (first, gain_section(book, values, names)) if node is not None),
+        *([] if first is None else [first]),
+        *doubtful_sections(book, values),
+        *([] if (gain := gain_section(book, values, names)) is None else [gain]),
         *residual_sections(book, diagnosed, names),
         *evidence_sections(book, diagnosed, names),
         *rest_sections(book, diagnosed),
@@ -161,82 +176,3 @@ def _grasped(values: Values) -> PayloadEstimate:
         none, none, np.zeros(count), np.zeros(count),
     )  # fmt: skip
     return PayloadEstimate(None, count, "staged", found, None, None, None, None, (), (), ())
-
-
-def _causes(values: Values) -> list[Node]:
-    """What is named and what supports it."""
-    causes = values["causes"]
-    units = one_each(
-        (parameter(name)[1], entry["value"])
-        for cause in causes
-        for name, entry in cause["parameters"].items()
-    )
-    sizes: list[list[Entry]] = []
-    support: list[list[Entry]] = []
-    for cause in causes:
-        who = cause_name(name_of(cause), cause["cause"])
-        for k, (name, entry) in enumerate(cause["parameters"].items()):
-            words, unit = parameter(name)
-            unit, scale = units[unit] if unit in ("s", "m", "rad", "m/N") else (unit, 1.0)
-            se = None if entry["se"] is None else scale * entry["se"]
-            shown = measurement(scale * entry["value"], se, spelled(unit))
-            sizes.append([who if k == 0 else "", shown, words])
-        shares = (Num(_share(cause["explained"][kind])) for kind in ("in_sample", "held_out"))
-        folds = cause["folds"]
-        better = f"{sum(gain > 0 for gain in folds)} of {len(folds)}" if folds else NONE
-        support.append([tidy(name_of(cause)), *shares, Num(better), Num(power(cause["log10_p"]))])
-    if len(causes) > 1:
-        each = ([cause["explained"][kind] for cause in causes] for kind in ("in_sample", "held_out"))
-        sums = [Num(NONE) if None in shares else Num(_share(sum(shares))) for shares in each]
-        support.append(["All together", *sums, Num(""), Num("")])
-    note = (
-        "share of the misfit as simulated that a cause removes beyond those above it, so that shares add up; held out: "
-        "fitted to the other trials; by chance: probability of so much evidence in clean data"
-    )
-    supports = ["cause", "in sample [%]", "held out [%]", "folds better", "by chance"]
-    return [
-        table(
-            "What is named", ["cause", "value ± standard error", "parameter"], sizes, groups=True, stack=True
-        ),
-        table("What supports it", supports, support, note=note, stack=True),
-        *_rivals(causes),
-        *_shapes(causes),
-    ]
-
-
-def _share(share: float | None) -> str:
-    return percent(share).removesuffix("\u00a0%")
-
-
-def _rivals(causes: Sequence[Values]) -> list[Node]:
-    rows: list[list[Entry]] = []
-    advice: dict[str, None] = {}
-    for cause in causes:
-        alike = [rival for rival in cause["alternatives"] if rival["ambiguous"]]
-        if alike:
-            advice |= dict.fromkeys(text for entry in [cause, *alike] if (text := entry["separate"]))
-        for k, rival in enumerate(cause["alternatives"]):
-            gap, chi2 = value(rival["evidence_gap"]), value(rival["chi2_per_n"])
-            said = "cannot be told apart" if rival["ambiguous"] else "fits worse"
-            named, other = tidy(name_of(cause)) if k == 0 else "", cause_name(name_of(rival), rival["cause"])
-            rows.append([named, other, said, gap, chi2])
-    if not rows:
-        return [paragraph(f"No other {'cause comes' if len(causes) == 1 else 'causes come'} near.")]
-    head = ["named", "alternative", "verdict", "behind by [nats]", "closed loop chi²/n"]
-    out = [
-        table("Alternatives", head, rows, note="how much less the rows speak for it", groups=True, stack=True)
-    ]
-    return [*out, verdict("warn", "What would tell them apart", bullets(list(advice)))] if advice else out
-
-
-def _shapes(causes: Sequence[Values]) -> list[Node]:
-    """Numbers that change a cause's columns and were chosen, not fitted."""
-    entries = []
-    for cause in causes:
-        named = ((*parameter(name), number) for name, number in cause["shape"].items())
-        said = ", ".join(
-            f"{words} {plain(number, 4)} {spelled(unit)}".rstrip() for words, unit, number in named
-        )
-        if said:
-            entries.append((tidy(name_of(cause)), said))
-    return [folded("Shape parameters", facts(entries))] if entries else []

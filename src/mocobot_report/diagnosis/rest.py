@@ -5,7 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from discrepancy.causes.units import one_each, parameter
-from discrepancy.result.read import kind_of, name_of
+from discrepancy.result.read import kind_of
+from discrepancy.result.text import NOTHING_WRONG_HERE
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Child, Node, el
 from mocobot_report.blocks.numbers import plain, size, spelled
@@ -23,18 +24,13 @@ def rest_sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
     """Detection limits, undecidable questions, the extended model's files, notes."""
     values = diagnosed.values
     limits = _limits(values) if values["detection_limits"] else None
-    if limits is not None and values["verdict"] != "consistent":
+    if limits is not None and values["verdict"] not in NOTHING_WRONG_HERE:
         limits = folded("Show the limits", limits)
     entries = [
         (el("dt", tidy(entry["what"])), el("dd", tidy(f"{entry['why']}; needs {entry['remedy']}.")))
         for entry in values["undecidable"]
     ]
     notes = [tidy(note) for note in values["notes"]]
-    if values["rejected"]:
-        names = ", ".join(name_of(c) for c in values["rejected"])
-        notes.append(
-            f"Looked likely, but did not hold on other trials, or something simpler tells more: {names}."
-        )
     outline = [
         ("What would have been noticed", limits),
         ("What such recordings cannot decide", el("dl", entries, class_="list") if entries else None),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from diagnosed import small_diagnosis
+from diagnosed import VERDICTS, scattered, small_diagnosis
 from discrepancy.result.remains import remains
 from discrepancy.result.text import format_diagnosis
 from mocobot_report.diagnosis.part import KINDS
@@ -15,7 +15,7 @@ def words(text: str) -> str:
 
 
 def test_clean_verdicts_stand_alone() -> None:
-    for verdict in ("explained", "consistent"):
+    for verdict in ("explained", "consistent", "miscalibrated"):
         assert remains(small_diagnosis(verdict)) == []
 
 
@@ -53,14 +53,27 @@ def test_a_response_that_causes_hardly_mend_is_told(share: float, told: bool) ->
     assert remains(values) == []
 
 
-def test_strained_tolerances_are_told() -> None:
+def test_a_small_rest_that_is_no_noise_is_told() -> None:
     values = small_diagnosis("partly_explained")
-    values["residual"] |= {"tolerances": {"chi2": 90.0, "freedom": 30.0, "log10_p": -9.0}}
+    values["residual"]["unlisted_nats"] = 35.2
     (said,) = remains(values)
-    assert "by chance once in 10^9" in said
+    assert said == "What remains is small (chi2/n 1.1), but no noise (by 35 nats): somewhere."
+
+
+@pytest.mark.parametrize("verdict", ["explained", "miscalibrated"])
+def test_what_is_off_everywhere_is_told_once(verdict: str) -> None:
+    values = small_diagnosis(verdict)
+    values["scatter"] = [scattered()]
+    told = "all places alike are off by more than their tolerances: zero of a gimbal axis."
+    assert any(told in said for said in remains(values)) == (verdict == "explained")
+    text = words(format_diagnosis(values))
+    assert text.count('"mocobot calibrate"') == 1
+    assert (
+        "zero of a gimbal axis (theta_zero): 5.2 mrad, 52 times the tolerance; likelier than it by 140 nats."
+        in text
+    )
 
 
 def test_every_verdict_has_its_colour() -> None:
-    assert {verdict: KINDS[verdict] for verdict in ("partly_explained", "unexplained")} == {
-        "partly_explained": "warn", "unexplained": "bad"
-    }  # fmt: skip
+    assert set(KINDS) == set(VERDICTS)
+    assert [KINDS[verdict] for verdict in ("miscalibrated", "unexplained")] == ["warn", "bad"]
