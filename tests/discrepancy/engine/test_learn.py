@@ -89,7 +89,7 @@ def test_what_is_left_open_has_the_evidence_of_its_covariance(rng, rows, monkeyp
 
 @pytest.mark.parametrize("free", [(), (4, 0)])
 def test_what_is_learnt_is_stationary(rows, free, monkeypatch):
-    """Slopes of the dense evidence with its priors, by logarithms: nought, but at a bound, where they point outwards."""
+    """Slopes of the dense evidence with its priors, by logarithms: nought; at a bound, outwards."""
     monkeypatch.setattr(rules, "LEARN_NATS", 1e-11)
     one = learnt(Problem.of(rows, CANDIDATES), free, 400).problem
 

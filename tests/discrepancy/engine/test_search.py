@@ -9,6 +9,7 @@ from discrepancy import rules
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.engine.explanation import explain
 from discrepancy.engine.hypothesis import Hypothesis
+from discrepancy.engine.scan import score_of
 from discrepancy.engine.search import search
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
@@ -57,7 +58,8 @@ def test_one_cause_is_found_with_its_value(seed):
     assert found.probability > 0.99
     assert found.over_nothing > 100.0
     assert len(found.folds) == 4
-    assert min(found.folds) > 0
+    # Each of four trials shows it: 25 squared times 480 numbers of 0.09, less what the unknowns take.
+    np.testing.assert_allclose(found.folds, 25.0**2 * 480 * 0.09, rtol=0.2)
     assert found.held_out > 0.9
     assert found.in_sample > 0.9
     assert explanation.explained > 0.9
@@ -80,9 +82,9 @@ def test_two_causes_are_found_the_larger_first():
 
 
 def test_no_more_causes_than_asked_for():
-    rig = FakeRig({k: 30.0 for k in range(5)})
+    rig = FakeRig({k: 30.0 for k in range(3)})
     assert len(search(rig, most=2).best.free) == 2
-    assert len(search(rig).best.free) == rules.MOST_CAUSES
+    assert len(search(rig).best.free) == 3
     assert search(rig, most=0).best.free == ()
 
 
@@ -140,8 +142,8 @@ def test_event_is_found_in_a_shape_that_is_not_the_catalogues():
     assert names(explanation.found) == ["event"]
     assert explanation.found[0].candidate.shape == {"right": 1.0}
     assert explanation.found[0].values[0] == pytest.approx(8.0, abs=0.5)
-    unseen = Fit.of(Problem.of(rig.rows(rig.candidates()), rig.candidates())).evidence_of(len(CATALOGUE))
-    assert unseen.log10_p > -2  # the scan alone would not have
+    unseen = score_of(Fit.of(Problem.of(rig.rows(rig.candidates()), rig.candidates())), len(CATALOGUE))
+    assert unseen < rules.NAMED_NATS  # the scan alone would not have
 
 
 def test_misfit_of_unknown_origin_is_unexplained():
@@ -226,12 +228,13 @@ def test_look_alike_is_a_rival_at_its_distance():
     named = diagnosis.causes[0].candidate.cause
     assert named in ("cause 2", "cause 4")
     alternatives = diagnosis.alternatives[0]
-    assert [a.candidate.cause for a in alternatives] == ["cause 4" if named == "cause 2" else "cause 2"]
+    assert alternatives[0].candidate.cause == ("cause 4" if named == "cause 2" else "cause 2")
+    assert all(a.evidence_gap > 20 for a in alternatives[1:])
     gap = alternatives[0].evidence_gap
     assert 0 <= gap < 5
     assert alternatives[0].ambiguous
     assert alternatives[0].chi2_per_n is None
-    assert diagnosis.causes[0].probability == pytest.approx(1.0 / (1.0 + np.exp(-gap)), abs=1e-3)
+    assert diagnosis.causes[0].probability == pytest.approx(1.0 / (1.0 + np.exp(-gap)), abs=0.01)
 
     told = diagnose(FakeRig({2: 25.0}, twins={4: (2, 0.04)}), closed_loop=False)
     assert names(told.causes) == ["cause 2"]
@@ -253,14 +256,36 @@ def test_gap_is_the_difference_of_scores():
     )
 
 
-def test_one_among_many_alike_is_suspected_only():
-    """Of four that leave the same trace none is likelier than not; the next step says what is left of it."""
-    rig = FakeRig({2: 25.0}, twins={k: (2, 0.0005) for k in (4, 6, 7)})
-    diagnosis = diagnose(rig, closed_loop=False)
+def test_one_among_many_alike_is_named_with_its_look_alikes():
+    """Of four that leave the same trace none is likelier than not; that it is one of them is as good as certain."""
+    diagnosis = diagnose(FakeRig({2: 25.0}, twins={k: (2, 0.0005) for k in (4, 6, 7)}), closed_loop=False)
+    (found,) = diagnosis.causes
+    alike = [a.candidate.cause for a in diagnosis.alternatives[0] if a.ambiguous]
+    assert sorted([found.candidate.cause, *alike]) == ["cause 2", "cause 4", "cause 6", "cause 7"]
+    gaps = [a.evidence_gap for a in diagnosis.alternatives[0] if a.ambiguous]
+    assert found.probability == pytest.approx(1.0 / (1.0 + np.sum(np.exp(-np.array(gaps)))), abs=0.01)
+    assert found.probability < 0.5
+    assert found.probability_alike > 0.99
+
+
+class Lawless(FakeRig):
+    """Something unlisted whose trace is that of cause 2 but for as much again, of another kind."""
+
+    def __post_init__(self):
+        super().__post_init__()
+        rng = np.random.default_rng(9)
+        for t, (x, *own) in enumerate(self.data):
+            self.data[t] = x + 25.0 * 0.3 * rng.standard_normal(x.shape), *own
+
+
+def test_what_leaves_as_much_as_it_explains_is_suspected_only():
+    diagnosis = diagnose(Lawless({2: 25.0}), closed_loop=False)
     assert diagnosis.causes == ()
     (suspect,) = diagnosis.explanation.suspected
-    assert suspect.candidate.cause in ("cause 2", "cause 4", "cause 6", "cause 7")
-    assert 0.15 < suspect.probability < rules.LEAST_PROBABILITY
+    assert suspect.candidate.cause == "cause 2"
+    assert suspect.share_left == pytest.approx(np.sqrt(0.5), abs=0.07)
+    assert suspect.over_nothing > 10.0
+    assert suspect.probability <= suspect.probability_alike < rules.LEAST_PROBABILITY
     assert diagnosis.explanation.hypothesis.free == ()
     assert any("too little to name it" in note for note in diagnosis.notes)
     assert diagnosis.verdict == "unexplained"
@@ -292,7 +317,9 @@ class Sum(FakeRig):
         super().__post_init__()
         key = self.catalogue[6].key
         parts = [self.columns_of[self.catalogue[k].key] for k in (0, 1)]
-        self.columns_of[key] = [a + b + 0.5 * c for a, b, c in zip(*parts, self.columns_of[key], strict=True)]
+        self.columns_of[key] = [
+            a + b + 0.08 * c for a, b, c in zip(*parts, self.columns_of[key], strict=True)
+        ]
         for t, (x, *own) in enumerate(self.data):
             self.data[t] = x + 20.0 * (parts[0][t] + parts[1][t])[..., 0], *own
 
@@ -301,7 +328,7 @@ def test_what_the_first_guess_left_goes_once_the_right_ones_stand_there():
     """One that accounts for most comes first, the two behind it are found, and it is taken away."""
     said = []
     explanation = explain(search(Sum({}), progress=said.append))
-    assert [what for what in said if what.startswith("refit")][0].startswith("refit cause 6")
+    assert next(what for what in said if what.startswith("refit")).startswith("refit cause 6")
     assert sorted(names(explanation.found)) == ["cause 0", "cause 1"]
     for found in explanation.found:
         assert found.values[0] == pytest.approx(20.0, abs=3.0)
