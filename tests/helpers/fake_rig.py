@@ -9,13 +9,16 @@ from discrepancy.rig import Candidate, Channel, Parameter, Rig, Rows, Transient
 ROWS, CHANNELS, RATE_HZ = 120, 4, 12.5
 
 
-def cause(name, robot=1, tolerance=1.0, parameters=1, family="made up", transient=None):
+def cause(name, robot=1, tolerance=1.0, parameters=1, family="made up", transient=None, joint=None):
     listed = tuple(Parameter(f"p{k}", tolerance, 1.0) for k in range(parameters))
-    return Candidate(name, family, robot, None, listed, {}, transient)
+    return Candidate(name, family, robot, joint, listed, {}, transient)
 
 
 CATALOGUE = tuple(cause(f"cause {k}", parameters=2 if k == 5 else 1) for k in range(8))
 
+
+NINE = tuple(cause("many", robot, joint=joint) for robot in (1, 2, 3) for joint in (1, 2, 3))
+"""A kind of nine places; the first is candidate 0."""
 
 TWINS = {4: (2, 0.005)}  # cause 4 leaves the trace of cause 2, but for half a percent
 

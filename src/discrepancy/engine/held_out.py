@@ -16,11 +16,12 @@ def held_out_gains(problem: Problem, free: Sequence[int], index: int) -> list[fl
     """
     if problem.candidates[index].transient or len(problem.trials) < 2:
         return []
-    gains = []
+    gains, nothing = [], np.zeros(len(problem.candidates[index].parameters))
     for t in problem.trials:
         others = [k for k in problem.trials if k != t]
-        without, with_it = Fit.of(problem, free, others), Fit.of(problem, [*free, index], others)
-        gains.append(without.held_out(t) - with_it.held_out(t))
+        # Not within its tolerance: the spread of what is there is its size.
+        without = Fit.of(problem, free, others, fixed=(index, nothing))
+        gains.append(without.held_out(t) - Fit.of(problem, [*free, index], others).held_out(t))
     return gains
 
 
