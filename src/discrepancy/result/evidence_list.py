@@ -59,7 +59,7 @@ def _with_shapes(explanation: Explanation) -> tuple[Problem, dict[int, Problem]]
         own = best.problem.opened.get(candidate.key)
         left_open = [one.columns for one in own] if own else []
         # What it leaves open has unit size already.
-        out[index] = problem.with_unknowns(candidate.key, left_open, 1.0, own[0].allowance if own else 0.0)
+        out[index] = problem.with_unknowns(candidate.key, left_open, 1.0)
     return problem, out
 
 
