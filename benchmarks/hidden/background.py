@@ -11,8 +11,13 @@ from hidden.draw import signed
 from mocobot_sim.effects import EFFECTS, Effect, make_effect
 
 
-def draw_background(robots: int, rng: np.random.Generator) -> list[Effect]:
+def draw_background(robots: int, rng: np.random.Generator, times: float = 1.0) -> list[Effect]:
     """Every cause with a tolerance at every place, normal, with its standard deviation.
+
+    Args:
+        robots: how many.
+        rng: what is drawn from.
+        times: deviations over the tolerances.
 
     Magnitudes where a parameter cannot be negative. Pushes are left out: their tolerance stands for friction at rest.
     """
@@ -26,7 +31,7 @@ def draw_background(robots: int, rng: np.random.Generator) -> list[Effect]:
         )
         for robot, joint in places:
             values = {
-                name: signed(cause, name, float(deviation * rng.standard_normal()))
+                name: signed(cause, name, float(times * deviation * rng.standard_normal()))
                 for name, deviation in deviations.items()
             }
             out.append(make_effect(cause, values, robot, joint))

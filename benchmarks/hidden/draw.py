@@ -61,7 +61,10 @@ def draw_effect(cause: str, factor: float, ground: Ground, rng: np.random.Genera
     elif cause == "slosh":
         parameters = _slosh(factor, ground, rng)
     elif cause == "tether":
-        parameters = _tether(factor, rng)
+        parameters = _tether(factor, np.zeros(3), rng)
+    elif cause == "payload_tether":
+        point = _near(ground.p_1c, rng)
+        parameters = _tether(factor, point, rng) | _vector("point", "m", point)
     else:
         parameters = _sized(cause, factor, rng)
     return make_effect(cause, parameters, robot, joint)
@@ -100,11 +103,12 @@ def _slosh(factor: float, ground: Ground, rng: np.random.Generator) -> dict[str,
     return mass | shape | _vector("point", "m", _near(ground.p_1c, rng))
 
 
-def _tether(factor: float, rng: np.random.Generator) -> dict[str, float]:
+def _tether(factor: float, point: Array, rng: np.random.Generator) -> dict[str, float]:
+    """From a point, in the axes of {b} from where {i} is at home."""
     limits = np.array(list(LIMITS["tether"].values()))
     stiffness = factor * TETHER_STIFFNESS * limits[3]
     force = factor * np.sqrt(1.0 - TETHER_STIFFNESS**2) * limits[:3] * _direction(rng, 3)
-    anchor = force / stiffness + [0.0, 0.0, omnid_design().home_height_m]
+    anchor = force / stiffness + point + [0.0, 0.0, omnid_design().home_height_m]
     return {"stiffness_N_per_m": float(stiffness)} | _vector("anchor", "m", anchor)
 
 

@@ -97,7 +97,7 @@ def generate(request: HiddenSet) -> tuple[list[Recording], Sealed]:
         "mass_kg": GroundTruth.of(team).mass_kg,
         "effects": [effect_to_dict(effect) for effect in hidden],
         "background": [effect_to_dict(effect) for effect in background],
-        "gimbal_axes_1": _gimbal_axes(team),
+        "gimbal_axes_1": gimbal_axes(team),
     }
     return recordings, Sealed(truth)
 
@@ -134,7 +134,7 @@ def _place(effect: Effect) -> Sequence[Any]:
     return effect.cause, *(getattr(effect, name) for name in effect.place_names())
 
 
-def _gimbal_axes(team: TeamScene) -> list[list[list[float]]]:
+def gimbal_axes(team: TeamScene) -> list[list[list[float]]]:
     """Axes of the gimbal joints 1, 2, 3 (z, y, x) at home in {1}, one per row, for every robot."""
     out = []
     for theta, X in zip(team.theta_home, team.X_1i, strict=True):

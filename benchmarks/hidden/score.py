@@ -128,9 +128,9 @@ def _deviations(item: Item, effect: Item) -> tuple[float, ...]:
 def _vector(cause: str, parameters: Mapping[str, float]) -> Array:
     """Parameters that count, each in units of its detection limit; a tether's as force at home and stiffness."""
     values = dict(parameters)
-    if cause == "tether":
+    if cause in ("tether", "payload_tether"):
         home = (0.0, 0.0, omnid_design().home_height_m)
         for axis, at in zip("xyz", home, strict=True):
-            arm = values[f"anchor_{axis}_m"] - at
+            arm = values[f"anchor_{axis}_m"] - at - values.get(f"point_{axis}_m", 0.0)
             values[f"force_{axis}_N"] = values["stiffness_N_per_m"] * arm
     return np.array([values.get(name, 0.0) / limit for name, limit in LIMITS[cause].items()])

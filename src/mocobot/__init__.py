@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from mocobot.api.calibration import Calibration as Calibration
     from mocobot.api.calibration import calibrate as calibrate
     from mocobot.api.calibration import read_calibration as read_calibration
+    from mocobot.api.comparison import Comparison as Comparison
+    from mocobot.api.comparison import compare as compare
     from mocobot.api.conversion import Conversion as Conversion
     from mocobot.api.conversion import convert as convert
     from mocobot.api.conversion import convert_parts as convert_parts
@@ -41,6 +43,7 @@ if TYPE_CHECKING:
     from mocobot.api.replay import replay as replay
     from mocobot.api.simulation import SimulatedRecording as SimulatedRecording
     from mocobot.api.simulation import simulate as simulate
+    from mocobot.api.simulation import simulate_trials as simulate_trials
     from mocobot_sim.effects.base import Effect as Effect
     from mocobot_sim.effects.catalogue import EFFECTS as EFFECTS
     from mocobot_sim.effects.catalogue import apply_effects as apply_effects
@@ -61,12 +64,13 @@ _NAMES = {
     "estimator.recording.parquet": "read_recording write_recording",
     "mocobot": "bases emps guiding pictures robots trajectories",
     "mocobot.api.calibration": "Calibration calibrate read_calibration",
+    "mocobot.api.comparison": "Comparison compare",
     "mocobot.api.conversion": "Conversion convert convert_parts",
     "mocobot.api.diagnosis": "Cause Diagnosis diagnose",
     "mocobot.api.estimation": "Estimate estimate read_estimate",
     "mocobot.api.inspection": "Inspection inspect",
     "mocobot.api.replay": "replay",
-    "mocobot.api.simulation": "SimulatedRecording simulate",
+    "mocobot.api.simulation": "SimulatedRecording simulate simulate_trials",
     "mocobot_sim.effects.base": "Effect",
     "mocobot_sim.effects.catalogue": "EFFECTS apply_effects make_effect",
     "mocobot_sim.errors": "TrialError",

@@ -14,6 +14,7 @@ from mocobot.strict import NotGood
 from mocobot_sim.errors import TrialError
 
 COMMANDS = {
+    "watch": options.Watch,
     "paper": options.Paper,
     "estimate": options.Estimate,
     "calibrate": options.Calibrate,
@@ -23,9 +24,14 @@ COMMANDS = {
     "replay": options.Replay,
     "inspect": options.Inspect,
     "report": options.Report,
+    "compare": options.Compare,
     "simulate": options.Simulate,
+    "effects": options.Effects,
 }
-"""Options by command; ``mocobot.commands`` has a module of each name, whose ``run`` takes them."""
+"""Options by command; ``mocobot.commands`` has a module of each name, whose ``run`` takes them, and ``mocobot.checks``
+another, whose ``check`` refuses what it can before anything is loaded that takes time."""
+UNCHECKED = {"effects"}
+"""Commands with nothing to be refused so early."""
 NOT_GOOD, REFUSED, INTERRUPTED, CLOSED = 1, 2, 130, 141
 """Exit codes; the last two are 128 and the signal that other programs die of."""
 
@@ -76,13 +82,28 @@ def _exit(sentence: str, code: int) -> NoReturn:
 def _run(arguments: Sequence[str]) -> None:
     if isinstance(sys.stdout, io.TextIOWrapper):  # names may hold what the terminal cannot show
         sys.stdout.reconfigure(errors="backslashreplace")
+    if "--version" in arguments:
+        print(f"mocobot {_version()}")
+        return
     options = parse(COMMANDS, arguments)
-    _command(options)(options)
+    name = next(name for name, kind in COMMANDS.items() if isinstance(options, kind))
+    if name not in UNCHECKED:
+        import_module(f"mocobot.checks.{name}").check(options)
+    _command(name)(options)
 
 
-def _command(parsed: Any) -> Callable[[Any], None]:
-    """What runs the options: imported only now, for the help needs neither MuJoCo nor the estimator."""
-    name = next(name for name, kind in COMMANDS.items() if isinstance(parsed, kind))
+def _version() -> str:
+    """Of the installed package."""
+    from importlib.metadata import PackageNotFoundError, version  # 20 ms that nothing else needs
+
+    try:
+        return version("mocobot")
+    except PackageNotFoundError:
+        return "(not installed, run from its source)"
+
+
+def _command(name: str) -> Callable[[Any], None]:
+    """What runs the options: imported only now, for neither the help nor a refusal needs MuJoCo or the estimator."""
     try:
         return import_module(f"mocobot.commands.{name}").run
     except (AttributeError, ImportError, RuntimeError) as error:

@@ -4,7 +4,6 @@ import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 from estimator.arm.design import OmnidDesign
 from estimator.errors import InputError
@@ -18,20 +17,11 @@ from mocobot_logs.cut.piece import Piece
 from mocobot_logs.cut.split import SHORTEST_NS, Omission, omissions, split
 from mocobot_logs.log import NS, Level, LogSource
 from mocobot_logs.one_clock import ClockReport, to_recording
+from mocobot_logs.output_kind import output_kind
 from mocobot_logs.resample.log import MAX_GAP_S, RATE_HZ, resample
 from mocobot_logs.resample.report import StreamReport
 from mocobot_logs.table.write import write_csv, write_npz
 
-Kind = Literal["parquet", "csv", "npz", "mcap", "sqlite3", "folder"]
-SUFFIXES: dict[str, Kind] = {
-    ".parquet": "parquet",
-    ".csv": "csv",
-    ".npz": "npz",
-    ".mcap": "mcap",
-    ".db3": "sqlite3",
-    "": "folder",
-}
-"""What is written, by the target's suffix; a bag's folder has none."""
 UNKNOWN_TRIAL = "random"
 """Kind of trial where nothing says which; it labels reports only."""
 PERIOD_DOUBT = 0.05
@@ -194,19 +184,6 @@ def _convert(source: LogSource, how: _How, advance: Callable[[int], object] = la
     del resampled  # as large as the recording
     check_recording(recording)
     return Converted(recording, source.level, streams, clocks, None, ())
-
-
-def output_kind(path: Path) -> Kind:
-    """What a target is to hold.
-
-    Raises:
-        InputError: nothing is written under such a name.
-    """
-    kind = SUFFIXES.get(path.suffix.lower())
-    if kind is None or not path.name:
-        known = ", ".join(suffix for suffix in SUFFIXES if suffix)
-        raise InputError(f"{path}: the name must end in one of {known}, or have no suffix (a bag's folder)")
-    return kind
 
 
 def write_converted(

@@ -22,13 +22,10 @@ from estimator.estimate.result import VERSION as ESTIMATE_VERSION
 from estimator.estimate.result import PayloadEstimate
 from estimator.files import system_errors
 from estimator.strict import Fields, is_number, read_json
+from mocobot_report.sought import SOUGHT, check_folder
 from mocobot_sim.paper.tables import paper_tables, summary_table
 from mocobot_view.facts.fact_files import read_estimate
 
-SOUGHT = (
-    "paper.json of `mocobot paper --out`, diagnosis.json of `mocobot diagnose --out`, calibration.json of "
-    "`mocobot calibrate --out`, or JSON files of `mocobot estimate --out`"
-)
 PROVENANCE = "mocobot-provenance"
 TRIAL_KEYS = ("rotation_deg", "torque_Nm", "rod_error_m", "weld_error_m", "weld_error_deg")
 Json = dict[str, Any]
@@ -109,11 +106,8 @@ def read_folder(folder: Path) -> Contents:
     Raises:
         InputError: there is no such folder, it holds no result, or one of them cannot be read.
     """
+    check_folder(folder)
     with system_errors(folder, "read"):
-        if not folder.exists():
-            raise InputError(f"{folder}: there is no such folder; it must hold {SOUGHT}")
-        if not folder.is_dir():
-            raise InputError(f"{folder}: is a file; name the folder that holds it")
         jsons = sorted(path for path in folder.glob("*.json") if path.is_file())
     paper = diagnosis = None
     estimates, calibrations, files = [], [], []

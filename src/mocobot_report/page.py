@@ -16,8 +16,8 @@ from mocobot_report.folder import Calibrated, Contents, Diagnosed, Estimated, Pa
 from mocobot_report.glossary import glossary, link_terms
 from mocobot_report.paper import part as paper_part
 from mocobot_report.provenance_part import provenance_part
+from mocobot_report.sought import NAME, SUFFIX
 
-NAME, SUFFIX = "report.html", ".html"
 Say = Callable[[str], object]
 
 

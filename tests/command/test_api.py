@@ -114,7 +114,7 @@ class Tags(HTMLParser):
 def test_every_example_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In order and in one place, as a reader would run them; what they leave is looked at here."""
     monkeypatch.chdir(tmp_path)
-    assert len(EXAMPLES) == 8
+    assert len(EXAMPLES) == 9
     space: dict[str, object] = {"__name__": "page"}
     for example in EXAMPLES:
         exec(compile(example, f"docs/api.md: {example[:40]!r}", "exec"), space)

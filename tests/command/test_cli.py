@@ -7,6 +7,7 @@ import json
 import re
 import subprocess
 import sys
+import tomllib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -168,7 +169,7 @@ def test_estimate_of_a_simulated_trial(
     estimate = json.loads(out.read_text())
     truth = json.loads(recording.with_suffix(".truth.json").read_text())
     assert code == 0
-    assert estimate["method"] == "joint"
+    assert estimate["method"] == "fit"
     assert estimate["mass"]["m_kg"] == pytest.approx(truth["mass_kg"], rel=2e-3)
     assert estimate["com"]["p_1c_m"] == pytest.approx(truth["p_1c_m"], abs=2e-3)
     assert estimate["inertia"]["principal_kgm2"] == pytest.approx(truth["principal_inertia_kgm2"], rel=0.02)
@@ -196,6 +197,12 @@ def test_help_of_the_installed_command() -> None:
     assert "usage: mocobot" in done.stdout
     assert all(name in done.stdout for name in COMMANDS)
     assert done.stderr == ""
+
+
+@pytest.mark.parametrize("arguments", [("--version",), ("estimate", "--version")])
+def test_version(capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...]) -> None:
+    written = tomllib.loads((Path(__file__).parents[2] / "pyproject.toml").read_text())["project"]["version"]
+    assert run(capsys, *arguments) == (0, f"mocobot {written}\n", "")
 
 
 @pytest.mark.parametrize("name", COMMANDS)

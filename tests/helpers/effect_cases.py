@@ -23,13 +23,18 @@ SIZES: dict[str, dict[str, float]] = {
     "gimbal_friction": {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.02},
     "torque_skew": {"delay_s": 0.0015},
     "torque_lag": {"time_constant_s": 0.003},
+    "sensor_lag": {"time_constant_s": 0.003},
     "clock_delay": {"delay_s": -0.0015},
     "tether": {"stiffness_N_per_m": 5.0, "anchor_x_m": 0.1, "anchor_y_m": 0.0, "anchor_z_m": 0.8},
+    "payload_tether": {
+        "stiffness_N_per_m": 5.0, "anchor_x_m": 0.1, "anchor_y_m": 0.0, "anchor_z_m": 0.8,
+        "point_x_m": 0.05, "point_y_m": 0.0, "point_z_m": 0.02,
+    },
     "push": {
         "trial": 1, "start_s": 1.0, "duration_s": 0.5, "force_x_N": 3.0, "force_y_N": 0.0, "force_z_N": 1.0,
         "point_x_m": 0.1, "point_y_m": 0.05, "point_z_m": 0.0,
     },
-    "drag": {"coefficient_Ns_per_m": 2.0},
+    "drag": {"coefficient_Ns_per_m": 2.0, "turning_Nms_per_rad": 0.5},
     "slosh": {
         "mass_kg": 0.3, "length_m": 0.1, "damping_ratio": 0.05, "point_x_m": 0.0, "point_y_m": 0.0, "point_z_m": 0.1,
     },
@@ -37,6 +42,7 @@ SIZES: dict[str, dict[str, float]] = {
 # What makes an effect nothing; places and shapes stay.
 SIZE_NAMES = {
     "tether": ("stiffness_N_per_m",),
+    "payload_tether": ("stiffness_N_per_m",),
     "push": ("force_x_N", "force_y_N", "force_z_N"),
     "slosh": ("mass_kg",),
 }

@@ -10,7 +10,7 @@ FREE = {
     "discrepancy.emps.recording.axis_log": {"FIRST_GUESS_KG", "LIMIT_V"},  # the nominal axis
     "discrepancy.result.evidence_list": {"MOST", "CLOSELY"},  # of JSON, and of a picture
     "discrepancy.result.read": {"VERSION"},
-    "discrepancy.result.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
+    "discrepancy.result.pictures.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
     "discrepancy.result.sensitivity": {"HALVINGS", "LEARNT"},  # how finely limits are sought
     "discrepancy.result.text": {"WIDTH", "SAID"},
     "discrepancy.result.traces_file": {"VERSION"},

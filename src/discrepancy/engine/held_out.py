@@ -10,7 +10,7 @@ from discrepancy.least_squares.problem import Problem
 
 
 def held_out_gains(problem: Problem, free: Sequence[int], index: int) -> list[float]:
-    """How much rather every trial has a cause as the other trials fitted it than all within its tolerance.
+    """By how much the other trials' fit predicts every trial better with a cause in it than without: of chi-square.
 
     An event in one trial says nothing of the others: it has none.
     """
@@ -18,9 +18,9 @@ def held_out_gains(problem: Problem, free: Sequence[int], index: int) -> list[fl
         return []
     gains = []
     for t in problem.trials:
-        values, _ = Fit.of(problem, [*free, index], [k for k in problem.trials if k != t]).part(index)
-        tolerated = Fit.of(problem, free, [t])
-        gains.append(tolerated.misfit - Fit.of(problem, free, [t], fixed=(index, values)).misfit)
+        others = [k for k in problem.trials if k != t]
+        without, with_it = Fit.of(problem, free, others), Fit.of(problem, [*free, index], others)
+        gains.append(without.held_out(t) - with_it.held_out(t))
     return gains
 
 

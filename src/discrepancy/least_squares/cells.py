@@ -56,7 +56,7 @@ class Cells:
         """Rows in cosine transform, shape (n, C, ...) -> the same."""
         out = np.array(x, dtype=np.float64)
         if self.moving:
-            out[: self.moving] = dct(out[: self.moving], axis=0, norm="ortho")
+            out[: self.moving] = np.asarray(dct(out[: self.moving], axis=0, norm="ortho"))
         return out
 
     def grams(self, a: Array, b: Array) -> Array:

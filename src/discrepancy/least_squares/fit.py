@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.least_squares.evidence import Evidence, log10_survival, visible
 from discrepancy.least_squares.gram import flat_inverse, gram_of
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate
@@ -113,7 +112,7 @@ class Fit:
         """Chi-square of all trials with the noise as whitened, and of the tolerances in use."""
         x = np.append(-self.coefficients, 1.0)
         left = sum(float(np.einsum("i,kij,j->", x, grams, x)) for grams in self.problem.cell_grams)
-        return left + self.strain[0]
+        return left + self.used_of_tolerances
 
     def at(self, index: int) -> NDArray[np.intp]:
         """Where one candidate's parameters are in the solution, shape (k,); it must be in the model."""
@@ -126,17 +125,15 @@ class Fit:
         return self.solution[at], self.covariance[np.ix_(at, at)]
 
     @property
-    def strain(self) -> tuple[float, float, float]:
-        """How hard the tolerances are used: their chi-square, its degrees of freedom, log10 p of as much."""
+    def used_of_tolerances(self) -> float:
+        """Chi-square of the tolerances in use, over their spreads."""
         prior = np.zeros(self.gram.shape[0] - 1, dtype=bool)
         prior[self.problem.shared :] = self.problem.tolerant
         for index in self.free:
             prior[self.problem.spans[index]] = False
         at = prior[self.used]
         spread = np.concatenate([np.ones(self.problem.shared), self.problem.spread])[self.used][at]
-        value = float(np.sum((self.solution[at] / spread) ** 2))
-        freedom = float(np.sum(1.0 - np.minimum(np.diag(self.covariance)[at] / spread**2, 1.0)))
-        return value, freedom, log10_survival(value, max(freedom, 1e-9))
+        return float(np.sum((self.solution[at] / spread) ** 2))
 
     def held_out(self, trial: int) -> float:
         """Chi-square of one trial under this solution, without the priors' part."""
@@ -164,32 +161,6 @@ class Fit:
         left = self.problem.raw[trial] @ np.append(-self.coefficients, 1.0)
         return self.problem.without_own(trial, left[..., None])[..., 0]
 
-    def evidence(self, inflation: float = 1.0) -> list[Evidence]:
-        """Evidence of every candidate that is not free yet, undecidable ones left out.
-
-        Args:
-            inflation: of the noise's variance, at least 1; divides the gain before it is judged.
-        """
-        found = [self.evidence_of(index, inflation) for index in range(len(self.problem.spans))]
-        return sorted((e for e in found if e is not None), key=lambda e: -e.score)
-
-    def evidence_of(self, index: int, inflation: float = 1.0) -> Evidence | None:
-        """Evidence of one candidate; None if it is free already or undecidable."""
-        return None if index in self.free else self._judged(index, self.told(index), inflation)
-
-    def evidence_with(self, index: int, columns: Sequence[Array], inflation: float = 1.0) -> Evidence | None:
-        """Evidence of a candidate that is not in the model, if its columns were others, shape (n, C, k) per trial.
-
-        The same as that of ``Problem.with_columns``, without changing the problem.
-        """
-        units = self.problem.candidates[index].units
-        return self._judged(index, self.told_by([new * units for new in columns]), inflation)
-
-    def fall_with(self, columns: Sequence[Array]) -> float:
-        """How much chi-square falls with further columns, shape (n, C, k) per trial, whose values are free."""
-        lam, _, z = visible(*self.told_by(columns))
-        return float(np.sum(z**2 / lam))
-
     def solution_with(self, columns: Sequence[Array]) -> tuple[Array, Array]:
         """Values (k,) and covariance (k, k) of further columns, shape (n, C, k) per trial, beside all in the model."""
         information, score = self.told_by(columns)
@@ -208,24 +179,6 @@ class Fit:
                 edge += gram_of(self.problem.spectra[t], weighted)
         cross = edge[self.used].T
         return information - cross @ self.covariance @ cross.T, edge[-1] - cross @ self.solution
-
-    def _judged(self, index: int, told: tuple[Array, Array], inflation: float) -> Evidence | None:
-        tolerant, samples = self.problem.has_tolerance(index), self.problem.samples
-        return Evidence.of(index, told, tolerant=tolerant, inflation=inflation, samples=samples)
-
-    def limits(self, gain: float) -> list[Array]:
-        """Size of every candidate's parameters, each alone, that raises the evidence by ``gain``; infinite if none.
-
-        In the parameters' own units; one array (k,) per candidate.
-        """
-        out = []
-        for index, candidate in enumerate(self.problem.candidates):
-            lam, V, _ = visible(*self.told(index))
-            weight = lam / (1.0 + lam) if self.problem.has_tolerance(index) else lam
-            power = np.einsum("ik,k,ik->i", V, weight, V)
-            size = np.sqrt(gain / np.maximum(power, 1e-300))
-            out.append(np.where(power > 0, candidate.units * size, np.inf))
-        return out
 
     def told(self, index: int) -> tuple[Array, Array]:
         """Information about a candidate given all else in the model, and its score vector."""

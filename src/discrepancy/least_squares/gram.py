@@ -21,7 +21,7 @@ def orthonormal(columns: Array) -> Array:
 
 def project(x: Array, off: Array) -> Array:
     """Take the orthonormal columns ``off`` out of x; shapes (n, C, k), (n, C, l)."""
-    if off.shape[2] == 0:
+    if off.shape[2] == 0 or x.shape[2] == 0:
         return x
     q, flat = off.reshape(-1, off.shape[2]), x.reshape(-1, x.shape[2])
     return np.asarray(flat - q @ (q.T @ flat)).reshape(x.shape)

@@ -18,7 +18,7 @@ class Opened:
     again. With U = Q diag(s) V^T that is y - Q diag(f) Q^T y, f = 1 - 1 / sqrt(1 + size^2 s^2).
 
     Attributes:
-        columns: U / size^-1, that is of unknowns of unit size, shape (n, C, k).
+        columns: of the unknowns in units of their size, as they were given, shape (n, C, k).
         basis: Q, shape (n, C, r).
         shrink: f, shape (r,).
         price: log sqrt det of the covariance [nats].
@@ -30,17 +30,24 @@ class Opened:
     price: float
 
     @classmethod
-    def of(cls, columns: Array, size: float) -> Opened:
-        """Unknowns of a size; columns shape (n, C, k), possibly k = 0."""
-        scaled = size * columns
+    def of(cls, columns: Array, size: float, left: Array | None = None) -> Opened:
+        """Unknowns of a size.
+
+        Args:
+            columns: shape (n, C, k), possibly k = 0.
+            size: standard deviation of their values.
+            left: what other unknowns leave of these columns, where there are such; the same shape.
+        """
+        given = size * columns
+        scaled = given if left is None else size * left
+        if not np.any(scaled):
+            return cls(given, np.zeros((*columns.shape[:2], 0)), np.zeros(0), 0.0)
         flat = scaled.reshape(-1, scaled.shape[2])
-        if not flat.shape[1] or not np.any(flat):
-            return cls(scaled, np.zeros((*columns.shape[:2], 0)), np.zeros(0), 0.0)
         u, s, _ = np.linalg.svd(flat, full_matrices=False)
         keep = s > 1e-6 * max(s[0], 1.0)
         variance = 1.0 + s[keep] ** 2
         basis = np.ascontiguousarray(u[:, keep]).reshape(*columns.shape[:2], -1)
-        return cls(scaled, basis, 1.0 - variance**-0.5, 0.5 * float(np.sum(np.log(variance))))
+        return cls(given, basis, 1.0 - variance**-0.5, 0.5 * float(np.sum(np.log(variance))))
 
     def __call__(self, x: Array) -> Array:
         """Rows that are white with these unknowns integrated out, shape (n, C, l) -> the same."""

@@ -63,7 +63,8 @@ class Problem:
         for trial in trials:
             parts = [trial.shared, *(a * u for a, u in zip(trial.causes, units, strict=True))]
             raw.append(np.concatenate([*parts, trial.residual[..., None]], axis=2))
-            cells.append(Cells.of(*trial.residual.shape, trial.moving, trial.groups))
+            rows, channels = trial.residual.shape
+            cells.append(Cells.of(rows, channels, trial.moving, trial.groups))
         shared, spans, at = trials[0].shared.shape[2], [], trials[0].shared.shape[2]
         for candidate in candidates:
             spans.append(slice(at, at + len(candidate.parameters)))
@@ -188,7 +189,7 @@ class Problem:
         """
         if key in self.opened or not any(u.shape[2] for u in unknowns):
             return self
-        own = [Opened.of(self.without_own(t, u), size) for t, u in enumerate(unknowns)]
+        own = [Opened.of(u, size, self.without_own(t, u)) for t, u in enumerate(unknowns)]
         spectra, grams = [], []
         for one, cells, old, gram in zip(own, self.cells, self.spectra, self.cell_grams, strict=True):
             if not len(one.shrink):

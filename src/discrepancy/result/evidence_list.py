@@ -8,9 +8,9 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.engine.explanation import Explanation
-from discrepancy.engine.hypothesis import Hypothesis
-from discrepancy.engine.prior import log_prior_odds
-from discrepancy.engine.scan import scan
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.prior import log_prior_odds
+from discrepancy.inference.scan import scan
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.result.read import kind_of, name_of
@@ -94,7 +94,7 @@ def nats(base: Hypothesis, index: int, problem: Problem | None = None) -> float:
         index: which of its problem's candidates.
         problem: with what it leaves open, if it is not the hypothesis' own.
     """
-    more = Hypothesis.of(problem or base.problem, (*base.free, index))
+    more = Hypothesis.of(problem or base.problem, (*base.free, index), base.allowed)
     return float(more.score - base.score - log_prior_odds(base.problem, base.problem.candidates[index]))
 
 

@@ -10,7 +10,7 @@ from estimator.calibrate.calibration import Calibration
 from estimator.calibrate.outcome.apply import calibrated, units_for
 from estimator.errors import InputError
 from estimator.recording.model import Recording
-from mocobot.files.calibrations import NAME, read_calibration
+from mocobot.files.calibrations import read_calibration
 from mocobot.files.recordings import read
 from mocobot_logs.convert import Converted, Labels, convert
 from mocobot_logs.log import LogSource
@@ -61,13 +61,6 @@ class Robots:
             return None
         known = design if source.metadata is None else source.metadata.design
         return units_for(self.calibration, source.robots, known, source.name, self.called)
-
-
-def calibration_file(given: Path | None) -> list[Path]:
-    """The file that a calibration is read from."""
-    if given is None:
-        return []
-    return [given / NAME if given.is_dir() else given]
 
 
 def recordings_of(

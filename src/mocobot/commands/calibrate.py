@@ -9,9 +9,9 @@ from estimator.errors import InputError
 from estimator.files import whole_folder
 from mocobot.api.calibration import WEIGHED, calibrate
 from mocobot.api.given import Logs
-from mocobot.files.calibrations import is_calibration, write_into
+from mocobot.files.calibrations import write_into
 from mocobot.files.provenance import provenance
-from mocobot.files.targets import check_folder, check_recordings, map_file
+from mocobot.files.targets import map_file
 from mocobot.options import Calibrate
 from mocobot.progress import stages
 from mocobot.strict import NotGood
@@ -25,14 +25,9 @@ def run(options: Calibrate) -> None:
         InputError: recordings or options that cannot be used, or an output that cannot be written.
         NotGood: with ``strict``, there are findings.
     """
-    if not options.rec:
-        raise InputError("no recording with a payload is given; name them first, those of --free after it")
     files = [*options.rec, *options.free]
-    check_recordings(files)
     labels, masses = _labels(options.payload_of, options.rec), _masses(options.known_mass)
     inputs = [*files, *([options.prior] if options.prior else []), *map_file(options.map)]
-    if options.out is not None:
-        check_folder(options.out, inputs, is_calibration, "an earlier calibration", force=options.force)
     logs, notes = Logs(options.map), []
     with whole_folder(options.out) if options.out else nullcontext() as folder, stages() as (say, _):
         read = []

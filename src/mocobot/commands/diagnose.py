@@ -12,16 +12,17 @@ from discrepancy.emps import catalogue as emps_catalogue
 from discrepancy.emps import causes as emps_causes
 from discrepancy.emps.diagnosis import diagnose_emps
 from discrepancy.emps.recording.reader import read_emps
-from discrepancy.result.diagnosed import Diagnosed, is_diagnosis
+from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnosis import against_truth, diagnose_team
 from discrepancy.team.tolerances import default_tolerances
 from estimator.errors import InputError
 from estimator.files import whole_folder
 from estimator.recording.model import Recording
-from mocobot.api.given import Logs, Robots, calibration_file
+from mocobot.api.given import Logs, Robots
+from mocobot.cluster import workers_of
 from mocobot.files.provenance import file_facts, provenance
-from mocobot.files.targets import check_folder, check_recordings, map_file
+from mocobot.files.targets import calibration_file, map_file
 from mocobot.options import Diagnose
 from mocobot.progress import bar, stages
 from mocobot.strict import NotGood
@@ -49,13 +50,13 @@ def run(options: Diagnose) -> None:
     rig = RIGS[options.rig]
     inputs = [*options.rec, *([options.tolerances] if options.tolerances else []), *map_file(options.map)]
     inputs += calibration_file(options.calibration)
-    _check(options, rig.causes, inputs)
+    _check(options.exclude, rig.causes)
     logs, robots = Logs(options.map), Robots(options.calibration)
     tolerances = read_tolerances(options.tolerances, rig.tolerances())
     with whole_folder(options.out) if options.out else nullcontext() as folder:
         data = rig.read(options.rec, logs, robots)
         made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
-        with stages() as (say, simulated):
+        with workers_of(options.scheduler), stages() as (say, simulated):
             found = rig.diagnose(
                 data, tolerances, options.exclude,
                 closed_loop=options.closed_loop, jobs=options.jobs, say=say, simulated=simulated,
@@ -77,33 +78,13 @@ def run(options: Diagnose) -> None:
         raise NotGood(f"the verdict is {verdict.replace('_', ' ')}")
 
 
-def _check(options: Diagnose, causes: Collection[str], inputs: Sequence[Path]) -> None:
-    """Everything that can be refused before a recording is read."""
-    if not options.rec and options.exclude:
-        raise InputError("no recording given; name them before --exclude")
-    if options.jobs < 1:
-        raise InputError(f"jobs is {options.jobs}; it must be at least 1")
-    check_recordings(options.rec)
-    for name in options.exclude:
+def _check(excluded: Sequence[str], causes: Collection[str]) -> None:
+    """Causes that do not exist, or are all excluded."""
+    for name in excluded:
         if name not in causes:
             raise InputError(f"cause {name!r} does not exist; the causes are {', '.join(causes)}")
-    if set(causes) <= set(options.exclude):
+    if set(causes) <= set(excluded):
         raise InputError("every cause is excluded; nothing is left to look for")
-    if options.out:
-        check_folder(options.out, inputs, is_diagnosis, "an earlier diagnosis", force=options.force)
-    if options.rig == "emps" and options.map is not None:
-        raise InputError("--map is for logs of a team; the emps rig reads its benchmark's MAT file")
-    if options.rig == "emps" and options.calibration is not None:
-        raise InputError("--calibration is of a team's robots; the emps rig has none")
-    if options.rig == "team":
-        for path in options.rec:
-            if path.suffix == ".mat":
-                raise InputError(f"{path}: is a MAT file; --rig emps reads those of the EMPS benchmark")
-    elif len(options.rec) > 1:
-        raise InputError(
-            f"{len(options.rec)} recordings are given; the emps rig takes one and cuts it into blocks that validate "
-            "each other"
-        )
 
 
 def _read(paths: Sequence[Path], logs: Logs, robots: Robots) -> list[Recording]:

@@ -3,14 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import asdict
 
-from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.files import write_json
 from estimator.recording.model import Recording
 from mocobot.api.estimation import estimate
-from mocobot.api.given import Logs, calibration_file
+from mocobot.api.given import Logs
 from mocobot.files.provenance import provenance
-from mocobot.files.targets import check_output, check_recordings, map_file
+from mocobot.files.targets import calibration_file, map_file
 from mocobot.options import Estimate
 from mocobot.progress import stages
 from mocobot.strict import NotGood
@@ -24,11 +23,7 @@ def run(options: Estimate) -> None:
         InputError: recordings that cannot be used, or an output that cannot be written.
         NotGood: with ``strict``, the estimate is flagged, or says nothing.
     """
-    check_recordings(options.rec)
-    _check_choice(options)
     inputs = [*options.rec, *map_file(options.map), *calibration_file(options.calibration)]
-    if options.out is not None:
-        check_output(options.out, inputs, force=options.force)
     logs = Logs(options.map)
     with stages() as (say, _):
 
@@ -50,15 +45,6 @@ def run(options: Estimate) -> None:
     print(found)
     if options.strict:
         _expect_good(found)
-
-
-def _check_choice(options: Estimate) -> None:
-    for name, given in (
-        ("--calibration", options.calibration is not None),
-        (f"--method {options.method}", options.method != "auto"),
-    ):
-        if options.self_calibrate and given:
-            raise InputError(f"--self-calibrate and {name} are both given; choose one")
 
 
 def _expect_good(found: PayloadEstimate) -> None:

@@ -4,8 +4,7 @@ from pathlib import Path
 
 from estimator.arm.design import load_design
 from estimator.files import write_json
-from mocobot.api.given import Robots, calibration_file
-from mocobot.files.targets import check_output
+from mocobot.api.given import Robots
 from mocobot.options import Inspect
 from mocobot.progress import bar
 from mocobot.strict import NotGood
@@ -24,8 +23,6 @@ def run(options: Inspect) -> None:
         NotGood: with ``strict``, the log is ready for nothing.
         InputError: the log, map or design cannot be read, or the JSON cannot be written.
     """
-    if options.json is not None:
-        check_output(options.json, [options.rec, *calibration_file(options.calibration)], force=options.force)
     log_map = read_map(options.map) if options.map is not None else None
     design = load_design(options.design) if options.design is not None else omnid_design()
     robots = Robots(options.calibration)

@@ -3,7 +3,6 @@
 import sys
 
 from estimator.files import write_text
-from mocobot.files.targets import check_output
 from mocobot.options import Map
 from mocobot_logs.draft.draft import Draft
 from mocobot_logs.draft.of_log import draft_of
@@ -15,8 +14,6 @@ def run(options: Map) -> None:
     Raises:
         InputError: the log cannot be read, or the draft not be written.
     """
-    if options.out is not None:
-        check_output(options.out, [options.log], force=options.force)
     draft = draft_of(options.log, options.episode)
     if options.out is None:
         print(draft.text, end="")

@@ -5,22 +5,21 @@ from dataclasses import asdict
 from pathlib import Path
 
 from estimator.calibrate.json import calibration_to_dict
-from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.recording.parquet import write_recording
+from mocobot.checks.paper import SCORES
+from mocobot.cluster import workers_of
 from mocobot.files.provenance import NAME, folder_provenance, provenance
-from mocobot.files.targets import check_folder
+from mocobot.files.resume import run_key
 from mocobot.options import Paper
 from mocobot.progress import share_bar
 from mocobot_sim.paper.experiment import PaperPlan, PaperResult, run_paper
-from mocobot_sim.paper.plots import save_plots
+from mocobot_sim.paper.store import Store
 from mocobot_sim.paper.text import format_summary, format_tables
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import sensor_preset
 from mocobot_sim.trial.simulate import draw_units
 from mocobot_sim.trial.truth import GroundTruth, truth_path, write_truth
-
-SCORES = "paper.json"
 
 
 def run(options: Paper) -> None:
@@ -33,15 +32,10 @@ def run(options: Paper) -> None:
     plan = PaperPlan(
         options.payload, options.preset, options.trials, options.seed, staged_only=options.staged_only
     )
-    if options.recordings and not options.out:
-        raise InputError("--recordings needs --out")
-    if options.jobs < 1:
-        raise InputError(f"jobs is {options.jobs}; it must be at least 1")
-    if options.out:
-        check_folder(options.out, [], _is_paper, "an earlier experiment", force=options.force)
     start, made_with = time.perf_counter(), provenance("paper", asdict(options))
-    with share_bar("paper", "steps") as tell:
-        result = run_paper(plan, options.jobs, tell)
+    store = Store(options.out, run_key(asdict(plan)), force=options.force) if options.out else None
+    with workers_of(options.scheduler), share_bar("paper", "steps") as tell:
+        result = run_paper(plan, options.jobs, tell, store, remote=options.scheduler is not None)
     tables = f"{format_tables(result.scores)}\n\n{format_summary(result.scores)}"
     print(tables)
     print(f"\n{_summary(result)} Wall time {time.perf_counter() - start:.0f} s.")
@@ -50,13 +44,11 @@ def run(options: Paper) -> None:
         if options.recordings:
             written += _write_recordings(options.out / "recordings", plan, result)
         write_json(options.out / NAME, folder_provenance(made_with, options.out, written))
+        if store is not None:
+            store.drop()
         print(
             f"Written to {options.out}: paper.json, tables.txt, provenance.json, estimates, fits and plots."
         )
-
-
-def _is_paper(folder: Path) -> bool:
-    return (folder / SCORES).is_file()
 
 
 def _summary(result: PaperResult) -> str:
@@ -72,6 +64,8 @@ def _summary(result: PaperResult) -> str:
 
 def _write(folder: Path, plan: PaperPlan, result: PaperResult, tables: str) -> list[Path]:
     """Write scores, tables, estimates, fits and plots, and say where."""
+    from mocobot_sim.paper.plots import save_plots  # matplotlib, which printing needs not
+
     scores, text, trials = (folder / name for name in (SCORES, "tables.txt", "trials.json"))
     write_json(scores, result.scores)
     write_text(text, tables + "\n")

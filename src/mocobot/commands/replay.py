@@ -6,10 +6,9 @@ from pathlib import Path
 from discrepancy.result.read import read_diagnosis
 from estimator.errors import InputError
 from estimator.recording.metadata import FREE
-from mocobot.api.given import Robots, calibration_file
-from mocobot.api.replay import SUFFIX, check_rerun
+from mocobot.api.given import Robots
+from mocobot.api.replay import check_rerun
 from mocobot.files.recordings import read
-from mocobot.files.targets import check_output, check_recordings
 from mocobot.options import Replay
 from mocobot.progress import bar
 from mocobot_view.facts.fact_files import read_estimate, read_truth
@@ -23,7 +22,6 @@ def run(options: Replay) -> None:
         InputError: recordings or options that cannot be used, no Rerun, no display, or an output that cannot be
             written.
     """
-    _check(options)
     check_rerun()
     from mocobot_view.replay.outputs import (
         check_enabled,
@@ -58,17 +56,6 @@ def run(options: Replay) -> None:
             time.sleep(3600.0)
     except KeyboardInterrupt:
         stream.disconnect()
-
-
-def _check(options: Replay) -> None:
-    """Everything that can be refused before a recording is read."""
-    if options.save is not None and options.web:
-        raise InputError("--save and --web are both given; choose a file or a browser")
-    check_recordings(options.rec)
-    if options.save is not None:
-        inputs = [*options.rec, *([options.estimate] if options.estimate else [])]
-        inputs += calibration_file(options.calibration)
-        check_output(options.save, inputs, force=options.force, suffix=SUFFIX)
 
 
 def _trials(options: Replay) -> list[ReplayTrial]:

@@ -2,10 +2,10 @@
 
 from estimator.errors import InputError
 from mocobot.files.recordings import check_no_log
-from mocobot.files.targets import check_output
 from mocobot.options import Report
 from mocobot.progress import stages
-from mocobot_report.page import NAME, SUFFIX, write_report
+from mocobot_report.page import write_report
+from mocobot_report.sought import NAME
 
 
 def run(options: Report) -> None:
@@ -20,8 +20,6 @@ def run(options: Report) -> None:
             f"{options.dir}: is a file; name a folder of results, such as mocobot estimate --out results/est.json makes"
         )
     out = options.out if options.out is not None else options.dir / NAME
-    if options.dir.is_dir():  # else a better sentence follows
-        check_output(out, force=options.force, suffix=SUFFIX)
     with stages() as (say, _):
         write_report(options.dir, out, say)
     print(f"{out}: {out.stat().st_size / 1e6:.1f} MB; open it in a browser, or hand it on.")

@@ -1,14 +1,15 @@
-"""``mocobot simulate``: simulate one trial, write its recording and the truth beside it."""
+"""``mocobot simulate``: simulate trials of one team, write their recordings and the truth beside them."""
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from estimator.errors import InputError
-from mocobot.api.simulation import check_fits, simulate
-from mocobot.files.targets import check_output
+from estimator.files import whole_folder
+from mocobot.api.simulation import SimulatedRecording, simulate_trials
+from mocobot.checks.simulate import kinds_of
 from mocobot.options import Simulate
 from mocobot.progress import share_bar
+from mocobot_sim.effects.spec import parse_effect
 from mocobot_sim.trial.trajectories import RATE_HZ
-from mocobot_sim.trial.truth import truth_path
 
 
 def run(options: Simulate) -> None:
@@ -16,30 +17,48 @@ def run(options: Simulate) -> None:
 
     Raises:
         InputError: an option that cannot be met, or an output that cannot be written.
-        TrialError: the physics of the trial cannot be trusted.
+        TrialError: the physics of a trial cannot be trusted.
     """
-    given = Path(options.payload or "")
-    inputs = [given] if given.is_file() else []
-    check_output(options.out, inputs, force=options.force, suffix=".parquet")
-    check_output(truth_path(options.out), inputs, force=options.force)
-    check_fits("--vias", options.vias, ("random", "free"), options.trajectory)
-    check_fits("--duration", options.duration, ("periodic",), options.trajectory)
-    check_fits("--robots", options.robots, ("free",), options.trajectory)
-    if options.payload is not None and options.robots is not None:
-        raise InputError("--payload and --robots are both given; a payload says how many robots there are")
-    if options.model is not None and options.payload is not None:
-        raise InputError(
-            "--payload and --model are both given; the model has its own payload, so leave one out"
-        )
-    with share_bar(f"{options.trajectory} trial", "s") as tell:
-
-        def advance(done: int, samples: int) -> None:
-            tell(done / RATE_HZ, samples / RATE_HZ, "")
-
-        done = simulate(
-            options.payload, options.trajectory,
+    kinds = kinds_of(options)
+    effects = [parse_effect(text) for text in options.effect]
+    length = f"{len(kinds)} trials" if len(kinds) > 1 else f"{kinds[0]} trial"
+    with share_bar(length, "trial" if len(kinds) > 1 else "s") as tell:
+        done = simulate_trials(
+            options.payload, kinds,
             vias=options.vias, duration_s=options.duration, preset=options.preset, seed=options.seed,
-            model=options.model, level=options.level, robots=options.robots, progress=advance,
+            effects=effects, units=options.units or (), model=options.model, level=options.level,
+            robots=options.robots, progress=_progress(kinds, tell),
         )  # fmt: skip
-    done.write(options.out)
-    print(f"{options.out}: {done.time[-1]:.1f} s of {options.trajectory} motion, {options.preset} sensors")
+    if options.out is not None:
+        done[0].write(options.out)
+        print(_line(options.out, done[0], options))
+    elif options.out_dir is not None:
+        names = _names(kinds)
+        with whole_folder(options.out_dir) as folder:
+            for recording, name in zip(done, names, strict=True):
+                recording.write(folder / name)
+        for recording, name in zip(done, names, strict=True):
+            print(_line(options.out_dir / name, recording, options))
+
+
+def _names(kinds: Sequence[str]) -> list[str]:
+    width = len(str(len(kinds)))
+    return [f"trial{k:0{width}}_{kind}.parquet" for k, kind in enumerate(kinds, start=1)]
+
+
+def _progress(
+    kinds: Sequence[str], tell: Callable[[float, float, str], object]
+) -> Callable[[int, int, int], object]:
+    """Seconds of one trial, or trials of several."""
+
+    def advance(trial: int, done: int, samples: int) -> None:
+        if len(kinds) == 1:
+            tell(done / RATE_HZ, samples / RATE_HZ, "")
+        else:
+            tell(trial - 1 + done / samples, len(kinds), kinds[trial - 1])
+
+    return advance
+
+
+def _line(path: Path, done: SimulatedRecording, options: Simulate) -> str:
+    return f"{path}: {done.time[-1]:.1f} s of {done.metadata.trial} motion, {options.preset} sensors"

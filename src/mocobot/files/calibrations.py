@@ -20,9 +20,8 @@ from estimator.calibrate.outcome.unit_toml import unit_toml
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.strict import read_json
+from mocobot.files.targets import CALIBRATION as NAME
 
-NAME = "calibration.json"
-"""The file in the folder of ``mocobot calibrate --out``."""
 REPORT, MODEL, PAGE = "report.txt", "model", "report.html"
 
 

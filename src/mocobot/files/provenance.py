@@ -24,7 +24,7 @@ from estimator.files import file_facts
 
 PACKAGES = ("dm-control", "joblib", "mujoco", "numba", "numpy", "pyarrow", "scipy")
 """Libraries that a result's numbers pass through."""
-NO_MATTER = ("out", "force", "strict", "jobs", "rec")
+NO_MATTER = ("out", "force", "strict", "jobs", "scheduler", "rec")
 """Options that are not listed: results do not depend on where they go, on what they replace, on the exit code or on the
 number of processes, and recordings are listed as files."""
 FORMAT, VERSION, NAME = "mocobot-provenance", 1, "provenance.json"
@@ -44,13 +44,13 @@ def provenance(command: str, options: Mapping[str, Any], inputs: Sequence[Path] 
         InputError: an input cannot be read.
     """
     return {
-        "mocobot": _version("mocobot"),
+        "mocobot": version_of("mocobot"),
         "commit": _commit(Path(__file__).resolve().parents[3]),
         "python": platform.python_version(),
         "platform": " ".join(
             part for part in (platform.system(), platform.machine(), *platform.libc_ver()) if part
         ),
-        "packages": {name: found for name in PACKAGES if (found := _version(name)) is not None},
+        "packages": {name: found for name in PACKAGES if (found := version_of(name)) is not None},
         "command": command,
         "options": {name: _plain(value) for name, value in options.items() if name not in NO_MATTER},
         "files": [file_facts(file) for path in inputs for file in _files(path)],
@@ -83,7 +83,8 @@ def _files(path: Path) -> list[Path]:
     return sorted(file for file in path.rglob("*") if file.is_file()) if path.is_dir() else [path]
 
 
-def _version(package: str) -> str | None:
+def version_of(package: str) -> str | None:
+    """Version of an installed package, or None."""
     try:
         return version(package)
     except PackageNotFoundError:

@@ -11,6 +11,9 @@ from pathlib import Path
 from estimator.errors import InputError
 from estimator.files import check_place, check_target, system_errors
 
+CALIBRATION = "calibration.json"
+"""The file in the folder of ``mocobot calibrate --out``."""
+
 
 def check_recordings(recordings: Sequence[Path]) -> None:
     """At least one recording, each once.
@@ -28,11 +31,35 @@ def check_recordings(recordings: Sequence[Path]) -> None:
         seen.add(real)
 
 
+def check_there(paths: Sequence[Path]) -> None:
+    """Find out that a file or folder to read is missing; what else may be wrong with it, reading tells.
+
+    Raises:
+        InputError: one is.
+    """
+    for path in paths:
+        try:
+            path.stat()
+        except (FileNotFoundError, NotADirectoryError):
+            raise InputError(f"{path}: there is no such file") from None
+        except (OSError, ValueError):
+            continue
+
+
 def map_file(name: str | None) -> list[Path]:
     """The file that a map is read from, none for a built-in one."""
-    from mocobot_logs.map.files import MAPS
+    if name is None or not Path(name).is_file():
+        return []
+    from mocobot_logs.map.files import MAPS  # takes time, and files are seldom named like built-in maps
 
-    return [] if name is None or name in MAPS or not Path(name).is_file() else [Path(name)]
+    return [] if name in MAPS else [Path(name)]
+
+
+def calibration_file(given: Path | None) -> list[Path]:
+    """The file that a calibration is read from."""
+    if given is None:
+        return []
+    return [given / CALIBRATION if given.is_dir() else given]
 
 
 def check_output(path: Path, inputs: Sequence[Path] = (), *, force: bool, suffix: str = "") -> None:

@@ -19,7 +19,6 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.base.contact import WheelContacts
 from mocobot_sim.base.design import BaseDesign, base_design
-from mocobot_sim.base.drive_kernel import update_drives
 from mocobot_sim.base.index import BaseIndex
 from mocobot_sim.base.mecanum import MecanumKinematics
 from mocobot_sim.base.motion import PlanarMotion
@@ -118,12 +117,15 @@ class BaseDrive:
         self._lag, self._speed = np.zeros((index.robots, 4)), np.zeros((index.robots, 4))
         self._contacts = WheelContacts(model, data, index, self._design)
         self._rows: list[tuple[Array, ...]] = []
+        from mocobot_sim.base.drive_kernel import update_drives  # numba takes half a second to load
+
+        self._update = update_drives
 
     def act(self, tick: int) -> None:
         """One control tick: read wheel angles and speeds, write torques."""
         data, index = self._data, self._index
         pose, twist = self._planned(tick)
-        update_drives(
+        self._update(
             data.qpos, data.qvel, data.ctrl, index.wheel_qpos, index.wheel_dof, index.drive,
             self._kinematics.matrix, self._kinematics.inverse, self._constants,
             pose, twist, self._odometry, self._angle, self._lag, self._speed,

@@ -1,10 +1,11 @@
 """Arithmetic of the drives (see ``drive``), compiled with numba."""
 
 import numpy as np
-from numba import njit
+
+from mocobot_sim.compiled import compiled
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def update_drives(
     qpos, qvel, ctrl, wheel_qpos, wheel_dof, drive, matrix, inverse, constants, pose, twist, odometry, angle, lag, speed
 ):  # fmt: skip

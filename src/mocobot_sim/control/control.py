@@ -24,8 +24,6 @@ from estimator.arm.design import OmnidDesign
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.strict import is_number
-from mocobot_sim.control.kernel import update_team
-from mocobot_sim.control.kernel import wrist as wrist
 from mocobot_sim.scene.as_built import AsBuilt, units_of
 from mocobot_sim.scene.sensor_effects import SensorEffects
 from mocobot_sim.scene.team_index import TeamIndex
@@ -89,6 +87,7 @@ class TeamController:
         sensors: timing faults; only the torque's lag reaches the controller.
         feed_forward: F_ff of every robot in its {b} [N], shape (N, 3), held from the start; None to take it up.
         sensed: filled with what the sensors see, (phi, theta, torque) of one tick per row, shape (T, N, 3, 3).
+        qpos: what the sensors see in place of ``data.qpos``, kept up to date by whoever gives it; shape (nq,).
 
     Raises:
         InputError: ``as_built`` or ``feed_forward`` does not match the number of robots.
@@ -104,10 +103,11 @@ class TeamController:
         sensors: SensorEffects | None = None,
         feed_forward: Array | None = None,
         sensed: Array | None = None,
+        qpos: Array | None = None,
     ) -> None:
         units = units_of(as_built, index.robots)
         phi_zero = np.array([unit.phi_zero_rad for unit in units])
-        self._qpos, self._ctrl = data.qpos, data.ctrl
+        self._qpos, self._ctrl = data.qpos if qpos is None else qpos, data.ctrl
         # (N, 4, leg or gimbal axis)
         self._address = np.stack(
             [index.motor_qpos, index.spring_qpos, index.actuator, index.gimbal_qpos], axis=1
@@ -143,12 +143,15 @@ class TeamController:
                 raise InputError(f"feed-forward is not {index.robots} x 3 finite forces; it must be, in N")
             self._state[:, 4] = feed_forward
         lag = (sensors or SensorEffects()).of("torque_lag_s", index.robots)
-        self._lag = np.array([_lag_filter(time_constant, 1.0 / gains.rate_hz) for time_constant in lag])
+        self._lag = np.array([lag_filter(time_constant, 1.0 / gains.rate_hz) for time_constant in lag])
         self._home = home_phi(design)
         self._sensed = np.empty((1, index.robots, 3, 3)) if sensed is None else sensed
         self._keep = sensed is not None
         self._take_up_ticks = round(gains.take_up_s * gains.rate_hz)
         self._tick = 0
+        from mocobot_sim.control.kernel import update_team  # numba takes half a second to load
+
+        self._update = update_team
 
     @property
     def feed_forward(self) -> Array:
@@ -169,7 +172,7 @@ class TeamController:
             ref_dot: their rates [m/s], shape (N, 3).
         """
         phase = 1 if self._tick < self._take_up_ticks and not self._given else 2
-        update_team(
+        self._update(
             self._qpos, self._ctrl, self._address, self._offset, self._constants, self._state,
             ref, ref_dot, self._tick == 0, phase == 1, self._lag, self._home,
             self._sensed[self._tick if self._keep else 0],
@@ -189,7 +192,7 @@ def home_phi(design: OmnidDesign) -> float:
     return float(np.arctan2(height, -reach) - np.arccos(cosine))
 
 
-def _lag_filter(time_constant_s: float, period_s: float) -> tuple[float, float, float]:
+def lag_filter(time_constant_s: float, period_s: float) -> tuple[float, float, float]:
     """Coefficients of y = a y + b_old x_old + b_new x_new, exact for inputs that are straight between ticks.
 
     Without a lag y = x, and all are zero.

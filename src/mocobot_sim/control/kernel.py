@@ -1,7 +1,8 @@
 """Arithmetic of the wrist controller (see ``control``), compiled with numba."""
 
 import numpy as np
-from numba import njit
+
+from mocobot_sim.compiled import compiled
 
 # The kernel works on tuples of three floats: an array per vector would cost more than the arithmetic.
 
@@ -9,7 +10,7 @@ _COS = (1.0, -0.5, -0.5)
 _SIN = (0.0, float(np.sqrt(0.75)), -float(np.sqrt(0.75)))
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def update_team(
     qpos, ctrl, address, offset, constants, state, ref, ref_dot, first, take_up, lag, home, sensed
 ):  # fmt: skip
@@ -56,7 +57,7 @@ def update_team(
             ctrl[address[i, 2, k]] = min(max(command, -limit), limit)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def wrist(phi, reach, proximal, rod):
     """Forward kinematics of one Delta.
 
@@ -103,28 +104,28 @@ def wrist(phi, reach, proximal, rod):
     return h, s, lever, cos_phi
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _knee(cos_phi, sin_phi, leg, reach, proximal):
     radius = reach + proximal * cos_phi
     return (radius * _COS[leg], radius * _SIN[leg], proximal * sin_phi)
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _minus(a, b):
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _cross(a, b):
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
-@njit(cache=True, nogil=True)
+@compiled
 def _solve(m, y):
     """Solve the 3x3 system m x = y by Cramer's rule (LAPACK's call costs more than the work)."""
     c0, c1, c2 = _cross(m[1], m[2]), _cross(m[2], m[0]), _cross(m[0], m[1])

@@ -25,8 +25,8 @@ class BaseCreep(Effect):
 
     ranges: ClassVar = {"x_mps": (-1e-3, 1e-3), "y_mps": (-1e-3, 1e-3)}
     robot: int
-    x_mps: float
-    y_mps: float
+    x_mps: float = 0.0
+    y_mps: float = 0.0
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         precise(scene, TOLERANCE)

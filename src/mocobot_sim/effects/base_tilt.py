@@ -22,8 +22,8 @@ class BaseTilt(Effect):
 
     ranges: ClassVar = {"roll_rad": (-0.2, 0.2), "pitch_rad": (-0.2, 0.2)}
     robot: int
-    roll_rad: float
-    pitch_rad: float
+    roll_rad: float = 0.0
+    pitch_rad: float = 0.0
 
     @property
     def tilt(self) -> Rotation:

@@ -10,34 +10,36 @@ from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.soft import SoftRow
 from mocobot_sim.scene.team_index import GIMBAL_AXES
 
-# The gimbal is light, so one row would creep (see ``friction``): stiction would fade within ten seconds. Rows side by
-# side share the torque, and creep by as much less.
-PARALLEL = 8
-
 
 @dataclass(frozen=True)
 class GimbalFriction(Effect):
     """Coulomb [N m] and viscous [N m s/rad] friction of one gimbal joint (joints 1, 2, 3 are z, y, x).
 
-    ``frictionloss`` of ``PARALLEL`` fixed tendons along the joint, and a soft ``joint`` equality (see
+    ``frictionloss`` of ``rows`` fixed tendons along the joint, and a soft ``joint`` equality (see
     ``mocobot_sim.scene.soft``) as its damper: damping of the joint itself would pull the welds open.
+
+    Attributes:
+        rows: The gimbal is light, so one row would creep (see ``friction``): stiction would fade within ten seconds.
+            Rows side by side share the torque, and creep by as much less.
     """
+
+    rows: ClassVar[int] = 8
 
     ranges: ClassVar = {"coulomb_Nm": (0.0, 5.0), "viscous_Nms_per_rad": (0.0, 10.0)}
     robot: int
     joint: int
-    coulomb_Nm: float
-    viscous_Nms_per_rad: float
+    coulomb_Nm: float = 0.0
+    viscous_Nms_per_rad: float = 0.0
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         if self.coulomb_Nm or self.viscous_Nms_per_rad:
             precise(scene)
         axis = GIMBAL_AXES[self.joint - 1]
         joint = scene.root.find("joint", f"omnid{self.robot}/gimbal_{axis}")
-        for k in range(PARALLEL if self.coulomb_Nm else 0):
+        for k in range(self.rows if self.coulomb_Nm else 0):
             tendon = scene.root.tendon.add(
                 "fixed", name=f"friction{self.robot}_gimbal_{axis}{k + 1}",
-                frictionloss=self.coulomb_Nm / PARALLEL, **STICK,
+                frictionloss=self.coulomb_Nm / self.rows, **STICK,
             )  # fmt: skip
             tendon.add("joint", joint=joint, coef=1.0)
         if self.viscous_Nms_per_rad:

@@ -21,8 +21,8 @@ class JointFriction(Effect):
     ranges: ClassVar = {"coulomb_Nm": (0.0, 20.0), "viscous_Nms_per_rad": (0.0, 100.0)}
     robot: int
     joint: int
-    coulomb_Nm: float
-    viscous_Nms_per_rad: float
+    coulomb_Nm: float = 0.0
+    viscous_Nms_per_rad: float = 0.0
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         if not (self.coulomb_Nm or self.viscous_Nms_per_rad):

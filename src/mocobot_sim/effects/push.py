@@ -24,12 +24,12 @@ class Push(Effect):
     trial: int
     start_s: float
     duration_s: float
-    force_x_N: float
-    force_y_N: float
-    force_z_N: float
-    point_x_m: float
-    point_y_m: float
-    point_z_m: float
+    force_x_N: float = 0.0
+    force_y_N: float = 0.0
+    force_z_N: float = 0.0
+    point_x_m: float = 0.0
+    point_y_m: float = 0.0
+    point_z_m: float = 0.0
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         return scene

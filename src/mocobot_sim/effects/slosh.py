@@ -25,9 +25,9 @@ class Slosh(Effect):
     mass_kg: float
     length_m: float
     damping_ratio: float
-    point_x_m: float
-    point_y_m: float
-    point_z_m: float
+    point_x_m: float = 0.0
+    point_y_m: float = 0.0
+    point_z_m: float = 0.0
 
     def carried(self) -> Array:
         """The mass at its pivot, which is where small swings leave it."""

@@ -16,6 +16,7 @@ from mocobot_sim.effects import Effect, effect_from_dict, effect_to_dict
 from mocobot_sim.extended.poses import poses_to_list, read_poses
 from mocobot_sim.extended.readme import readme
 from mocobot_sim.scene.as_built import AsBuilt
+from mocobot_sim.scene.as_built_file import unit_in
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.sensor_effects import SensorEffects
 from mocobot_sim.scene.team_index import TeamIndex
@@ -24,7 +25,7 @@ FORMAT = "mocobot-extended-model"
 VERSION = 1
 SCENE, NUMBERS, README = "team.xml", "effects.json", "README.md"
 AS_BUILT, SENSORS = (tuple(entry.name for entry in fields(kind)) for kind in (AsBuilt, SensorEffects))
-MASSES, WRIST_MASS = ("proximal_mass_ratio", "rod_mass_ratio"), "wrist_mass_ratio"
+MASSES = ("proximal_mass_ratio", "rod_mass_ratio", "wrist_mass_ratio")
 """What older folders do not say of a unit: that it has the masses of its design."""
 INITIAL = ("phi_rad", "theta_rad")
 KEYS = (
@@ -164,17 +165,10 @@ def _effects(entries: list[Any], where: str) -> list[Effect]:
 
 
 def _units(read: Fields, robots: int) -> tuple[AsBuilt, ...]:
-    newer = (*MASSES, WRIST_MASS)
-    required = [name for name in AS_BUILT if name not in newer]
+    required = [name for name in AS_BUILT if name not in MASSES]
     entries = enumerate(read.list("as_built", robots), start=1)
-    units = (Fields(entry, required, f"{read.where}: as_built[{i}]", newer) for i, entry in entries)
-    return tuple(_unit(unit) for unit in units)
-
-
-def _unit(read: Fields) -> AsBuilt:
-    given = [*read.required, *(name for name in MASSES if name in read)]
-    wrist = read.number(WRIST_MASS) if WRIST_MASS in read else 0.0
-    return AsBuilt(**{name: read.array(name, (3,)) for name in given}, wrist_mass_ratio=wrist)
+    units = (Fields(entry, required, f"{read.where}: as_built[{i}]", MASSES) for i, entry in entries)
+    return tuple(unit_in(unit) for unit in units)
 
 
 def _sensors(read: Fields, robots: int) -> SensorEffects:

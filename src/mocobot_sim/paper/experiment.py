@@ -4,13 +4,13 @@ Order as in the paper (section IV.C): random trials first; the grasps estimated 
 motion and the static orientations; then everything is estimated, staged as in the paper and in one fit beside it.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
+from joblib import Parallel
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.arrays import Array
@@ -24,12 +24,12 @@ from estimator.signals.process import process_recording
 from mocobot_sim.paper.fits import COLUMNS, SELF_CALIBRATED, TRANSFER, fit_trials, three_trials
 from mocobot_sim.paper.published import payload_truth
 from mocobot_sim.paper.scoring import score, score_fit
-from mocobot_sim.paper.shares import shares
+from mocobot_sim.paper.store import Store
+from mocobot_sim.paper.work import Progress, Work
 from mocobot_sim.scene.models import payload_path
 from mocobot_sim.trial.sensors import PRESETS, SensorPreset, sensor_preset
 from mocobot_sim.trial.simulate import TrialRequest, draw_units, simulate
 
-Progress = Callable[[float, float, str], object]
 # Positions p_1i and orientations R_1i between processes: arrays keep their bits there, a RigidTransform is normalised.
 Grasps = tuple[Array, Array]
 
@@ -144,7 +144,14 @@ class PaperResult:
     trials: list[TrialSummary] = field(default_factory=list)
 
 
-def run_paper(plan: PaperPlan, jobs: int = 1, progress: Progress | None = None) -> PaperResult:
+def run_paper(
+    plan: PaperPlan,
+    jobs: int = 1,
+    progress: Progress | None = None,
+    store: Store | None = None,
+    *,
+    remote: bool = False,
+) -> PaperResult:
     """Run the whole experiment.
 
     Args:
@@ -152,26 +159,19 @@ def run_paper(plan: PaperPlan, jobs: int = 1, progress: Progress | None = None) 
         jobs: parallel processes; the result does not depend on them.
         progress: called several times a second, from another thread, with the steps done, parts of trials counting, all
             steps, and the name of the stage that runs.
+        store: where outcomes are kept as they end; those that are there already are taken from it.
+        remote: whether joblib's backend has its processes on other machines.
 
     Raises:
         TrialError: the physics of a trial cannot be trusted.
     """
-    progress = progress or (lambda done, steps, stage: None)
     result = PaperResult()
     teams = list(product(plan.payloads, plan.teams()))
-    before = 0
-    with Parallel(n_jobs=jobs, return_as="generator") as pool:
-
-        def each(stage: str, function: Callable[..., Any], tasks: Sequence[tuple[Any, ...]]) -> Iterable[Any]:
-            """Outcomes of a function of a share to write to and a task."""
-            nonlocal before
-            start, before = before, before + len(tasks)
-            with shares(len(tasks), lambda now: progress(start + now, plan.steps, stage)) as done:
-                calls = (delayed(function)(done[k : k + 1], *task) for k, task in enumerate(tasks))
-                for k, outcome in enumerate(pool(calls)):
-                    done[k] = 1.0
-                    yield outcome
-
+    # Far away all is sent at once: workers may come while it runs. A task's arguments are one tuple (``work``), which
+    # joblib does not put on a worker beforehand, where they would be lost with it.
+    ahead = "all" if remote else "2 * n_jobs"
+    with Parallel(n_jobs=jobs, return_as="generator_unordered", pre_dispatch=ahead) as pool:
+        each = Work(pool, plan.steps, progress or _untold, store, remote=remote).each
         first = [
             (_request(plan, payload, "random", k), team, None)
             for payload, team in teams
@@ -212,6 +212,10 @@ def run_paper(plan: PaperPlan, jobs: int = 1, progress: Progress | None = None) 
                 result.fits.setdefault(column, {})[payload] = found
     result.scores = _scores(plan, result)
     return result
+
+
+def _untold(_done: float, _steps: float, _stage: str) -> None:
+    """Nobody wants to know."""
 
 
 def _scores(plan: PaperPlan, result: PaperResult) -> dict[str, dict[str, dict[str, Any] | None]]:

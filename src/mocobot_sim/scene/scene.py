@@ -44,6 +44,8 @@ class TeamScene:
         sensors: timing faults of the sensors.
         grasp_slack_m: by how much each grasp may open in a sound trial, beyond a weld's softness [m], N entries;
             empty for none.
+        grasp_slack_rad: by how much each grasp may turn in it, beyond a weld's softness [rad], N entries; empty for
+            none.
         soft: springs and dampers that are soft constraints.
         effects: what was applied to the team.
         xml: the scene's MJCF if ``root`` is None.
@@ -61,6 +63,7 @@ class TeamScene:
     initial: tuple[Array, Array] | None = None
     sensors: SensorEffects = field(default_factory=SensorEffects)
     grasp_slack_m: tuple[float, ...] = ()
+    grasp_slack_rad: tuple[float, ...] = ()
     soft: tuple[SoftRow, ...] = ()
     effects: tuple[Applied, ...] = ()
     xml: str | None = None

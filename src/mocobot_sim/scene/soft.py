@@ -34,12 +34,14 @@ class SoftRow:
     Attributes:
         equality: its name in the scene.
         compliance: of the spring [m/N or rad/(N m)], or None.
+        relaxation_s: time constant in which the spring follows its load [s]; zero for a critically damped one.
         damping: of the damper [N s/m or N m s/rad], or None.
     """
 
     equality: str
     compliance: float | None = None
     damping: float | None = None
+    relaxation_s: float = 0.0
 
 
 def spring_parameters(compliance: float, inverse_inertia: float) -> tuple[list[float], list[float]]:
@@ -54,6 +56,19 @@ def spring_parameters(compliance: float, inverse_inertia: float) -> tuple[list[f
     if soft < _LEAST:
         soft, s = _LEAST, min(_LEAST * inverse_inertia / compliance, _STIFFEST_PER_S2)
     return [-s, -2.0 * np.sqrt(s)], _constant_impedance(1.0 - soft)
+
+
+def viscoelastic_parameters(
+    compliance: float, relaxation_s: float, inverse_inertia: float
+) -> tuple[list[float], list[float]]:
+    """``solref`` and ``solimp`` of a spring beside a damper (Kelvin and Voigt): damping is relaxation over compliance.
+
+    The mass that moves is made to lag forty times less than the damper does.
+    """
+    s = 40.0 / relaxation_s**2
+    soft = min(max(s * compliance / inverse_inertia, _LEAST), 1.0 - _LEAST)
+    s = soft * inverse_inertia / compliance
+    return [-s, -s * relaxation_s], _constant_impedance(1.0 - soft)
 
 
 def damper_parameters(damping: float, inverse_inertia: float) -> tuple[list[float], list[float]]:
@@ -76,7 +91,9 @@ def tune(root: mjcf.RootElement, model: mujoco.MjModel, rows: Sequence[SoftRow])
             inverse_inertia = float(model.tendon_invweight0[on])
         else:
             inverse_inertia = float(model.dof_invweight0[model.jnt_dofadr[on]])
-        if row.compliance is not None:
+        if row.compliance is not None and row.relaxation_s:
+            solref, solimp = viscoelastic_parameters(row.compliance, row.relaxation_s, inverse_inertia)
+        elif row.compliance is not None:
             solref, solimp = spring_parameters(row.compliance, inverse_inertia)
         else:
             assert row.damping is not None

@@ -34,8 +34,9 @@ class TeamIndex:
         grasp_site: the flange's site of every robot, shape (N,).
         payload_site: the payload's grasp site of every robot, shape (N,); that of the flange where nothing is held.
         payload_body: body id of the payload; -1 where nothing is held.
-        yielding_dof: slides that effects have added: bases and grasps that yield, are loose or creep.
-        hanging_dof: hinges that effects have added: what swings in the payload.
+        yielding_dof: slides, and hinges on springs, that effects have added: bases and grasps that yield, are loose or
+            creep.
+        hanging_dof: other hinges that effects have added: what swings in the payload.
         base_dof: free chassis, wheels and rollers; none in a team that is parked.
     """
 
@@ -82,6 +83,10 @@ class TeamIndex:
             if kind != "knee"
         }
         dof = {f"{kind}_dof": model.jnt_dofadr[joints[kind]].astype(np.intp) for kind in JOINTS}
+        sprung = model.eq_obj1id[model.eq_type == mujoco.mjtEq.mjEQ_JOINT]
+        slides = _added(model, own, mujoco.mjtJoint.mjJNT_SLIDE)
+        hinges = _added(model, own, mujoco.mjtJoint.mjJNT_HINGE)
+        turning = np.isin(model.dof_jntid[hinges], sprung)
         flanges = ids_of(model.site, robots, ("grasp",)).ravel()
         grasps = [model.site(f"{PAYLOAD_PREFIX}grasp{i + 1}").id for i in range(robots if carries else 0)]
         return cls(
@@ -91,8 +96,8 @@ class TeamIndex:
             grasp_site=flanges,
             payload_site=np.array(grasps, dtype=np.intp) if carries else flanges,
             payload_body=model.body(f"{PAYLOAD_PREFIX}payload").id if carries else -1,
-            yielding_dof=_added(model, own, mujoco.mjtJoint.mjJNT_SLIDE),
-            hanging_dof=_added(model, own, mujoco.mjtJoint.mjJNT_HINGE),
+            yielding_dof=np.concatenate([slides, hinges[turning]]),
+            hanging_dof=hinges[~turning],
             base_dof=np.flatnonzero(np.isin(model.dof_jntid, base)).astype(np.intp),
         )
 

@@ -1,10 +1,12 @@
-"""What else acts in a trial, besides the robots' arms: bases that drive, a person's hand."""
+"""What else acts in a trial, besides the robots' arms: bases that drive, a person's hand, effects that MJCF lacks."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import mujoco
 
+from estimator.arrays import Array
 from mocobot_sim.control.control import TeamController
 from mocobot_sim.scene.team_index import TeamIndex
 
@@ -43,5 +45,36 @@ class Actor(Protocol):
         ...
 
     def act(self, tick: int) -> None:
-        """Write ``ctrl`` of what it drives, add to ``xfrc_applied`` of the payload (zero before), or both."""
+        """Write ``ctrl`` of what it drives; add to ``xfrc_applied`` of the payload or ``qfrc_applied`` (both zero)."""
+        ...
+
+
+class Reader(Protocol):
+    """A sensor that misreads: it changes what the robots' controllers and logs see."""
+
+    def start(self, stage: Stage) -> None:
+        """Get ready; called once."""
+        ...
+
+    def read(self, tick: int, seen: Array) -> None:
+        """Change, in place, the positions that the sensors see.
+
+        Args:
+            tick: of the control.
+            seen: ``qpos`` of this instant, and what readers before this one made of it, shape (nq,). The driven angle
+                is motor plus spring, the torque minus the design stiffness times the spring.
+        """
+        ...
+
+
+@runtime_checkable
+class Acting(Protocol):
+    """An effect that MJCF cannot express: somebody acts, or a sensor misreads, while a trial runs."""
+
+    def actors(self, trial_number: int | None) -> Sequence[Actor]:
+        """Who acts in a trial, new ones for each (trials count from 1; None is any)."""
+        ...
+
+    def readers(self, trial_number: int | None) -> Sequence[Reader]:
+        """Sensors that misread in it."""
         ...

@@ -26,15 +26,17 @@ class Rows:
         model, data, index: the trial's.
         samples: Q.
         slack_m: by how much each grasp may open beyond a weld's softness [m], N entries; empty for none.
+        slack_rad: by how much it may turn [rad], likewise.
     """
 
     def __init__(
         self, model: mujoco.MjModel, data: mujoco.MjData, index: TeamIndex, samples: int,
-        slack_m: tuple[float, ...] = (),
+        slack_m: tuple[float, ...] = (), slack_rad: tuple[float, ...] = (),
     ) -> None:  # fmt: skip
         self.model, self.data, self.index = model, data, index
         robots = index.robots
         self.weld_limit_m = WELD_LIMIT_M + np.array(slack_m or (0.0,) * robots)
+        self.weld_limit_rad = WELD_LIMIT_RAD + np.array(slack_rad or (0.0,) * robots)
         ends = (
             ids_of(model.site, robots, [name.format(k) for k in (1, 2, 3)])
             for name in ("rod{}_tip", "platform{}")
@@ -97,9 +99,9 @@ class Rows:
         _limit("theta (z, y, x)", theta, -design.gimbal_limit_rad, design.gimbal_limit_rad, "rad", when)
         _limit("SEA torque", tau, -design.torque_limit_Nm, design.torque_limit_Nm, "N m", when)
         _limit("rod error", rod.reshape(len(rod), -1, 3), 0.0, ROD_LIMIT_M, "m", when)
-        for i, limit in enumerate(self.weld_limit_m):
-            _limit("weld error", weld[:, i : i + 1, None], 0.0, limit, "m", when, robot=i)
-        _limit("weld angle", angle[:, :, None], 0.0, WELD_LIMIT_RAD, "rad", when)
+        for i, (limit_m, limit_rad) in enumerate(zip(self.weld_limit_m, self.weld_limit_rad, strict=True)):
+            _limit("weld error", weld[:, i : i + 1, None], 0.0, limit_m, "m", when, robot=i)
+            _limit("weld angle", angle[:, i : i + 1, None], 0.0, limit_rad, "rad", when, robot=i)
 
     def finish(
         self,

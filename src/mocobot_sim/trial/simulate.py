@@ -89,6 +89,8 @@ def simulate(
     progress: Callable[[int, int], object] | None = None,
     scene: TeamScene | None = None,
     effects: Sequence[Effect] = (),
+    units: Sequence[AsBuilt] = (),
+    place: int | None = None,
 ) -> Simulated:
     """Run one trial and read it through one or several sensor presets.
 
@@ -105,6 +107,9 @@ def simulate(
         scene: the team, in place of one built from ``request.payload``, which then is its label only; its robots are
             what they are, so the presets must be calibrated ones.
         effects: what is hidden in the team.
+        units: the robots, in place of those that the presets draw or leave as designed; the presets must be calibrated
+            ones.
+        place: 1-based place of the trial in a sequence, which a push names; None for one more than its number.
 
     Raises:
         InputError: a request or preset that cannot be met.
@@ -121,19 +126,22 @@ def simulate(
         raise InputError("a model carries a payload; robots of a free trial hold nothing")
     if request.robots is not None and not free:
         raise InputError(f"robots is for a free trial; a {request.trial} one has a robot for each grasp")
-    if free:
-        scene = _free_team(request, presets[0])
-    elif scene is None:
-        scene = build_team(request.payload, draw_units(request.payload, presets[0], request.seed))
-    elif not presets[0].calibrated:
+    if (scene is not None or units) and not presets[0].calibrated:
+        who = "units are given, which already say" if scene is None else "the model already says"
         raise InputError(
-            f"preset {presets[0].name!r} draws robots of its own, but the model already says how its robots deviate; "
+            f"preset {presets[0].name!r} draws robots of its own, but {who} how its robots deviate; "
             f"use {' or '.join(name for name, preset in PRESETS.items() if preset.calibrated)}"
         )
+    if free:
+        scene = _free_team(request, presets[0], units)
+    elif scene is None:
+        scene = build_team(request.payload, units or draw_units(request.payload, presets[0], request.seed))
     if effects:
         scene = apply_effects(scene, effects)
     trajectory = make_trajectory(request, scene, grasps)
-    log = run_trial(scene, trajectory, gains, progress, trial_number=request.number + 1)
+    log = run_trial(
+        scene, trajectory, gains, progress, trial_number=request.number + 1 if place is None else place
+    )
     recordings = {
         preset.name: measure(
             log,
@@ -163,12 +171,12 @@ def _grasps(payload: str) -> RigidTransform:
     return grasp_frames(load_payload(payload), payload)
 
 
-def _free_team(request: TrialRequest, preset: SensorPreset) -> TeamScene:
+def _free_team(request: TrialRequest, preset: SensorPreset, units: Sequence[AsBuilt]) -> TeamScene:
     """The seed's robots, which are those of its other trials, with their gimbals as somebody left them."""
     robots = len(_grasps(request.payload)) if request.robots is None else request.robots
     check_robots(robots)
     theta = request.rng("gimbals").uniform(-LEFT_RAD, LEFT_RAD, (robots, 3))
-    return build_free_team(robots, _draw(robots, preset, request.seed), theta)
+    return build_free_team(robots, units or _draw(robots, preset, request.seed), theta)
 
 
 def make_trajectory(

@@ -12,7 +12,7 @@ from mocobot_sim.control.control import ControlGains, TeamController
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import TeamIndex
-from mocobot_sim.trial.actors import Actor, Stage
+from mocobot_sim.trial.actors import Acting, Actor, Stage
 from mocobot_sim.trial.assemble import assemble_at_home
 from mocobot_sim.trial.rows import Rows
 from mocobot_sim.trial.sensed import SensedLog
@@ -66,11 +66,17 @@ def run_trial(
     if feed_forward is None and not scene.carries:
         feed_forward = np.zeros((index.robots, 3))
     sensed = np.empty((len(ref), index.robots, 3, 3))
-    controller = TeamController(index, design, gains, data, scene.units, scene.sensors, feed_forward, sensed)
-    log = Rows(model, data, index, len(trajectory.ref_b), scene.grasp_slack_m)
+    acting = [effect for effect in scene.effects if isinstance(effect, Acting)]
+    actors = [*actors, *(actor for effect in acting for actor in effect.actors(trial_number))]
+    readers = [reader for effect in acting for reader in effect.readers(trial_number)]
+    seen = data.qpos.copy() if readers else data.qpos
+    controller = TeamController(
+        index, design, gains, data, scene.units, scene.sensors, feed_forward, sensed, seen
+    )
+    log = Rows(model, data, index, len(trajectory.ref_b), scene.grasp_slack_m, scene.grasp_slack_rad)
     pushes = [push for push in scene.pushes if trial_number in (None, push.trial)]
-    for actor in actors:
-        actor.start(Stage(model, data, index, controller, gains.rate_hz, ticks, len(ref)))
+    for part in (*actors, *readers):
+        part.start(Stage(model, data, index, controller, gains.rate_hz, ticks, len(ref)))
     R_Wb1 = scene.mounts.rotation[0].as_matrix()
     reported, last = 0, len(trajectory.ref_b) - 1
     if progress:
@@ -79,8 +85,14 @@ def run_trial(
         for tick in range(sample * ticks, (sample + 1) * ticks):
             if scene.carries and (pushes or actors):
                 data.xfrc_applied[index.payload_body] = 0.0
+            if actors:
+                data.qfrc_applied[:] = 0.0
             for actor in actors:
                 actor.act(tick)
+            if readers:
+                seen[:] = data.qpos
+                for reader in readers:
+                    reader.read(tick, seen)
             controller.update(ref[tick], ref_dot[tick])
             for push in pushes:
                 push.act(model, data, index.payload_body, R_Wb1)

@@ -17,6 +17,7 @@ from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.models import posed
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import TeamIndex
+from mocobot_sim.trial.sidecar import truth_path as truth_path
 
 
 @dataclass(frozen=True)
@@ -93,11 +94,6 @@ class GroundTruth:
             "effects": [effect_to_dict(effect) for effect in self.effects],
         }
         return payload | robots if len(self.p_1i) else robots
-
-
-def truth_path(recording: Path) -> Path:
-    """Sidecar of a recording: ``rec.parquet`` has ``rec.truth.json``."""
-    return recording.with_suffix(".truth.json")
 
 
 def write_truth(truth: GroundTruth, recording: Path) -> None:

@@ -7,8 +7,8 @@ import pytest
 
 from discrepancy.engine.confirm import confirm
 from discrepancy.engine.diagnose import diagnose
-from discrepancy.engine.refit import explanation_of, refit
-from discrepancy.engine.search import search
+from discrepancy.inference.refit import explanation_of, refit
+from discrepancy.inference.search import search
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from fake_rig import CATALOGUE, TWINS, FakeRig, names

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discrepancy.engine.search import search
+from discrepancy.inference.search import search
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Transient

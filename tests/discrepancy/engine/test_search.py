@@ -7,8 +7,8 @@ import pytest
 
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.engine.held_out import confirmed
-from discrepancy.engine.refit import explanation_of, idlest, refit, without_idle
-from discrepancy.engine.search import search
+from discrepancy.inference.refit import explanation_of, idlest, refit, without_idle
+from discrepancy.inference.search import search
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rules import CLEAN_CHI2_PER_N

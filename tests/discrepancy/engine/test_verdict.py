@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from discrepancy.engine.diagnose import diagnose
-from discrepancy.engine.search import search
 from discrepancy.engine.verdict import verdict_of
+from discrepancy.inference.search import search
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Transient

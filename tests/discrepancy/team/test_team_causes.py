@@ -132,6 +132,8 @@ def spoiled(case, cause, robot, joint, values):
         tau = resampled(tau, values[0])
     elif cause == "torque_lag":
         tau = lagged(tau, values[0])
+    elif cause == "sensor_lag":
+        tau = with_joint(tau, joint, lagged(tau[:, joint], values[0]))
     elif cause == "clock_delay":
         phi, theta, tau = (resampled(x, values[0]) for x in (phi, theta, tau))
     elif cause == "link_length":
@@ -151,11 +153,18 @@ READINGS = {
     "joint_friction": [0.02, 0.01],
     "torque_skew": [2e-3],
     "torque_lag": [2e-3],
+    "sensor_lag": [2e-3],
     "clock_delay": [5e-4],
     "link_length": [1e-4, -5e-5, 8e-5],
 }
 # link_length takes what hangs at the knees for a part of the load on the wrist: a tenth of its small wrench.
-TOLERANCE = {"link_length": 0.01, "joint_friction": 0.04, "sea_hysteresis": 0.03, "torque_lag": 0.02}
+TOLERANCE = {
+    "link_length": 0.01,
+    "joint_friction": 0.04,
+    "sea_hysteresis": 0.03,
+    "torque_lag": 0.02,
+    "sensor_lag": 0.02,
+}
 
 
 # Channels of one unit, with what filtering leaves: rotations, positions, force, moment.

@@ -80,9 +80,36 @@ def test_tether(case, motion, robot):
     np.testing.assert_allclose([physical[f"anchor_{a}_m"] for a in "xyz"], anchor)
 
 
-def test_drag(case, motion):
-    force = -5.0 * motion[2]
-    check_wrench(case, motion, "drag", 0, 0, {}, [5.0], force, np.cross(motion[0] @ COM, force))
+@pytest.mark.parametrize("arm", [0.0, 0.15])
+def test_payload_tether(case, motion, arm):
+    """Tied to the centre of mass it is exact; beside it, its lever turns and its stiffness acts there."""
+    stiffness, anchor = (30.0, np.array([0.1, -0.2, 0.9])) if not arm else (1.0, np.array([3.0, -6.0, 9.0]))
+    R_b1 = GRASPS[0][0]  # {b} of robot 1 is turned like {1} at rest
+    np.testing.assert_array_equal(R_b1, np.eye(3))
+    tied = COM + arm * np.array([0.6, 0.8, 0.0])
+    wrist = forward_kinematics(case.signals.phi[:, 0], DESIGN)
+    force = stiffness * (anchor - wrist - motion[0] @ tied)  # world
+    home = stiffness * (anchor - HOME - tied)
+    values = np.concatenate([home, np.cross(tied - COM, home), [stiffness]])
+    moment = np.cross(motion[0] @ tied, force)
+    check_wrench(case, motion, "payload_tether", 0, 0, {}, values, force, moment, 0.15 if arm else 0.01)
+    physical = reported(case, "payload_tether", values)
+    assert physical["stiffness_N_per_m"] == stiffness
+    at = np.array([physical[f"point_{a}_m"] for a in "xyz"])
+    np.testing.assert_allclose(np.cross(at - tied, home), 0.0, atol=1e-9)
+    towards = np.array([physical[f"anchor_{a}_m"] for a in "xyz"])
+    np.testing.assert_allclose(stiffness * (towards - HOME - at), home, atol=1e-9)
+
+
+@pytest.mark.parametrize(("along", "turning"), [(5.0, 0.0), (0.0, 3.0), (5.0, 3.0)])
+def test_drag(case, motion, along, turning):
+    ahead, behind = (
+        Rotation.from_euler("xyz", case.path(case.signals.time + h)[:, :3]) for h in (STEP_S, -STEP_S)
+    )
+    omega = (ahead * behind.inv()).as_rotvec() / (2.0 * STEP_S)  # world
+    force = -along * motion[2]
+    moment = np.cross(motion[0] @ COM, force) - turning * omega
+    check_wrench(case, motion, "drag", 0, 0, {}, [along, turning], force, moment)
 
 
 def test_push(case, motion):

@@ -38,6 +38,38 @@ def test_drag_is_minus_c_v():
     np.testing.assert_allclose(force[2:], -c * velocity[1:], rtol=0, atol=1e-3 * c * np.abs(velocity).max())
 
 
+def test_a_tether_of_the_payload_pulls_with_stiffness_times_distance():
+    """At rest the robots hold the weight less the pull, at the point of the payload where the tether is tied."""
+    k, anchor, point = 40.0, np.array([0.3, -0.2, 0.9]), np.array([0.1, 0.2, -0.05])
+    values = [*anchor.tolist(), *point.tolist()]
+    names = [f"{name}_{axis}_m" for name in ("anchor", "point") for axis in "xyz"]
+    effect = example("payload_tether", stiffness_N_per_m=k, **dict(zip(names, values, strict=True)))
+    loop = ClosedLoop(team_with("b", effect))
+    p_Wb, R_Wb = base_poses(loop.scene)
+    site = loop.index.payload_site[0]
+    tied = loop.data.site_xpos[site] + loop.data.site_xmat[site].reshape(3, 3) @ point
+    pull = k * (p_Wb[0] + R_Wb[0] @ anchor - tied)
+    assert np.linalg.norm(pull) > 10.0
+    weight = np.array([0, 0, 9.81 * loop.model.body_mass[loop.index.payload_body]])
+    total = loop.forces_on_payload().sum(axis=0) + pull - weight
+    np.testing.assert_allclose(total, 0, rtol=0, atol=5e-4 * weight[2])
+
+
+def test_drag_resists_turning_with_minus_c_omega():
+    """Its generalised force is that of a moment against MuJoCo's own angular velocity, and of no force."""
+    c = 3.0
+    scene = team_with("a", example("drag", coefficient_Ns_per_m=0.0, turning_Nms_per_rad=c))
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.02 * np.random.default_rng(0).standard_normal(model.nq)
+    data.qvel[:] = np.random.default_rng(1).standard_normal(model.nv)
+    mujoco.mj_forward(model, data)
+    turn = np.zeros((3, model.nv))
+    mujoco.mj_jacBody(model, data, None, turn, model.body("omnid1/payload/payload").id)
+    np.testing.assert_allclose(data.qfrc_actuator, -c * turn.T @ (turn @ data.qvel), atol=1e-9)
+    assert np.abs(turn @ data.qvel).max() > 0.1
+
+
 @pytest.mark.parametrize("robot", [1, 3])
 def test_a_tether_pulls_with_stiffness_times_distance(robot):
     """At rest the robots hold weight and tether; Newton's balance is MuJoCo's, the tether's force is Hooke's."""

@@ -5,7 +5,7 @@ import pytest
 
 from closed_loop import ClosedLoop
 from effect_cases import example, one_robot, team_with
-from mocobot_sim.control.control import _lag_filter
+from mocobot_sim.control.control import lag_filter
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.resimulate import predicted
 from mocobot_sim.trial.sensed import SensedLog
@@ -140,7 +140,7 @@ def test_delays_between_ticks_are_interpolated(delay_s):
 
 @pytest.mark.parametrize("time_constant_s", [1e-4, 1e-3, 0.02])
 def test_lag_of_a_ramp_and_of_a_sine_is_the_filters(time_constant_s):
-    a, old, new = _lag_filter(time_constant_s, 1e-3)
+    a, old, new = lag_filter(time_constant_s, 1e-3)
     time = np.arange(2000) / 1000.0
     for signal, steady in (
         (time, time - time_constant_s),
@@ -162,4 +162,19 @@ def test_a_lagging_torque_sensor_is_seen_by_log_and_controller(clean):
     np.testing.assert_allclose(x[20:-20:10], log.tau[2:-2, 1][: len(x[20:-20:10])], rtol=0, atol=5e-3)
     assert np.abs(log.tau[:, 1] - y[::10]).max() > 0.02
     np.testing.assert_allclose(log.sensed.tau[::10, 0], log.tau[:, 0], rtol=0, atol=1e-12)
+    assert np.abs(log.phi - clean.phi).max() > 1e-5
+
+
+def test_a_single_lagging_sensor_is_seen_by_log_and_controller(clean):
+    """y + T dy/dt = x of its own torque alone; exact for inputs that are straight between ticks."""
+    T, k = 0.004, 1
+    log = _run(example("sensor_lag", 2, joint=k + 1, time_constant_s=T))
+    y = log.sensed.tau[:, 1]
+    x = y[:, k] + T * np.gradient(y[:, k], 1e-3)
+    np.testing.assert_allclose(x[20:-20:10], log.tau[2:-2, 1, k][: len(x[20:-20:10])], rtol=0, atol=5e-3)
+    assert np.abs(log.tau[:, 1, k] - y[::10, k]).max() > 0.02
+    others = np.ones((3, 3), dtype=bool)
+    others[1, k] = False
+    np.testing.assert_allclose(log.sensed.tau[::10, others], log.tau[:, others], rtol=0, atol=1e-11)
+    np.testing.assert_allclose(log.sensed.phi[::10], log.phi, rtol=0, atol=1e-12)
     assert np.abs(log.phi - clean.phi).max() > 1e-5

@@ -25,6 +25,7 @@ HIDDEN = (
     "grasp_flex",
     "joint_friction",
     "torque_lag",
+    "sensor_lag",
     "clock_delay",
     "push",
     "drag",

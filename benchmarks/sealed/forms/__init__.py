@@ -1,0 +1,1 @@
+"""Effects in other forms than the catalogue's laws; ``registry`` lists them."""

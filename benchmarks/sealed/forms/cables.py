@@ -1,0 +1,105 @@
+"""Cables: springs to a fixed point of the room, slack below their length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from hidden.draw import REACH_M
+from mocobot_sim.scene.models import omnid_design
+from mocobot_sim.scene.scene import TeamScene
+from sealed.forms.base import Form, Place, direction, near, vector
+from sealed.ground import Ground
+
+TRAVEL_M = (0.01, 0.05)
+"""How far a cable is stretched at home: the payload moves by as much, so it goes slack at times."""
+
+
+def _hang(
+    scene: TeamScene, name: str, site: Any, anchor_W: np.ndarray, stiffness: float, length: float
+) -> TeamScene:
+    fixed = scene.root.worldbody.add("site", name=name, pos=anchor_W.tolist(), group=4, size=[0.006])
+    tendon = scene.root.tendon.add(
+        "spatial", name=name, stiffness=stiffness, springlength=[0.0, length], width=0.002
+    )
+    tendon.add("site", site=site)
+    tendon.add("site", site=fixed)
+    return scene
+
+
+@dataclass(frozen=True)
+class PayloadCable(Form):
+    """From a point of the payload, given in {1}, to a point of the room, given in {1} as the payload rests at home."""
+
+    answer = "payload_tether"
+    size = "stiffness_N_per_m"
+    on_payload = True
+    ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4), "length_m": (0.0, 100.0)}
+    stiffness_N_per_m: float
+    length_m: float
+    point_x_m: float
+    point_y_m: float
+    point_z_m: float
+    anchor_x_m: float
+    anchor_y_m: float
+    anchor_z_m: float
+
+    @classmethod
+    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+        point, distance = near(ground.p_1c, REACH_M, rng), rng.uniform(0.5, 1.5)
+        return cls(
+            stiffness_N_per_m=size,
+            length_m=float(distance - rng.uniform(*TRAVEL_M)),
+            **vector("point", "m", point),
+            **vector("anchor", "m", point + distance * direction(rng)),
+        )
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        point = [self.point_x_m, self.point_y_m, self.point_z_m]
+        site = scene.root.find("body", "omnid1/payload/payload").add(
+            "site", name="cable", pos=point, group=4, size=[0.006]
+        )
+        rest = scene.X_Wb[0].apply(scene.wrist_home_b[0])  # origin of {1} at home
+        R_W1 = (scene.X_Wb[0].rotation * _home_turn(scene)).as_matrix()
+        anchor = rest + R_W1 @ [self.anchor_x_m, self.anchor_y_m, self.anchor_z_m]
+        return _hang(scene, "payload_cable", site, anchor, self.stiffness_N_per_m, self.length_m)
+
+
+def _home_turn(scene: TeamScene) -> Rotation:
+    return Rotation.from_euler("ZYX", scene.theta_home[0])
+
+
+@dataclass(frozen=True)
+class RobotCable(Form):
+    """From a robot's wrist to a point of the room, given in its {b}."""
+
+    answer = "tether"
+    size = "stiffness_N_per_m"
+    ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4), "length_m": (0.0, 100.0)}
+    robot: int
+    stiffness_N_per_m: float
+    length_m: float
+    anchor_x_m: float
+    anchor_y_m: float
+    anchor_z_m: float
+
+    @classmethod
+    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+        distance, home = rng.uniform(0.5, 1.5), np.array([0.0, 0.0, omnid_design().home_height_m])
+        return cls(
+            **place,
+            stiffness_N_per_m=size,
+            length_m=float(distance - rng.uniform(*TRAVEL_M)),
+            **vector("anchor", "m", home + distance * direction(rng)),
+        )
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        platform = scene.root.find("body", f"omnid{self.robot}/platform")
+        site = platform.add("site", name="cable", pos=[0.0, 0.0, 0.0], group=4, size=[0.006])
+        anchor = scene.X_Wb[self.robot - 1].apply([self.anchor_x_m, self.anchor_y_m, self.anchor_z_m])
+        return _hang(
+            scene, f"cable{self.robot}", site, np.asarray(anchor), self.stiffness_N_per_m, self.length_m
+        )

@@ -1,0 +1,86 @@
+"""All forms by name: other forms of listed causes, and what no catalogue lists."""
+
+from __future__ import annotations
+
+from sealed.forms.base import Form
+from sealed.forms.cables import PayloadCable, RobotCable
+from sealed.forms.creep import LateCreep
+from sealed.forms.drags import QuadraticDrag, TurningDrag
+from sealed.forms.friction import DrivenDahl, DrivenLugre, GimbalDahl, GimbalLugre
+from sealed.forms.grasps import SlowBaseCompliance, SlowGrasp, SoftPlay, TurningGrasp
+from sealed.forms.lags import SecondOrderTorqueLag, SingleTorqueLag
+from sealed.forms.masses import MassDrift, MassOfTrials
+from sealed.forms.pendulums import DoublePendulum, UnequalPendulum
+from sealed.forms.pushes import HalfSinePush, RampPush
+from sealed.forms.springs import BoucWenSpring
+from sealed.unlisted.encoders import (
+    CyclicPhi,
+    EccentricPhi,
+    EccentricTheta,
+    EncoderBacklash,
+    SlippingZero,
+    SoftEncoderMount,
+)
+from sealed.unlisted.readings import (
+    AngleInTorque,
+    CrossTalk,
+    QuadraticReading,
+    Saturation,
+    TorqueBacklash,
+    TorqueHum,
+    WarmingScale,
+    WarmingZero,
+)
+from sealed.unlisted.torques import CableSpring, Cogging, CubicSpring, DoorCloser
+from sealed.unlisted.wrenches import GrowingPush, Gyroscope, Shaker, ShiftingLoad, SinkingBase
+
+LISTED: tuple[type[Form], ...] = (
+    DrivenLugre,
+    DrivenDahl,
+    GimbalLugre,
+    GimbalDahl,
+    BoucWenSpring,
+    SoftPlay,
+    SlowGrasp,
+    TurningGrasp,
+    SlowBaseCompliance,
+    LateCreep,
+    RampPush,
+    HalfSinePush,
+    DoublePendulum,
+    UnequalPendulum,
+    SecondOrderTorqueLag,
+    SingleTorqueLag,
+    PayloadCable,
+    RobotCable,
+    TurningDrag,
+    QuadraticDrag,
+    MassDrift,
+    MassOfTrials,
+)
+UNLISTED: tuple[type[Form], ...] = (
+    CrossTalk,
+    WarmingScale,
+    WarmingZero,
+    Saturation,
+    QuadraticReading,
+    AngleInTorque,
+    TorqueBacklash,
+    TorqueHum,
+    EccentricPhi,
+    EccentricTheta,
+    CyclicPhi,
+    EncoderBacklash,
+    SoftEncoderMount,
+    SlippingZero,
+    Cogging,
+    CubicSpring,
+    CableSpring,
+    DoorCloser,
+    GrowingPush,
+    Shaker,
+    Gyroscope,
+    ShiftingLoad,
+    SinkingBase,
+)
+FORMS: dict[str, type[Form]] = {form.cause: form for form in (*LISTED, *UNLISTED)}

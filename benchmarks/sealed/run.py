@@ -1,0 +1,110 @@
+"""The sealed campaign: simulate sets, diagnose them blind, print the tables.
+
+Sets and results are kept in the output folder, and skipped when the command is given again. Recordings are kept, so
+that engines can be compared on the same ones: give each a ``--label``.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+import tyro
+
+from sealed import store
+from sealed.backgrounds import Background
+from sealed.campaign import diagnose_all, simulate_all
+from sealed.sets import TIMESTEP_S, Kind, SealedSet, plan
+from sealed.tables import misses, tables
+
+MIXED: tuple[Kind, ...] = (
+    "clean", "single", "forms", "single", "pairs", "single", "clean", "single", "forms", "single",
+)  # fmt: skip
+"""Kinds of successive seeds of a mixed part."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """Command line.
+
+    Attributes:
+        part: what is hidden.
+        draws: how many sets.
+        first: seed of the first.
+        out: where recordings and results go.
+        jobs: processes.
+        only: simulate or diagnose only.
+        kept: diagnose every set that is in the folder, whatever its seed.
+        label: name of the results.
+        background: the robots; drawn if not given.
+        factors: sizes over the limit, in turn; drawn if none is given.
+        names: causes or forms, in turn; drawn if none is given.
+        timestep_ms: integration step.
+        closed_loop: run the recorded commands again.
+        keep: keep the recordings of diagnosed sets.
+        tables: print the tables of the results instead.
+        misses: print every set that is not wholly right instead.
+        list: print what the sets are instead.
+    """
+
+    part: Kind | Literal["mixed"] = "mixed"
+    draws: int = 10
+    first: int = 0
+    out: Path = Path("out/sealed")
+    jobs: int = 1
+    only: Literal["both", "simulate", "diagnose"] = "both"
+    kept: bool = False
+    label: str = "results"
+    background: Background | None = None
+    factors: tuple[float, ...] = ()
+    names: tuple[str, ...] = ()
+    timestep_ms: float = 1e3 * TIMESTEP_S
+    closed_loop: bool = True
+    keep: bool = True
+    tables: bool = False
+    misses: bool = False
+    list: bool = False
+
+
+def planned(options: Options) -> Sequence[SealedSet]:
+    """The sets of a command."""
+    out = []
+    for k, seed in enumerate(range(options.first, options.first + options.draws)):
+        kind = MIXED[seed % len(MIXED)] if options.part == "mixed" else options.part
+        factor = options.factors[k % len(options.factors)] if options.factors else None
+        name = (
+            options.names[k // max(len(options.factors), 1) % len(options.names)] if options.names else None
+        )
+        name = None if kind == "clean" else name
+        out.append(plan(kind, seed, options.background, factor, name, options.timestep_ms / 1e3))
+    return out
+
+
+def main(options: Options) -> None:
+    """Run, or print what was run."""
+    if options.tables:
+        print(tables(store.read(options.out / f"{options.label}.jsonl")))
+        return
+    if options.misses:
+        print(misses(store.read(options.out / f"{options.label}.jsonl")))
+        return
+    requests = store.kept(options.out) if options.kept else planned(options)
+    if options.list:
+        print("\n".join(request.key for request in requests))
+        return
+    if options.only != "diagnose":
+        simulate_all(requests, options.out, options.jobs)
+    if options.only != "simulate":
+        diagnose_all(
+            requests, options.out, options.label, options.jobs,
+            closed_loop=options.closed_loop, keep=options.keep,
+        )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main(tyro.cli(Options))

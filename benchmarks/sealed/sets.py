@@ -1,0 +1,197 @@
+"""Data sets of the sealed campaign: planned from a seed, drawn, simulated, read through the sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from estimator.recording.model import Recording
+from hidden.generator import PAYLOADS, gimbal_axes
+from hidden.schedule import Schedule
+from mocobot_sim.effects import Effect, apply_effects, effect_to_dict
+from mocobot_sim.scene.scene import build_team
+from mocobot_sim.trial.sensors import measure, sensor_preset
+from mocobot_sim.trial.trial import run_trial
+from mocobot_sim.trial.truth import GroundTruth
+from sealed.backgrounds import BACKGROUNDS, Background, tolerated, units_of
+from sealed.draw import CATALOGUE, NOWHERE, OTHER, SIZES, draw, family, largest, possible
+from sealed.forms.base import Form
+from sealed.ground import Ground
+
+TIMESTEP_S = 1e-3
+"""As the diagnosis: the integrator's error is below the sensors' noise (docs/diagnosis/validation.md)."""
+SCHEDULE = Schedule(randoms=2, vias=22, periodic_s=35.0, hold_s=3.0)
+"""146 s or a little more: two random trials, a periodic one, a static one."""
+Kind = Literal[
+    "clean", "single", "forms", "unlisted", "pairs", "triples", "pushes", "left-out", "unlisted-pairs"
+]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+SHARES = (0.4, 0.25, 0.2, 0.15)
+"""Of the backgrounds where they are drawn."""
+
+
+@dataclass(frozen=True)
+class SealedSet:
+    """One data set; equal ones give equal bits.
+
+    Attributes:
+        kind: what is hidden.
+        seed: of everything random.
+        background: the robots.
+        names: causes, forms.
+        factors: their sizes over the detection limit of the background.
+        payload: name of a shipped payload.
+        schedule: what is recorded.
+        timestep_s: integration step [s].
+    """
+
+    kind: Kind
+    seed: int
+    background: Background
+    names: tuple[str, ...] = ()
+    factors: tuple[float, ...] = ()
+    payload: str = "a"
+    schedule: Schedule = SCHEDULE
+    timestep_s: float = TIMESTEP_S
+
+    @property
+    def key(self) -> str:
+        """Name of the set."""
+        what = [f"{name}-x{factor:.3g}" for name, factor in zip(self.names, self.factors, strict=True)]
+        return "_".join([str(self.seed), self.kind, self.background, *what])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+    def rng(self, purpose: str) -> np.random.Generator:
+        """Independent stream for one purpose."""
+        return np.random.default_rng([self.seed, *f"{self.kind}|{purpose}".encode()])
+
+
+def plan(
+    kind: Kind,
+    seed: int,
+    background: Background | None = None,
+    factor: float | None = None,
+    name: str | None = None,
+    timestep_s: float = TIMESTEP_S,
+) -> SealedSet:
+    """Decide what a set is; everything that is not given is drawn from its seed.
+
+    Args:
+        kind: what is hidden.
+        seed: of everything random.
+        background: the robots; clean sets take turns.
+        factor: size of every effect.
+        name: the one cause or form of a set with one.
+        timestep_s: integration step [s].
+    """
+    rng = np.random.default_rng([seed, *f"plan {kind}".encode()])
+    drawn: Background = BACKGROUNDS[int(rng.choice(len(BACKGROUNDS), p=SHARES))]
+    payload = str(rng.choice(list(PAYLOADS)))
+    if kind == "clean":
+        drawn = BACKGROUNDS[seed // 2 % len(BACKGROUNDS)]
+        payload = PAYLOADS[(seed + seed // (2 * len(BACKGROUNDS))) % len(PAYLOADS)]
+    background = background or drawn
+    names = (name,) if name else _names(kind, seed, background, rng, factor or SIZES[0])
+    factors = tuple(factor or _size(one, background, rng) for one in names)
+    return SealedSet(kind, seed, background, names, factors, payload, timestep_s=timestep_s)
+
+
+def _names(
+    kind: Kind, seed: int, background: Background, rng: np.random.Generator, least: float
+) -> tuple[str, ...]:
+    if kind == "clean":
+        return ()
+    if kind == "pushes":
+        return ("pushes",)
+    several = {"pairs": 2, "triples": 3, "unlisted-pairs": 2}.get(kind, 1)
+    pools: dict[Kind, tuple[str, ...]] = {
+        "single": CATALOGUE, "left-out": CATALOGUE, "forms": OTHER, "unlisted": NOWHERE, "unlisted-pairs": NOWHERE,
+    }  # fmt: skip
+    found: list[str] = []
+    while len(found) < several:
+        # In sets of several, one in three has another form than the catalogue's.
+        pool = pools.get(kind) or (OTHER if rng.uniform() < 1.0 / 3.0 else CATALOGUE)
+        pool = possible(_in_turn(pool, seed + len(found)), background, least)
+        found.append(next(name for name in pool if family(name) not in [family(other) for other in found]))
+    return tuple(found)
+
+
+def _in_turn(pool: Sequence[str], seed: int) -> list[str]:
+    """The pool in an order in which successive seeds begin with every one once, then again in another order."""
+    turn, at = divmod(seed, len(pool))
+    order = np.random.default_rng([turn, *b"turn"]).permutation(len(pool))
+    return [pool[k] for k in np.roll(order, -at)]
+
+
+def _size(name: str, background: Background, rng: np.random.Generator) -> float:
+    low, high = SIZES[0], min(SIZES[1], largest(name, background))
+    return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+
+
+def generate(request: SealedSet) -> tuple[list[Recording], dict[str, Any]]:
+    """Draw what is hidden, simulate the trials, read them through the sensors: recordings, and the truth.
+
+    Raises:
+        TrialError: the physics of a trial cannot be trusted.
+    """
+    nominal = build_team(request.payload)
+    units = units_of(request.background, nominal.robots, request.rng("units"))
+    trajectories = request.schedule.trajectories(nominal, request.rng("trajectories"))
+    ground = Ground.of(nominal, trajectories)
+    hidden: list[Effect] = []
+    for k, (name, factor) in enumerate(zip(request.names, request.factors, strict=True)):
+        hidden += draw(name, factor, request.background, ground, request.rng(f"effect {k}"))
+    taken = [place for effect in hidden for place in _places(effect)]
+    background = [
+        effect
+        for effect in tolerated(request.background, nominal.robots, request.rng("background"))
+        if _place(effect) not in taken
+    ]
+    recordings = []
+    for number, trajectory in enumerate(trajectories, start=1):
+        scene = build_team(request.payload, units, request.timestep_s)
+        scene = apply_effects(scene, [*hidden, *background])
+        log = run_trial(scene, trajectory, trial_number=number)
+        noise = request.rng(f"sensors {number}")
+        recordings.append(measure(log, sensor_preset("nominal"), noise, name=f"trial {number}"))
+    truth = {
+        "mass_kg": GroundTruth.of(nominal).mass_kg,
+        "effects": [_told(effect) for effect in hidden],
+        "background": [effect_to_dict(effect) for effect in background],
+        "units": [unit.to_dict() for unit in units],
+        "gimbal_axes_1": gimbal_axes(nominal),
+    }
+    return recordings, truth
+
+
+def _places(effect: Effect) -> list[tuple[Any, ...]]:
+    """Cause and place of an effect, and of what is tolerated in its place."""
+    where = _place(effect)
+    if not isinstance(effect, Form):
+        return [where]
+    # MuJoCo has six joints between two bodies at most, so a grasp gives way in one form only.
+    instead = (
+        ("grasp_flex", "grasp_play") if effect.answer in ("grasp_flex", "grasp_play") else (effect.answer,)
+    )
+    return [where, *((cause, *where[1:]) for cause in instead)]
+
+
+def _place(effect: Effect) -> tuple[Any, ...]:
+    return effect.cause, *(getattr(effect, name) for name in effect.place_names())
+
+
+def _told(effect: Effect) -> dict[str, Any]:
+    """An effect with its right ``answer`` {cause, robot, joint, known}, and the ``law`` of an unlisted one."""
+    told = effect_to_dict(effect)
+    if isinstance(effect, Form):
+        cause, known, law = effect.answer, effect.known(), effect.law()
+    else:
+        cause, known, law = effect.cause, told["parameters"], None
+    answer = {"cause": cause, "robot": told.get("robot"), "joint": told.get("joint"), "known": known}
+    return told | {"form": isinstance(effect, Form), "answer": answer, "law": law}

@@ -1,0 +1,214 @@
+"""Wrenches on the payload that no catalogue has."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from hidden.draw import REACH_M
+from mocobot_sim.effects.base_creep import ARMATURE_KG, DAMPING_NS_PER_M, TOLERANCE
+from mocobot_sim.effects.slides import add_slides
+from mocobot_sim.effects.solver import precise
+from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.trial.actors import Actor, Stage
+from sealed.forms.base import Form, Place, direction, near, vector
+from sealed.forms.parts import PayloadWrench, PointForce
+from sealed.ground import Ground
+
+
+@dataclass(frozen=True)
+class _Force(Form):
+    """A force on a point of the payload, given in {1}, in a direction of robot 1's {b}."""
+
+    on_payload = True
+    along_x_m: float
+    along_y_m: float
+    along_z_m: float
+    point_x_m: float
+    point_y_m: float
+    point_z_m: float
+
+    @staticmethod
+    def where(ground: Ground, rng: np.random.Generator) -> dict[str, float]:
+        """Direction and point at random."""
+        return vector("along", "m", direction(rng)) | vector("point", "m", near(ground.p_1c, REACH_M, rng))
+
+    def _law(self, variables: list[str], formula: str, amplitude: float, unit: str) -> dict[str, Any]:
+        along = [self.along_x_m, self.along_y_m, self.along_z_m]
+        return {
+            "place": {}, "of": "force on the payload, in the world", "along": along, "variables": variables,
+            "formula": formula, "amplitude": amplitude, "unit": unit,
+        }  # fmt: skip
+
+    def force(self, time: float) -> float:
+        """Along its direction [N]."""
+        raise NotImplementedError
+
+    def actors(self, trial_number: int | None) -> Sequence[Actor]:
+        along = np.array([self.along_x_m, self.along_y_m, self.along_z_m])
+        point = np.array([self.point_x_m, self.point_y_m, self.point_z_m])
+        return [PointForce(lambda time: along * self.force(time), point)]
+
+
+@dataclass(frozen=True)
+class GrowingPush(_Force):
+    """It grows from nothing through every trial."""
+
+    size = "rate_Nps"
+    ranges: ClassVar = {"rate_Nps": (0.0, 10.0)}
+    rate_Nps: float = 0.0
+
+    @classmethod
+    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+        return cls(**cls.where(ground, rng), rate_Nps=size)
+
+    def law(self) -> dict[str, Any]:
+        return self._law(["t"], "a t", self.rate_Nps, "N/s")
+
+    def force(self, time: float) -> float:
+        return self.rate_Nps * time
+
+
+@dataclass(frozen=True)
+class Shaker(_Force):
+    """Something unbalanced that turns on the payload."""
+
+    size = "amplitude_N"
+    ranges: ClassVar = {"amplitude_N": (0.0, 1e3), "frequency_hz": (0.05, 200.0)}
+    amplitude_N: float = 0.0
+    frequency_hz: float = 1.0
+
+    @classmethod
+    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+        return cls(**cls.where(ground, rng), amplitude_N=size, frequency_hz=float(rng.uniform(0.9, 3.5)))
+
+    def law(self) -> dict[str, Any]:
+        return self._law(["t"], f"a sin(2 pi {self.frequency_hz:.4g} Hz t)", self.amplitude_N, "N")
+
+    def force(self, time: float) -> float:
+        return self.amplitude_N * math.sin(2.0 * np.pi * self.frequency_hz * time)
+
+
+@dataclass(frozen=True)
+class Gyroscope(Form):
+    """Something that spins in the payload: a moment omega x h, with h fixed in the payload."""
+
+    size = "spin_kgm2ps"
+    on_payload = True
+    ranges: ClassVar = {"spin_kgm2ps": (0.0, 1e3)}
+    spin_kgm2ps: float
+    along_x_m: float
+    along_y_m: float
+    along_z_m: float
+
+    @classmethod
+    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+        return cls(spin_kgm2ps=size, **vector("along", "m", direction(rng)))
+
+    def law(self) -> dict[str, Any]:
+        along = [self.along_x_m, self.along_y_m, self.along_z_m]
+        return {
+            "place": {}, "of": "moment on the payload", "along": along, "variables": ["payload's angular velocity"],
+            "formula": "-omega x h", "amplitude": self.spin_kgm2ps, "unit": "kg m^2/s",
+        }  # fmt: skip
+
+    def actors(self, trial_number: int | None) -> Sequence[Actor]:
+        spin = self.spin_kgm2ps * np.array([self.along_x_m, self.along_y_m, self.along_z_m])
+        # The payload turns by some degrees only, so its axes are the world's but for that.
+        return [PayloadWrench(lambda t, p, v, w: (np.zeros(3), -np.cross(w, spin)))]
+
+
+@dataclass(frozen=True)
+class ShiftingLoad(Form):
+    """A mass on a slow spring in the payload: it shifts sideways as the payload is tilted or hurried."""
+
+    size = "mass_kg"
+    on_payload = True
+    ranges: ClassVar = {"mass_kg": (0.0, 100.0), "frequency_hz": (0.1, 100.0)}
+    mass_kg: float
+    frequency_hz: float
+    heading_rad: float
+    point_x_m: float
+    point_y_m: float
+    point_z_m: float
+
+    @classmethod
+    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+        return cls(
+            mass_kg=size,
+            frequency_hz=float(rng.uniform(0.8, 1.6)),
+            heading_rad=float(rng.uniform(-np.pi, np.pi)),
+            **vector("point", "m", near(ground.p_1c, REACH_M, rng)),
+        )
+
+    def law(self) -> dict[str, Any]:
+        return {
+            "place": {}, "of": "force and moment on the payload", "variables": ["payload's tilt and acceleration"],
+            "along": [float(np.cos(self.heading_rad)), math.sin(self.heading_rad), 0.0],
+            "formula": f"mass that slides on a spring of {self.frequency_hz:.3g} Hz, damping ratio 0.7",
+            "amplitude": self.mass_kg, "unit": "kg",
+        }  # fmt: skip
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        payload = scene.root.find("body", "omnid1/payload/payload")
+        body = payload.add("body", name="load", pos=[self.point_x_m, self.point_y_m, self.point_z_m])
+        omega = 2.0 * np.pi * self.frequency_hz
+        body.add(
+            "joint", name="load", type="slide", axis=[np.cos(self.heading_rad), np.sin(self.heading_rad), 0.0],
+            stiffness=self.mass_kg * omega**2, damping=1.4 * self.mass_kg * omega, group=3,
+        )  # fmt: skip
+        body.add("inertial", pos=[0.0, 0.0, 0.0], mass=self.mass_kg, diaginertia=[1e-4 * self.mass_kg] * 3)
+        return scene
+
+
+@dataclass(frozen=True)
+class SinkingBase(Form):
+    """A base that sinks into the floor, fast at first, in every trial anew."""
+
+    size = "depth_m"
+    ranges: ClassVar = {"depth_m": (0.0, 0.1), "time_s": (0.1, 1e4)}
+    robot: int
+    depth_m: float
+    time_s: float
+
+    @classmethod
+    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+        return cls(**place, depth_m=size, time_s=float(rng.uniform(6.0, 20.0)))
+
+    def law(self) -> dict[str, Any]:
+        return {
+            "place": {"robot": self.robot}, "of": "displacement of the base, down", "variables": ["t"],
+            "formula": f"a (1 - exp(-t / {self.time_s:.3g} s))", "amplitude": self.depth_m, "unit": "m",
+        }  # fmt: skip
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+
+        precise(scene, TOLERANCE)
+        chassis = scene.root.find("body", f"omnid{self.robot}/chassis")
+        add_slides(chassis, "sink", "z", armature=ARMATURE_KG, damping=DAMPING_NS_PER_M, stiffness=1.0)
+        return scene
+
+    def actors(self, trial_number: int | None) -> Sequence[Actor]:
+        return [_Sinks(self)]
+
+
+class _Sinks:
+    """Pulls the slide as its damping asks for."""
+
+    def __init__(self, sinking: SinkingBase) -> None:
+        self._sinking = sinking
+
+    def start(self, stage: Stage) -> None:
+
+        sinking = self._sinking
+        self._data, self._dt = stage.data, 1.0 / stage.rate_hz
+        self._dof = int(stage.model.joint(f"omnid{sinking.robot}/sink_z").dofadr[0])
+        self._force = -DAMPING_NS_PER_M * sinking.depth_m / sinking.time_s
+
+    def act(self, tick: int) -> None:
+        decay = math.exp(-tick * self._dt / self._sinking.time_s)
+        self._data.qfrc_applied[self._dof] += self._force * decay

@@ -1,0 +1,72 @@
+"""A hypothesis: some causes at some places are there; how likely it is, and the fit that goes with it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+from discrepancy.inference.learn import Learnt, learnt
+from discrepancy.inference.prior import log_prior_odds
+from discrepancy.least_squares.fit import Fit
+from discrepancy.least_squares.problem import Problem
+from discrepancy.rig import Candidate, Rig
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """What is there, at its best.
+
+    Attributes:
+        learnt: its spreads and powers, and its evidence.
+        allowed: what a healthy one of a cause would explain, too, by the cause: not to its credit [nats].
+    """
+
+    learnt: Learnt
+    allowed: Mapping[int, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(
+        cls, problem: Problem, free: Sequence[int], allowed: Mapping[int, float] | None = None
+    ) -> Hypothesis:
+        """The hypothesis that some of a problem's candidates are there."""
+        return cls(learnt(problem, free), allowed or {})
+
+    @property
+    def problem(self) -> Problem:
+        """With its spreads and powers."""
+        return self.learnt.problem
+
+    @property
+    def free(self) -> tuple[int, ...]:
+        """Which of the problem's candidates are there."""
+        return self.learnt.free
+
+    @property
+    def causes(self) -> list[Candidate]:
+        """What is there."""
+        return [self.problem.candidates[i] for i in self.free]
+
+    @cached_property
+    def fit(self) -> Fit:
+        """The values with it."""
+        return Fit.of(self.problem, self.free)
+
+    @cached_property
+    def score(self) -> float:
+        """Log posterior probability, up to what all hypotheses have in common [nats]."""
+        odds = sum(log_prior_odds(self.problem, candidate) for candidate in self.causes)
+        return self.learnt.log_evidence + odds - sum(self.allowed[i] for i in self.free if i in self.allowed)
+
+    def without(self, index: int) -> Hypothesis:
+        """The hypothesis that one of the causes is not there."""
+        kept = [i for i in self.free if i != index]
+        keys = {self.problem.candidates[i].key for i in kept}
+        return Hypothesis.of(self.problem.without_unknowns(keys), kept, self.allowed)
+
+    def possible(self, rig: Rig, index: int) -> bool:
+        """Whether one of the causes has values that can be."""
+        candidate = self.problem.candidates[index]
+        values, covariance = self.fit.part(index)
+        units = candidate.units
+        return rig.possible(candidate, values * units, covariance * units[:, None] * units)

@@ -1,0 +1,181 @@
+"""What is not known beforehand: how much every kind scatters, how strong the noise is, how large what is hidden."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_solve, cholesky, get_lapack_funcs
+
+from discrepancy import rules
+from discrepancy.least_squares.problem import Problem
+from estimator.arrays import Array
+
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class Learnt:
+    """A hypothesis at its best: some candidates are there, and spreads and powers are as likely as can be.
+
+    Empirical Bayes: the marginal likelihood, in which all unknowns are integrated out, times the priors of spreads and
+    powers is maximal; found by MacKay's fixed point ("Bayesian interpolation", Neural Computation 4, 1992, eq. 2.22).
+
+    Attributes:
+        problem: with the spreads and powers.
+        free: candidates that are there; the spread of each is its own.
+        log_evidence: of all data, up to what all hypotheses have in common [nats].
+    """
+
+    problem: Problem
+    free: tuple[int, ...]
+    log_evidence: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Parts:
+    """The columns that are in a hypothesis.
+
+    Attributes:
+        grams: Gram matrices of every cell that has numbers, shape (K, used + 1, used + 1), the residual last.
+        sizes: numbers in every cell, shape (K,).
+        group: of every used column: -1 for shared unknowns, else the number of its spread.
+        least, most: spread that a group has at least and at most, shape (groups,).
+        weight: numbers that its prior counts for, shape (groups,).
+        own: which groups are spreads of free candidates.
+    """
+
+    grams: Array
+    sizes: Array
+    group: Indices
+    least: Array
+    most: Array
+    weight: Array
+    own: NDArray[np.bool_]
+
+
+def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN_ROUNDS) -> Learnt:
+    """Spreads, powers and evidence of a hypothesis.
+
+    Args:
+        problem: where to start; its powers and spreads should be near.
+        free: candidates that are there.
+        rounds: largest number of steps.
+    """
+    names, parts = _parts(problem, free)
+    power = np.concatenate([p[c.sizes > 0] for p, c in zip(problem.power, problem.cells, strict=True)])
+    start = np.array([np.sqrt(np.mean(problem.spread[at] ** 2)) for at in names])
+    spread = np.clip(start, parts.least, parts.most)
+    last = -np.inf
+    for _ in range(rounds):
+        evidence, power_next, spread_next = _step(parts, power, spread)
+        if evidence - last < rules.LEARN_NATS and np.isfinite(last):
+            break
+        last, power, spread = evidence, power_next, spread_next
+    evidence = _step(parts, power, spread)[0] - problem.price
+    found, at = [], 0
+    for old, cells in zip(problem.power, problem.cells, strict=True):
+        new, filled = np.array(old), cells.sizes > 0
+        new[filled] = power[at : at + int(filled.sum())]
+        found.append(new)
+        at += int(filled.sum())
+    spreads = np.array(problem.spread)
+    for where, value in zip(names, spread, strict=True):
+        spreads[where] = value
+    return Learnt(problem.with_noise(found, spreads), tuple(free), evidence)
+
+
+def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts]:
+    count = problem.shared + len(problem.tolerant)
+    group = np.full(count, -2)
+    group[: problem.shared] = -1
+    names: list[Indices] = []
+    least, most, weight, own = [], [], [], []
+    kinds: dict[str, list[int]] = {}
+    for index, candidate in enumerate(problem.candidates):
+        if index not in free and problem.has_tolerance(index):
+            kinds.setdefault(candidate.cause, []).append(index)
+    base: dict[str, int] = {}
+    for kind, members in kinds.items():
+        base[kind] = len(names)
+        at = np.concatenate([np.r_[problem.columns_of(i)] for i in members])
+        group[problem.shared + at] = len(names)
+        names.append(at)
+        least.append(1.0)
+        # One of a kind cannot scatter: it is off or not.
+        most.append(rules.MOST_SPREAD if len(members) > 1 else 1.0)
+        weight.append(rules.SPREAD_NUMBERS)
+        own.append(False)
+    for index in free:
+        at = np.r_[problem.columns_of(index)]
+        group[problem.shared + at] = len(names)
+        names.append(at)
+        least.append(
+            rules.LEAST_SLAB if problem.candidates[index].parameters[0].tolerance else rules.LEAST_SIZE
+        )
+        most.append(np.inf)
+        weight.append(0.0)
+        own.append(True)
+    used = np.flatnonzero(group > -2)
+    both = np.append(used, count)
+    grams = [
+        g[c.sizes > 0][:, both][:, :, both] for g, c in zip(problem.cell_grams, problem.cells, strict=True)
+    ]
+    sizes = [c.sizes[c.sizes > 0] for c in problem.cells]
+    parts = _Parts(
+        np.concatenate(grams), np.concatenate(sizes).astype(float), group[used], np.array(least), np.array(most),
+        np.array(weight), np.array(own, dtype=bool),
+    )  # fmt: skip
+    return names, parts
+
+
+def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Array]:
+    """Log evidence with its priors at given powers and spreads, and the next ones."""
+    gram = np.tensordot(1.0 / power, parts.grams, 1)
+    H, b, c = gram[:-1, :-1], gram[:-1, -1], gram[-1, -1]
+    shared = parts.group < 0
+    with np.errstate(divide="ignore"):
+        prior = np.where(shared, rules.FLAT_SHARE * np.diag(H), np.append(spread, 1.0)[parts.group] ** -2.0)
+    H = H + np.diag(np.maximum(prior, 1e-300))
+    scale = 1.0 / np.sqrt(np.diag(H))
+    factor = cholesky(H * np.outer(scale, scale), lower=True) if len(H) else H
+    solution = scale * cho_solve((factor, True), scale * b) if len(H) else b
+    (potri,) = get_lapack_funcs(("potri",), (factor,))
+    inverse = potri(factor, lower=1)[0] if len(H) else H
+    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    covariance = inverse * np.outer(scale, scale)
+    log_det = 2.0 * float(np.sum(np.log(np.diag(factor)) - np.log(scale)))
+    numbers = np.bincount(parts.group[~shared], minlength=len(spread)).astype(float)
+    evidence = -0.5 * (float(c - b @ solution) + log_det) - float(
+        numbers @ np.log(np.maximum(spread, 1e-300))
+    )
+    evidence -= 0.5 * float(parts.sizes @ np.log(power))
+    evidence -= 0.5 * rules.POWER_NUMBERS * float(np.sum(np.log(power) + 1.0 / power - 1.0))
+    evidence -= 0.5 * float(parts.weight @ (2.0 * np.log(spread) + spread**-2.0 - 1.0))
+    # Next powers: what is left over the numbers that are not spent on unknowns.
+    x = np.append(-solution, 1.0)
+    left = np.einsum("i,kij,j->k", x, parts.grams, x, optimize=True)
+    spent = np.einsum("kij,ij->k", parts.grams[:, :-1, :-1], covariance, optimize=True) / power
+    power_next = (left + rules.POWER_NUMBERS) / (np.maximum(parts.sizes - spent, 1.0) + rules.POWER_NUMBERS)
+    # Next spreads: squares over the numbers that the data determine.
+    squares = np.bincount(parts.group[~shared], solution[~shared] ** 2, minlength=len(spread))
+    variance = np.bincount(parts.group[~shared], np.diag(covariance)[~shared], minlength=len(spread))
+    told = np.clip(numbers - variance / spread**2, 1e-6, None)
+    spread_next = np.sqrt((squares + parts.weight) / (told + parts.weight))
+    return evidence, np.maximum(power_next, rules.LEAST_POWER), np.clip(spread_next, parts.least, parts.most)
+
+
+def worth_a_spread(one: Learnt, kind: str) -> float:
+    """By how many nats the data want a kind to scatter more than its tolerance; 0 where they do not."""
+    problem = one.problem
+    spread = np.array(problem.spread)
+    for index, candidate in enumerate(problem.candidates):
+        if candidate.cause == kind and index not in one.free and problem.has_tolerance(index):
+            spread[problem.columns_of(index)] = 1.0
+    held = replace(problem, spread=spread)
+    names, parts = _parts(held, one.free)
+    power = np.concatenate([p[c.sizes > 0] for p, c in zip(held.power, held.cells, strict=True)])
+    values = np.array([np.sqrt(np.mean(spread[at] ** 2)) for at in names])
+    return one.log_evidence + held.price - _step(parts, power, values)[0]

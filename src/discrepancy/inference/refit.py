@@ -1,0 +1,47 @@
+"""Exact residuals for a hypothesis: columns are slopes, and what is there may be far from nought."""
+
+import numpy as np
+
+from discrepancy import rules
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.rig import Rig
+
+
+def exact(
+    rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis, rounds: int = rules.REFIT_ROUNDS
+) -> Hypothesis:
+    """The hypothesis with exact residuals: Gauss-Newton on causes and unknowns until the values have settled.
+
+    Unknowns are moved as far as the causes move them. What they share with tolerances stays linear on both sides: moved
+    alone, without the tolerances that make up for it, they would be far from where the data are.
+
+    Args:
+        rig: the rig.
+        hypothesis: what is there.
+        nothing: the hypothesis that nothing is.
+        rounds: largest number of steps.
+    """
+    own, trials = rig.local_unknowns, hypothesis.problem.trials
+    start = [nothing.fit.local(t)[:own] for t in trials]
+    for _ in range(rounds):
+        fit = hypothesis.fit
+        shared = fit.shared - nothing.fit.shared
+        local = [fit.local(t)[:own] - there for t, there in zip(trials, start, strict=True)]
+        residual = rig.residual(-shared, [-x for x in local], fit.active)
+        # The problem counts total values, so what its columns stand for is added back.
+        back = []
+        for t, total in zip(trials, residual, strict=True):
+            raw = fit.problem.raw[t]
+            total = total + raw[..., : fit.problem.shared] @ shared
+            total += fit.problem.local[t][..., :own] @ local[t]
+            for i in hypothesis.free:
+                total += raw[..., fit.problem.spans[i]] @ fit.part(i)[0]
+            back.append(total)
+        new = Hypothesis.of(fit.problem.with_residual(back), hypothesis.free, hypothesis.allowed)
+        if new.learnt.log_evidence < hypothesis.learnt.log_evidence - rules.DIVERGED_NATS:
+            break  # it diverges: the linear answer is the better one
+        moved = np.abs(new.fit.solution - fit.solution) / np.sqrt(np.diag(new.fit.covariance))
+        hypothesis = new
+        if moved.max(initial=0.0) < rules.SETTLED_SE:
+            break
+    return hypothesis

@@ -1,0 +1,84 @@
+"""What each candidate that is not in a hypothesis would add to its evidence, at the powers and spreads it has."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from discrepancy import rules
+from discrepancy.inference.prior import log_prior_odds
+from discrepancy.least_squares.fit import Fit
+from discrepancy.rig import Candidate
+from estimator.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Scanned:
+    """A candidate's first judgement.
+
+    Attributes:
+        index: which of the problem's; None for an event that is not among them.
+        candidate: itself, in its shape.
+        score: log odds that it is there [nats].
+        columns: of an event or a shape that is not the problem's, else None.
+    """
+
+    index: int | None
+    candidate: Candidate
+    score: float
+    columns: tuple[Array, ...] | None = None
+
+
+def scan(fit: Fit, barred: Sequence[tuple[object, ...]] = ()) -> list[Scanned]:
+    """Every candidate of the problem that is not free, the best first."""
+    found = []
+    for index, candidate in enumerate(fit.problem.candidates):
+        if index in fit.free or candidate.key in barred:
+            continue
+        found.append(Scanned(index, candidate, score_of(fit, index)))
+    return sorted(found, key=lambda item: -item.score)
+
+
+def score_of(fit: Fit, index: int) -> float:
+    """Log odds that a candidate of the problem is there rather than within its tolerance."""
+    problem, candidate = fit.problem, fit.problem.candidates[index]
+    spike = float(problem.spread[problem.columns_of(index)][0]) if problem.has_tolerance(index) else 0.0
+    return log_bayes_factor(*fit.told(index), spike) + log_prior_odds(problem, candidate)
+
+
+def score_with(fit: Fit, candidate: Candidate, columns: Sequence[Array], spike: float = 0.0) -> float:
+    """The same of a candidate that is not in the model, with columns in its own units, shape (n, C, k) per trial."""
+    told = fit.told_by([new * candidate.units for new in columns])
+    return log_bayes_factor(*told, spike) + log_prior_odds(fit.problem, candidate)
+
+
+def log_bayes_factor(information: Array, score: Array, spike: float) -> float:
+    """Of values that are normal with the best of some spreads, over values that are normal with the spread ``spike``.
+
+    Args:
+        information: about the values given all else, without their own prior, shape (k, k).
+        score: its score vector, shape (k,).
+        spike: spread of a healthy one; 0 where it has none.
+    """
+    lam, z = _visible(information, score)
+    if not len(lam):
+        return -np.inf
+    best = np.sqrt(np.mean((z / lam) ** 2))
+    slabs = best * 2.0 ** np.arange(-2.0, 2.5)
+    if spike > 0:
+        slabs = np.maximum(slabs, rules.LEAST_SLAB * spike)
+    return max(_log_evidence(lam, z, slab) for slab in slabs) - _log_evidence(lam, z, spike)
+
+
+def _visible(information: Array, score: Array) -> tuple[Array, Array]:
+    """Information along the directions that the data see, and the score along them."""
+    eigenvalues, vectors = np.linalg.eigh(information)
+    keep = eigenvalues > rules.LEAST_INFORMATION
+    return eigenvalues[keep], vectors[:, keep].T @ score
+
+
+def _log_evidence(lam: Array, z: Array, spread: float) -> float:
+    with_prior = 1.0 + lam * spread**2
+    return float(0.5 * np.sum(z**2 * spread**2 / with_prior - np.log(with_prior)))

@@ -1,0 +1,122 @@
+"""The likeliest hypothesis: causes are added, exchanged and taken away while that makes it likelier."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from discrepancy import rules
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.probability import probability
+from discrepancy.inference.propose import proposals
+from discrepancy.inference.refit import exact
+from discrepancy.inference.remainder import nats_left, share_left
+from discrepancy.least_squares.problem import Problem
+from discrepancy.rig import Candidate, Rig
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """What could be there instead of a cause.
+
+    Attributes:
+        candidate: the other; None for nothing at all in its place.
+        gap: by how much the cause is likelier [nats].
+    """
+
+    candidate: Candidate | None
+    gap: float
+
+
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """The likeliest hypothesis found.
+
+    Attributes:
+        nothing: the hypothesis that nothing is there beyond its kind's spread.
+        best: the likeliest.
+        rivals: of every cause of the best, the likeliest first.
+        rig: the rig, linear around where the search found it.
+    """
+
+    rig: Rig
+    nothing: Hypothesis
+    best: Hypothesis
+    rivals: tuple[tuple[Rival, ...], ...]
+
+
+def search(
+    rig: Rig, most: int = rules.MOST_CAUSES, progress: Callable[[str], object] | None = None
+) -> Searched:
+    """Find what is most probably there.
+
+    Args:
+        rig: the rig.
+        most: largest number of causes.
+        progress: called with what is being done.
+    """
+    say = progress or (lambda what: None)
+    rig, nothing = _based(rig, say)
+    say("scan")
+    best = nothing
+    rivals: dict[int, list[Rival]] = {}
+    doubtful = 0
+    while len(best.free) < most and doubtful < rules.DOUBTFUL:
+        added = next(iter(proposals(rig, best)), None)
+        if added is None or added.score - best.score < rules.NAMED_NATS:
+            break
+        say(f"refit {added.causes[-1].label}")
+        little = added.score - best.score < rules.LITTLE_SHARE * nats_left(best)
+        best, rivals = _settled(rig, exact(rig, added, nothing), nothing)
+        last = best.free[-1] if best.free else None
+        likely = last is None or _law_holds(rig, best, last)
+        doubtful = doubtful + 1 if little and not likely else 0
+    return Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free))
+
+
+def _law_holds(rig: Rig, hypothesis: Hypothesis, index: int) -> bool:
+    """Whether a cause is likelier than something unlisted that looks like it."""
+    share = rig.law_share(hypothesis.problem.candidates[index])
+    return probability([], share_left(hypothesis, index), share) >= rules.LEAST_PROBABILITY
+
+
+def _based(rig: Rig, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
+    """The rig linear around where it is, and the hypothesis that nothing is there beyond its kind's spread."""
+    nothing = _nothing(rig, say)
+    for _ in range(rules.BASE_ROUNDS - 1):
+        moved = rig.relinearised(nothing)
+        if moved is None:
+            break
+        say("linearise")
+        rig, nothing = moved, _nothing(moved, say)
+    return rig, nothing
+
+
+def _nothing(rig: Rig, say: Callable[[str], object]) -> Hypothesis:
+    say("columns")
+    candidates = rig.candidates()
+    return Hypothesis.of(Problem.of(rig.rows(candidates), candidates), ())
+
+
+def _settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis, dict[int, list[Rival]]]:
+    """Exchange and take away causes until none is likelier, and what could be there instead of each."""
+    rivals: dict[int, list[Rival]] = {}
+    for _ in range(rules.EXCHANGES):
+        changed = False
+        for index in best.free:
+            less = best.without(index)
+            if best.score - less.score < rules.NAMED_NATS:
+                best, changed = exact(rig, less, nothing), True
+                break
+            candidate = best.problem.candidates[index]
+            others = proposals(rig, less, [candidate.key], events=candidate.transient is None)
+            rivals[index] = [Rival(h.causes[-1], best.score - h.score) for h in others]
+            rivals[index].append(Rival(None, best.score - less.score))
+            if others and others[0].score > best.score:
+                other = exact(rig, others[0], nothing)
+                if other.score > best.score:
+                    best, changed = other, True
+                    break
+        if not changed:
+            break
+    return best, rivals

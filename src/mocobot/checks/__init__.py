@@ -1,0 +1,1 @@
+"""What every command can refuse before it loads numpy, MuJoCo or anything else that takes time: a module for each."""

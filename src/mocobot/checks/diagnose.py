@@ -1,0 +1,50 @@
+"""What ``mocobot diagnose`` refuses at once."""
+
+from pathlib import Path
+
+from estimator.errors import InputError
+from mocobot.files.targets import calibration_file, check_folder, check_recordings, check_there, map_file
+from mocobot.options import Diagnose
+
+
+def check(options: Diagnose) -> None:
+    """Everything that can be refused before a recording is read, but for the names of causes.
+
+    Raises:
+        InputError: an option or an output that cannot be met, or a missing file.
+    """
+    if not options.rec and options.exclude:
+        raise InputError("no recording given; name them before --exclude")
+    if options.jobs < 1:
+        raise InputError(f"jobs is {options.jobs}; it must be at least 1")
+    check_recordings(options.rec)
+    if options.out is not None:
+        inputs = [*options.rec, *([options.tolerances] if options.tolerances else []), *map_file(options.map)]
+        inputs += calibration_file(options.calibration)
+        check_folder(options.out, inputs, _is_diagnosis, "an earlier diagnosis", force=options.force)
+    _check_rig(options)
+    check_there(options.rec)
+
+
+def _check_rig(options: Diagnose) -> None:
+    if options.rig == "emps" and options.map is not None:
+        raise InputError("--map is for logs of a team; the emps rig reads its benchmark's MAT file")
+    if options.rig == "emps" and options.calibration is not None:
+        raise InputError("--calibration is of a team's robots; the emps rig has none")
+    if options.rig == "team":
+        for path in options.rec:
+            if path.suffix == ".mat":
+                raise InputError(f"{path}: is a MAT file; --rig emps reads those of the EMPS benchmark")
+    elif len(options.rec) > 1:
+        raise InputError(
+            f"{len(options.rec)} recordings are given; the emps rig takes one and cuts it into blocks that validate "
+            "each other"
+        )
+
+
+def _is_diagnosis(folder: Path) -> bool:
+    from discrepancy.result.diagnosed import (
+        is_diagnosis,  # all of it, which is of no use where there is no folder
+    )
+
+    return is_diagnosis(folder)

@@ -1,0 +1,15 @@
+"""What ``mocobot map`` refuses at once."""
+
+from mocobot.files.targets import check_output, check_there
+from mocobot.options import Map
+
+
+def check(options: Map) -> None:
+    """Everything that can be refused before the log is read.
+
+    Raises:
+        InputError: an output that cannot be written, or a missing file.
+    """
+    if options.out is not None:
+        check_output(options.out, [options.log], force=options.force)
+    check_there([options.log])

@@ -1,0 +1,77 @@
+"""What ``mocobot simulate`` refuses at once."""
+
+import re
+from pathlib import Path
+from typing import get_args
+
+from estimator.errors import InputError
+from mocobot.api.fits import check_fits
+from mocobot.files.targets import check_folder, check_output
+from mocobot.options import Simulate
+from mocobot.options.simulation import Kind
+from mocobot_sim.scene.model_files import payload_path
+from mocobot_sim.trial.sidecar import truth_path
+
+KINDS = get_args(Kind)
+OURS = re.compile(rf"trial\d+_({'|'.join(KINDS)})\.(parquet|truth\.json)")
+"""Files in the folder of several trials."""
+
+
+def check(options: Simulate) -> None:
+    """Everything that can be refused before a team is built, but for the effects' numbers.
+
+    Raises:
+        InputError: an option or an output that cannot be met.
+    """
+    kinds = kinds_of(options)
+    given = Path(options.payload or "")
+    inputs = [*([given] if given.is_file() else []), *([options.units] if options.units else [])]
+    if options.out is not None:
+        check_output(options.out, inputs, force=options.force, suffix=".parquet")
+        check_output(truth_path(options.out), inputs, force=options.force)
+    elif options.out_dir is not None:
+        check_folder(options.out_dir, inputs, _is_ours, "an earlier simulation", force=options.force)
+    check_fits("--vias", options.vias, ("random", "free"), kinds)
+    check_fits("--duration", options.duration, ("periodic",), kinds)
+    check_fits("--robots", options.robots, ("free",), kinds)
+    for one, other, why in (
+        ("payload", "robots", "a payload says how many robots there are"),
+        ("payload", "model", "the model has its own payload, so leave one out"),
+        ("units", "model", "the model has robots of its own, so leave one out"),
+    ):
+        if getattr(options, one) is not None and getattr(options, other) is not None:
+            raise InputError(f"--{one} and --{other} are both given; {why}")
+    if options.payload is not None and given.suffix != ".xml":
+        payload_path(options.payload)
+
+
+def kinds_of(options: Simulate) -> list[str]:
+    """Kind of every trial.
+
+    Raises:
+        InputError: neither one trial is named nor several, or one of no known kind.
+    """
+    if options.trials is None:
+        if options.out is None:
+            raise InputError(
+                "--out REC.parquet, or --trials with --out-dir DIR, must be given; see mocobot simulate --help"
+            )
+        if options.out_dir is not None:
+            raise InputError(
+                "--out-dir is for several trials; name their kinds with --trials, or leave it out"
+            )
+        return [options.trajectory]
+    if options.out is not None or options.out_dir is None:
+        raise InputError("--trials needs --out-dir DIR, a folder for its recordings, in place of --out")
+    kinds = options.trials.split(",")
+    for kind in kinds:
+        if kind not in KINDS:
+            raise InputError(
+                f"--trials is {options.trials!r}; it must be a list such as random,random,periodic,static of "
+                f"{', '.join(KINDS)}"
+            )
+    return kinds
+
+
+def _is_ours(folder: Path) -> bool:
+    return all(path.is_file() and OURS.fullmatch(path.name) for path in folder.iterdir())

@@ -1,0 +1,110 @@
+"""Processes on other machines: joblib's work goes to a Dask scheduler while a block runs."""
+
+import os
+import platform
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from estimator.errors import InputError
+
+INSTALL = "pip install 'mocobot[cluster]'"
+REACH_S, WORKERS_S = 20.0, 120.0
+"""How long a scheduler is looked for, and its first worker waited for."""
+
+
+@contextmanager
+def workers_of(scheduler: str | None) -> Iterator[None]:
+    """A block in which ``joblib.Parallel`` runs on the workers of a scheduler; as ever without one.
+
+    What a lost worker had to do is done by another. Workers must have the same versions of everything that numbers pass
+    through, and one thread each, so that the same seeds give the same bits on any number of them.
+
+    Args:
+        scheduler: its address (``tcp://host:8786``), or the path of its scheduler file; None for no cluster.
+
+    Raises:
+        InputError: dask.distributed is not installed, the scheduler cannot be reached, has no workers, or workers of
+            other versions, it is lost, or a task ends every worker that tries it.
+    """
+    if scheduler is None:
+        yield
+        return
+    try:
+        from distributed import CancelledError, Client, KilledWorker
+        from distributed.comm.core import CommClosedError
+        from joblib._dask import DaskDistributedBackend  # which "dask" stands for; it has no public name
+    except ImportError as error:
+        raise InputError(
+            f"--scheduler needs dask.distributed, which is not installed; get it with: {INSTALL}"
+        ) from error
+    from joblib import parallel_config
+
+    class Workers(DaskDistributedBackend):
+        """Sends work away even where one worker is left: joblib would do it in this process then."""
+
+        def effective_n_jobs(self, n_jobs: int) -> int:
+            return max(2, super().effective_n_jobs(n_jobs))
+
+    is_file = "://" not in scheduler
+    if is_file and not Path(scheduler).is_file():
+        raise InputError(
+            f"--scheduler is {scheduler!r}; it must be an address such as tcp://host:8786, or a scheduler file"
+        )
+    place: dict[str, str] = {"scheduler_file" if is_file else "address": scheduler}
+    try:
+        client = Client(**place, timeout=REACH_S, set_as_default=True)
+    except (OSError, ValueError, TypeError) as error:  # a time that ran out is an OSError
+        raise InputError(f"scheduler {scheduler}: cannot be reached ({_line(error)})") from error
+    with client:
+        _check_workers(client, scheduler)
+        try:
+            with parallel_config(backend=Workers(client=client)):
+                yield
+        except KilledWorker as error:
+            raise InputError(
+                f"scheduler {scheduler}: a task ended every worker that tried it; they may be short of memory "
+                f"({_line(error)})"
+            ) from error
+        except (CommClosedError, CancelledError) as error:
+            raise InputError(
+                f"scheduler {scheduler}: it, or data on a worker, was lost ({_line(error)})"
+            ) from error
+
+
+def _check_workers(client: Any, scheduler: str) -> None:
+    try:
+        client.wait_for_workers(1, timeout=WORKERS_S)
+    except TimeoutError as error:
+        raise InputError(f"scheduler {scheduler}: has no workers, after {WORKERS_S:g} s") from error
+    threads = {
+        name: worker["nthreads"] for name, worker in client.scheduler_info(n_workers=-1)["workers"].items()
+    }
+    for name, count in threads.items():
+        if count != 1:
+            raise InputError(f"worker {name} has {count} threads; start workers with --nthreads 1")
+    here = versions()
+    for name, there in client.run(versions, on_error="return").items():
+        if not isinstance(there, Mapping):
+            raise InputError(f"worker {name}: mocobot cannot be loaded there ({_line(there)})")
+        for what, version in here.items():
+            if there.get(what) != version:
+                raise InputError(f"worker {name} has {what} {there.get(what)}; it must be {version}, as here")
+
+
+def versions() -> dict[str, str]:
+    """What must be the same on every machine."""
+    from mocobot.files.provenance import PACKAGES, version_of
+    from mocobot.files.resume import code_digest
+
+    found = {name: version_of(name) or "none" for name in PACKAGES}
+    return found | {
+        "python": platform.python_version(),
+        "mocobot": code_digest()[:12],
+        "OPENBLAS_NUM_THREADS": os.environ.get("OPENBLAS_NUM_THREADS", "none"),
+    }
+
+
+def _line(error: object) -> str:
+    return " ".join(str(error).split())[:200]

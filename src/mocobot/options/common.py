@@ -1,0 +1,23 @@
+"""Options that several commands have."""
+
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+Flag = Annotated[bool, tyro.conf.FlagCreatePairsOff]
+Force = Annotated[Flag, tyro.conf.arg(help="Replace what exists there; nothing is overwritten without it.")]
+Scheduler = Annotated[
+    str | None,
+    tyro.conf.arg(
+        metavar="tcp://HOST:PORT|FILE",
+        help="Run on the workers of a Dask scheduler, by its address or its scheduler file (docs/commands/cluster.md).",
+    ),
+]
+Calibrated = Annotated[
+    Path | None,
+    tyro.conf.arg(
+        metavar="CALIBRATION.json",
+        help="The robots as `mocobot calibrate` found them, in place of what the recordings say of them.",
+    ),
+]

@@ -1,0 +1,40 @@
+"""Something elastic that ties the payload to the room."""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from mocobot_sim.effects.base import Effect
+from mocobot_sim.scene.scene import TeamScene
+
+
+@dataclass(frozen=True)
+class PayloadTether(Effect):
+    """A spring of rest length zero from a point of the payload, given in {1}, to a fixed point.
+
+    A spatial tendon like that of ``Tether``. The anchor is given in robot 1's {b} as its floor mount has it [m].
+    """
+
+    on_payload = True
+    ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4)}
+    stiffness_N_per_m: float
+    anchor_x_m: float
+    anchor_y_m: float
+    anchor_z_m: float
+    point_x_m: float
+    point_y_m: float
+    point_z_m: float
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        if not self.stiffness_N_per_m:
+            return scene
+        at, root = scene.X_Wb[0].apply([self.anchor_x_m, self.anchor_y_m, self.anchor_z_m]), scene.root
+        point = [self.point_x_m, self.point_y_m, self.point_z_m]
+        name, payload = "payload_tether", root.find("body", "omnid1/payload/payload")
+        site = payload.add("site", name=name, pos=point, group=4, size=[0.006])
+        anchor = root.worldbody.add("site", name=name, pos=at, group=4, size=[0.006])
+        tendon = root.tendon.add(
+            "spatial", name=name, stiffness=self.stiffness_N_per_m, springlength=[0.0, 0.0], width=0.002
+        )
+        tendon.add("site", site=site)
+        tendon.add("site", site=anchor)
+        return scene

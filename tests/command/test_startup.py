@@ -1,0 +1,95 @@
+"""What is refused costs no imports, and machine code is kept where an installation cannot be written."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from mocobot.cli import COMMANDS, UNCHECKED
+from mocobot.options.simulation import Kind
+
+ROOT = Path(__file__).resolve().parents[2]
+SLOW = {"numpy", "scipy", "pyarrow", "mujoco", "dm_control", "numba", "matplotlib", "plotly", "joblib"}
+REFUSED = {
+    "watch": "watch none.parquet",
+    "paper": "paper --payload z",
+    "estimate": "estimate none.parquet",
+    "calibrate": "calibrate none.parquet",
+    "diagnose": "diagnose none.parquet",
+    "convert": "convert none.csv rec.parquet",
+    "map": "map none.csv",
+    "replay": "replay none.parquet --save rec.rrd",
+    "inspect": "inspect none.csv",
+    "report": "report none",
+    "compare": "compare none.json none.json",
+    "simulate": "simulate --payload z --out rec.parquet",
+}
+"""A mistake of every command that refuses something at once."""
+
+
+def test_every_command_refuses_something_at_once() -> None:
+    assert set(REFUSED) == set(COMMANDS) - UNCHECKED
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_refusal_loads_nothing_that_takes_time(name: str, tmp_path: Path) -> None:
+    code = (
+        "import sys, mocobot.cli\n"
+        f"try: mocobot.cli.main({REFUSED[name].split()!r})\n"
+        "except SystemExit as stop: assert stop.code == 2, stop.code\n"
+        "else: raise AssertionError('not refused')\n"
+        f"assert not {SLOW!r} & set(sys.modules), {SLOW!r} & set(sys.modules)\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.startswith("mocobot: ")
+    assert "there is no such" in done.stderr or "does not exist" in done.stderr
+
+
+def test_kinds_of_trials_are_those_of_recordings() -> None:
+    from typing import get_args
+
+    from estimator.recording.metadata import TRIALS
+
+    assert get_args(Kind) == tuple(TRIALS)
+
+
+def test_simulating_needs_numba_only_when_it_runs() -> None:
+    code = (
+        "import sys, mocobot\nmocobot.simulate\n"
+        "assert not {'numba', 'matplotlib'} & set(sys.modules)\n"
+        "mocobot.build_team('b'); assert 'numba' not in sys.modules\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
+
+
+CODE = (
+    "from mocobot_sim.base.drive_kernel import update_drives\n"
+    "kept = getattr(update_drives._cache, '_impl', None)\n"
+    "print(kept.locator.get_cache_path() if kept else 'nowhere')\n"
+)
+
+
+@pytest.mark.parametrize("home", [True, False])
+def test_machine_code_goes_to_the_users_cache(tmp_path: Path, home: bool) -> None:
+    """Where nothing can be put beside the source; without such a folder either it is compiled, and not kept."""
+    site, cache = tmp_path / "site", tmp_path / "cache"
+    for package in ("mocobot_sim", "estimator"):
+        shutil.copytree(ROOT / "src" / package, site / package, ignore=shutil.ignore_patterns("__pycache__"))
+    for place in (site / "mocobot_sim" / "base" / "__pycache__", *([] if home else [cache])):
+        place.touch()  # a file is in the way, whoever runs the test
+    done = subprocess.run(
+        [sys.executable, "-B", "-c", CODE],
+        env=os.environ | {"PYTHONPATH": str(site), "XDG_CACHE_HOME": str(cache), "NUMBA_CACHE_DIR": ""},
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    kept = done.stdout.strip()
+    assert kept.startswith(str(cache)) if home else kept == "nowhere"

@@ -1,0 +1,224 @@
+"""Sets of the sealed campaign and their scores."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discrepancy.team.causes import CAUSES
+from hidden.schedule import Schedule
+from mocobot_sim.effects import EFFECTS
+from sealed import store
+from sealed.backgrounds import BACKGROUNDS, limit_over_nominal, tolerated
+from sealed.draw import CATALOGUE, NOWHERE, OTHER, family, largest
+from sealed.limits import LIMITS
+from sealed.registry import FORMS, LISTED, UNLISTED
+from sealed.score import score
+from sealed.sets import KINDS, plan
+from sealed.tables import interval, misses, tables
+
+TINY = Schedule(randoms=1, vias=1, periodic_s=None, hold_s=None)
+
+
+def test_there_are_enough_forms_and_each_has_an_answer_or_a_law():
+    assert len(UNLISTED) >= 14
+    assert all(form.answer is not None for form in LISTED)
+    assert all(form.answer is None for form in UNLISTED)
+    assert set(LIMITS) == set(FORMS)
+    assert not set(FORMS) & set(EFFECTS)
+    assert {form.answer for form in LISTED} - set(CAUSES) == {"payload_mass"}  # listed one day
+
+
+def test_successive_seeds_hide_every_cause_once():
+    for kind, pool in (("single", CATALOGUE), ("forms", OTHER), ("unlisted", NOWHERE)):
+        first = len(pool) * 3
+        names = [plan(kind, seed, "x1").names[0] for seed in range(first, first + len(pool))]
+        assert sorted(names) == sorted(pool), kind
+
+
+def test_plans_keep_to_what_can_be_hidden():
+    for seed in range(60):
+        for kind in KINDS:
+            request = plan(kind, seed)
+            assert request == plan(kind, seed)
+            assert len({family(name) for name in request.names if name != "pushes"}) == len(
+                [name for name in request.names if name != "pushes"]
+            )
+            for name, factor in zip(request.names, request.factors, strict=True):
+                assert 2.0 <= factor <= 20.0
+                assert factor <= largest(name, request.background)
+
+
+def test_limits_follow_the_background():
+    """A zero is limited by its tolerance, a slosh by noise alone."""
+    assert [limit_over_nominal("phi_zero", b) for b in BACKGROUNDS] == pytest.approx(
+        [1, 2.86, 9.4, 1], rel=0.05
+    )
+    assert [limit_over_nominal("slosh", b) for b in BACKGROUNDS] == [1.0] * 4
+
+
+def test_a_wider_background_has_the_same_draws():
+    one, ten = (tolerated(b, 3, np.random.default_rng(5)) for b in ("x1", "x10"))
+    assert [type(effect) for effect in one] == [type(effect) for effect in ten]
+    zeros = [[e.zero_rad for e in team if e.cause == "phi_zero"] for team in (one, ten)]
+    np.testing.assert_allclose(zeros[1], 10.0 * np.array(zeros[0]), rtol=1e-12)
+    spread = tolerated("uncalibrated", 3, np.random.default_rng(5))
+    assert not {effect.cause for effect in spread} & {
+        "phi_zero",
+        "theta_zero",
+        "link_length",
+        "sea_scale",
+        "sea_bias",
+    }
+
+
+@pytest.mark.slow
+def test_same_seed_same_bits(tmp_path):
+    """Recordings and truth, of a team with everything a little off and an effect of another form."""
+    request = replace(plan("forms", 3, "x3", 4.0, "driven_lugre"), schedule=TINY)
+    truths = [store.simulate(request, tmp_path / name) for name in "ab"]
+    assert truths[0] == truths[1] == store.truth_of(request, tmp_path / "a")
+    files = [store.recordings_of(request, tmp_path / name) for name in "ab"]
+    assert len(files[0]) == 1
+    assert [f.read_bytes() for f in files[0]] == [f.read_bytes() for f in files[1]]
+    assert store.kept(tmp_path / "a") == [request]
+    other = store.simulate(replace(request, seed=4), tmp_path / "c")
+    assert other["background"] != truths[0]["background"]
+    (effect,) = truths[0]["effects"]
+    assert effect["answer"]["cause"] == "joint_friction"
+    assert effect["form"] is True
+
+
+def _effect(cause="joint_friction", robot=2, joint=1, **known):
+    known = known or {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.02}
+    answer = {"cause": cause, "robot": robot, "joint": joint, "known": known}
+    return {
+        "cause": cause,
+        "robot": robot,
+        "joint": joint,
+        "parameters": known,
+        "answer": answer,
+        "law": None,
+    }
+
+
+def _named(cause="joint_friction", robot=2, joint=1, probability=None, alternatives=(), **values):
+    values = values or {"coulomb_Nm": (0.051, 0.001), "viscous_Nms_per_rad": (0.02, 0.002)}
+    parameters = {name: {"value": value, "se": se} for name, (value, se) in values.items()}
+    return {
+        "cause": cause, "family": CAUSES[cause].family, "robot": robot, "joint": joint, "parameters": parameters,
+        "alternatives": list(alternatives), **({} if probability is None else {"probability": probability}),
+    }  # fmt: skip
+
+
+def _result(effects, named, verdict="explained", kind="single", factor=4.0, names=None, background="x1"):
+    names = [effect["cause"] for effect in effects] if names is None else names
+    return {
+        "key": f"1_{kind}", "engine": "e", "error": None,
+        "set": {"kind": kind, "names": names, "factors": [factor] * len(names), "background": background},
+        "verdict": {
+            "verdict": verdict, "causes": named, "cpu_s": 10.0, "peak_gb": 0.5, "residual": {"chi2_per_n": 1.0}
+        },
+        "truth": {"effects": effects, "gimbal_axes_1": np.tile(np.eye(3), (3, 1, 1)).tolist()},
+    }  # fmt: skip
+
+
+def test_a_right_cause_is_right_and_its_error_is_counted():
+    scored = score(_result([_effect()], [_named(probability=0.95)]))
+    (one,) = scored.scores
+    assert one.right
+    assert scored.whole
+    assert one.error == pytest.approx(0.02)
+    np.testing.assert_allclose(one.deviations, [1.0, 0.0], atol=1e-9)
+    assert scored.stated == ((0.95, True),)
+
+
+@pytest.mark.parametrize(
+    ("named", "family", "member", "place"),
+    [
+        (_named(joint=2), True, True, False),
+        (_named("sea_hysteresis", probability=0.6), True, False, False),
+        (_named("sea_bias"), False, False, False),
+        (
+            _named(
+                "sea_hysteresis",
+                alternatives=[{"cause": "joint_friction", "robot": 2, "joint": 1, "ambiguous": True}],
+            ),
+            True,
+            False,
+            True,
+        ),
+    ],
+)
+def test_a_wrong_cause_is_wrong(named, family, member, place):
+    scored = score(_result([_effect()], [named]))
+    (one,) = scored.scores
+    assert (one.family, one.member, one.place) == (family, member, place)
+    assert scored.whole is place
+    assert all(not right for _, right in scored.stated)
+
+
+def test_parallel_gimbals_are_one_place():
+    effect = _effect("gimbal_friction", 1, 1)
+    assert score(_result([effect], [_named("gimbal_friction", 3, 1)])).whole
+    assert not score(_result([effect], [_named("gimbal_friction", 1, 2)])).whole
+
+
+def test_of_two_effects_each_gets_its_own_and_a_stranger_is_an_extra():
+    effects = [_effect(), _effect("sea_bias", 1, 3, bias_Nm=0.1)]
+    bias = _named("sea_bias", 1, 3, bias_Nm=(0.1, 0.01))
+    assert score(_result(effects, [bias, _named()], kind="pairs")).whole
+    scored = score(_result(effects, [_named(), _named("push", None, None, probability=0.8)], kind="pairs"))
+    assert [one.right for one in scored.scores] == [True, False]
+    assert [item["cause"] for item in scored.extras] == ["push"]
+    assert scored.stated == ((0.8, False),)
+
+
+def test_nothing_hidden_and_nothing_named():
+    assert score(_result([], [], "consistent", "clean")).whole
+    assert score(_result([], [], "miscalibrated", "clean")).whole
+    assert not score(_result([], [], "unexplained", "clean")).whole
+    assert not score(_result([], [_named()], "explained", "clean")).whole
+
+
+def test_what_nobody_lists_should_stay_unexplained():
+    effect = _effect() | {"cause": "cross_talk"}
+    effect["answer"] = {"cause": None, "robot": 2, "joint": 1, "known": {}}
+    assert score(_result([effect], [], "unexplained", "unlisted")).whole
+    assert not score(_result([effect], [], "consistent", "unlisted")).whole
+    assert not score(_result([effect], [_named()], "explained", "unlisted")).whole
+
+
+def test_a_left_out_cause_is_nobodys():
+    result = _result([_effect()], [_named("sea_hysteresis", probability=0.4)], kind="left-out")
+    scored = score(result)
+    assert not scored.scores[0].listed
+    text = tables([result])
+    assert "| left-out: joint_friction | 1 | explained 1 | 0 | 1 | 0 | 0 | sea_hysteresis 1 |" in text
+
+
+def test_tables_and_misses_of_a_small_campaign():
+    results = [
+        _result([], [], "consistent", "clean", names=[]),
+        _result([], [_named()], "explained", "clean", names=[], background="x10"),
+        *(_result([_effect()], [_named(probability=p)]) for p in (0.6, 0.8, 0.95, 0.95)),
+        _result([_effect()], [_named(joint=3, probability=0.65)]),
+        _result([_effect()], [], "consistent", factor=2.0) | {"error": "Traceback\nValueError: no"},
+    ]
+    text = tables(results)
+    assert "| x10 | 1 | 1 (2 .. 100 %) | 1 (2 .. 100 %) | explained 1 | joint_friction 1 |" in text
+    assert (
+        "| x1 | 3 to 6 | 5 | 5 (48 .. 100 %) | 5 (48 .. 100 %) | 4 (28 .. 99 %) | 0 | joint_friction 1 | - |"
+        in text
+    )
+    assert "| 50 to 70 % | 2 | 62.5 % | 1 (1 .. 99 %) | yes |" in text
+    brier = np.mean([0.4**2, 0.2**2, 0.05**2, 0.05**2, 0.65**2])
+    assert f"Brier {brier:.4f}" in text
+    assert "1 x ValueError: no" in text
+    assert len(misses(results).splitlines()) == 3
+
+
+def test_interval_of_none_is_clopper_and_pearsons():
+    """1 - 0.025^(1/n)."""
+    assert interval(0, 20) == pytest.approx((0.0, 1.0 - 0.025 ** (1 / 20)))
+    assert interval(20, 20) == pytest.approx((0.025 ** (1 / 20), 1.0))
