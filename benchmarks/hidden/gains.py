@@ -1,4 +1,4 @@
-"""Sizes of causes by the chi-square that they add: the yardstick of what is hidden, whatever the diagnosis makes of it."""
+"""Sizes of causes by the chi-square that they add: a yardstick apart from the diagnosis."""
 
 from __future__ import annotations
 
