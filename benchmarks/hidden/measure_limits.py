@@ -15,6 +15,7 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances, read_tolerances
 from estimator.estimate.payload import estimate_payload
+from hidden.gains import sizes_of
 from hidden.generator import PAYLOADS, HiddenSet, generate
 from hidden.limits import GAIN, PENDULUM_LENGTHS_M, PUSH_S
 
@@ -49,7 +50,7 @@ def _limits(payload: str) -> tuple[list[tuple[str, tuple[str, ...], list[float]]
     problem = Problem.of(rig.rows(candidates), candidates)
     limits = [
         (candidate.cause, tuple(p.name for p in candidate.parameters), values.tolist())
-        for candidate, values in zip(candidates, Fit.of(problem).limits(GAIN), strict=True)
+        for candidate, values in zip(candidates, sizes_of(Fit.of(problem), GAIN), strict=True)
     ]
     return limits, _pendulum(rig, problem)
 
@@ -61,5 +62,5 @@ def _pendulum(rig: TeamRig, problem: Problem) -> list[float]:
         shape = {"length_m": length, "damping_ratio": 0.05}
         candidate = replace(problem.candidates[index], shape=shape)
         other = problem.with_columns(index, candidate, rig.columns(candidate))
-        masses.append(float(Fit.of(other).limits(GAIN)[index][0]))
+        masses.append(float(sizes_of(Fit.of(other), GAIN)[index][0]))
     return masses

@@ -14,6 +14,7 @@ from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances, read_tolerances
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
+from hidden.gains import sizes_of
 from hidden.limits import GAIN, LIMITS, PUSH_S
 
 Place = tuple[str, int | None, int | None, int | None]
@@ -26,7 +27,7 @@ def limits_of(recordings: Sequence[Recording]) -> dict[Place, float]:
     candidates = [*rig.candidates(), *pushes(rig)]
     problem = Problem.of(rig.rows(candidates), candidates)
     found: dict[Place, list[float]] = {}
-    for candidate, values in zip(candidates, Fit.of(problem).limits(GAIN), strict=True):
+    for candidate, values in zip(candidates, sizes_of(Fit.of(problem), GAIN), strict=True):
         known, at = LIMITS[candidate.cause], candidate.transient
         trial = None if at is None else at.trial + 1
         ratios = [

@@ -8,8 +8,7 @@ from typing import Any
 import pytest
 
 from discrepancy.engine.explanation import Scatter
-from discrepancy.result.remains import remains
-from discrepancy.result.scatter import scatter_to_dict
+from discrepancy.result.remains import remains, scatter_to_dict
 from discrepancy.rig import Candidate, Parameter
 
 VERDICTS = ("consistent", "miscalibrated", "explained", "partly_explained", "unexplained")

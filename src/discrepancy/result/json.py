@@ -56,6 +56,7 @@ notes               sentences
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -67,10 +68,8 @@ from discrepancy.engine.explanation import Found
 from discrepancy.engine.gain import Gain, Response
 from discrepancy.least_squares.fit import Fit
 from discrepancy.result.evidence_list import at_of, evidence_list, place_of
-from discrepancy.result.instead import Instead
 from discrepancy.result.read import FORMAT, VERSION
-from discrepancy.result.remains import remains
-from discrepancy.result.scatter import scatter_to_dict
+from discrepancy.result.remains import remains, scatter_to_dict
 from discrepancy.result.sensitivity import blind_spots, detection_limits
 from discrepancy.result.signature import signature
 from discrepancy.rig import Rig
@@ -134,7 +133,7 @@ def diagnosis_to_dict(
 
 
 def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: Words) -> dict[str, Any]:
-    candidate, instead = found.candidate, Instead.of(found)
+    candidate, instead = found.candidate, _Instead.of(found)
     values, se = rig.effect_parameters(candidate, found.values, found.covariance)
     return {
         **place_of(candidate),
@@ -173,6 +172,29 @@ def _suspected(found: Found, rig: Rig, words: Words) -> dict[str, Any]:
         "probability": float(found.probability),
         "over_nothing": _finite(found.over_nothing),
     }
+
+
+@dataclass(frozen=True)
+class _Instead:
+    """Probabilities that add up to 1 with that of the cause.
+
+    Attributes:
+        rivals: of every listed rival, in the order of ``Found.rivals``.
+        nothing: that there is nothing in its place.
+        unlisted: that something is there that is not in the catalogue, and looks like it.
+    """
+
+    rivals: tuple[float, ...]
+    nothing: float
+    unlisted: float
+
+    @classmethod
+    def of(cls, found: Found) -> "_Instead":
+        """What ``engine.probability`` weighs against a cause: what is so many nats less likely, by so much less."""
+        gaps = np.array([*(gap for _, gap in found.rivals), found.over_nothing], dtype=float)
+        listed = found.probability * np.exp(-np.clip(gaps, -50.0, 700.0))
+        rest = 1.0 - found.probability - float(listed.sum())
+        return cls(tuple(map(float, listed[:-1])), float(listed[-1]), max(rest, 0.0))
 
 
 def _gain(gain: Gain, rig: Rig, words: Words) -> dict[str, Any]:

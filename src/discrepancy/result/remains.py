@@ -1,13 +1,15 @@
-"""What a verdict leaves open: figures that would contradict it if nothing were said of them."""
+"""What a verdict leaves open: figures that would contradict it if nothing were said of them, and kinds that scatter."""
 
 from collections.abc import Mapping
 from typing import Any
 
 from discrepancy import rules
+from discrepancy.causes.units import one_each, parameter
+from discrepancy.engine.explanation import Scatter
 from discrepancy.result.read import kind_of
-from discrepancy.result.scatter import REMEDY
 
 Values = Mapping[str, Any]
+REMEDY = '"mocobot calibrate" finds the robots as they are; diagnose again with what it writes.'
 
 
 def remains(values: Values) -> list[str]:
@@ -63,3 +65,39 @@ def _of_response(values: Values) -> list[str]:
         f"With the named causes the simulated response to the commands is still off by chi2/n {left} ({before:.3g} "
         "without them; noise alone leaves 1)."
     ]
+
+
+def scatter_to_dict(item: Scatter) -> dict[str, Any]:
+    """One entry of ``scatter``; see ``discrepancy.result.json``."""
+    tolerance = {p.name: float(p.tolerance) for p in item.candidate.parameters}
+    values: dict[str, Any] = {
+        "cause": item.candidate.cause,
+        "kind": item.candidate.kind,
+        "family": item.candidate.family,
+        "factor": float(item.factor),
+        "places": item.places,
+        "spread": {name: item.factor * size for name, size in tolerance.items()},
+        "tolerance": tolerance,
+        "nats": float(item.nats),
+    }
+    return values | {"sentence": _sentence(values)}
+
+
+def _sentence(entry: Values) -> str:
+    kind = kind_of(entry)
+    return (
+        f"{kind[:1].upper()}{kind[1:]}: a spread of {sizes_of(entry, 'spread')} over {entry['places']} places "
+        f"(tolerance {sizes_of(entry, 'tolerance')})."
+    )
+
+
+def sizes_of(entry: Values, which: str) -> str:
+    """``spread`` or ``tolerance`` of an entry in words; both in the unit that fits the spread."""
+    shown = one_each((parameter(name)[1], size) for name, size in entry["spread"].items())
+    said = []
+    for name, size in entry[which].items():
+        words, unit = parameter(name)
+        unit, scale = shown[unit]
+        number = f"{scale * size:.2g} {unit}".rstrip()
+        said.append(number if len(entry[which]) == 1 else f"{words} {number}")
+    return ", ".join(said)

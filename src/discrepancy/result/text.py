@@ -8,8 +8,7 @@ from discrepancy import rules
 from discrepancy.causes.units import Shown, one_each, parameter
 from discrepancy.result.evidence_list import label
 from discrepancy.result.read import kind_of, name_of
-from discrepancy.result.remains import of_scatter, remains
-from discrepancy.result.scatter import REMEDY, sizes_of
+from discrepancy.result.remains import REMEDY, of_scatter, remains, sizes_of
 from discrepancy.result.text_gain import gain_lines
 
 WIDTH = 100

@@ -5,8 +5,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from discrepancy.result.read import name_of
-from discrepancy.result.remains import remains
-from discrepancy.result.scatter import REMEDY
+from discrepancy.result.remains import REMEDY, remains
 from estimator.calibrate.calibration import Calibration
 from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.html import Child, Node, el

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from discrepancy.result.evidence_list import label
-from discrepancy.result.scatter import REMEDY, sizes_of
+from discrepancy.result.remains import REMEDY, sizes_of
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import about

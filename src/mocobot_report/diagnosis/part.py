@@ -8,8 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discrepancy.result.read import VERDICTS, read_diagnosis
-from discrepancy.result.remains import remains
-from discrepancy.result.scatter import REMEDY
+from discrepancy.result.remains import REMEDY, remains
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate

@@ -87,13 +87,15 @@ def test_a_named_cause_has_the_evidence_it_needs_and_nothing_else_afterwards() -
     assert first["nats"] + prior == pytest.approx(values["causes"][0]["over_nothing"], rel=0.05)
 
 
-def test_of_two_that_look_alike_neither_is_named() -> None:
-    values = written("twins")
-    (one, *_) = values["suspected"]
-    assert one["cause"] in ("cause 2", "cause 4")
-    assert 0.3 < one["probability"] < 0.5
-    assert not values["causes"]
-    assert f"{one['name']} ({one['cause']}), probability 4" in " ".join(format_diagnosis(values).split())
+def test_of_two_that_look_alike_each_is_as_probable() -> None:
+    (one,) = written("twins")["causes"]
+    (twin,) = [rival for rival in one["alternatives"] if rival["ambiguous"]]
+    assert {one["cause"], twin["cause"]} == {"cause 2", "cause 4"}
+    assert one["probability"] + twin["probability"] > 0.9
+    assert 0.5 <= one["probability"] < 0.6
+    text = " ".join(format_diagnosis(written("twins")).split())
+    assert f"; else {twin['name']} ({100 * twin['probability']:.0f} %)" in text
+    assert f"Cannot be told from: {twin['name']} by {twin['evidence_gap']:.1f} nats." in text
 
 
 def test_nothing_to_tell() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from diagnosed import VERDICTS, scattered, small_diagnosis
+from discrepancy import rules
 from discrepancy.result.remains import remains
 from discrepancy.result.text import format_diagnosis
 from mocobot_report.diagnosis.part import KINDS
@@ -55,9 +56,12 @@ def test_a_response_that_causes_hardly_mend_is_told(share: float, told: bool) ->
 
 def test_a_small_rest_that_is_no_noise_is_told() -> None:
     values = small_diagnosis("partly_explained")
-    values["residual"]["unlisted_nats"] = 35.2
+    values["residual"]["unlisted_nats"] = 1.2 * rules.UNLISTED_NATS
     (said,) = remains(values)
-    assert said == "What remains is small (chi2/n 1.1), but no noise (by 35 nats): somewhere."
+    assert (
+        said
+        == f"What remains is small (chi2/n 1.1), but no noise (by {1.2 * rules.UNLISTED_NATS:.0f} nats): somewhere."
+    )
 
 
 @pytest.mark.parametrize("verdict", ["explained", "miscalibrated"])

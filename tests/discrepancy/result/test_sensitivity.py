@@ -37,7 +37,8 @@ def test_cause_of_the_size_of_its_limit_is_named_nine_times_in_ten(catalogue: tu
         values = [explanation.fit.part(k)[0] for k in range(len(catalogue))]
         values[index] = np.full(1, low)
         pure = [
-            sum(rig.columns(c)[t] @ v for c, v in zip(catalogue, values, strict=True)) for t in problem.trials
+            np.sum([rig.columns(c)[t] @ v for c, v in zip(catalogue, values, strict=True)], axis=0)
+            for t in problem.trials
         ]
         base = Hypothesis.of(problem.with_residual(pure), ())
         assert nats(base, index) == pytest.approx(needed_nats(problem, candidate), rel=0.1)

@@ -1,0 +1,27 @@
+"""Sizes of causes by the chi-square that they add: a yardstick apart from the diagnosis."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy import rules
+from discrepancy.least_squares.fit import Fit
+
+
+def sizes_of(fit: Fit, gain: float) -> list[NDArray[np.float64]]:
+    """Size of every candidate's parameters, each alone, whose expected gain of chi-square is ``gain``.
+
+    The gain is that of leaving the tolerance. In the parameters' own units, one array (k,) per candidate; infinite
+    where the data say nothing.
+    """
+    out = []
+    for index, candidate in enumerate(fit.problem.candidates):
+        lam, vectors = np.linalg.eigh(fit.told(index)[0])
+        keep = lam > rules.LEAST_INFORMATION
+        lam, vectors = lam[keep], vectors[:, keep]
+        weight = lam / (1.0 + lam) if fit.problem.has_tolerance(index) else lam
+        power = vectors**2 @ weight
+        size = np.sqrt(gain / np.maximum(power, 1e-300))
+        out.append(np.where(power > 0, candidate.units * size, np.inf))
+    return out
