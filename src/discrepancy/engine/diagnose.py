@@ -83,11 +83,6 @@ def diagnose(
             f"The named causes were not tried in closed loop ({why_not}), so look-alikes that only the response to "
             "the commands separates remain possible."
         )
-    for suspect in explanation.suspected:
-        notes.append(
-            f"{suspect.candidate.label[:1].upper()}{suspect.candidate.label[1:]} would explain some of it, with a "
-            f"probability of {100 * suspect.probability:.0f} %: too little to name it."
-        )
     if len(rig.trials) == 1:
         notes.append("One trial only: nothing could be validated on data that was not used for the fit.")
     return Diagnosis(rig, verdict, explanation, alternatives, gain, why_not, tuple(notes))
