@@ -29,10 +29,8 @@ def block_covariance(fit: Fit, rows_per_block: int) -> Array:
 
 def block_scores(fit: Fit, rows_per_block: int) -> Iterator[Array]:
     """Score of every block: its columns times what the fit leaves in it, one number per column in the fit."""
-    problem = fit.problem
-    for t in problem.trials:
-        # Rows as the fit weighs them: every cell of the noise over its power.
-        rows = problem.cells[t].series(problem.spectra[t] * np.sqrt(problem.weights[t]))
+    for t in fit.problem.trials:
+        rows = fit.problem.weighted(t)
         left = rows @ np.append(-fit.coefficients, 1.0)
         count = max(1, round(len(rows) / rows_per_block))
         for part in np.array_split(np.arange(len(rows)), count):
