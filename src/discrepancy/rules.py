@@ -5,7 +5,7 @@ campaigns in docs/diagnosis/validation.md and docs/emps.md were run with it, and
 What one cause alone has (tolerances, typical sizes, grids of its shapes) is in its file.
 """
 
-# Evidence: what the data say about one candidate.
+# What the data say about one candidate.
 
 LEAST_INFORMATION = 1e-3
 """Inverse variance (in units of tolerance) below which a direction is undecidable. Chosen."""
@@ -259,7 +259,7 @@ LEARN_ROUNDS, LEARN_NATS = 30, 0.05
 LEAST_POWER = 0.5
 """Of a cell over that of its whitening. Chosen: some noise of healthy robots is drawn larger than it is."""
 FLAT_SHARE = 1e-10
-"""Information that shared unknowns have beforehand, over that of the data: none, but what is undecidable stays put."""
+"""Information that shared unknowns have beforehand, over that of the data. Derived: as good as none."""
 PRIOR_ODDS = 0.05
 """Of any cause of the catalogue being there, at all its places together. Chosen: one in a team, of twenty causes."""
 SLAB_OCTAVES = 10.0
@@ -272,10 +272,12 @@ HELD_FACTOR = 1.5
 """Spread of a kind from which it is scanned within its tolerance, too. Chosen."""
 WORST_EVENTS = 3
 """Intervals looked at closely. Chosen."""
-NAMED_NATS = 3.0
-"""Log odds from which a cause is named. Derived: a false alarm costs as much as twenty misses, ln 20."""
+NAMED_NATS = 5.0
+"""Log odds from which a cause is named. Derived: a false alarm costs as much as 150 misses, ln 150."""
 EXCHANGES = 4
 """Rounds in which causes are exchanged and taken away after one was added. Chosen."""
+EXCHANGED_NATS = 1.0
+"""By which another cause, or another shape, must be likelier to be taken instead. Chosen: less is a matter of steps."""
 DIVERGED_NATS = 50.0
 """Fall of the evidence from which a Gauss-Newton step is not taken. Chosen."""
 SETTLED_SE = 0.05
@@ -302,7 +304,6 @@ STRAIGHT_CHI2_PER_N = 0.01
 """What curvature adds to chi-square, from which all is linearised again. Chosen: a hundredth of the noise."""
 BASE_ROUNDS = 4
 """Linearisations at most. Measured: robots 1 deg off take two."""
-DOUBTFUL = 2
-LITTLE_SHARE = 0.05
+DOUBTFUL, LITTLE_SHARE = 2, 0.05
 """Causes in a row that are less likely than not when they are added, and the share of what is left (in nats) that they
 explain at most, after which no more are looked for. Chosen: one may become likely beside the next."""

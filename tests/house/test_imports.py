@@ -67,7 +67,7 @@ UNWANTED = {
     "estimator": SIMULATOR | {"numba", "mocobot_logs"},
     "mocobot_logs": SIMULATOR | {"numba", "discrepancy", "mocobot"},
     "mocobot_inspect": SIMULATOR | {"numba", "discrepancy", "mocobot"},
-    "discrepancy.engine": SIMULATOR | {"discrepancy.team", "discrepancy.emps"},
+    "discrepancy.inference": SIMULATOR | {"discrepancy.team", "discrepancy.emps"},
     "discrepancy.emps.causes": SIMULATOR,
     "discrepancy.team.causes": SIMULATOR,
 }
@@ -87,7 +87,7 @@ def test_packages_run_without_the_simulator_and_what_is_above_them() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-@pytest.mark.parametrize("package", ["discrepancy.engine", "discrepancy.least_squares"])
+@pytest.mark.parametrize("package", ["discrepancy.engine", "discrepancy.inference", "discrepancy.least_squares"])
 def test_engine_of_the_diagnosis_knows_no_rig(package: str) -> None:
     """What looks for causes works for any rig: it sees neither a machine nor the simulator."""
     files = module_files(package)

@@ -8,10 +8,11 @@ from source_tree import SRC, module_files
 
 FREE = {
     "discrepancy.emps.recording.axis_log": {"FIRST_GUESS_KG", "LIMIT_V"},  # the nominal axis
-    "discrepancy.result.evidence_list": {"LEAST_LOG10_P", "MOST", "BY_CHANCE"},  # of JSON, and of a picture
+    "discrepancy.result.evidence_list": {"CLOSELY", "MOST"},  # of a picture
     "discrepancy.result.read": {"VERSION"},
-    "discrepancy.result.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
-    "discrepancy.result.text": {"WIDTH"},
+    "discrepancy.result.pictures.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
+    "discrepancy.result.sensitivity": {"HALVINGS", "LEARNT"},  # a grid
+    "discrepancy.result.text": {"SAID", "WIDTH"},
     "discrepancy.result.traces_file": {"VERSION"},
 }
 """Formats, layouts and sizes of pictures, by module."""

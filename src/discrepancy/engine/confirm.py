@@ -8,10 +8,10 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.engine.explanation import Explanation, Found, explain
 from discrepancy.engine.gain import Gain, mean_chi2, responses
-from discrepancy.engine.hypothesis import Hypothesis
-from discrepancy.engine.probability import probability
-from discrepancy.engine.refit import exact
-from discrepancy.engine.search import Rival, Searched
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.probability import probability
+from discrepancy.inference.refit import exact
+from discrepancy.inference.search import Rival, Searched
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
 

@@ -7,8 +7,8 @@ from discrepancy import rules
 from discrepancy.engine.confirm import Alternative, confirm, not_simulated
 from discrepancy.engine.explanation import Explanation, Found, explain
 from discrepancy.engine.gain import Gain, responses
-from discrepancy.engine.search import search
 from discrepancy.engine.verdict import Verdict, verdict_of
+from discrepancy.inference.search import search
 from discrepancy.rig import Rig
 
 

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discrepancy import rules
-from discrepancy.engine.best_shape import covariance_with_shape
 from discrepancy.engine.held_out import held_out_gains, shares
-from discrepancy.engine.hypothesis import Hypothesis
-from discrepancy.engine.learn import worth_a_spread
-from discrepancy.engine.probability import probability
-from discrepancy.engine.remainder import share_left, unlisted_nats
-from discrepancy.engine.search import Rival, Searched
+from discrepancy.inference.best_shape import covariance_with_shape
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.learn import worth_a_spread
+from discrepancy.inference.probability import probability
+from discrepancy.inference.remainder import share_left, unlisted_nats
+from discrepancy.inference.search import Rival, Searched
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig

@@ -10,7 +10,7 @@ from typing import Any
 from discrepancy.causes.words import Words
 from discrepancy.engine.diagnose import Diagnosis
 from discrepancy.result.json import diagnosis_to_dict
-from discrepancy.result.plots import PLOTS, save_plots
+from discrepancy.result.pictures.plots import PLOTS, save_plots
 from discrepancy.result.read import FORMAT, NAME
 from discrepancy.result.text import format_diagnosis
 from discrepancy.result.traces import Trace

@@ -8,9 +8,9 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.engine.explanation import Explanation
-from discrepancy.engine.hypothesis import Hypothesis
-from discrepancy.engine.prior import log_prior_odds
-from discrepancy.engine.scan import scan
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.prior import log_prior_odds
+from discrepancy.inference.scan import scan
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.result.read import kind_of, name_of

@@ -1,29 +1,15 @@
-"""A team of Omnids as a rig: rows from recordings, candidates from the catalogue."""
+"""A team of Omnids as a rig: its rows, and how to simulate it again."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from discrepancy import rules
-from discrepancy.causes.excluded import excluded_from
 from discrepancy.engine.explanation import Explanation
-from discrepancy.engine.hypothesis import Hypothesis
 from discrepancy.least_squares.fit import Fit
-from discrepancy.least_squares.whitening import Whitening
-from discrepancy.rig import Candidate, Channel, Rig, Rows
-from discrepancy.team.candidates import (
-    every_candidate,
-    nearby_events,
-    other_shapes,
-    shape_steps,
-    worst_events,
-)
+from discrepancy.rig import Candidate
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.closed_loop import (
@@ -36,163 +22,15 @@ from discrepancy.team.closed_loop import (
     team_of,
     why_not,
 )
-from discrepancy.team.dependence import directions_of, quantities_of
-from discrepancy.team.elsewhere import HEALTHY, found_at, resting_of
-from discrepancy.team.imitators import wrong_torques
-from discrepancy.team.linear.noise import Noise
-from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, start_shared
-from discrepancy.team.linear.trial_linear import TrialLinear
-from discrepancy.team.origin import origin_of
+from discrepancy.team.rows import TeamRows
 from discrepancy.team.undecidable import statements
-from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
-from estimator.estimate.result import PayloadEstimate
-from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Shared
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.extended.extended import write_extended
 
 
-@dataclass(frozen=True, eq=False)
-class TeamRig(Rig):
-    """Recordings of one payload, linearised around the best unknowns without any cause.
-
-    Attributes:
-        recordings: the trials.
-        sensed: what noise leaves in the rows.
-        linear: linearised trials.
-        tolerances: standard deviations by cause and parameter.
-        excluded: causes left out of the catalogue.
-        origin: how far from the robots as they were believed to be all is linear; None for not at all.
-        resting: spread over its tolerance of each kind that leaves something open, such as friction at rest: noise.
-        jobs: parallel processes.
-        kept: whitened columns of shapes that are asked for again and again.
-    """
-
-    recordings: tuple[Recording, ...]
-    sensed: Sensed
-    linear: tuple[TrialLinear, ...]
-    tolerances: Mapping[str, Mapping[str, float]]
-    excluded: frozenset[str]
-    origin: ArmUnit | None = None
-    resting: Mapping[str, float] = field(default_factory=dict)
-    jobs: int = 1
-    kept: dict[tuple[Any, ...], Array] = field(default_factory=dict, repr=False)
-
-    @classmethod
-    def of(
-        cls,
-        recordings: Sequence[Recording],
-        estimate: PayloadEstimate,
-        tolerances: Mapping[str, Mapping[str, float]],
-        excluded: Sequence[str] = (),
-        jobs: int = 1,
-    ) -> TeamRig:
-        """Linearise recordings around their estimate.
-
-        Raises:
-            InputError: the recordings do not determine the grasps, the mass and the centre of mass, or a cause to
-                be excluded does not exist.
-        """
-        left_out = excluded_from(CAUSES, excluded)
-        return cls._at(recordings, start_shared(estimate), tolerances, left_out, None, HEALTHY, jobs)
-
-    @classmethod
-    def _at(
-        cls,
-        recordings: Sequence[Recording],
-        shared: Shared,
-        tolerances: Mapping[str, Mapping[str, float]],
-        excluded: frozenset[str],
-        origin: ArmUnit | None,
-        resting: Mapping[str, float],
-        jobs: int,
-        sensed: Sensed | None = None,
-    ) -> TeamRig:
-        limits = {
-            cause: {name: resting[cause] * value for name, value in tolerances.get(cause, {}).items()}
-            for cause in resting
-        }
-        linear, known = linearised_trials(recordings, shared, limits, jobs, sensed)
-        return cls(tuple(recordings), known, linear, tolerances, excluded, origin, resting, jobs)
-
-    @property
-    def noise(self) -> Noise:
-        """Resolution of the sensors."""
-        return self.sensed.noise
-
-    @property
-    def whitening(self) -> tuple[Whitening, ...]:
-        """Of every trial."""
-        return self.sensed.whitening
-
-    def relinearised(self, nothing: Hypothesis) -> TeamRig | None:
-        """The rig at the robots as a fit with tolerances finds them, where straight columns do not reach that far."""
-        there = found_at(self.linear, self.whitening, nothing, self.origin)
-        resting = resting_of(nothing)
-        same = all(0.5 < resting[kind] / self.resting[kind] < 2.0 for kind in resting)
-        if there.curvature < rules.STRAIGHT_CHI2_PER_N and same:
-            return None
-        moved = [replace(r, metadata=replace(r.metadata, units=there.units)) for r in self.recordings]
-        sensed, resting = (self.sensed, self.resting) if same else (None, resting)
-        return self._at(
-            moved, there.shared, self.tolerances, self.excluded, there.origin, resting, self.jobs, sensed
-        )
-
-    @property
-    def trials(self) -> Sequence[str]:
-        return [recording.name for recording in self.recordings]
-
-    @property
-    def robots(self) -> int:
-        """Number of robots N."""
-        return self.linear[0].robots
-
-    @property
-    def local_unknowns(self) -> int:
-        return self.linear[0].by_bases.shape[2]
-
-    @property
-    def channels(self) -> Sequence[Channel]:
-        out = []
-        for i in range(2, self.robots + 1):
-            out += [Channel(f"grasp {i} rotation {a}", "kinematic", i, "rad") for a in "xyz"]
-            out += [Channel(f"grasp {i} position {a}", "kinematic", i, "m") for a in "xyz"]
-        out += [Channel(f"force {a}", "balance", None, "N") for a in "xyz"]
-        return out + [Channel(f"moment {a}", "balance", None, "N m") for a in "xyz"]
-
-    @property
-    def _groups(self) -> list[int]:
-        """Every robot's loop is a group of channels, and so are the forces and the moments, shape (C,)."""
-        return [k // 6 for k in range(6 * (self.robots - 1))] + [self.robots - 1] * 3 + [self.robots] * 3
-
-    def candidates(self) -> list[Candidate]:
-        """Every cause of the catalogue at every place; transients come from ``transients``."""
-        found = every_candidate(self.robots, self.tolerances, self.excluded)
-        return [candidate for candidate in found if not (self.aligned and CAUSES[candidate.cause].by_clocks)]
-
-    @property
-    def aligned(self) -> bool:
-        """Whether the motion has set the robots' clocks in every trial."""
-        return all(any(s.aligned for s in linear.signals.sampling or ()) for linear in self.linear)
-
-    def columns(self, candidate: Candidate) -> list[Array]:
-        return [self._columns(t, candidate) for t in range(len(self.linear))]
-
-    def _columns(self, trial: int, candidate: Candidate) -> Array:
-        linear = self.linear[trial]
-        if not candidate.acts_in(trial):
-            return np.zeros((*linear.residual.shape, len(candidate.parameters)))
-        cause = CAUSES[candidate.cause]
-        robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-        again = candidate.transient is None and len(cause.shapes) > 1 and candidate.shape in cause.shapes
-        key = (trial, *candidate.key, *candidate.shape.items())
-        if again and key in self.kept:
-            return self.kept[key]
-        columns = self.whitening[trial](cause.columns(linear, robot, joint, candidate.shape))
-        if again:
-            self.kept[key] = columns
-        return columns
+class TeamRig(TeamRows):
+    """Recordings of one payload, linearised around the best unknowns without any cause, and their simulator."""
 
     def effect_parameters(
         self, candidate: Candidate, values: Array, covariance: Array
@@ -208,11 +46,6 @@ class TeamRig(Rig):
         """The simulator's effect, or None where the values are none that it can have (a negative play)."""
         return effect_of(candidate, values, self._context(candidate))
 
-    def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
-        """Whether such values can be: no negative stiffness or friction, no mass that swings outside the payload."""
-        se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        return CAUSES[candidate.cause].possible(values, se, candidate.shape)
-
     def can_resimulate(self) -> str | None:
         return next(filter(None, map(why_not, self.recordings)), None)
 
@@ -225,7 +58,7 @@ class TeamRig(Rig):
         that cannot be simulated. It carries the recording and numbers only, so that processes can take it.
         """
         linear = self.linear[trial]
-        effects = [self.effect(candidate, self._beyond(candidate, values)) for candidate, values in active]
+        effects = [self.effect(candidate, self.beyond(candidate, values)) for candidate, values in active]
         if any(effect is None for effect in effects):
             return impossible
         return partial(
@@ -242,108 +75,6 @@ class TeamRig(Rig):
         """Standard deviation of the noise and of the motion, by channel, shape (N, 3) each."""
         return scale_of_response(self.noise, self.linear[trial].signals)
 
-    def unknowns(self, candidate: Candidate) -> list[Array]:
-        out = []
-        robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-        for linear, white in zip(self.linear, self.whitening, strict=True):
-            columns = CAUSES[candidate.cause].unknowns(linear, robot, joint, candidate.shape)
-            empty = np.zeros((*linear.residual.shape, 0))
-            out.append(white(np.stack(columns, axis=-1)) if columns else empty)
-        return out
-
-    def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
-        out = []
-        for t, linear in enumerate(self.linear):
-            causes = [self._columns(t, candidate) for candidate in candidates]
-            residual = self.whitening[t](linear.residual)
-            for candidate, columns in zip(candidates, causes, strict=True):
-                residual += self._at_origin(candidate, columns)
-            out.append(
-                Rows(
-                    self.recordings[t].name,
-                    residual,
-                    self.whitening[t](np.concatenate([linear.by_bases, linear.by_clocks], axis=2)),
-                    self.whitening[t](linear.by_shared),
-                    causes,
-                    linear.reduction.time,
-                    linear.reduction.moving,
-                    self._groups,
-                )
-            )
-        return out
-
-    def _at_origin(self, candidate: Candidate, columns: Array) -> Array | float:
-        """What the robots, as they were found, take out of the residual: values are counted from the design."""
-        origin = origin_of(candidate, self.origin)
-        return 0.0 if origin is None else columns @ origin
-
-    def _beyond(self, candidate: Candidate, values: Array) -> Array:
-        """Values beyond what the robots, as they were found, have already."""
-        origin = origin_of(candidate, self.origin)
-        return values if origin is None else values - origin
-
-    def residual(
-        self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
-    ) -> list[Array]:
-        out, there = [], [candidate.key for candidate, _ in active]
-        others = [
-            c for c in self.candidates() if origin_of(c, self.origin) is not None and c.key not in there
-        ]
-        for t, (linear, x) in enumerate(zip(self.linear, local, strict=True)):
-            signals, modelled = linear.signals, np.zeros_like(linear.residual)
-            for candidate, values in active:
-                if not candidate.acts_in(t):
-                    continue
-                cause, beyond = CAUSES[candidate.cause], self._beyond(candidate, values)
-                robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-                corrected = cause.undo(signals, linear, robot, joint, beyond, candidate.shape)
-                if corrected is None:
-                    modelled += cause.columns(linear, robot, joint, candidate.shape) @ beyond
-                else:
-                    signals = corrected
-            residual = exact_residual(
-                signals, linear.shared.moved(shared), linear.bases.moved(x), linear.arms, linear.reduction
-            )
-            left = self.whitening[t](residual - modelled)
-            for candidate in others:
-                left += self._at_origin(candidate, self._columns(t, candidate))
-            out.append(left)
-        return out
-
-    def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
-        """The candidate with every other shape of its cause; a transient with its interval moved."""
-        if candidate.transient:
-            tolerance = self.tolerances.get(candidate.cause, {})
-            return nearby_events(candidate.cause, candidate.transient, tolerance)
-        return other_shapes(candidate, finer=finer)
-
-    def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
-        """Pushes at the intervals where the wrench balance is worst.
-
-        Args:
-            remaining: whitened residual of every trial, shape (n, C).
-        """
-        reductions = [linear.reduction for linear in self.linear]
-        return worst_events(reductions, remaining, self.tolerances, self.excluded)
-
-    def imitators(self, candidate: Candidate) -> list[list[Array]]:
-        """One joint's torque wrong by a constant for as long as a push lasts, every joint in turn."""
-        return wrong_torques(self.linear, self.whitening, candidate)
-
-    def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
-        return shape_steps(candidate)
-
-    def quantities(self, trial: int) -> dict[str, Array]:
-        """Speed of the payload [m/s], its distance from where it started [m], load [N m]: shape (n,) each."""
-        return quantities_of(self.linear[trial])
-
-    def row_rate_hz(self, trial: int) -> float:
-        return self.linear[trial].signals.rate_hz / self.linear[trial].reduction.step
-
-    def directions(self, trial: int) -> dict[str, Array]:
-        """Directions of every spring torque and every gimbal axis, from the linearisation."""
-        return directions_of(self.linear[trial], self.whitening[trial])
-
     def write_extended(self, explanation: Explanation, folder: Path) -> None:
         """Write the estimated team with the named causes in it; ``mocobot simulate --model`` takes it.
 
@@ -352,7 +83,7 @@ class TeamRig(Rig):
         """
         effects = [
             named_effect(
-                found.candidate, self.effect(found.candidate, self._beyond(found.candidate, found.values))
+                found.candidate, self.effect(found.candidate, self.beyond(found.candidate, found.values))
             )
             for found in explanation.found
         ]

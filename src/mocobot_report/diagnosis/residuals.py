@@ -6,7 +6,7 @@ from itertools import zip_longest
 import numpy as np
 
 from discrepancy.causes.units import Shown
-from discrepancy.result.residual_statistics import binned, multiples, spectrum
+from discrepancy.result.pictures.residual_statistics import binned, multiples, spectrum
 from discrepancy.result.traces import Group, Trace, group_units, groups
 from estimator.arrays import Array
 from mocobot_report.blocks.book import Book

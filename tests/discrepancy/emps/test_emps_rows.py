@@ -18,7 +18,7 @@ from discrepancy.emps.recording.signals import Signals, at_delay
 from discrepancy.emps.reduction import Reduction
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.engine.block_errors import with_block_errors
-from discrepancy.engine.search import search
+from discrepancy.inference.search import search
 from discrepancy.least_squares.block_errors import block_covariance
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem

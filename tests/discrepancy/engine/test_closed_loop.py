@@ -6,7 +6,7 @@ import pytest
 from discrepancy import rules
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.engine.explanation import explain
-from discrepancy.engine.search import search
+from discrepancy.inference.search import search
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from fake_rig import TWINS, FakeRig, names

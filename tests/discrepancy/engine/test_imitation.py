@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from discrepancy.engine.explanation import explain
-from discrepancy.engine.search import search
+from discrepancy.inference.search import search
 from discrepancy.rig import Transient
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.imitators import wrong_torques

@@ -7,7 +7,7 @@ import pytest
 
 from dense_evidence import dense_evidence, log_prior
 from discrepancy import rules
-from discrepancy.engine.learn import learnt, worth_a_spread
+from discrepancy.inference.learn import learnt, worth_a_spread
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Parameter, Rows
 from linear_problem import cosines, random_rows, with_residuals

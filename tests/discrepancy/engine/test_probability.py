@@ -6,8 +6,8 @@ from scipy.stats import binom, norm
 
 from discrepancy import rules
 from discrepancy.engine.explanation import explain
-from discrepancy.engine.probability import probability
-from discrepancy.engine.search import search
+from discrepancy.inference.probability import probability
+from discrepancy.inference.search import search
 from fake_rig import FakeRig
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from discrepancy.engine.hypothesis import Hypothesis
-from discrepancy.engine.refit import exact
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.refit import exact
 from discrepancy.least_squares.problem import Problem
 from fake_rig import CATALOGUE, FakeRig
 

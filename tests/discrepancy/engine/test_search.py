@@ -8,9 +8,9 @@ import pytest
 from discrepancy import rules
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.engine.explanation import explain
-from discrepancy.engine.hypothesis import Hypothesis
-from discrepancy.engine.scan import score_of
-from discrepancy.engine.search import search
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.scan import score_of
+from discrepancy.inference.search import search
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Transient

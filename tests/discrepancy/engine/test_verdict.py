@@ -6,8 +6,8 @@ import pytest
 
 from discrepancy import rules
 from discrepancy.engine.explanation import Scatter, explain
-from discrepancy.engine.search import search
 from discrepancy.engine.verdict import verdict_of
+from discrepancy.inference.search import search
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from fake_rig import CATALOGUE, FakeRig

@@ -14,8 +14,8 @@ from discrepancy.causes.numbers import number
 from discrepancy.emps.causes import CAUSES as AXIS
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.result.json import plain
-from discrepancy.result.plots import file_names
-from discrepancy.result.plots_evidence import closed_loop_figure
+from discrepancy.result.pictures.plots import file_names
+from discrepancy.result.pictures.plots_evidence import closed_loop_figure
 from discrepancy.result.text import WIDTH, format_diagnosis, probability_words
 from discrepancy.result.text_gain import response_units
 from discrepancy.result.traces import Trace, group_units, groups

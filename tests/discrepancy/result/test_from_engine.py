@@ -11,7 +11,7 @@ import pytest
 from diagnosed import check_finite
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.result.json import diagnosis_to_dict
-from discrepancy.result.plots_evidence import evidence_figure
+from discrepancy.result.pictures.plots_evidence import evidence_figure
 from discrepancy.result.text import WIDTH, format_diagnosis
 from fake_rig import CATALOGUE, TWINS, FakeRig, cause
 

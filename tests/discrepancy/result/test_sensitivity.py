@@ -8,7 +8,7 @@ import pytest
 from discrepancy import rules
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.engine.explanation import Explanation
-from discrepancy.engine.hypothesis import Hypothesis
+from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.result.evidence_list import nats, needed_nats
 from discrepancy.result.sensitivity import blind_spots, detection_limits
 from fake_rig import CATALOGUE, FakeRig, cause

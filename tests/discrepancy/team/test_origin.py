@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from discrepancy.engine.hypothesis import Hypothesis
+from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.least_squares.problem import Problem
 from discrepancy.team.candidates import every_candidate
 from discrepancy.team.causes import CAUSES
-from discrepancy.team.elsewhere import found_at
+from discrepancy.team.linear.elsewhere import found_at
+from discrepancy.team.linear.origin import origin_of, places_of
 from discrepancy.team.linear.start import Sensed, exact_residual
-from discrepancy.team.origin import origin_of, places_of
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances
 from estimator.arm.arms import true_joints

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from discrepancy import rules
-from discrepancy.engine.hypothesis import Hypothesis
+from discrepancy.inference.hypothesis import Hypothesis
 from estimator.arrays import Array
 
 

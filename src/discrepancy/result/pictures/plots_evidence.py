@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from discrepancy.result.evidence_list import label, relation
-from discrepancy.result.plots_against import AFTER, BEFORE, log_scale, titled
+from discrepancy.result.pictures.plots_against import AFTER, BEFORE, log_scale, titled
 from discrepancy.result.text_gain import response_units
 
 RELATIONS = {

@@ -2,35 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from discrepancy import rules
-from discrepancy.engine.best_shape import nearest_shape
-from discrepancy.engine.hypothesis import Hypothesis
-from discrepancy.engine.imitation import imitated
-from discrepancy.engine.scan import Scanned, scan, score_of, score_with
+from discrepancy.inference.best_shape import nearest_shape
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.imitation import imitated
+from discrepancy.inference.scan import Scanned, scan, score_of, score_with
 from discrepancy.least_squares.fit import Fit
-from discrepancy.least_squares.problem import Key, Problem
+from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
 
 
-def proposals(
-    rig: Rig, base: Hypothesis, barred: Collection[Key] = (), *, events: bool = True
-) -> list[Hypothesis]:
+def proposals(rig: Rig, base: Hypothesis, *, events: bool = True) -> list[Hypothesis]:
     """Hypotheses with one cause more, the likeliest first; the added one is the last of its ``free``.
 
     Args:
         rig: for columns of other shapes.
         base: what is there already.
-        barred: causes at places that are not to be added.
         events: whether to look for what acts for a while, too.
     """
     fit = base.fit
-    ranked = [item for item in _with_kinds_held(base) if item.candidate.key not in barred]
-    ranked = [_in_best_shape(rig, fit, item) for item in ranked]
+    ranked = [_in_best_shape(rig, fit, item) for item in _with_kinds_held(base)]
     ranked += _events(rig, fit) if events else []
     ranked.sort(key=lambda item: -item.score)
     likely = []

@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from discrepancy import rules
-from discrepancy.engine.hypothesis import Hypothesis
-from discrepancy.engine.probability import probability
-from discrepancy.engine.propose import proposals
-from discrepancy.engine.refit import exact
-from discrepancy.engine.remainder import nats_left, share_left
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.probability import probability
+from discrepancy.inference.propose import proposals
+from discrepancy.inference.refit import exact
+from discrepancy.inference.remainder import nats_left, share_left
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
 
@@ -109,10 +109,16 @@ def _settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesi
                 best, changed = exact(rig, less, nothing), True
                 break
             candidate = best.problem.candidates[index]
-            others = proposals(rig, less, [candidate.key], events=candidate.transient is None)
-            rivals[index] = [Rival(h.causes[-1], best.score - h.score) for h in others]
+            # Its own shape may be another beside what was found since.
+            others = proposals(rig, less, events=candidate.transient is None)
+            last = [h.causes[-1] for h in others]
+            rivals[index] = [
+                Rival(other, best.score - h.score)
+                for other, h in zip(last, others, strict=True)
+                if other.key != candidate.key
+            ]
             rivals[index].append(Rival(None, best.score - less.score))
-            if others and others[0].score > best.score:
+            if others and others[0].score > best.score + rules.EXCHANGED_NATS:
                 other = exact(rig, others[0], nothing)
                 if other.score > best.score:
                     best, changed = other, True

@@ -1,7 +1,7 @@
 """Is it what it seems, or something simpler, such as one sensor that was wrong for as long?"""
 
-from discrepancy.engine.hypothesis import Hypothesis
-from discrepancy.engine.scan import log_bayes_factor
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.scan import log_bayes_factor
 from discrepancy.rig import Candidate, Rig
 
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from discrepancy.engine.hypothesis import Hypothesis
+from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.least_squares.whitening import Whitening
+from discrepancy.team.linear.origin import origin_of, places_of
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import exact_residual
 from discrepancy.team.linear.trial_linear import TrialLinear
-from discrepancy.team.origin import origin_of, places_of
 from estimator.arm.arms import true_joints
 from estimator.arm.unit import COUNT, ArmUnit
 from estimator.arrays import Array
@@ -63,9 +63,11 @@ def found_at(
             moved.append(index)
     units, shared = ArmUnit(linear[0].design, at + step), linear[0].shared.moved(-fit.shared)
     square = [
-        np.mean((whitening[t](_exact(trial, units, shared, fit.local(t)[:own])) - _straight(nothing, t, own, moved)) ** 2)
-        for t, trial in enumerate(linear)
-    ]  # fmt: skip
+        np.mean(
+            (white(_exact(trial, units, shared, fit.local(t)[:own])) - _straight(nothing, t, own, moved)) ** 2
+        )
+        for t, (trial, white) in enumerate(zip(linear, whitening, strict=True))
+    ]
     before = np.zeros_like(step) if origin is None else origin.x
     return Elsewhere(units, ArmUnit(units.design, before + step), shared, float(np.mean(square)))
 

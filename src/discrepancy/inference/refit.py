@@ -3,7 +3,7 @@
 import numpy as np
 
 from discrepancy import rules
-from discrepancy.engine.hypothesis import Hypothesis
+from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.rig import Rig
 
 

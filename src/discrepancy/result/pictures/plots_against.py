@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
 from discrepancy.causes.words import Words
-from discrepancy.result.residual_statistics import binned, spectrum
+from discrepancy.result.pictures.residual_statistics import binned, spectrum
 from discrepancy.result.traces import Group, Trace
 
 BEFORE, AFTER = "#c8553d", "#2f6fd0"

@@ -12,9 +12,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from discrepancy.causes.words import Words
-from discrepancy.result.plots_against import AFTER, BEFORE, against_figure, scale_multiples, titled
-from discrepancy.result.plots_evidence import closed_loop_figure, evidence_figure
-from discrepancy.result.residual_statistics import multiples
+from discrepancy.result.pictures.plots_against import AFTER, BEFORE, against_figure, scale_multiples, titled
+from discrepancy.result.pictures.plots_evidence import closed_loop_figure, evidence_figure
+from discrepancy.result.pictures.residual_statistics import multiples
 from discrepancy.result.traces import Group, Trace, group_units, groups
 from estimator.arrays import Array
 
