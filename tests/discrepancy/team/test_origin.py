@@ -40,9 +40,9 @@ def rows_of(case, x):
 
 
 def team(case, origin=None):
-    return TeamRig(
-        (), Sensed(None, (lambda x: x,), ()), (case.linear,), default_tolerances(), frozenset(), origin
-    )
+    sensed = Sensed(None, (np.copy,), ())
+    trials = (case.carried.recording,), sensed, (case.linear,)
+    return TeamRig(*trials, default_tolerances(), frozenset(), origin)
 
 
 def test_every_group_but_the_masses_is_a_cause():
@@ -134,7 +134,9 @@ def test_the_fit_finds_the_robots_where_they_are(case):
     linear = replace(linear, residual=residual)
     scale = np.r_[np.full(12, 1e-5), np.full(6, 3e-3)]  # noise of unit size
     white = lambda x: x / scale.reshape(1, 18, *(1,) * (x.ndim - 2))  # noqa: E731
-    rig = TeamRig((), Sensed(None, (white,), ()), (linear,), default_tolerances(), frozenset())
+    rig = TeamRig(
+        (case.carried.recording,), Sensed(None, (white,), ()), (linear,), default_tolerances(), frozenset()
+    )
     candidates = [c for c in CANDIDATES if c.cause in ("sea_bias", "theta_zero")]
     nothing = Hypothesis.of(Problem.of(rig.rows(candidates), candidates), ())
     there = found_at(rig.linear, rig.whitening, nothing, None)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import fftconvolve
 from scipy.stats import chi2
 
 from discrepancy.least_squares.whitening import Whitening
@@ -13,22 +14,24 @@ from team_case import exact
 
 LIMIT_NM = 0.05
 JOINT = {"joint_friction": {"coulomb_Nm": LIMIT_NM}}
-HOLDS_S = ((3.0, 5.5), (7.0, 9.5), (11.0, 13.5))
+HOLDS_S, STOPPING_S = ((3.0, 5.5), (7.0, 9.5), (11.0, 13.5)), 0.2
 
 
 def still(time, holds):
     return np.any([(time >= start) & (time < stop) for start, stop in holds], axis=0)
 
 
-def trial_with(holds, joints):
-    """The exact trial's derivatives; every joint moves at 0.2 rad/s and 2 N m/s, but some during holds."""
+def trial_with(holds, joints, speed=0.05):
+    """The exact trial's derivatives; every joint moves at one speed [rad/s] and 3 N m/s, but some rest in holds."""
     case = exact()
     s = case.signals
     moving = np.ones((*s.phi.shape,))
     moving[np.ix_(still(s.time, holds), *joints)] = 0.0
+    slow_down = np.hanning(round(2 * STOPPING_S * s.rate_hz) + 1)[:, None, None]
+    moving = fftconvolve(moving, slow_down / slow_down.sum(), mode="same", axes=0)
     travel = np.cumsum(moving, axis=0) / s.rate_hz
     # Only rests are taken from these; what an error does is in the exact trial's derivatives.
-    signals = replace(s, phi=0.2 * travel, theta=0.2 * travel, tau=2.0 * travel)
+    signals = replace(s, phi=speed * travel, theta=speed * travel, tau=3.0 * travel)
     return replace(case.linear, signals=signals)
 
 
@@ -43,7 +46,7 @@ def by_rest(trial):
     out = []
     for hold in HOLDS_S[:2]:
         tau = np.zeros((len(trial.signals.time), 3))
-        tau[still(trial.signals.time, [hold]), 1] = 1.0
+        tau[still(trial.signals.time, [(hold[0] + STOPPING_S, hold[1] - STOPPING_S)]), 1] = 1.0
         out.append(trial.of_signals(1, tau=tau).ravel())
     return np.array(out).T
 
@@ -66,7 +69,7 @@ def test_draws_are_torques_at_rest_of_the_tolerances_size(one_rest, tolerances, 
         rows = draw(rng).ravel()
         value = np.linalg.lstsq(columns, rows, rcond=None)[0]
         left = rows - columns @ value
-        assert np.linalg.norm(left) < 0.15 * np.linalg.norm(
+        assert np.linalg.norm(left) < 0.3 * np.linalg.norm(
             rows
         )  # the filter moves the ends of a rest by a sample
         values.append(value)
@@ -104,7 +107,7 @@ def test_friction_in_a_gimbal_is_a_moment_alone(one_rest):
 
 def test_healthy_holds_leave_noise_alone():
     """Torques at rest drawn here, through the trial's derivatives: chi-square per number of the holds is one."""
-    trial = trial_with(HOLDS_S, (range(3), range(3)))
+    trial = trial_with(HOLDS_S, (range(3), range(3)), speed=0.01)
     reduction = Reduction.of(trial.signals)
     trial = replace(trial, reduction=reduction)
     assert len(reduction.time) - reduction.moving == 3
@@ -127,9 +130,9 @@ def test_healthy_holds_leave_noise_alone():
         return rows
 
     resting = Resting(trial, JOINT)
-    noise = np.array([sensors() for _ in range(60)])
+    noise = np.array([sensors() for _ in range(40)])
     with_friction = noise + np.array([resting(rng) for _ in noise])
-    data = [sensors() + friction() for _ in range(12)]
+    data = [sensors() + friction() for _ in range(8)]
 
     def left(draws):
         white = Whitening.of(draws, reduction.moving, uneven=True)
