@@ -135,6 +135,9 @@ PLAY_FORCE_N = 0.4
 """Below which a payload may be anywhere in its play. Chosen."""
 PLAY_KNOTS_S = 0.2
 """Between knots of the travel that play leaves open at small forces. Chosen."""
+PULL_SE = 5.0
+"""Standard errors that the stiffness of a payload's tether must be. Measured: uncalibrated robots without one leave up
+to 3, with a constant force of 2 N."""
 SLOSH_LENGTHS_M = (0.04, 1.0)
 """Derived: pendulums of 2.5 to 0.5 Hz; slower and faster ones look like drag or play."""
 SLOSH_MOST_DAMPED = 0.3

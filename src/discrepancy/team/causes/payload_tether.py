@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.team.causes.base import Cause, stack
 
 
@@ -37,6 +38,13 @@ class PayloadTether(Cause):
         none = np.zeros_like(p)
         moments = [trial.of_wrench(none, np.tile(axis, (len(p), 1))) for axis in np.eye(3)]
         return stack([*columns[:3], *moments, columns[3]])
+
+    def possible(self, values, se, shape):
+        """It must pull the more the farther it is.
+
+        A constant force down is also what the arms' own weight and a scale common to all springs leave open.
+        """
+        return bool(values[6] > rules.PULL_SE * se[6])
 
     def physical(self, values, context):
         force, moment, k = values[:3], values[3:6], values[6] if abs(values[6]) > 1e-6 else 1e-6
