@@ -11,6 +11,7 @@ from estimator.strict import Fields, check_known
 from mocobot_logs.joints.joint_map import JointChannel
 from mocobot_logs.joints.quantities import (
     COMMANDS,
+    COUNTS,
     DUTIES,
     EFFORTS,
     POSITIONS,
@@ -171,6 +172,7 @@ def _channel(
         scale=sign * factor,
         offset=fields.number("offset") if "offset" in fields else 0.0,
         bits=bits,
+        counted=unit == COUNTS,
     )
 
 
