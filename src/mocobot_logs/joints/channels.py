@@ -62,11 +62,6 @@ def channels_of(
         for joint in joints
     }  # fmt: skip
     found: Channels = {}
-    for name, table in common.items():
-        if QUANTITIES[name].shared and table is not None:
-            found[name, ""] = _channel(
-                name, defaults | table, f"{where}: channels.{name}", None, False, command
-            )
     for index, joint in enumerate(joints):
         for name in dict.fromkeys([*common, *own[joint]]):
             table = own[joint].get(name, {})
@@ -83,6 +78,11 @@ def channels_of(
             merged = defaults | (common.get(name) or {}) | table
             place = {"joint": joint, "number": f"{index + 1}", "index": f"{index}"}
             found[name, joint] = _channel(name, merged, inside, place, slides[joint], command)
+    for name, table in common.items():
+        if QUANTITIES[name].shared and table is not None:
+            found[name, ""] = _channel(
+                name, defaults | table, f"{where}: channels.{name}", None, False, command
+            )
     for joint in joints:
         _check_joint([name for name, of in found if of == joint], joint, where)
     return found
