@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from estimator.arrays import Array
 from estimator.errors import InputError
 
+_OTHER = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
+_AT_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
 _LONGEST = 300
 """Characters of MuJoCo's message that are shown."""
 
@@ -44,12 +46,12 @@ class SerialModel:
 
 
 def load_spec(path: Path | str) -> mujoco.MjSpec:
-    """A model as MuJoCo's editable description, without meshes that are not there.
+    """A model as MuJoCo's editable description; without its meshes if it does not compile with them.
 
-    Shapes do not matter to inverse dynamics once inertias are given; URDF files often come without their meshes.
+    Shapes do not matter to inverse dynamics once inertias are given, and many URDF files come without their meshes.
 
     Raises:
-        InputError: MuJoCo cannot read the file.
+        InputError: MuJoCo cannot read the file, or not compile it.
     """
     path = Path(path)
     if not path.is_file():
@@ -58,7 +60,27 @@ def load_spec(path: Path | str) -> mujoco.MjSpec:
         spec = mujoco.MjSpec.from_file(str(path))
     except (ValueError, RuntimeError, OSError) as error:
         raise InputError(f"{path}: MuJoCo cannot read it ({_sentence(error)})") from error
+    try:
+        spec.compile()
+    except (ValueError, RuntimeError, OSError) as error:
+        said = _sentence(error)
+        if spec.meshes:
+            _drop_meshes(spec)
+            try:
+                spec.compile()
+                return spec
+            except (ValueError, RuntimeError, OSError) as other:
+                said += f"; without its meshes: {_sentence(other)}"
+        raise InputError(f"{path}: MuJoCo cannot compile it ({said})") from error
     return spec
+
+
+def _drop_meshes(spec: mujoco.MjSpec) -> None:
+    """Leave out meshes and what is drawn with them; a body whose inertia is to come from one then does not compile."""
+    for geom in [geom for geom in spec.geoms if geom.meshname]:
+        spec.delete(geom)
+    for mesh in list(spec.meshes):
+        spec.delete(mesh)
 
 
 def load_model(path: Path | str) -> SerialModel:
@@ -68,11 +90,7 @@ def load_model(path: Path | str) -> SerialModel:
         InputError: MuJoCo cannot read the file, or the model is not of that kind: it has no joints, joints without a
             name, free or ball joints, equality constraints (closed chains), tendons, or soft bodies.
     """
-    spec = load_spec(path)
-    try:
-        model = spec.compile()
-    except (ValueError, RuntimeError, OSError) as error:
-        raise InputError(f"{path}: MuJoCo cannot compile it ({_sentence(error)})") from error
+    model = load_spec(path).compile()
     _check(Path(path), model)
     joint = range(model.njnt)
     limited = model.jnt_limited.astype(bool)
@@ -81,7 +99,7 @@ def load_model(path: Path | str) -> SerialModel:
         model=model,
         joints=tuple(model.joint(j).name for j in joint),
         bodies=tuple(model.body(model.jnt_bodyid[j]).name for j in joint),
-        slides=model.jnt_type == mujoco.mjtJoint.mjJNT_SLIDE,
+        slides=model.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE),
         lower=np.where(limited, model.jnt_range[:, 0], -np.inf),
         upper=np.where(limited, model.jnt_range[:, 1], np.inf),
         torque_limit=_torque_limits(model),
@@ -93,9 +111,8 @@ def _check(path: Path, model: mujoco.MjModel) -> None:
     if not model.njnt:
         raise InputError(f"{path}: the model has no joints; {allowed}")
     for j in range(model.njnt):
-        kind, name = model.jnt_type[j], model.joint(j).name
-        if kind in (mujoco.mjtJoint.mjJNT_FREE, mujoco.mjtJoint.mjJNT_BALL):
-            word = "free" if kind == mujoco.mjtJoint.mjJNT_FREE else "ball"
+        name, word = model.joint(j).name, _OTHER.get(int(model.jnt_type[j]))
+        if word is not None:
             raise InputError(f"{path}: joint {name or j + 1!r} is a {word} joint; {allowed}")
         if not name:
             body = model.body(model.jnt_bodyid[j]).name
@@ -114,13 +131,14 @@ def _check(path: Path, model: mujoco.MjModel) -> None:
 
 
 def _torque_limits(model: mujoco.MjModel) -> Array:
-    """By the joints' own limit on actuator forces, or by their only actuator's force range."""
+    """By the joints' own limit on actuator forces, and by the force ranges of all actuators of a joint together."""
     limits = np.where(model.jnt_actfrclimited.astype(bool), np.abs(model.jnt_actfrcrange).max(axis=1), np.inf)
-    for a in range(model.nu):
-        if model.actuator_trntype[a] == mujoco.mjtTrn.mjTRN_JOINT and model.actuator_forcelimited[a]:
-            joint = model.actuator_trnid[a, 0]
-            most = np.abs(model.actuator_forcerange[a]).max() * abs(model.actuator_gear[a, 0])
-            limits[joint] = min(limits[joint], most)
+    at_joint = np.isin(model.actuator_trntype, _AT_JOINT)
+    for joint in range(model.njnt):
+        own = np.flatnonzero(at_joint & (model.actuator_trnid[:, 0] == joint))
+        if len(own) and model.actuator_forcelimited[own].all():
+            most = np.abs(model.actuator_forcerange[own]).max(axis=1) * np.abs(model.actuator_gear[own, 0])
+            limits[joint] = min(limits[joint], float(most.sum()))
     return limits
 
 

@@ -10,6 +10,7 @@ from estimator.arrays import Array
 
 Command = Literal["none", "position", "velocity", "torque", "duty"]
 """What the robot is told: nothing that is logged, or where to go, how fast, or what to give."""
+GainOf = Literal["torque", "velocity", "duty", "firmware"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +29,9 @@ class Drive:
         position_gain: of the position loop, in torque, velocity or duty (by ``gain_of``) per rad or m of
             error, shape (J,).
         velocity_gain: of the velocity loop or of the damping, per rad/s or m/s, shape (J,).
-        gain_of: what the gains make of an error: a torque [N m], a velocity [rad/s] or a duty (1 is full scale).
+        gain_of: what the gains make of an error: a torque [N m], a velocity [rad/s] or a duty (1 is full scale); gains
+            of a firmware are in its own unit, proportional to one of these by a factor that is not known.
+        limit: most that the loop gives, in ``gain_of`` (a duty for a firmware's gains), shape (J,).
         supply_V: supply voltage, shape (Q,), or None.
         duty: share of the supply that each motor is given, -1 to 1, shape (Q, J), or None.
     """
@@ -40,7 +43,8 @@ class Drive:
     command: Command
     position_gain: Array
     velocity_gain: Array
-    gain_of: Literal["torque", "velocity", "duty"] = "torque"
+    gain_of: GainOf
+    limit: Array
     supply_V: Array | None = None
     duty: Array | None = None
 
@@ -64,7 +68,10 @@ class JointLog:
         position_step: resolution of the reading of each position [rad or m], 0 where none shows, shape (J,).
         usable: samples that are what they seem, shape (Q,): False where a gap in the log was filled.
         native_hz: rate of the log as it was read [Hz].
-        resampled: whether stamps or rate called for interpolation.
+        resampled: whether stamps or rate called for interpolation and a low-pass: then nothing is left above half
+            of ``rate_hz``, and a fifth of it is where the low-pass begins.
+        start_s: where ``time`` is 0, after the first stamp of the file [s].
+        enabled: whether the drives are switched on, shape (Q,); None where the log does not say.
         motor: positions at the motors brought to the joints, shape (Q, J), NaN where a joint has none; None unless the
             log has positions on both sides of some drive.
         notes: what was found odd, and done about it; sentences.
@@ -83,6 +90,8 @@ class JointLog:
     usable: NDArray[np.bool_]
     native_hz: float
     resampled: bool = False
+    start_s: float = 0.0
+    enabled: NDArray[np.bool_] | None = None
     motor: Array | None = None
     notes: tuple[str, ...] = ()
 
