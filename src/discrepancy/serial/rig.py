@@ -23,9 +23,10 @@ from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.base import Hints
 from discrepancy.serial.logs import Part, parts_of
 from discrepancy.serial.model import SerialModel
+from discrepancy.serial.prediction import unforetold
 from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.remainder import remainder
-from discrepancy.serial.rows.noise import sensor_rows, whitening_of
+from discrepancy.serial.remainder import Key, NoiseInTraces, remainder, reversals
+from discrepancy.serial.rows.noise import SensorNoise, draws_of, whitening_of
 from discrepancy.serial.rows.signals import Nominal
 from estimator.arrays import Array
 
@@ -40,9 +41,10 @@ class SerialRig(Rig):
         joints: which joints have torques, and so channels, from 0, shape (C,).
         hints: where shapes begin.
         whitening: of every block.
-        level: sensors' noise over what the whole catalogue leaves, of every whitened channel, shape (C,).
+        level: sensors' noise over what the whole catalogue leaves, of every joint with torques, shape (C,).
         tolerances: given standard deviations by cause and parameter; causes that are not in it have their own.
         excluded: causes left out of the catalogue.
+        spoilt: cause and place of what noise of the positions hides.
     """
 
     model: SerialModel
@@ -53,6 +55,7 @@ class SerialRig(Rig):
     level: Array
     tolerances: Tolerances
     excluded: frozenset[str]
+    spoilt: frozenset[Key]
     _seen: dict[Any, list[Array]] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -73,13 +76,28 @@ class SerialRig(Rig):
         hints = catalogue.hints_of([part.signals for part in parts], logs)
         given = {} if tolerances is None else tolerances
         every = catalogue.candidates(parts[0].signals.tree, model.joints, hints, left_out, given)
-        left, freedom = remainder(parts, joints, every)
         rng = np.random.default_rng(rules.NOISE_SEED)
-        sensors = [rows[:, joints] for p in parts for rows in sensor_rows(p.signals, p.reduction, rng)]
-        torques = [rows[:, joints] for p in parts for rows in p.reduction(p.signals.torque)]
-        shared, level = whitening_of(left, sensors, torques, freedom)
-        whitening = tuple(replace(shared, moving=len(rows)) for rows in left)
-        return cls(model, parts, joints, hints, whitening, level, given, left_out)
+        noises = [SensorNoise.of(part.signals.log, rng) for part in parts]
+        rows = [
+            r
+            for part, noise in zip(parts, noises, strict=True)
+            for r in noise.rows(part.signals, part.reduction)
+        ]
+        torques = [r[:, joints] for part in parts for r in part.reduction(part.signals.torque)]
+        sensors = draws_of([r[:, joints] for r in rows], torques)
+        first = Whitening.of(sensors, sensors.shape[1], rules.AR_ORDER)
+        noisy = NoiseInTraces.of(parts, noises, joints, every)
+        spoilt = noisy.spoilt(every, first)
+        clear = [k for k, c in enumerate(every) if c.key not in spoilt]
+        told, noisy = [every[k] for k in clear], noisy.only(clear)
+        left = remainder(parts, joints, noisy.traces)
+        # Sensors' noise goes through what the arm is, not through what its model says.
+        through = [a[:, joints] - b for a, b in zip(rows, noisy.of_values(left.values), strict=True)]
+        uncertain = reversals(parts, joints, told, left.values)
+        whitening, level = whitening_of(
+            left.rows, left.freedom, uncertain, draws_of(through, torques), torques
+        )
+        return cls(model, parts, joints, hints, whitening, level, given, left_out, spoilt)
 
     # Recordings.
 
@@ -130,10 +148,8 @@ class SerialRig(Rig):
 
     def directions(self, trial: int) -> dict[str, Array]:
         """Every joint's own channel."""
-        n, white = len(self.whitening), self.whitening[trial]
-        part, k = self._where[trial]
-        n = len(part.reduction.samples[k])
-        own = white.rows_only(np.tile(np.eye(len(self.joints)), (n, 1, 1)))
+        white = self.whitening[trial]
+        own = white.rows_only(np.tile(np.eye(len(self.joints)), (white.moving, 1, 1)))
         own /= np.linalg.norm(own, axis=1, keepdims=True)
         return {f"the torque of joint {j + 1}": own[:, :, [c]] for c, j in enumerate(self.joints)}
 
@@ -169,6 +185,13 @@ class SerialRig(Rig):
             )
         return out
 
+    def local_columns(self, trial: int) -> Array:
+        """Whitened columns of the friction that joints may have while they rest, shape (n, C, l)."""
+        part, k = self._where[trial]
+        rests = [rest[:, self.joints] for rest in part.rests(k)]
+        none = np.zeros((len(part.reduction.samples[k]), len(self.joints), 0))
+        return self.whitening[trial](np.stack(rests, axis=2)) if rests else none
+
     def residual(
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
     ) -> list[Array]:
@@ -197,7 +220,8 @@ class SerialRig(Rig):
     def candidates(self) -> list[Candidate]:
         """Every cause at every place; pushes come from ``transients``."""
         tree = self.nominal.tree
-        return [*catalogue.candidates(tree, self.model.joints, self.hints, self.excluded, self.tolerances)]
+        every = catalogue.candidates(tree, self.model.joints, self.hints, self.excluded, self.tolerances)
+        return [c for c in every if c.key not in self.spoilt]
 
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         """Whether such values can be: no negative mass, moments of inertia, compliance or play beyond the errors."""
@@ -240,19 +264,24 @@ class SerialRig(Rig):
         """
         return partial(self._unforetold, trial, [(c, v) for c, v in active if c.acts_in(trial)])
 
-    def _unforetold(self, trial: int, active: Sequence[tuple[Candidate, Array]]) -> dict[str, Array] | None:
-        left = self.physical_residual(active)[trial]
+    def _unforetold(self, trial: int, active: Sequence[tuple[Candidate, Array]]) -> dict[str, Array]:
+        left = unforetold(self, trial, active)
         return {channel.name: left[:, c] for c, channel in enumerate(self.channels)}
 
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
         """Noise of the rows, and the torque's own size."""
         part, k = self._where[trial]
         torque = part.reduction(part.signals.torque)[k][:, self.joints]
-        noise = np.linalg.norm(self.whitening[trial].chol_moving, axis=1)
+        noise = np.sqrt(np.mean(self.sigma(trial) ** 2, axis=0))
         return {
             channel.name: (noise[[c]], np.array([np.sqrt(np.mean(torque[:, c] ** 2))]))
             for c, channel in enumerate(self.channels)
         }
+
+    def sigma(self, trial: int) -> Array:
+        """Standard deviation of the noise in every row of a block, shape (n, C)."""
+        white = self.whitening[trial]
+        return white.loudness * np.linalg.norm(white.chol_moving, axis=1)
 
     def effect_parameters(
         self, candidate: Candidate, values: Array, covariance: Array

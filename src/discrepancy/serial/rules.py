@@ -36,6 +36,15 @@ NOISE_BAND = (1.5, 6.0)
 """Where the torque's noise is read off, over the rows' cut-off. Chosen: next to the rows, where little moves."""
 TOP_BAND = (0.25, 0.45)
 """Where the position's is, over the sampling rate. Chosen: motion is least there, whose noise is differentiated."""
+FILTERED_BAND = (0.1, 0.2)
+"""The same of a log that was low-passed when it was resampled. Derived: ``mocobot_logs`` keeps as much."""
+SPOILT_SHARE = 0.01
+"""Of a trace's square, that noise of the positions may be. Derived: a fit would be off by as much."""
+STICKING_SHARE = 0.03
+"""Of a joint's typical speed, by which its smoothed velocity is off where it turns round. Derived: sticking takes some
+10 ms there, in which a joint that takes 0.3 s from one speed to the other would have gone on by as much."""
+LEAST_FREEDOM = 0.1
+"""Of the rows, that a fit of all causes leaves. Chosen: with less the logs are too short to be told noise from."""
 SEGMENT_S = 0.5
 """Of the spectra whose median over time is the noise: bursts, such as reversals, are not. Chosen."""
 NOISE_SEED = 8113
@@ -78,6 +87,8 @@ LEVEL_RAD = 5e-3
 """By which a base is not level. Chosen: a bubble's worth."""
 SCALE_SHARE = 0.02
 """By which torques are off in scale. Chosen: torque constants are given to two digits."""
+DELAY_S = 5e-4
+"""By which torques are late or early. Chosen: half a period of a drive's loop at 1 kHz."""
 MOST_SCALE = 0.5
 """From which a scale is none, but a wrong unit or gear. Chosen."""
 

@@ -19,9 +19,8 @@ def traces(rig: SerialRig, explanation: Explanation) -> list[Trace]:
     ]
     before, after = rig.physical_residual([]), rig.physical_residual(causes)
     out = []
-    for t, white in enumerate(rig.whitening):
+    for t in range(len(rig.trials)):
         n = len(before[t])
-        sigma = np.tile(np.linalg.norm(white.chol_moving, axis=1), (n, 1))
         out.append(
             Trace(
                 rig.trials[t],
@@ -30,7 +29,7 @@ def traces(rig: SerialRig, explanation: Explanation) -> list[Trace]:
                 rig.row_rate_hz(t),
                 before[t],
                 after[t],
-                sigma,
+                rig.sigma(t),
                 nominal.remaining(t),
                 fit.remaining(t),
                 rig.quantities(t),

@@ -11,6 +11,7 @@ class AsymmetricCoulomb(Cause):
 
     title = "Coulomb friction in {joint} that differs by direction"
     family = "constant_torque"
+    dry = True
     parameters = ("asymmetry_Nm",)
     scales = (0.3,)
     separate = "Rest: raise the torque slowly in either direction and see where the joint breaks loose."

@@ -52,12 +52,12 @@ class Cause(base.Cause):
 
     Attributes:
         part: where it sits.
-        slides: of joints that slide (True) or turn (False) only; None for both.
+        dry: whether it jumps where a joint turns round.
     """
 
     where = "arm"
     part: ClassVar[Part] = "joint"
-    slides: ClassVar[bool | None] = None
+    dry: ClassVar[bool] = False
 
     @abstractmethod
     def columns(self, signals: Signals, at: int, shape: Shape) -> Array:

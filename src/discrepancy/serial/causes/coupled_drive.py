@@ -12,6 +12,7 @@ class CoupledDrive(Cause):
     title = "coupled drive of {pair}"
     family = "coupling"
     part = "pair"
+    dry = True
     parameters = ("coulomb_Nm", "viscous_Nms_per_rad", "armature_kgm2")
     scales = (1.0, 1.0, 0.1)
     separate = "Motions of one of the two joints alone."

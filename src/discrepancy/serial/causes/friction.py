@@ -13,6 +13,7 @@ class Friction(Cause):
 
     title = "friction in {joint}"
     family = "friction"
+    dry = True
     parameters = ("coulomb_Nm", "viscous_Nms_per_rad")
     scales = (1.0, 1.0)
     separate = "Steady motions at several speeds in either direction."

@@ -14,6 +14,7 @@ class LoadFriction(Cause):
 
     title = "load-dependent friction in {joint}"
     family = "load_friction"
+    dry = True
     parameters = ("share",)
     scales = (0.05,)
     separate = "The same steady motion under several loads, such as two poses or two payloads."

@@ -1,7 +1,5 @@
 """Something pushed the arm for a while."""
 
-import numpy as np
-
 from discrepancy.serial.causes.base import Cause, last_link
 from discrepancy.serial.mechanics.regressor import force_torque
 

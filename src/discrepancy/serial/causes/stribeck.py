@@ -11,6 +11,7 @@ class Stribeck(Cause):
 
     title = "Stribeck friction in {joint}"
     family = "low_speed_friction"
+    dry = True
     parameters = ("excess_Nm",)
     scales = (1.0,)
     separate = "Steady motions at low speeds."

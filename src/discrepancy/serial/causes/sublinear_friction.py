@@ -15,6 +15,7 @@ class SublinearFriction(Cause):
 
     title = "sublinear friction in {joint}"
     family = "sublinear_friction"
+    dry = True
     parameters = ("bend_Nm",)
     scales = (1.0,)
     separate = "Steady motions at several speeds: friction over speed bends."

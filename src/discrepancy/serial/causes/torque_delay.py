@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from discrepancy.serial import rules
 from discrepancy.serial.causes.base import Cause, at_joint
 from estimator.filtering import differentiate
 
@@ -13,7 +14,7 @@ class TorqueDelay(Cause):
     title = "delay of the torque of {joint}"
     family = "delay"
     parameters = ("delay_s",)
-    scales = (1e-3,)
+    tolerances = (rules.DELAY_S,)
     separate = "A step of the torque with the joint clamped."
 
     def sentence(self, n):
