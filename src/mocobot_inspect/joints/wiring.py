@@ -25,8 +25,8 @@ Kind = Literal[
 ]  # fmt: skip
 SUSPICIOUS = 0.2
 """Misfit above which a joint is suspected. Measured on healthy logs: 0.003 to 0.01 at joints of a real arm, 0.11 and
-0.27 at two whose drives are coupled; up to 0.08 on 24 simulated arms of seven joints, masses and centres off by 10 or by
-50 %, and none of them was suspected of anything."""
+0.27 at two whose drives are coupled; up to 0.08 on 24 simulated arms of seven joints with masses and centres off by
+10 or 50 %, none of which was suspected of anything."""
 DECISIVE, DECISIVE_UNSUSPECTED = 3.0, 5.0
 """So many times smaller must undoing a mistake make the misfit of the joints that it concerns; the second where none of
 them is suspected: rubbing joints hide that they are exchanged as wholes, 7 to 12 times on a real arm."""
