@@ -97,7 +97,10 @@ def _column(replay: JointReplay) -> rrb.Horizontal:
 
 def _plots(replay: JointReplay, j: int) -> rrb.Horizontal:
     log, (length, force) = replay.log, replay.units[j]
-    quantities = {"position": f"position [{length}]", "torque": f"torque [{force}]"}
+    quantities = {
+        "position": f"position [{length}]" + ("" if log.command is None else " (white: command)"),
+        "torque": f"torque [{force}] (orange: model)",
+    }
     if log.drive.duty is not None:
         quantities["duty"] = "duty"
     views = [
@@ -105,7 +108,7 @@ def _plots(replay: JointReplay, j: int) -> rrb.Horizontal:
             origin=f"/{_series(replay, j)}/{quantity}",
             name=f"{replay.joints[j]}: {title}",
             axis_x=rrb.TimeAxis(link="LinkToGlobal"),
-            plot_legend=rrb.PlotLegend(visible=quantity == "torque"),
+            plot_legend=rrb.PlotLegend(visible=False),
         )
         for quantity, title in quantities.items()
     ]
