@@ -41,11 +41,12 @@ def _run_joints(options: Map, model: Path) -> None:
         print(draft.text, end="")
     else:
         write_text(options.out, draft.text)
+    count = len(robot.joints)
     doubts = f"{draft.doubtful} doubtful line{'s' * (draft.doubtful != 1)} must be looked at"
     lacking = (
         f"; the draft is not complete: {', '.join(draft.missing)} must be filled in" if draft.missing else ""
     )
-    print(f"mocobot: {len(robot.joints)} joints; {doubts}{lacking}", file=sys.stderr)
+    print(f"mocobot: {count} joint{'s' * (count > 1)}; {doubts}{lacking}", file=sys.stderr)
 
 
 def _summary(draft: Draft) -> str:

@@ -21,13 +21,15 @@ from mocobot_logs.open_log import log_kind, open_table
 from mocobot_logs.table.table import Table, Wanted
 
 _WORDS: dict[str, set[str]] = {
-    "command": {"cmd", "command", "commanded", "goal", "target", "ref", "reference", "desired", "des", "action", "setpoint"},
+    "enabled": {"enable", "enabled"},
+    "command": {
+        "cmd", "command", "commanded", "goal", "target", "ref", "reference", "desired", "des", "action", "setpoint"
+    },
     "dq": {"dq", "qd", "vel", "velocity", "speed", "omega", "qdot"},
     "torque": {"tau", "torque", "trq", "effort", "force"},
     "current": {"current", "cur", "amp", "amps"},
     "duty": {"pwm", "duty", "load"},
     "supply": {"supply", "bus", "battery", "vin", "volts"},
-    "enabled": {"enable", "enabled"},
     "q": {"q", "pos", "position", "angle", "joint", "state", "ang"},
 }  # fmt: skip
 """Words that tell a quantity, the most telling first."""
@@ -50,6 +52,7 @@ _SI: dict[Kind, tuple[str, str]] = {
 _TURNS = 4.0 * np.pi
 """Joints that turn farther than that are taken to be logged in degrees [rad]."""
 _ROWS = 20_000
+_LISTED = 12
 
 
 @dataclass(frozen=True)
@@ -119,20 +122,15 @@ def _drafted(
     missing = [] if {"q", "motor_position"} & set(places) else ["a position"]
     if not set(places) - {"q", "motor_position", "dq", "motor_velocity", "supply", "enabled"}:
         missing.append("a torque, a current, a command or a duty")
-    tail = (
-        ["", f"# not used: {printable(', '.join(unused[:12]))}{', ...' if len(unused) > 12 else ''}"]
-        if unused
-        else []
-    )
+    tail = []
+    if unused:
+        more = ", ..." if len(unused) > _LISTED else ""
+        tail += ["", f"# not used: {printable(', '.join(unused[:_LISTED]))}{more}"]
     if {"command", "motor_command"} & set(places):
         tail += ["", "[control]", f'command = "position"  # {DOUBTFUL}or velocity, or torque?']
     if {"motor_position", "motor_torque", "current"} & set(places):
-        tail += [
-            "",
-            f"# {DOUBTFUL}the motor's side is logged: motor turns per joint turn",
-            "# [drive]",
-            "# gear = [ ... ]",
-        ]
+        what = "motors are logged; how often does each turn for one turn of its joint?"
+        tail += ["", f"# {DOUBTFUL}{what}", "# [drive]", "# gear = [ ... ]"]
     if "current" in places:
         tail += ['# torque_constant = "free"']
     absent = [f"# {DOUBTFUL}nothing was found that is {what}" for what in missing]
