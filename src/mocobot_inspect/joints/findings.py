@@ -117,13 +117,16 @@ def _magnitudes(found: JointInspection) -> Iterator[str]:
 def _scales(found: JointInspection) -> Iterator[str]:
     if found.gains is None or not found.logs:
         return
-    known = ~np.isnan(found.logs[0].drive.torque_constant)
+    log = found.logs[0]
+    if log.torque is None:
+        return
+    known = ~np.isnan(log.drive.torque_constant) & np.isfinite(log.torque).any(axis=0)
     for j in np.flatnonzero(known & np.isfinite(found.gains)):
         gain = float(found.gains[j])
         if gain > WRONG_SCALE or gain < 1.0 / WRONG_SCALE:
             words = unit_of(gain)
             hint = f"is it in {words}" if words else "are its unit, gear and torque constant right"
-            yield f"torque of {found.robot.joints[j]} is {gain:.3g} times what the model asks for; {hint}?"
+            yield f"torque of {found.robot.joints[j]} is {gain:.4g} times what the model asks for; {hint}?"
 
 
 def mistake_sentence(found: Found, joints: tuple[str, ...]) -> str:

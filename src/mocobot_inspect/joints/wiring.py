@@ -42,6 +42,7 @@ _CHANGED = 1.5  # a joint is concerned by a mistake that changes its misfit by s
 _SLOW = 0.05  # of the rms speed, below which the sign of a speed means nothing
 _LEAST_TORQUE = 1e-9
 _LEAST_ROWS = 20
+_TURN = 2.0 * np.pi  # hardly any joint moves farther, and hardly any log is of less than so many degrees
 
 
 @dataclass(frozen=True)
@@ -233,8 +234,10 @@ def _candidates(case: _Case, robot: Robot) -> Iterator[Mistake]:
     suspected = {int(j) for j in np.flatnonzero(case.misfit > SUSPICIOUS)}
     moving = [int(j) for j in np.flatnonzero(np.any(case.dq, axis=0))]
     turning = tuple(j for j in moving if not robot.slides[j])
-    if turning:
+    spans = np.ptp(case.q[:, turning], axis=0)
+    if len(spans) and spans.max() > _TURN:
         yield Mistake("position_degrees", turning)
+    if len(spans) and np.degrees(spans.max()) < 2.0 * _TURN:
         yield Mistake("position_radians", turning)
     if len(suspected) > 1:
         yield Mistake("torque_sign", tuple(range(len(robot.joints))))

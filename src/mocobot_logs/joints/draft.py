@@ -198,7 +198,8 @@ def _line(name: str, place: _Place, values: Array | None, slides: Sequence[bool]
     slide = all(slides) and not QUANTITIES[name].motor
     if any(slides) and not all(slides) and kind in ("position", "velocity", "effort"):
         doubts.append("sliding joints need their own unit: [joint.NAME.channels]")
-    said = [_UNITS[token] for token in _tokens(place.keys.get("column", "")) if token in _UNITS]
+    chunks = re.split(r"[^a-z]+", re.sub(r"\{\w+\}", " ", place.keys.get("column", "")).lower())
+    said = [_UNITS[chunk] for chunk in chunks if chunk in _UNITS]
     allowed = units_of(kind, slides=slide)
     unit = next((each for each in reversed(said) if each in allowed), None)
     more = ""
