@@ -110,7 +110,7 @@ REFUSED = {
         ["diagnose", "{log}", "--model", "{model}", "--exclude", "sorcery"], "cause 'sorcery' does not exist", []
     ),
     "calibration": (
-        ["diagnose", "{log}", "--model", "{model}", "--calibration", "c.json"], "--calibration is of a team's robots", []
+        ["diagnose", "{log}", "--model", "{model}", "--calibration", "c.json"], "--calibration is of a team's", []
     ),
     "jobs": (["diagnose", "{log}", "--model", "{model}", "--jobs", "0"], "jobs is 0; it must be at least 1", []),
     "output over the model": (["inspect", "{log}", "--model", "{model}", "--json", "{model}"], "is an input", []),
@@ -119,8 +119,12 @@ REFUSED = {
     "replay of a truth": (
         ["replay", "{log}", "--model", "{model}", "--truth", "--save", "{folder}/x.rrd"], "--truth is of a team's", []
     ),
-    "map of a replay": (["replay", "{log}", "--map", "log.toml", "--save", "{folder}/x.rrd"], "--map goes with --model", []),
-    "folder of the log": (["diagnose", "{log}", "--model", "{model}", "--out", "{folder}"], "log.csv, which would be lost", []),
+    "map of a replay": (
+        ["replay", "{log}", "--map", "log.toml", "--save", "{folder}/x.rrd"], "--map goes with --model", []
+    ),
+    "folder of the log": (
+        ["diagnose", "{log}", "--model", "{model}", "--out", "{folder}"], "which would be lost; name another folder", []
+    ),
 }  # fmt: skip
 
 
