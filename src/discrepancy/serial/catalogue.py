@@ -56,7 +56,14 @@ def hints_of(parts: Sequence[Signals], logs: Sequence[JointLog]) -> Hints:
     for j in range(q.shape[1]):
         each = {n * g for n in rules.RIPPLE_TURNS for g in {1.0, abs(float(logs[0].drive.gear[j]))}}
         turns.append([] if tree.slides[j] else [t for t in sorted(each) if _passes(t, typical[j], logs)])
-    return Hints(typical, load, np.ptp(q, axis=0), turns, _couplings(tree, logs[0]))
+    return Hints(
+        typical,
+        load,
+        np.ptp(q, axis=0),
+        0.5 * (q.max(axis=0) + q.min(axis=0)),
+        turns,
+        _couplings(tree, logs[0]),
+    )
 
 
 def _alike(tree: Tree, one: int, other: int) -> bool:

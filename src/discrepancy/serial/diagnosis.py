@@ -6,11 +6,11 @@ from functools import partial
 
 import numpy as np
 
-from discrepancy.engine.block_errors import with_block_errors
 from discrepancy.engine.diagnose import Diagnosis, diagnose
 from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.serial import rules
 from discrepancy.serial.catalogue import Tolerances
+from discrepancy.serial.errors import with_errors
 from discrepancy.serial.model import SerialModel
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
@@ -53,7 +53,7 @@ def diagnose_rig(rig: SerialRig, *, jobs: int = 1, say: Callable[[str], object] 
     """
     found = diagnose(rig, most=rules.MOST_CAUSES, jobs=jobs, say=say)
     rows = max(2, round(rules.ERROR_BLOCK_S * rig.row_rate_hz(0)))
-    explanation = with_block_errors(found.explanation, rows)
+    explanation = with_errors(found.explanation, rows)
     notes = (*(note for part in rig.parts for note in part.signals.log.notes), *found.notes, *_notes(rig))
     return replace(found, explanation=explanation, notes=notes)
 

@@ -36,40 +36,51 @@ class Remainder:
 
 
 def remainder(
-    parts: Sequence[Part], joints: NDArray[np.intp], traces: Sequence[Sequence[Array]]
+    parts: Sequence[Part], joints: NDArray[np.intp], traces: Sequence[Sequence[Array]], white: Whitening
 ) -> Remainder:
     """What a plain fit of all causes leaves.
 
-    Joints count alike: every channel is scaled to its own residual. Combinations that the data do not tell stay zero.
+    Rows are as white as the sensors' noise makes them, or the fit would use causes to cancel noise where that is loud;
+    but joints count alike, by what there is to explain. Combinations that the data do not tell stay zero.
 
     Args:
         parts: the logs.
         joints: those with torques, shape (C,).
         traces: of every cause and block, rows (n, C, k).
+        white: of the sensors' noise.
     """
-    columns = [np.concatenate(own, axis=2) for own in zip(*traces, strict=True)]
-    rests = [[rest[:, joints] for rest in part.rests(k)] for part in parts for k in range(len(part.blocks))]
     residual = [rows[:, joints] for part in parts for rows in part.reduction(part.signals.residual)]
-    scale = np.sqrt(np.mean(np.concatenate(residual) ** 2, axis=0))
+    rests = [[rest[:, joints] for rest in part.rests(k)] for part in parts for k in range(len(part.blocks))]
+    whites = [replace(white, moving=len(rows)) for rows in residual]
+    seen = [w(r) for w, r in zip(whites, residual, strict=True)]
+    scale = np.sqrt(np.mean(np.concatenate(seen) ** 2, axis=0))
     scale = np.where(scale > 0, scale, 1.0)
-    ends = np.cumsum([r.size for r in residual])[:-1]
-    A = np.concatenate([(x / scale[:, None]).reshape(-1, x.shape[2]) for x in columns])
-    local = _block_diagonal([[rest / scale for rest in own] for own in rests], [r.size for r in residual])
+    columns = [np.concatenate(own, axis=2) for own in zip(*traces, strict=True)]
+    A = np.concatenate([_flat(w(x), scale) for w, x in zip(whites, columns, strict=True)])
+    local = _block_diagonal([[w(rest) / scale for rest in own] for w, own in zip(whites, rests, strict=True)],
+                            [r.size for r in residual])  # fmt: skip
     A = np.column_stack([A, local])
     size = np.linalg.norm(A, axis=0)
     size = np.where(size > 0, size, 1.0)
-    b = np.concatenate([(r / scale).ravel() for r in residual])
+    b = np.concatenate([(z / scale).ravel() for z in seen])
     U, s, Vt = np.linalg.svd(A / size, full_matrices=False)
     told = s > rules.REDUNDANT**0.5 * s[0]
-    U, s, Vt = U[:, told], s[told], Vt[told]
-    values = Vt.T @ ((U.T @ b) / s) / size
-    left = np.split(b - U @ (U.T @ b), ends)
-    ends = np.cumsum([own[0].shape[2] for own in traces])
-    return Remainder(
-        rows=[x.reshape(r.shape) * scale for x, r in zip(left, residual, strict=True)],
-        freedom=max(1.0 - len(s) / len(b), rules.LEAST_FREEDOM),
-        values=np.split(values, ends)[:-1],
-    )
+    found = Vt[told].T @ ((U[:, told].T @ b) / s[told]) / size
+    count = columns[0].shape[2]
+    left, at = [], count
+    for rows, x, own in zip(residual, columns, rests, strict=True):
+        rested = sum(
+            (v * rest for v, rest in zip(found[at : at + len(own)], own, strict=True)), np.zeros_like(rows)
+        )
+        left.append(rows - x @ found[:count] - rested)
+        at += len(own)
+    ends = np.cumsum([own[0].shape[2] for own in traces])[:-1]
+    freedom = max(1.0 - np.count_nonzero(told) / len(b), rules.LEAST_FREEDOM)
+    return Remainder(left, freedom, np.split(found[:count], ends))
+
+
+def _flat(rows: Array, scale: Array) -> Array:
+    return (rows / scale[:, None]).reshape(-1, rows.shape[2])
 
 
 def reversals(
@@ -95,7 +106,7 @@ def reversals(
                 ends = [
                     cause.columns(replace(s, dq=s.dq + sign * off), at, c.shape) @ v for sign in (1.0, -1.0)
                 ]
-                total += 0.5 * (ends[0] - ends[1])
+                total += (ends[0] - ends[1]) / np.sqrt(12.0)  # of an even spread
         out += [np.abs(rows[:, joints]) for rows in part.reduction(np.abs(total))]
     return out
 
@@ -130,18 +141,35 @@ class NoiseInTraces:
                 changes[k] += [rows[:, joints] for rows in part.reduction(off - own)]
         return cls(traces, changes)
 
-    def spoilt(self, candidates: Sequence[SerialCandidate], white: Whitening) -> frozenset[Key]:
-        """Causes whose traces noise spoils: least squares would name them, or shrink them, for its sake.
+    def spoilt(
+        self, candidates: Sequence[SerialCandidate], noise: Sequence[Array], white: Whitening
+    ) -> frozenset[Key]:
+        """Causes that least squares would name, or shrink, for the sake of noise of the positions.
 
-        Noise is in a trace as it is in the residual, so that a fit sees the one in the other (errors in variables).
+        Noise is in a trace as it is in the residual, so that a fit sees the one in the other (errors in variables): by
+        chance it would have half the gain that noise times noise has.
+
+        Args:
+            candidates: the causes.
+            noise: the same draw in the nominal residual, rows (n, C) per block.
+            white: for noise.
         """
         out = set()
+        whites = [replace(white, moving=len(rows)) for rows in noise]
+        seen = [w(rows).ravel() for w, rows in zip(whites, noise, strict=True)]
         for c, traces, changes in zip(candidates, self.traces, self.changes, strict=True):
-            trace, error = (
-                sum(np.sum(replace(white, moving=len(x))(x) ** 2, axis=(0, 1)) for x in rows)
+            trace, change = (
+                np.concatenate([w(x).reshape(-1, x.shape[2]) for w, x in zip(whites, rows, strict=True)])
                 for rows in (traces, changes)
             )
-            if np.any(error > rules.SPOILT_SHARE * trace):
+            size = np.linalg.norm(trace, axis=0)
+            size = np.where(size > 0, size, 1.0)
+            together = change.T @ np.concatenate(seen) / size
+            gain = float(
+                together @ np.linalg.pinv((trace / size).T @ (trace / size), hermitian=True) @ together
+            )
+            share = np.sum(change**2, axis=0) / size**2
+            if gain > rules.SPOILT_GAIN or np.any(share > rules.SPOILT_SHARE):
                 out.add(c.key)
         return frozenset(out)
 

@@ -22,13 +22,16 @@ from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.base import Hints
 from discrepancy.serial.logs import Part, parts_of
-from discrepancy.serial.model import SerialModel
+from discrepancy.serial.model import SerialModel, load_spec
 from discrepancy.serial.prediction import unforetold
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.remainder import Key, NoiseInTraces, remainder, reversals
 from discrepancy.serial.rows.noise import SensorNoise, draws_of, whitening_of
 from discrepancy.serial.rows.signals import Nominal
+from discrepancy.serial.undecidable import general, look_alikes
 from estimator.arrays import Array
+from mocobot_sim.serial.effects import RobotEffect
+from mocobot_sim.serial.extended import write_extended
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,10 +90,15 @@ class SerialRig(Rig):
         sensors = draws_of([r[:, joints] for r in rows], torques)
         first = Whitening.of(sensors, sensors.shape[1], rules.AR_ORDER)
         noisy = NoiseInTraces.of(parts, noises, joints, every)
-        spoilt = noisy.spoilt(every, first)
+        angles = [
+            r[:, joints]
+            for p, n in zip(parts, noises, strict=True)
+            for r in n.of_angles(p.signals, p.reduction)
+        ]
+        spoilt = noisy.spoilt(every, angles, first)
         clear = [k for k, c in enumerate(every) if c.key not in spoilt]
         told, noisy = [every[k] for k in clear], noisy.only(clear)
-        left = remainder(parts, joints, noisy.traces)
+        left = remainder(parts, joints, noisy.traces, first)
         # Sensors' noise goes through what the arm is, not through what its model says.
         through = [a[:, joints] - b for a, b in zip(rows, noisy.of_values(left.values), strict=True)]
         uncertain = reversals(parts, joints, told, left.values)
@@ -101,7 +109,7 @@ class SerialRig(Rig):
 
     # Recordings.
 
-    @cached_property
+    @property
     def trials(self) -> Sequence[str]:
         """Names of the blocks."""
         return [name for part in self.parts for name in part.names]
@@ -111,7 +119,7 @@ class SerialRig(Rig):
         """Measured torque of every joint minus what the model asks for."""
         return [
             Channel(
-                f"torque of {self.model.joints[j]}",
+                f"{self.model.joints[j]} torque",
                 f"joint {j + 1}",
                 None,
                 "N" if self.model.slides[j] else "N m",
@@ -249,6 +257,19 @@ class SerialRig(Rig):
         shapes = cause.finer(candidate.shape) if finer else cause.shapes(self.hints, _at(candidate))
         return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
 
+    def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
+        """For every number of its shape that the data determine: a little less, a little more, and the difference."""
+        out = []
+        for name, step in CAUSES[candidate.cause].steps(candidate.shape).items():
+            less, more = (
+                replace(
+                    candidate, shape=dict(candidate.shape) | {name: candidate.shape[name] + sign * step / 2}
+                )
+                for sign in (-1.0, 1.0)
+            )
+            out.append((less, more, step))
+        return out
+
     def _event(self, when: Transient) -> SerialCandidate:
         found = CAUSES["push"].at(self.nominal.tree, self.model.joints, -1, when.shape)
         return replace(found, transient=when)
@@ -286,20 +307,33 @@ class SerialRig(Rig):
     def effect_parameters(
         self, candidate: Candidate, values: Array, covariance: Array
     ) -> tuple[dict[str, float], dict[str, float]]:
-        """Values with standard errors, and the shape, which has none."""
+        """Values with standard errors, and the shape, of which those have one that the data determine."""
         names = [p.name for p in candidate.parameters]
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         found = dict(zip(names, map(float, values), strict=True)) | dict(candidate.shape)
-        errors = dict(zip(names, map(float, se), strict=True))
-        return found, errors | {name: float("nan") for name in candidate.shape}
+        fitted = [*names, *CAUSES[candidate.cause].steps(candidate.shape)]
+        errors = {name: float("nan") for name in candidate.shape}
+        return found, errors | dict(zip(fitted, map(float, se), strict=False))
 
     def write_extended(self, explanation: Explanation, folder: Path) -> None:
         """Write the model with the named causes in it.
 
         Raises:
-            InputError: the folder cannot be written.
+            InputError: the folder cannot be written, or MuJoCo refuses the model.
         """
-        raise NotImplementedError
+        effects = []
+        for found in explanation.found:
+            candidate = found.candidate
+            values, _ = self.effect_parameters(candidate, found.values, found.covariance)
+            more = {"gyration_m": rules.PAYLOAD_GYRATION_M} if candidate.cause == "payload" else {}
+            before = candidate.partner if isinstance(candidate, SerialCandidate) else None
+            effects.append(RobotEffect(candidate.cause, candidate.joint, before, values | more))
+        write_extended(load_spec(self.model.path), effects, folder, self.trials)
+
+    def undecidable(self) -> list[dict[str, Any]]:
+        """What such logs cannot decide, and what these cannot."""
+        every = self.candidates()
+        return [*general(), *look_alikes(every, [self.columns(c) for c in every])]
 
 
 def _at(candidate: Candidate) -> int:

@@ -40,6 +40,9 @@ FILTERED_BAND = (0.1, 0.2)
 """The same of a log that was low-passed when it was resampled. Derived: ``mocobot_logs`` keeps as much."""
 SPOILT_SHARE = 0.01
 """Of a trace's square, that noise of the positions may be. Derived: a fit would be off by as much."""
+SPOILT_GAIN = 8.0
+"""Of chi-square, that noise in a trace may have by meeting itself in the residual. Derived: a third of the 24 from which
+a single number is significant."""
 STICKING_SHARE = 0.03
 """Of a joint's typical speed, by which its smoothed velocity is off where it turns round. Derived: sticking takes some
 10 ms there, in which a joint that takes 0.3 s from one speed to the other would have gone on by as much."""
@@ -87,6 +90,8 @@ LEVEL_RAD = 5e-3
 """By which a base is not level. Chosen: a bubble's worth."""
 SCALE_SHARE = 0.02
 """By which torques are off in scale. Chosen: torque constants are given to two digits."""
+MOST_ZERO_RAD, MOST_LENGTH_M = 0.2, 0.02
+"""Beyond which a zero or a length is not off but that of another pose or model. Chosen: 11 degrees, 2 cm."""
 DELAY_S = 5e-4
 """By which torques are late or early. Chosen: half a period of a drive's loop at 1 kHz."""
 MOST_SCALE = 0.5
@@ -98,16 +103,18 @@ RIPPLE_TURNS = (1.0, 2.0)
 """Periods of a ripple in one turn of joint or motor. Chosen: eccentricity, and a gear's or a rotor's two sides."""
 MOST_RIPPLE_HZ = 0.5
 """Of the rows' cut-off: at which a ripple may pass at the joint's typical speed. Chosen: faster ones are filtered."""
+PAYLOAD_M, PAYLOAD_FINER_M, PAYLOAD_STEP_M = (0.1, 0.25), (-0.03, -0.01, 0.01, 0.03), 0.02
+"""Where the centre of a payload is looked for in the last link's frame, and differences by it. Chosen: hands are as long."""
+PAYLOAD_GYRATION_M = 0.04
+"""Radius of gyration of a payload. Chosen: a ball of 6 cm; what it differs by is within what a link's inertia may."""
 SOFT_LOAD_SHARE = 0.03
 """Of a joint's typical torque, over which play changes sides. Chosen."""
 PUSH_S, SHORTEST_PUSH_S = (0.2, 0.4, 0.8, 1.6), 0.1
 """Durations searched, and what refining may leave. Chosen: octaves."""
 STEP_RAD, STEP_M = 1e-4, 1e-5
 """Of differences by joint positions and by lengths. Derived: squares of the step and rounding are both below 1e-6."""
-UNSEEN_SHARE = 1e-6
-"""Of the strongest direction's information, below which a combination of causes is unseen. Derived: a thousandth in
-size, where a model's own errors are a few percent."""
-SPREAD_SHARE = 0.2
-"""Of a combination's largest part, below which a cause is not worth telling of it. Chosen."""
+ALIKE_SHARE, MOST_UNITS = 0.02, 30.0
+"""Of a trace's square, that another cause may leave of it to be the same, and how many units of that may take. Chosen: a
+seventh of the trace itself; what would take more is no imitation."""
 REDUNDANT = 1e-9
 """Of the largest singular value, below which columns depend on each other. Derived: rounding is 1e-12."""

@@ -34,7 +34,7 @@ class Hints:
     Attributes:
         typical: speed while it moves [rad/s or m/s].
         load: typical torque of the nominal model without friction [N m or N].
-        travel: range of positions [rad or m].
+        travel, middle: range of positions, and its middle [rad or m].
         turns: periods of a ripple in one unit of joint position that are tried, per joint.
         couplings: how many times a joint's motor turns when the joint before it turns once, in units of its own
             joint's turns, if the map says so; else NaN.
@@ -43,6 +43,7 @@ class Hints:
     typical: Array
     load: Array
     travel: Array
+    middle: Array
     turns: Sequence[Sequence[float]]
     couplings: Array
 
@@ -80,6 +81,10 @@ class Cause(base.Cause):
     def finer(self, shape: Shape) -> Sequence[Shape]:
         """Shapes near a chosen one, for a second look."""
         return []
+
+    def steps(self, shape: Shape) -> Mapping[str, float]:
+        """Numbers of a shape that the data determine, and over which to take differences."""
+        return {}
 
     def normal(self, tree: Tree, at: int) -> Sequence[float]:
         """Standard deviations that are no news, one a parameter; 0 of an event."""

@@ -26,6 +26,9 @@ class JointZero(Cause):
     def sizes(self, tree, at):
         return self.normal(tree, at)
 
+    def possible(self, tree, at, values, se):
+        return abs(values[0]) < (rules.MOST_LENGTH_M if tree.slides[at] else rules.MOST_ZERO_RAD)
+
     def columns(self, signals, at, shape):
         step = rules.STEP_M if signals.tree.slides[at] else rules.STEP_RAD
         both = self._torque(signals, at, step) - self._torque(signals, at, -step)

@@ -19,5 +19,8 @@ class LinkLength(Cause):
         x, y, z = (n(f"{axis}_m", "mm", 1e3, signed=True) for axis in "xyz")
         return f"sits off by ({x}, {y}, {z}) in the frame of the link before it"
 
+    def possible(self, tree, at, values, se):
+        return bool(max(abs(values)) < rules.MOST_LENGTH_M)
+
     def columns(self, signals, at, shape):
         return by_displacement(signals.motion, int(signals.tree.joint_body[at]))

@@ -19,7 +19,7 @@ class LinkMass(Cause):
         return f"has {n('excess_kg', 'kg')} {n.either('excess_kg', 'more', 'less')} than modelled"
 
     def normal(self, tree, at):
-        return [rules.INERTIA_SHARE * tree.mass[tree.joint_body[at]]]
+        return [rules.INERTIA_SHARE * float(tree.mass[tree.joint_body[at]])]
 
     def sizes(self, tree, at):
         return self.normal(tree, at)

@@ -65,9 +65,15 @@ class SensorNoise:
         q, dq, ddq = moved
         return replace(signals, q=q, dq=dq, ddq=ddq, inverse=signals.inverse + inverse - before)
 
+    def of_angles(self, signals: Signals, reduction: Reduction) -> list[Array]:
+        """What the positions' noise makes of the rows of every block, through the nominal model, shape (n, J)."""
+        return reduction(signals.inverse - self.added(signals).inverse)
+
     def rows(self, signals: Signals, reduction: Reduction) -> list[Array]:
-        """What the sensors' noise makes of the rows of every block, shape (n, J)."""
-        return reduction(self.torque - (self.added(signals).inverse - signals.inverse))
+        """The same with the torques' own noise."""
+        return [
+            a + b for a, b in zip(reduction(self.torque), self.of_angles(signals, reduction), strict=True)
+        ]
 
 
 def draws_of(rows: Sequence[Array], moving: Sequence[Array]) -> Array:
@@ -118,7 +124,7 @@ def _density(x: Array, rate_hz: float, low: float, high: float) -> Array:
     """Power density of every channel in a band, median over time and frequency, shape (J,) per hertz."""
     size = min(len(x), max(16, round(rules.SEGMENT_S * rate_hz)))
     starts = range(0, len(x) - size + 1, max(1, size // 2))
-    each = []
+    frequency, each = np.zeros(0), []
     for start in starts:
         frequency, power = welch(x[start : start + size], rate_hz, nperseg=size, axis=0, detrend="linear")
         each.append(power)

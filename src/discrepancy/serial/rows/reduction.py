@@ -50,7 +50,7 @@ class Reduction:
     def __call__(self, x: Array) -> list[Array]:
         """Rows of every block, shape (W, ...) -> (n, ...); what is nowhere but zero is not filtered."""
         flat = x.reshape(len(x), -1)
-        rows = np.zeros((self.filter.shape[0], flat.shape[1]))
+        rows = np.zeros((sum(len(s) for s in self.samples), flat.shape[1]))
         seen = np.flatnonzero(flat.any(axis=0))
         rows[:, seen] = self.filter @ np.ascontiguousarray(flat[:, seen])
         ends = np.cumsum([len(s) for s in self.samples])[:-1]
