@@ -19,6 +19,15 @@ Calibrated = Annotated[
 ]
 
 
+Model = Annotated[
+    Path | None,
+    tyro.conf.arg(
+        metavar="ROBOT.xml",
+        help="MJCF or URDF of one fixed-base robot whose joints were logged (docs/serial/guide.md), not a team.",
+    ),
+]
+
+
 @dataclass(frozen=True)
 class Paper:
     """Run the paper's experiment and print Tables II-V, published figures beside ours."""
@@ -100,9 +109,12 @@ class Diagnose:
 
     rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
     """Recordings (Parquet), or logs of any format that ``convert`` reads, all of one payload; several, so that what is
-    named can be validated. One MAT file with --rig emps."""
+    named can be validated. One MAT file with --rig emps; logs of a robot's joints with --model."""
     map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml|NAME")] = None
-    """Map of the logs that are no recordings; found out if not given."""
+    """Map of the logs that are no recordings; found out if not given. With --model, log.toml beside log or model."""
+    model: Model = None
+    reference: Annotated[tuple[Path, ...], tyro.conf.arg(metavar="LOG...")] = ()
+    """With --model: logs of the same robot while it was well; what is off there, too, is no news."""
     rig: Literal["team", "emps"] = "team"
     """What was recorded: a team of mocobots, or the EMPS benchmark's axis (docs/emps.md)."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="DIR")] = None
@@ -164,6 +176,7 @@ class Map:
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
     """Log of any format that ``convert`` reads."""
+    model: Model = None
     out: Annotated[Path | None, tyro.conf.arg(metavar="MAP.toml")] = None
     """Write the draft to a file instead of the terminal."""
     force: Force = False
@@ -176,7 +189,10 @@ class Replay:
     """Watch recordings: the scene moving from the measured angles, estimate against truth, all signals (Rerun)."""
 
     rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
-    """Recordings (Parquet); several are shown side by side."""
+    """Recordings (Parquet); several are shown side by side. Logs of a robot's joints with --model."""
+    model: Model = None
+    map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml")] = None
+    """With --model: map of the logs; log.toml beside log or model if not given."""
     estimate: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
     """Estimate to show, as `mocobot estimate --out` writes it; made from each recording if not given."""
     calibration: Calibrated = None
@@ -201,6 +217,7 @@ class Inspect:
     """Recording or log of any format that ``convert`` reads; broken ones are looked at, too."""
     map: Annotated[str | None, tyro.conf.arg(metavar="MAP")] = None
     """Map file or the name of a built-in one; see docs/measured-data.md."""
+    model: Model = None
     json: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
     """Write the report as JSON, too."""
     force: Force = False

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from estimator.arrays import Array
 from estimator.errors import InputError
+from mocobot_logs.faults import shown
 
 _OTHER = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
 _AT_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
-_LONGEST = 300
-"""Characters of MuJoCo's message that are shown."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,4 +143,4 @@ def _torque_limits(model: mujoco.MjModel) -> Array:
 
 def _sentence(error: BaseException) -> str:
     """MuJoCo's message on one line."""
-    return " ".join(str(error).split())[:_LONGEST] or type(error).__name__
+    return shown(" ".join(str(error).split()), 300) or type(error).__name__

@@ -20,6 +20,7 @@ from estimator.errors import InputError
 from estimator.files import whole_folder
 from estimator.recording.model import Recording
 from mocobot.api.given import Logs, Robots, calibration_file
+from mocobot.commands import diagnose_joints
 from mocobot.files.provenance import file_facts, provenance
 from mocobot.files.targets import check_folder, check_recordings, map_file
 from mocobot.options import Diagnose
@@ -46,6 +47,11 @@ def run(options: Diagnose) -> None:
         InputError: recordings, tolerances or options that cannot be used, or an output that cannot be written.
         NotGood: with ``strict``, the verdict is neither consistent nor explained.
     """
+    if options.model is not None:
+        diagnose_joints.run(options, options.model)
+        return
+    if options.reference:
+        raise InputError("--reference goes with --model: a healthy log of the same robot")
     rig = RIGS[options.rig]
     inputs = [*options.rec, *([options.tolerances] if options.tolerances else []), *map_file(options.map)]
     inputs += calibration_file(options.calibration)

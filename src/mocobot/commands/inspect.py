@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from estimator.arm.design import load_design
+from estimator.errors import InputError
 from estimator.files import write_json
 from mocobot.api.given import Robots, calibration_file
 from mocobot.files.targets import check_output
@@ -24,6 +25,9 @@ def run(options: Inspect) -> None:
         NotGood: with ``strict``, the log is ready for nothing.
         InputError: the log, map or design cannot be read, or the JSON cannot be written.
     """
+    if options.model is not None:
+        _run_joints(options, options.model)
+        return
     if options.json is not None:
         check_output(options.json, [options.rec, *calibration_file(options.calibration)], force=options.force)
     log_map = read_map(options.map) if options.map is not None else None
@@ -40,3 +44,25 @@ def run(options: Inspect) -> None:
     ready = ready_line(found)
     if options.strict and (ready.startswith("ready for: nothing") or " yes" not in ready):
         raise NotGood(ready)
+
+
+def _run_joints(options: Inspect, model: Path) -> None:
+    """A log of one robot's joints, judged by its model."""
+    from mocobot import serial
+
+    for name in ("design", "calibration"):
+        if getattr(options, name) is not None:
+            raise InputError(f"--{name} is of a team's robots; with --model there is none")
+    inputs = [options.rec, model, *([Path(options.map)] if options.map is not None else [])]
+    if options.json is not None:
+        check_output(options.json, inputs, force=options.force)
+    robot = serial.read_model(model)
+    with bar(None, "reading", "") as advance, bar(None, "checking", "mistake") as tried:
+        found = serial.inspect(
+            options.rec, robot, map=options.map, episode=options.episode, advance=advance, tried=tried
+        )
+    if options.json is not None:
+        found.write(options.json)
+    print(found)
+    if options.strict and found.ready_for.startswith("ready for: nothing"):
+        raise NotGood(found.ready_for)

@@ -13,7 +13,7 @@ from estimator.quantisation import rounding_step
 from mocobot_logs.joints.even import Even
 from mocobot_logs.joints.joint_log import Drive, JointLog
 from mocobot_logs.joints.joint_map import Control, JointMap
-from mocobot_logs.joints.quantities import COMMANDS, DUTIES, EFFORTS, VELOCITIES
+from mocobot_logs.joints.quantities import COMMANDS, DUTIES, EFFORTS, POSITIONS, VELOCITIES
 
 _STEP_ROWS = 1024
 """Rows of a block in which the step of a reading is looked for."""
@@ -212,13 +212,12 @@ def _duty(columns: _Columns, supply_V: Array | None) -> Array | None:
 
 def _position_step(part: Even, log_map: JointMap, turns: Array) -> Array:
     """Resolution of the positions [rad or m], shape (J,): noise of rounding adds up through coupled drives."""
-    keys, joints = list(log_map.channels), log_map.joints
+    joints = log_map.joints
     at_joint, at_motor = np.zeros(len(joints)), np.zeros(len(joints))
-    for k, (name, joint) in enumerate(keys):
-        if name == "q":
-            at_joint[joints.index(joint)] = step_of(part.raw[:, k])
-        elif name == "motor_position":
-            at_motor[joints.index(joint)] = step_of(part.raw[:, k])
+    for k, ((name, joint), channel) in enumerate(log_map.channels.items()):
+        if name in POSITIONS:
+            step = abs(channel.scale) if channel.counted else step_of(part.raw[:, k])
+            (at_joint if name == "q" else at_motor)[joints.index(joint)] = step
     from_motors = np.sqrt(np.linalg.inv(turns) ** 2 @ at_motor**2)
     own = np.array([("q", joint) in log_map.channels for joint in joints])
     return np.where(own, at_joint, from_motors)

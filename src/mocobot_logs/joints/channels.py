@@ -11,6 +11,7 @@ from estimator.strict import Fields, check_known
 from mocobot_logs.joints.joint_map import JointChannel
 from mocobot_logs.joints.quantities import (
     COMMANDS,
+    COUNTS,
     DUTIES,
     EFFORTS,
     POSITIONS,
@@ -61,11 +62,6 @@ def channels_of(
         for joint in joints
     }  # fmt: skip
     found: Channels = {}
-    for name, table in common.items():
-        if QUANTITIES[name].shared and table is not None:
-            found[name, ""] = _channel(
-                name, defaults | table, f"{where}: channels.{name}", None, False, command
-            )
     for index, joint in enumerate(joints):
         for name in dict.fromkeys([*common, *own[joint]]):
             table = own[joint].get(name, {})
@@ -82,6 +78,11 @@ def channels_of(
             merged = defaults | (common.get(name) or {}) | table
             place = {"joint": joint, "number": f"{index + 1}", "index": f"{index}"}
             found[name, joint] = _channel(name, merged, inside, place, slides[joint], command)
+    for name, table in common.items():
+        if QUANTITIES[name].shared and table is not None:
+            found[name, ""] = _channel(
+                name, defaults | table, f"{where}: channels.{name}", None, False, command
+            )
     for joint in joints:
         _check_joint([name for name, of in found if of == joint], joint, where)
     return found
@@ -171,6 +172,7 @@ def _channel(
         scale=sign * factor,
         offset=fields.number("offset") if "offset" in fields else 0.0,
         bits=bits,
+        counted=unit == COUNTS,
     )
 
 

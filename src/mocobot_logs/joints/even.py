@@ -24,11 +24,12 @@ from mocobot_logs.resample.tally import MOST_MISSING, beyond_s
 
 MAX_GAP_S = 0.05
 """Longest time without samples, beyond one period, that is bridged [s]."""
-SHORTEST_S, LEAST_ROWS = 1.0, 64
+SHORTEST_S, LEAST_ROWS = 1.0, 32
 """Parts between gaps that are shorter are left out."""
 LEAST_HZ, MOST_HZ = 20.0, 20e3
-_SLOW_SHARE, _SLOW = 0.9, (1.1, 1.75)  # of all intervals; times the median one
+_BLOCK, _SLOW_SHARE, _SLOW = 64, 0.9, (1.1, 1.75)  # intervals; of the blocks; times the usual one
 _MANY, _UNEVEN = 2.0, 0.15  # as in resample.stream
+_GAP = 1.75  # periods: jitter alone makes no longer intervals
 _INSIDE = 0.1  # of a period: nearer to a sample than that, a bridged gap does not show
 
 
@@ -175,11 +176,11 @@ def _between_samples(at_ns: Array, time_ns: Stamps, period_ns: float) -> NDArray
     left, right = time_ns[after - 1], time_ns[after]
     margin = _INSIDE * period_ns
     inside = (at_ns - left > margin) & (right - at_ns > margin)
-    return ~(inside & (np.rint((right - left) / period_ns) > 1))
+    return ~(inside & (right - left > _GAP * period_ns))
 
 
 def _own_grid(time_ns: Stamps, period_ns: float) -> tuple[float, NDArray[np.int64], float] | None:
-    """If stamps are even: spacing [ns], each sample's number, and the step to which stamps are rounded, 0 for none [ns].
+    """If stamps are even: spacing [ns], each sample's number, and the step of rounded stamps, 0 for none [ns].
 
     Stamps rounded to milliseconds or to a tick of a clock are even if no one is further off than the rounding.
     """
@@ -208,9 +209,16 @@ def _own_grid(time_ns: Stamps, period_ns: float) -> tuple[float, NDArray[np.int6
 
 
 def _period_ns(interval: Stamps) -> float:
-    """The usual interval; the slower one where a log's rate changes by less than twice."""
-    median, slow = float(np.median(interval)), float(np.quantile(interval, _SLOW_SHARE))
-    return slow if _SLOW[0] * median < slow < _SLOW[1] * median else median
+    """The usual interval; the slower one where a log's rate changes by less than twice.
+
+    Such a change shows in the mean of many intervals, in which jitter and single gaps do not.
+    """
+    median = float(np.median(interval))
+    blocks = interval[: len(interval) // _BLOCK * _BLOCK].reshape(-1, _BLOCK).mean(axis=1)
+    if not len(blocks):
+        return median
+    slower = float(np.quantile(blocks, _SLOW_SHARE) / np.median(blocks))
+    return median * slower if _SLOW[0] < slower < _SLOW[1] else median
 
 
 def _plain(rate_hz: float) -> float:

@@ -22,9 +22,11 @@ class JointChannel(ChannelMap):
 
     Attributes:
         bits: of a number that is signed but was logged without its sign (two's complement), or None.
+        counted: whether the raw numbers are counts, whose step is 1.
     """
 
     bits: int | None = None
+    counted: bool = False
 
     def apply(self, raw: Array) -> Array:
         """Raw samples in SI."""

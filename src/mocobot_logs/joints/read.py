@@ -9,8 +9,8 @@ from pathlib import Path
 from mocobot_logs.joints.assemble import assemble
 from mocobot_logs.joints.even import even_parts
 from mocobot_logs.joints.joint_log import JointLog
-from mocobot_logs.joints.joint_map import JointMap
-from mocobot_logs.log import LogSource, collect
+from mocobot_logs.joints.joint_map import JointMap, label
+from mocobot_logs.log import LogSource, Samples, collect
 from mocobot_logs.open_log import open_log
 
 
@@ -41,11 +41,24 @@ def read_joint_log(
     Raises:
         InputError: the log is damaged, its stamps or values cannot be used, or it is too short.
     """
-    streams = collect(source, advance).streams
-    parts = even_parts(source.name, tuple(source.channels), streams[0], log_map.rate_hz)
-    file_name = Path(source.name).name
-    control = log_map.control_of(file_name)
-    logs = [assemble(part, log_map, source.name, control) for part in parts]
+    return joint_logs_of(source.name, collect(source, advance).streams[0], log_map)
+
+
+def joint_logs_of(name: str, samples: Samples, log_map: JointMap) -> list[JointLog]:
+    """The parts of a log that is in memory.
+
+    Args:
+        name: of the log, whose last part may decide about gains.
+        samples: its rows, channels in the map's order.
+        log_map: its map.
+
+    Raises:
+        InputError: see ``read_joint_log``.
+    """
+    channels = tuple(label(*key) for key in log_map.channels)
+    parts = even_parts(name, channels, samples, log_map.rate_hz)
+    control = log_map.control_of(Path(name).name)
+    logs = [assemble(part, log_map, name, control) for part in parts]
     if len(logs) == 1:
         return logs
     return [replace(log, name=f"{log.name} (part {number})") for number, log in enumerate(logs, 1)]
