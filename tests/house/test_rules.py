@@ -16,7 +16,6 @@ FREE = {
     "discrepancy.result.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
     "discrepancy.result.text": {"WIDTH"},
     "discrepancy.result.traces_file": {"VERSION"},
-    "discrepancy.serial.model": {"_LONGEST"},  # of a message
 }
 """Formats, layouts and sizes of pictures, by module."""
 

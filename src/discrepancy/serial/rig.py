@@ -81,8 +81,6 @@ class SerialRig(Rig):
         whitening, level, spoilt = whiten(parts, joints, every)
         return cls(model, parts, joints, hints, whitening, level, given, left_out, spoilt)
 
-    # Recordings.
-
     @property
     def trials(self) -> Sequence[str]:
         """Names of the blocks."""
@@ -135,8 +133,6 @@ class SerialRig(Rig):
         own /= np.linalg.norm(own, axis=1, keepdims=True)
         return {f"the torque of joint {j + 1}": own[:, :, [c]] for c, j in enumerate(self.joints)}
 
-    # Rows.
-
     def physical(self, candidate: Candidate) -> list[Array]:
         """Columns of one candidate in N m or N, rows (n, C, k) of every block."""
         cause, at = CAUSES[candidate.cause], _at(candidate)
@@ -156,16 +152,13 @@ class SerialRig(Rig):
     def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
         """Whitened rows of every block; where joints rest, their friction is an unknown of the block."""
         columns = [self.columns(candidate) for candidate in candidates]
-        out = []
-        for t, (white, residual) in enumerate(zip(self.whitening, self.physical_residual([]), strict=True)):
-            part, k = self._where[t]
-            rests = [rest[:, self.joints] for rest in part.rests(k)]
-            local = white(np.stack(rests, axis=2)) if rests else np.zeros((*residual.shape, 0))
-            none = np.zeros((*residual.shape, 0))
-            out.append(
-                Rows(self.trials[t], white(residual), local, none, [c[t] for c in columns], self.row_times(t))
+        return [
+            Rows(
+                self.trials[t], residual, self.local_columns(t), np.zeros((*residual.shape, 0)),
+                [c[t] for c in columns], self.row_times(t),
             )
-        return out
+            for t, residual in enumerate(self.residual(np.zeros(0), [], []))
+        ]  # fmt: skip
 
     def local_columns(self, trial: int) -> Array:
         """Whitened columns of the friction that joints may have while they rest, shape (n, C, l)."""
@@ -197,8 +190,6 @@ class SerialRig(Rig):
             out = [r - x * candidate.acts_in(t) for t, (r, x) in enumerate(zip(out, taken, strict=True))]
         return out
 
-    # Causes.
-
     def candidates(self) -> list[Candidate]:
         """Every cause at every place; pushes come from ``transients``."""
         tree = self.nominal.tree
@@ -225,8 +216,6 @@ class SerialRig(Rig):
         """For every number of its shape that the data determine: a little less, a little more, and the difference."""
         return shapes.steps(candidate)
 
-    # Prediction.
-
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
     ) -> Callable[[], dict[str, Array] | None]:
@@ -241,18 +230,13 @@ class SerialRig(Rig):
         within = [c for c in self._normal if c.key not in taken]
         left = self.physical_residual(active)
         if within:
+            physical = zip(*([x * c.units for x in self.physical(c)] for c in within), strict=True)
             each = [
-                Within(
-                    np.concatenate([self.physical(c)[t] * c.units for c in within], axis=2),
-                    self.whitening[t],
-                    self.local_columns(t),
-                )
-                for t in range(len(left))
+                Within(np.concatenate(columns, axis=2), self.whitening[t], self.local_columns(t))
+                for t, columns in enumerate(physical)
             ]
-            own = unforetold(trial, left, each)
-        else:
-            own = left[trial]
-        return {channel.name: own[:, c] for c, channel in enumerate(self.channels)}
+            left[trial] = unforetold(trial, left, each)
+        return {channel.name: left[trial][:, c] for c, channel in enumerate(self.channels)}
 
     @cached_property
     def _normal(self) -> list[Candidate]:
