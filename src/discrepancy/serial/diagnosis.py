@@ -62,6 +62,6 @@ def _notes(rig: SerialRig) -> Iterator[str]:
     share = float(np.sqrt(np.mean(rig.level**2)))
     if share < 0.99:
         yield (
-            "Noise (what counts as 1 in chi2/n) is that of the sensors, read off where nothing moves; all causes of the "
-            f"catalogue together, each at will, would leave {1.0 / share:.1f} times as much."
+            "Noise (what counts as 1 in chi2/n) is that of the sensors, read off where nothing moves; all causes of "
+            f"the catalogue together, each at will, would leave {1.0 / share:.1f} times as much."
         )

@@ -1,4 +1,4 @@
-"""Standard errors of what was found: what is left may be correlated in time, and what is normal is not known exactly."""
+"""Standard errors of what was found: what is left is correlated in time, and what is normal is not known exactly."""
 
 from dataclasses import replace
 
@@ -28,12 +28,9 @@ def with_errors(explanation: Explanation, rows_per_block: int) -> Explanation:
     inflation = max(1.0, explanation.after / explanation.samples)
     found = []
     for item in explanation.found:
-        if (
-            item.candidate.transient
-        ):  # it fits into a block or two, which says nothing of how it would scatter
-            part = inflation * fit.part(item.index)[1]
-        else:
-            part = part_of(fit, whole, item.index)
+        # A transient fits into a block or two, which says nothing of how it would scatter.
+        alone = inflation * fit.part(item.index)[1]
+        part = alone if item.candidate.transient else part_of(fit, whole, item.index)
         k = len(part)
         part = part * np.outer(item.candidate.units, item.candidate.units)
         if (

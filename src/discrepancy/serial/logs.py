@@ -91,7 +91,8 @@ def _part(signals: Signals, joints: NDArray[np.intp]) -> Part:
     if not keep:
         least = math.ceil(rules.LEAST_ROWS / (signals.rate_hz / reduction.step))
         raise InputError(
-            f"{signals.log.name}: no part of it is long enough to diagnose; it needs at least {least * 3} s without gaps"
+            f"{signals.log.name}: no part of it is long enough to diagnose; it needs at least "
+            f"{least * rules.FEWEST_BLOCKS} s without gaps"
         )
     if len(keep) < len(cut):
         cut = [cut[k] for k in keep]

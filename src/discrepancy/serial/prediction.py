@@ -1,48 +1,47 @@
-"""Torques foretold from the motion: with given causes, and with everything else as the other trials have it."""
-
-from __future__ import annotations
+"""Torques foretold from the motion: with given causes, and with what is normal as the other trials have it."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
 
 import numpy as np
 
-from discrepancy.rig import Candidate
+from discrepancy.least_squares.whitening import Whitening
 from estimator.arrays import Array
 
-if TYPE_CHECKING:
-    from discrepancy.serial.rig import SerialRig
+
+@dataclass(frozen=True, eq=False)
+class Within:
+    """What is normal of a model, such as masses that are off by a tenth, in units of its tolerances; one per block.
+
+    Attributes:
+        physical: columns, rows (n, C, k).
+        whitening: of the rows.
+        local: whitened columns of the block's own unknowns, rows (n, C, l).
+    """
+
+    physical: Array
+    whitening: Whitening
+    local: Array
 
 
-def unforetold(rig: SerialRig, trial: int, active: Sequence[tuple[Candidate, Array]]) -> Array:
+def unforetold(trial: int, left: Sequence[Array], within: Sequence[Within]) -> Array:
     """Measured minus foretold torques of one block, low-passed as its rows are, shape (n, C).
 
-    What is normal of a model, such as masses that are off by a tenth, is fitted to the other blocks, within its
-    tolerances; where there is one block only, to that.
+    What is normal is fitted to the other blocks, within its tolerances; where there is one block only, to that.
 
     Args:
-        rig: the logs.
         trial: the block, from 0.
-        active: causes and their values.
+        left: measured torques less those of the model with its causes, rows (n, C) of every block.
+        within: of every block.
     """
-    trials = range(len(rig.trials))
-    physical = rig.physical_residual(active)
-    taken = {candidate.key for candidate, _ in active}
-    within = [
-        c for c in rig.candidates() if c.key not in taken and all(p.tolerance > 0 for p in c.parameters)
-    ]
-    if not within:
-        return physical[trial]
-    columns = [np.concatenate([rig.columns(c)[t] * c.units for c in within], axis=2) for t in trials]
-    normal, score = np.eye(columns[0].shape[2]), np.zeros(columns[0].shape[2])
-    for t in [k for k in trials if k != trial] or [trial]:
-        local = rig.local_columns(t)
-        A = _without(columns[t].reshape(-1, columns[t].shape[2]), local)
-        normal += A.T @ A
-        score += A.T @ rig.whitening[t](physical[t]).ravel()
-    values = np.linalg.solve(normal, score)
-    own = np.concatenate([rig.physical(c)[trial] * c.units for c in within], axis=2)
-    return physical[trial] - own @ values
+    count = within[trial].physical.shape[2]
+    normal, score = np.eye(count), np.zeros(count)
+    for t in [k for k in range(len(left)) if k != trial] or [trial]:
+        block = within[t]
+        columns = _without(block.whitening(block.physical).reshape(-1, count), block.local)
+        normal += columns.T @ columns
+        score += columns.T @ block.whitening(left[t]).ravel()
+    return left[trial] - within[trial].physical @ np.linalg.solve(normal, score)
 
 
 def _without(columns: Array, local: Array) -> Array:

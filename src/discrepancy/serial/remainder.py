@@ -91,8 +91,8 @@ def reversals(
 ) -> list[Array]:
     """By how much dry friction is uncertain where joints turn round, rows (n, C) per block.
 
-    It has any value between its two while a joint sticks, and a smoothed velocity does not tell when that is. So much it
-    changes if the velocities are a little off.
+    It has any value between its two while a joint sticks, and a smoothed velocity does not tell when that is. So much
+    it changes if the velocities are a little off.
     """
     out = []
     for part in parts:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
@@ -12,23 +12,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.causes.excluded import excluded_from
-from discrepancy.causes.intervals import intervals_near, worst_intervals
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.rig import Candidate, Channel, Rig, Rows, Transient
-from discrepancy.serial import catalogue, rules
+from discrepancy.rig import Candidate, Channel, Rig, Rows
+from discrepancy.serial import catalogue, rules, shapes
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.base import Hints
 from discrepancy.serial.logs import Part, parts_of
 from discrepancy.serial.model import SerialModel, load_spec
-from discrepancy.serial.prediction import unforetold
+from discrepancy.serial.prediction import Within, unforetold
 from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.remainder import Key, NoiseInTraces, remainder, reversals
-from discrepancy.serial.rows.noise import SensorNoise, draws_of, whitening_of
+from discrepancy.serial.remainder import Key
 from discrepancy.serial.rows.signals import Nominal
 from discrepancy.serial.undecidable import general, look_alikes
+from discrepancy.serial.whiten import whiten
 from estimator.arrays import Array
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import write_extended
@@ -79,35 +78,8 @@ class SerialRig(Rig):
         hints = catalogue.hints_of([part.signals for part in parts], logs)
         given = {} if tolerances is None else tolerances
         every = catalogue.candidates(parts[0].signals.tree, model.joints, hints, left_out, given)
-        rng = np.random.default_rng(rules.NOISE_SEED)
-        noises = [SensorNoise.of(part.signals.log, rng) for part in parts]
-        rows = [
-            r
-            for part, noise in zip(parts, noises, strict=True)
-            for r in noise.rows(part.signals, part.reduction)
-        ]
-        torques = [r[:, joints] for part in parts for r in part.reduction(part.signals.torque)]
-        sensors = draws_of([r[:, joints] for r in rows], torques)
-        first = Whitening.of(sensors, sensors.shape[1], rules.AR_ORDER)
-        noisy = NoiseInTraces.of(parts, noises, joints, every)
-        angles = [
-            r[:, joints]
-            for p, n in zip(parts, noises, strict=True)
-            for r in n.of_angles(p.signals, p.reduction)
-        ]
-        spoilt = noisy.spoilt(every, angles, first)
-        clear = [k for k, c in enumerate(every) if c.key not in spoilt]
-        told, noisy = [every[k] for k in clear], noisy.only(clear)
-        left = remainder(parts, joints, noisy.traces, first)
-        # Sensors' noise goes through what the arm is, not through what its model says.
-        through = [a[:, joints] - b for a, b in zip(rows, noisy.of_values(left.values), strict=True)]
-        uncertain = reversals(parts, joints, told, left.values)
-        whitening, level = whitening_of(
-            left.rows, left.freedom, uncertain, draws_of(through, torques), torques
-        )
+        whitening, level, spoilt = whiten(parts, joints, every)
         return cls(model, parts, joints, hints, whitening, level, given, left_out, spoilt)
-
-    # Recordings.
 
     @property
     def trials(self) -> Sequence[str]:
@@ -161,8 +133,6 @@ class SerialRig(Rig):
         own /= np.linalg.norm(own, axis=1, keepdims=True)
         return {f"the torque of joint {j + 1}": own[:, :, [c]] for c, j in enumerate(self.joints)}
 
-    # Rows.
-
     def physical(self, candidate: Candidate) -> list[Array]:
         """Columns of one candidate in N m or N, rows (n, C, k) of every block."""
         cause, at = CAUSES[candidate.cause], _at(candidate)
@@ -182,16 +152,13 @@ class SerialRig(Rig):
     def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
         """Whitened rows of every block; where joints rest, their friction is an unknown of the block."""
         columns = [self.columns(candidate) for candidate in candidates]
-        out = []
-        for t, (white, residual) in enumerate(zip(self.whitening, self.physical_residual([]), strict=True)):
-            part, k = self._where[t]
-            rests = [rest[:, self.joints] for rest in part.rests(k)]
-            local = white(np.stack(rests, axis=2)) if rests else np.zeros((*residual.shape, 0))
-            none = np.zeros((*residual.shape, 0))
-            out.append(
-                Rows(self.trials[t], white(residual), local, none, [c[t] for c in columns], self.row_times(t))
+        return [
+            Rows(
+                self.trials[t], residual, self.local_columns(t), np.zeros((*residual.shape, 0)),
+                [c[t] for c in columns], self.row_times(t),
             )
-        return out
+            for t, residual in enumerate(self.residual(np.zeros(0), [], []))
+        ]  # fmt: skip
 
     def local_columns(self, trial: int) -> Array:
         """Whitened columns of the friction that joints may have while they rest, shape (n, C, l)."""
@@ -223,8 +190,6 @@ class SerialRig(Rig):
             out = [r - x * candidate.acts_in(t) for t, (r, x) in enumerate(zip(out, taken, strict=True))]
         return out
 
-    # Causes.
-
     def candidates(self) -> list[Candidate]:
         """Every cause at every place; pushes come from ``transients``."""
         tree = self.nominal.tree
@@ -238,43 +203,18 @@ class SerialRig(Rig):
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the torques are worst."""
-        cause = CAUSES["push"]
-        if cause.name in self.excluded:
+        if "push" in self.excluded:
             return []
-        found = []
-        for t, z in enumerate(remaining):
-            for when in worst_intervals(
-                t, self.row_times(t), np.sum(z**2, axis=1), rules.PUSH_S, two_sided=False
-            ):
-                found.append(self._event(when))
-        return found
+        times = [self.row_times(t) for t in range(len(remaining))]
+        return [*shapes.pushes(self.nominal.tree, self.model.joints, times, remaining)]
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a push with its interval moved."""
-        cause, when = CAUSES[candidate.cause], candidate.transient
-        if when:
-            return [self._event(near) for near in intervals_near(when, rules.SHORTEST_PUSH_S)]
-        shapes = cause.finer(candidate.shape) if finer else cause.shapes(self.hints, _at(candidate))
-        return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
+        return shapes.others(candidate, self.hints, finer=finer)
 
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
         """For every number of its shape that the data determine: a little less, a little more, and the difference."""
-        out = []
-        for name, step in CAUSES[candidate.cause].steps(candidate.shape).items():
-            less, more = (
-                replace(
-                    candidate, shape=dict(candidate.shape) | {name: candidate.shape[name] + sign * step / 2}
-                )
-                for sign in (-1.0, 1.0)
-            )
-            out.append((less, more, step))
-        return out
-
-    def _event(self, when: Transient) -> SerialCandidate:
-        found = CAUSES["push"].at(self.nominal.tree, self.model.joints, -1, when.shape)
-        return replace(found, transient=when)
-
-    # Prediction.
+        return shapes.steps(candidate)
 
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
@@ -286,8 +226,22 @@ class SerialRig(Rig):
         return partial(self._unforetold, trial, [(c, v) for c, v in active if c.acts_in(trial)])
 
     def _unforetold(self, trial: int, active: Sequence[tuple[Candidate, Array]]) -> dict[str, Array]:
-        left = unforetold(self, trial, active)
-        return {channel.name: left[:, c] for c, channel in enumerate(self.channels)}
+        taken = {candidate.key for candidate, _ in active}
+        within = [c for c in self._normal if c.key not in taken]
+        left = self.physical_residual(active)
+        if within:
+            physical = zip(*([x * c.units for x in self.physical(c)] for c in within), strict=True)
+            each = [
+                Within(np.concatenate(columns, axis=2), self.whitening[t], self.local_columns(t))
+                for t, columns in enumerate(physical)
+            ]
+            left[trial] = unforetold(trial, left, each)
+        return {channel.name: left[trial][:, c] for c, channel in enumerate(self.channels)}
+
+    @cached_property
+    def _normal(self) -> list[Candidate]:
+        """What is always in the model, within its tolerances."""
+        return [c for c in self.candidates() if all(p.tolerance > 0 for p in c.parameters)]
 
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
         """Noise of the rows, and the torque's own size."""

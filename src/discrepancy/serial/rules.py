@@ -1,4 +1,4 @@
-"""Constants that can change a verdict on a serial robot, as in ``discrepancy.rules``: *Derived*, *Measured*, *Chosen*."""
+"""Constants that can change a verdict on a serial robot: *Derived*, *Measured* or *Chosen* (``discrepancy.rules``)."""
 
 MOST_CAUSES = 60
 """A nominal model that says nothing of friction lacks four or five causes a joint. Chosen: no limit for seven axes."""
@@ -41,8 +41,8 @@ FILTERED_BAND = (0.1, 0.2)
 SPOILT_SHARE = 0.01
 """Of a trace's square, that noise of the positions may be. Derived: a fit would be off by as much."""
 SPOILT_GAIN = 8.0
-"""Of chi-square, that noise in a trace may have by meeting itself in the residual. Derived: a third of the 24 from which
-a single number is significant."""
+"""Of chi-square, that noise in a trace may have by meeting itself in the residual. Derived: a third of the 24 from
+which a single number is significant."""
 STICKING_SHARE = 0.03
 """Of a joint's typical speed, by which its smoothed velocity is off where it turns round. Derived: sticking takes some
 10 ms there, in which a joint that takes 0.3 s from one speed to the other would have gone on by as much."""
@@ -104,7 +104,7 @@ RIPPLE_TURNS = (1.0, 2.0)
 MOST_RIPPLE_HZ = 0.5
 """Of the rows' cut-off: at which a ripple may pass at the joint's typical speed. Chosen: faster ones are filtered."""
 PAYLOAD_M, PAYLOAD_FINER_M, PAYLOAD_STEP_M = (0.1, 0.25), (-0.03, -0.01, 0.01, 0.03), 0.02
-"""Where the centre of a payload is looked for in the last link's frame, and differences by it. Chosen: hands are as long."""
+"""Where a payload's centre is looked for in the last link's frame, and differences by it. Chosen: hands are as long."""
 PAYLOAD_GYRATION_M = 0.04
 """Radius of gyration of a payload. Chosen: a ball of 6 cm; what it differs by is within what a link's inertia may."""
 SOFT_LOAD_SHARE = 0.03
@@ -114,7 +114,7 @@ PUSH_S, SHORTEST_PUSH_S = (0.2, 0.4, 0.8, 1.6), 0.1
 STEP_RAD, STEP_M = 1e-4, 1e-5
 """Of differences by joint positions and by lengths. Derived: squares of the step and rounding are both below 1e-6."""
 ALIKE_SHARE, MOST_UNITS = 0.02, 30.0
-"""Of a trace's square, that another cause may leave of it to be the same, and how many units of that may take. Chosen: a
-seventh of the trace itself; what would take more is no imitation."""
+"""Of a trace's square, that another cause may leave of it to be the same, and how many units of that it may take.
+Chosen: a seventh of the trace itself; what would take more is no imitation."""
 REDUNDANT = 1e-9
 """Of the largest singular value, below which columns depend on each other. Derived: rounding is 1e-12."""

@@ -109,7 +109,7 @@ def test_extended_robot_rubs_as_found(model: SerialModel, tmp_path: Path) -> Non
 
     def rubbing(q: np.ndarray, v: np.ndarray, torque: np.ndarray, time: float) -> np.ndarray:
         out = np.zeros_like(q)
-        out[1] = 2.0 * np.tanh(v[1] / 0.005) * (1.0 + 1.5 * np.exp(-abs(v[1]) / 0.05))
+        out[1] = 2.0 * np.tanh(v[1] / 0.005) * (1.0 + 1.5 * np.exp(-abs(v[1]) / 0.05)) + 0.8 * v[1]
         return out
 
     found = diagnose_serial(model, [simulated(real(105).compile(), 6, rubbing)])
@@ -118,7 +118,7 @@ def test_extended_robot_rubs_as_found(model: SerialModel, tmp_path: Path) -> Non
     extended = mujoco.MjModel.from_xml_path(str(tmp_path / "extended" / "robot.xml"))
     assert extended.dof_frictionloss[1] == pytest.approx(2.0, rel=0.1)
     effects = load_effects(tmp_path / "extended")
-    assert [(e.cause, e.joint) for e in effects if e.joint == 2][0] == ("stribeck", 2)
+    assert next((e.cause, e.joint) for e in effects if e.joint == 2) == ("stribeck", 2)
     data = mujoco.MjData(extended)
     data.qvel[1] = 0.02
     step(extended, data, effects, np.zeros(4))

@@ -13,7 +13,8 @@ class Armature(Cause):
     separate = "Fast short motions of this joint alone, in a pose where gravity does not load it."
 
     def sentence(self, n):
-        return f"the rotor adds {n('armature_kgm2', 'kg m^2')} {n.either('armature_kgm2', 'more', 'less')} than modelled"
+        more = n.either("armature_kgm2", "more", "less")
+        return f"the rotor adds {n('armature_kgm2', 'kg m^2')} {more} than modelled"
 
     def columns(self, signals, at, shape):
         return at_joint(signals, at, signals.ddq[:, at])

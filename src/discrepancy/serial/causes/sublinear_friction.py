@@ -9,8 +9,8 @@ from discrepancy.serial.causes.base import Cause, at_joint, direction
 class SublinearFriction(Cause):
     """Friction over speed is no straight line: it goes as a power of the speed below one, as grease does.
 
-    What a straight line up to twice the typical speed can say is taken out, so that the numbers of ``friction`` mean the
-    same with and without it.
+    What a straight line up to twice the typical speed can say is taken out, so that the numbers of ``friction`` mean
+    the same with and without it.
     """
 
     title = "sublinear friction in {joint}"

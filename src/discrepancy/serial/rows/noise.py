@@ -69,12 +69,6 @@ class SensorNoise:
         """What the positions' noise makes of the rows of every block, through the nominal model, shape (n, J)."""
         return reduction(signals.inverse - self.added(signals).inverse)
 
-    def rows(self, signals: Signals, reduction: Reduction) -> list[Array]:
-        """The same with the torques' own noise."""
-        return [
-            a + b for a, b in zip(reduction(self.torque), self.of_angles(signals, reduction), strict=True)
-        ]
-
 
 def draws_of(rows: Sequence[Array], moving: Sequence[Array]) -> Array:
     """Rows (n, C) of blocks cut to one length, no quieter than a thousandth of the torques, shape (D, n, C).

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -78,4 +79,4 @@ def blocks(signals: Signals) -> list[slice]:
     first, last = edge, len(signals.time) - edge
     count = max(rules.FEWEST_BLOCKS, round((last - first) / signals.rate_hz / rules.BLOCK_S))
     cuts = np.linspace(first, last, count + 1).astype(int)
-    return [slice(int(a), int(b)) for a, b in zip(cuts[:-1], cuts[1:], strict=True)]
+    return [slice(int(a), int(b)) for a, b in itertools.pairwise(cuts)]
