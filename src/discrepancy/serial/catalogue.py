@@ -46,6 +46,11 @@ def candidates(
     return out
 
 
+def events() -> dict[str, dict[str, float]]:
+    """Tolerances of what differs between two days: none."""
+    return {name: dict.fromkeys(cause.parameters, 0.0) for name, cause in CAUSES.items()}
+
+
 def hints_of(parts: Sequence[Signals], logs: Sequence[JointLog]) -> Hints:
     """Hints from all logs of one robot."""
     typical = parts[0].typical

@@ -24,6 +24,7 @@ def diagnose_serial(
     tolerances: Tolerances | None = None,
     excluded: Sequence[str] = (),
     *,
+    reference: Sequence[JointLog] = (),
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
 ) -> Diagnosed:
@@ -34,12 +35,14 @@ def diagnose_serial(
         logs: of its joints.
         tolerances: standard deviations by cause and parameter that are no news; None for the defaults.
         excluded: causes left out of the catalogue.
+        reference: logs of the same robot while it was well: only what has changed since is news then, and tolerances
+            do not count.
         jobs, say: as of ``diagnose``.
 
     Raises:
         InputError: a log cannot be used, or a cause to be excluded does not exist.
     """
-    rig = SerialRig.of(model, logs, tolerances, excluded)
+    rig = SerialRig.of(model, logs, tolerances, excluded, reference)
     found = diagnose_rig(rig, jobs=jobs, say=say)
     return Diagnosed(rig, found, SerialWords(), partial(traces, rig, found.explanation))
 
@@ -59,6 +62,11 @@ def diagnose_rig(rig: SerialRig, *, jobs: int = 1, say: Callable[[str], object] 
 
 
 def _notes(rig: SerialRig) -> Iterator[str]:
+    if rig.common:
+        yield (
+            "What is wrong with the model in the reference, too, is fitted to all logs together and is no news; what "
+            "is named has changed."
+        )
     share = float(np.sqrt(np.mean(rig.level**2)))
     if share < 0.99:
         yield (

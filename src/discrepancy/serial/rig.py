@@ -3,62 +3,37 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.engine.explanation import Explanation
-from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rig, Rows
 from discrepancy.serial import catalogue, rules, shapes
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
-from discrepancy.serial.causes.base import Hints
-from discrepancy.serial.logs import Part, parts_of
+from discrepancy.serial.logs import parts_of
 from discrepancy.serial.model import SerialModel, load_spec
 from discrepancy.serial.prediction import Within, unforetold
 from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.remainder import Key
-from discrepancy.serial.rows.signals import Nominal
+from discrepancy.serial.rows.common import combinations
+from discrepancy.serial.rows.remainder import Key
+from discrepancy.serial.rows.whiten import whiten
+from discrepancy.serial.serial_rows import SerialRows, place_of
 from discrepancy.serial.undecidable import general, look_alikes
-from discrepancy.serial.whiten import whiten
 from estimator.arrays import Array
 from mocobot_sim.serial.effects import RobotEffect
 from mocobot_sim.serial.extended import write_extended
 
 
 @dataclass(frozen=True, eq=False)
-class SerialRig(Rig):
-    """Logs of one robot, cut into blocks that validate each other.
-
-    Attributes:
-        model: the robot as described.
-        parts: the logs with their rows.
-        joints: which joints have torques, and so channels, from 0, shape (C,).
-        hints: where shapes begin.
-        whitening: of every block.
-        level: sensors' noise over what the whole catalogue leaves, of every joint with torques, shape (C,).
-        tolerances: given standard deviations by cause and parameter; causes that are not in it have their own.
-        excluded: causes left out of the catalogue.
-        spoilt: cause and place of what noise of the positions hides.
-    """
-
-    model: SerialModel
-    parts: tuple[Part, ...]
-    joints: NDArray[np.intp]
-    hints: Hints
-    whitening: tuple[Whitening, ...]
-    level: Array
-    tolerances: Tolerances
-    excluded: frozenset[str]
-    spoilt: frozenset[Key]
-    _seen: dict[Any, list[Array]] = field(default_factory=dict, repr=False)
+class SerialRig(SerialRows, Rig):
+    """Logs of one robot as a rig; its attributes are those of ``SerialRows``."""
 
     @classmethod
     def of(
@@ -67,24 +42,46 @@ class SerialRig(Rig):
         logs: Sequence[JointLog],
         tolerances: Tolerances | None = None,
         excluded: Sequence[str] = (),
+        reference: Sequence[JointLog] = (),
     ) -> SerialRig:
         """Cut the logs and find their noise.
+
+        Args:
+            model, logs, tolerances, excluded: as of ``diagnose_serial``.
+            reference: logs of the robot while it was well. What is wrong with the model there, too, is no news; nothing
+                of what differs has a tolerance then.
 
         Raises:
             InputError: the logs cannot be used, or a cause to be excluded does not exist.
         """
         left_out = excluded_from(CAUSES, excluded)
-        parts, joints = parts_of(model, logs)
+        parts, joints = parts_of(model, [*logs, *reference])
         hints = catalogue.hints_of([part.signals for part in parts], logs)
-        given = {} if tolerances is None else tolerances
+        given = catalogue.events() if reference else {} if tolerances is None else tolerances
         every = catalogue.candidates(parts[0].signals.tree, model.joints, hints, left_out, given)
-        whitening, level, spoilt = whiten(parts, joints, every)
-        return cls(model, parts, joints, hints, whitening, level, given, left_out, spoilt)
-
-    @property
-    def trials(self) -> Sequence[str]:
-        """Names of the blocks."""
-        return [name for part in self.parts for name in part.names]
+        # What differs between the days must not look like noise, so each has its own.
+        apart = [group for group in (parts[: len(logs)], parts[len(logs) :]) if group]
+        whitened = [whiten(group, joints, every) for group in apart]
+        whitening = tuple(white for done in whitened for white in done[0])
+        spoilt = frozenset[Key]().union(*(done[2] for done in whitened))
+        changed = sum(len(part.blocks) for part in apart[0])
+        rig = cls(
+            model,
+            parts,
+            joints,
+            hints,
+            whitening,
+            whitened[0][1],
+            given,
+            left_out,
+            spoilt,
+            len(whitening),
+            (),
+        )
+        if not reference:
+            return rig
+        common = combinations([rig.physical(c) for c in rig.candidates()], whitening)
+        return replace(rig, changed=changed, common=common, _seen={})
 
     @property
     def channels(self) -> Sequence[Channel]:
@@ -99,24 +96,9 @@ class SerialRig(Rig):
             for j in self.joints
         ]
 
-    @property
-    def nominal(self) -> Nominal:
-        """The model's numbers."""
-        return self.parts[0].signals.nominal
-
-    @cached_property
-    def _where(self) -> list[tuple[Part, int]]:
-        """Log and number in it of every block."""
-        return [(part, k) for part in self.parts for k in range(len(part.blocks))]
-
     def row_rate_hz(self, trial: int) -> float:
         part, _ = self._where[trial]
         return part.signals.rate_hz / part.reduction.step
-
-    def row_times(self, trial: int) -> Array:
-        """Time of every row of a block on its log's clock [s], shape (n,)."""
-        part, k = self._where[trial]
-        return part.signals.time[part.reduction.samples[k]]
 
     def quantities(self, trial: int) -> dict[str, Array]:
         """Speed over every joint's typical one, and per joint position, per row of a block, shape (n,) each."""
@@ -133,62 +115,23 @@ class SerialRig(Rig):
         own /= np.linalg.norm(own, axis=1, keepdims=True)
         return {f"the torque of joint {j + 1}": own[:, :, [c]] for c, j in enumerate(self.joints)}
 
-    def physical(self, candidate: Candidate) -> list[Array]:
-        """Columns of one candidate in N m or N, rows (n, C, k) of every block."""
-        cause, at = CAUSES[candidate.cause], _at(candidate)
-        key = (candidate.key, tuple(sorted(candidate.shape.items())))
-        if key not in self._seen:
-            done = [part.reduction(cause.columns(part.signals, at, candidate.shape)) for part in self.parts]
-            rows = [block[:, self.joints] for blocks in done for block in blocks]
-            if candidate.transient:
-                return [block * candidate.acts_in(t) for t, block in enumerate(rows)]
-            self._seen[key] = rows
-        return self._seen[key]
-
-    def columns(self, candidate: Candidate) -> list[Array]:
-        """Whitened columns of one candidate, shape (n, C, k) per block."""
-        return [white(c) for white, c in zip(self.whitening, self.physical(candidate), strict=True)]
-
     def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
         """Whitened rows of every block; where joints rest, their friction is an unknown of the block."""
         columns = [self.columns(candidate) for candidate in candidates]
         return [
             Rows(
-                self.trials[t], residual, self.local_columns(t), np.zeros((*residual.shape, 0)),
+                self.trials[t], residual, self.local_columns(t), self.common_columns(t),
                 [c[t] for c in columns], self.row_times(t),
             )
             for t, residual in enumerate(self.residual(np.zeros(0), [], []))
         ]  # fmt: skip
 
-    def local_columns(self, trial: int) -> Array:
-        """Whitened columns of the friction that joints may have while they rest, shape (n, C, l)."""
-        part, k = self._where[trial]
-        rests = [rest[:, self.joints] for rest in part.rests(k)]
-        none = np.zeros((len(part.reduction.samples[k]), len(self.joints), 0))
-        return self.whitening[trial](np.stack(rests, axis=2)) if rests else none
-
     def residual(
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
     ) -> list[Array]:
         """Exact whitened residual of every block with causes taken out."""
-        return [white(r) for white, r in zip(self.whitening, self.physical_residual(active), strict=True)]
-
-    def physical_residual(self, active: Sequence[tuple[Candidate, Array]]) -> list[Array]:
-        """The same in N m or N, rows (n, C) of every block."""
-        out = []
-        for part in self.parts:
-            left = part.reduction(part.signals.residual)
-            out += [rows[:, self.joints] for rows in left]
-        for candidate, values in active:
-            cause = CAUSES[candidate.cause]
-            if type(cause).exact is type(CAUSES["armature"]).exact:  # linear
-                taken = [columns @ values for columns in self.physical(candidate)]
-            else:
-                at = _at(candidate)
-                done = [p.reduction(cause.exact(p.signals, at, values, candidate.shape)) for p in self.parts]
-                taken = [block[:, self.joints] for blocks in done for block in blocks]
-            out = [r - x * candidate.acts_in(t) for t, (r, x) in enumerate(zip(out, taken, strict=True))]
-        return out
+        left = self.physical_residual(active, shared)
+        return [white(r) for white, r in zip(self.whitening, left, strict=True)]
 
     def candidates(self) -> list[Candidate]:
         """Every cause at every place; pushes come from ``transients``."""
@@ -199,14 +142,14 @@ class SerialRig(Rig):
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         """Whether such values can be: no negative mass, moments of inertia, compliance or play beyond the errors."""
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        return CAUSES[candidate.cause].possible(self.nominal.tree, _at(candidate), values, se)
+        return CAUSES[candidate.cause].possible(self.nominal.tree, place_of(candidate), values, se)
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the torques are worst."""
         if "push" in self.excluded:
             return []
-        times = [self.row_times(t) for t in range(len(remaining))]
-        return [*shapes.pushes(self.nominal.tree, self.model.joints, times, remaining)]
+        times = [self.row_times(t) for t in range(self.changed)]
+        return shapes.pushes(self.nominal.tree, self.model.joints, times, remaining[: self.changed])
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a push with its interval moved."""
@@ -223,12 +166,14 @@ class SerialRig(Rig):
 
         It returns measured minus foretold torque by joint, low-passed as the rows are, shape (n,) each.
         """
-        return partial(self._unforetold, trial, [(c, v) for c, v in active if c.acts_in(trial)])
+        return partial(self._unforetold, trial, [(c, v) for c, v in active if c.acts_in(trial)], shared)
 
-    def _unforetold(self, trial: int, active: Sequence[tuple[Candidate, Array]]) -> dict[str, Array]:
+    def _unforetold(
+        self, trial: int, active: Sequence[tuple[Candidate, Array]], shared: Array
+    ) -> dict[str, Array]:
         taken = {candidate.key for candidate, _ in active}
         within = [c for c in self._normal if c.key not in taken]
-        left = self.physical_residual(active)
+        left = self.physical_residual(active, shared)
         if within:
             physical = zip(*([x * c.units for x in self.physical(c)] for c in within), strict=True)
             each = [
@@ -288,7 +233,3 @@ class SerialRig(Rig):
         """What such logs cannot decide, and what these cannot."""
         every = self.candidates()
         return [*general(), *look_alikes(every, [self.columns(c) for c in every])]
-
-
-def _at(candidate: Candidate) -> int:
-    return -1 if candidate.joint is None else candidate.joint - 1

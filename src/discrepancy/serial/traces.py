@@ -17,7 +17,7 @@ def traces(rig: SerialRig, explanation: Explanation) -> list[Trace]:
         for candidate, span in zip(problem.candidates, problem.spans, strict=True)
         if np.any(fit.coefficients[span])
     ]
-    before, after = rig.physical_residual([]), rig.physical_residual(causes)
+    before, after = rig.physical_residual([], -nominal.shared), rig.physical_residual(causes, -fit.shared)
     out = []
     for t in range(len(rig.trials)):
         n = len(before[t])

@@ -9,8 +9,8 @@ from discrepancy.least_squares.whitening import Whitening
 from discrepancy.serial import rules
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.logs import Part
-from discrepancy.serial.remainder import Key, NoiseInTraces, remainder, reversals
 from discrepancy.serial.rows.noise import SensorNoise, draws_of, whitening_of
+from discrepancy.serial.rows.remainder import Key, NoiseInTraces, remainder, reversals
 from estimator.arrays import Array
 
 
