@@ -90,7 +90,9 @@ def test_packages_run_without_the_simulator_and_what_is_above_them() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-@pytest.mark.parametrize("package", ["discrepancy.engine", "discrepancy.inference", "discrepancy.least_squares"])
+@pytest.mark.parametrize(
+    "package", ["discrepancy.engine", "discrepancy.inference", "discrepancy.least_squares"]
+)
 def test_engine_of_the_diagnosis_knows_no_rig(package: str) -> None:
     """What looks for causes works for any rig: it sees neither a machine nor the simulator."""
     files = module_files(package)

@@ -13,14 +13,14 @@ def with_errors(explanation: Explanation, rows_per_block: int) -> Explanation:
 
     The first is ``block_covariance``'s, H^-1 B H^-1 with the scores' scatter B in place of H. H also holds the
     tolerances' priors, and these scatter as they say from robot to robot: H^-1 P H^-1 is added, with P their inverse
-    variances (1 for what is normal, 0 for a named cause).
+    variances (one over the spread squared for what is normal, 0 for a named cause).
 
     Args:
         explanation: what was found.
         rows_per_block: length of a block.
     """
     fit = explanation.fit
-    prior = np.concatenate([np.zeros(fit.problem.shared), fit.problem.tolerant.astype(float)])
+    prior = np.concatenate([np.zeros(fit.problem.shared), fit.problem.tolerant / fit.problem.spread**2])
     for index in fit.free:
         prior[fit.problem.spans[index]] = 0.0
     from_tolerances = fit.covariance @ (prior[fit.used][:, None] * fit.covariance)

@@ -13,6 +13,7 @@ import numpy as np
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.engine.explanation import Explanation
 from discrepancy.rig import Candidate, Channel, Rig, Rows
+from discrepancy.rules import LAW_SHARE
 from discrepancy.serial import catalogue, rules, shapes
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.catalogue import Tolerances
@@ -143,6 +144,10 @@ class SerialRig(SerialRows, Rig):
         """Whether such values can be: no negative mass, moments of inertia, compliance or play beyond the errors."""
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return CAUSES[candidate.cause].possible(self.nominal.tree, place_of(candidate), values, se)
+
+    def law_share(self, candidate: Candidate) -> float:
+        """A real robot: noise is the sensors', and every law leaves more than that."""
+        return LAW_SHARE if candidate.transient else rules.SERIAL_LAW_SHARE
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the torques are worst."""
