@@ -129,9 +129,14 @@ SHORTEST_HOLD_S = 1.2
 
 # A team: noise of the sensors.
 
-ANGLE_FLOOR_RAD, TORQUE_FLOOR_NM, FLOOR_HZ = 2e-6, 3e-4, 100.0
-"""Noise at least, of readings at ``FLOOR_HZ``; as much in a band at any other rate. Measured: what soft rods, welds and
-the integrator leave of trials with ideal sensors weighs as much as 1 to 2 urad and 0.1 to 0.3 mN m."""
+MODEL_PHI_RAD, MODEL_THETA_RAD, MODEL_TAU_NM, MODEL_HZ = 2e-6, 7e-7, 3e-4, 100.0
+"""What the model itself leaves beside any sensor, as noise of readings at ``MODEL_HZ``; as much in a band at any
+other rate. Measured: what soft rods, welds and the integrator leave of trials with ideal sensors weighs as much as 1 to
+3 urad of phi below 0.5 Hz and a third of that to 2 Hz, 0.1 to 2 urad of theta, and, at the motion's own frequencies,
+0.1 to 0.2 mN m in random trials."""
+MODEL_BELOW_HZ, MODEL_ABOVE = 2.5, 0.2
+"""Up to where, and the share of it that is left above. Measured: of the same, a twentieth of the power from 3 Hz on,
+and hardly anything from 4 Hz."""
 NOISE_ABOVE_HZ = 25.0
 """Where nothing moves, so that what is there is noise. Chosen."""
 TEAM_SMOOTH_HZ = 12.0

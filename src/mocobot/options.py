@@ -68,8 +68,9 @@ class Estimate:
     self_calibrate: Flag = False
     """Calibrate the robots on these recordings, and take what they carry from the same fit; free trials may be among
     them."""
-    method: Literal["auto", "staged", "joint"] = "auto"
-    """The paper's stages, one joint least squares, or stages where static holds allow."""
+    method: Literal["auto", "fit", "staged", "joint"] = "auto"
+    """One fit of closed loops and balance of wrenches; the paper's stages; its grasps, and one least squares for the
+    rest. auto: the fit, if noise is all that it leaves."""
     cutoff_hz: float = 5.0
     """Cut-off of the low-pass filter [Hz]."""
 

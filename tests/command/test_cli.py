@@ -168,7 +168,7 @@ def test_estimate_of_a_simulated_trial(
     estimate = json.loads(out.read_text())
     truth = json.loads(recording.with_suffix(".truth.json").read_text())
     assert code == 0
-    assert estimate["method"] == "joint"
+    assert estimate["method"] == "fit"
     assert estimate["mass"]["m_kg"] == pytest.approx(truth["mass_kg"], rel=2e-3)
     assert estimate["com"]["p_1c_m"] == pytest.approx(truth["p_1c_m"], abs=2e-3)
     assert estimate["inertia"]["principal_kgm2"] == pytest.approx(truth["principal_inertia_kgm2"], rel=0.02)

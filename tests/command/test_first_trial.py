@@ -100,7 +100,7 @@ OPTIONS = {
     "estimate rec.parquet --cutoff-hz 0": "cutoff_hz is 0.0; it must lie between 0 and 50 Hz",
     "estimate rec.parquet --cutoff-hz nan": "--cutoff-hz is 'nan'; it must be a number",
     "estimate rec.parquet --cutoff-hz 5Hz": "--cutoff-hz is '5Hz'; it must be a number",
-    "estimate rec.parquet --method best": "--method is 'best'; it must be one of auto, staged, joint",
+    "estimate rec.parquet --method best": "--method is 'best'; it must be one of auto, fit, staged, joint",
     "diagnose": "no recording given; name at least one file",
     "diagnose --exclude push rec.parquet": "no recording given; name them before --exclude",
     "diagnose rec.parquet --exclude ghost": "cause 'ghost' does not exist; the causes are phi_zero, theta_zero, ...",

@@ -178,3 +178,13 @@ def test_damaged_logs_maps_and_models_leave_nothing_behind(tmp_path, capsys, val
             (tmp_path / "found.json").unlink()
         path.write_bytes(originals[path])
     assert count > 10
+
+
+def test_tolerances_of_the_causes_that_a_file_names(tmp_path) -> None:
+    path = tmp_path / "tolerances.toml"
+    path.write_text("[torque_scale]\nscale_percent = 2.0\n", encoding="utf-8")
+    with pytest.raises(serial.InputError, match="torque_scale has no 'scale_percent'; its parameters are"):
+        serial.serial_tolerances(path)
+    path.write_text("[torque_scale]\nscale = 0.02\n", encoding="utf-8")
+    assert serial.serial_tolerances(path) == {"torque_scale": {"scale": 0.02}}
+    assert serial.serial_tolerances(None) is None

@@ -13,18 +13,21 @@ from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, 
 from estimator.calibrate.equations.alone import AloneEquations
 from estimator.calibrate.equations.level import corrected
 from estimator.calibrate.equations.rows import Rows
-from estimator.calibrate.equations.sensing import Sensing
+from estimator.calibrate.equations.sensing import Resolution, Sensing
 from estimator.calibrate.findings import findings
-from estimator.calibrate.fit import Fit, KnownMass, Trial, fit
+from estimator.calibrate.fit import Fit, fit
 from estimator.calibrate.held_out import held_out
+from estimator.calibrate.left_out import Given
 from estimator.calibrate.outcome.shares import shares
 from estimator.calibrate.prior import Prior
+from estimator.calibrate.problem import KnownMass, Trial
 from estimator.calibrate.undecided import undecided
 from estimator.calibrate.unknowns import Unknowns
 from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
+from estimator.estimate.statics import CONTRADICTION
 from estimator.recording.checks import check_duration, check_recording
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
@@ -80,7 +83,7 @@ def calibrate(
         shared.append(_start(estimate_payload(members, "auto", compare_masses=True, withhold=False), members))
     say("calibration")
     units = ArmUnit(design, np.zeros((N, COUNT))) if robots is None else robots.units
-    sensing = Sensing.of_each([*recordings, *free])
+    sensing = Sensing.of_each([Resolution.of(recording) for recording in (*recordings, *free)])
     labels = list(groups)
     rows = [_rows(recording) for recording in recordings]
     payload_of = [labels.index(recording.metadata.payload) for recording in recordings]
@@ -92,6 +95,7 @@ def calibrate(
     ]
     start = Unknowns(units, tuple(shared), tuple(bases))
     weights = _weights(known_mass or {}, labels)
+    given = Given(trials, start, prior, alone, weights, robots)
     try:
         found = fit(trials, start, prior, alone, weights, robots)
     except (InputError, np.linalg.LinAlgError) as error:
@@ -101,7 +105,8 @@ def calibrate(
             "payloads that they name?"
         ) from error
     known = tuple(known_mass or ()) if robots is None else robots.known_mass
-    return _result(found, recordings, free, labels, payload_of, prior, known)
+    wrong = findings(found, given, [recording.name for recording in recordings])
+    return _result(found, wrong, recordings, free, labels, payload_of, prior, known)
 
 
 def _by_payload(recordings: Sequence[Recording]) -> dict[str | None, list[Recording]]:
@@ -147,6 +152,14 @@ def _start(estimate: PayloadEstimate, members: Sequence[Recording]) -> Shared:
     if grasps is None or mass is None or c is None:
         missing = "grasps" if grasps is None else "mass" if mass is None else "centre of mass"
         names = ", ".join(recording.name for recording in members)
+        doubts = [
+            weak.reason for step in estimate.steps for weak in step.weak if CONTRADICTION in weak.reason
+        ]
+        if doubts:
+            raise InputError(
+                f"{names}: no {missing} comes out of them, for {doubts[0]}; are all of them of the same robots, in the "
+                "same order?"
+            )
         raise InputError(
             f"{names}: the motion does not determine the {missing}, so there is nothing to calibrate against; "
             "add a trial in which the payload turns about all axes"
@@ -184,6 +197,7 @@ def _weights(known: Mapping[str, tuple[float, float]], labels: Sequence[str | No
 
 def _result(
     found: Fit,
+    wrong: Sequence[str],
     recordings: Sequence[Recording],
     free: Sequence[Recording],
     labels: Sequence[str | None],
@@ -248,7 +262,7 @@ def _result(
         trials=tuple(trials),
         known_mass=known_mass,
         steps=found.steps,
-        findings=tuple(findings(found, [recording.name for recording in recordings])),
+        findings=tuple(wrong),
         open=tuple(undecided(found, prior, scale_sd, alone=bool(free), single=single)),
     )
 

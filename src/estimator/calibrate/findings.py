@@ -12,6 +12,7 @@ from estimator.arm.unit import AT, COUNT
 from estimator.arrays import Array
 from estimator.calibrate import rules
 from estimator.calibrate.fit import Fit
+from estimator.calibrate.left_out import Given, contradicting
 from estimator.calibrate.quadratic import Quadratic
 
 _SENSORS = (
@@ -37,46 +38,45 @@ class Change(NamedTuple):
     unknowns: int
 
 
-def findings(fit: Fit, names: Sequence[str]) -> list[str]:
+def findings(fit: Fit, given: Given, names: Sequence[str]) -> list[str]:
     """Sentences on what no calibration explains; none on good recordings.
 
     Args:
         fit: the calibration.
+        given: what it was made from.
         names: of the recordings with a payload.
     """
-    if not fit.converged:
-        listed = ", ".join(names)
-        return [
-            f"The calibration did not settle within {rules.MAX_STEPS} steps, so its numbers are not to be used: "
-            f"{listed} contradict each other, or leave too much open. Are all of them of the same robots, and of the "
-            "payloads that they name? Leave out one at a time."
-        ]
-    odd = [
-        k
-        for k, trial in enumerate(fit.trials)
-        if _ratio(trial.loops) > rules.MISFIT or _ratio(trial.balance) > rules.MISFIT
-    ]
+    odd = [k for k, trial in enumerate(fit.trials) if trial.loops.misfits or trial.balance.misfits]
     if not odd:
-        return []
+        return [] if fit.converged else [_unsettled(names)]
+    if fit.converged:  # elsewhere, derivatives say nothing of what would explain it
+        changes = sorted(_changes(fit, names), key=lambda change: _worth(fit, change), reverse=True)
+        if changes and _worth(fit, changes[0]) > 0 and _suffices(fit, changes[0]):
+            best = changes[0]
+            rest = "the other recordings" if len(names) > 2 else "the other recording"
+            return [f"{names[best.trial]} contradicts {rest}: {best.what}. Leave it out, or record it again."]
+    sentence = contradicting(given, names)
+    return [sentence or _unexplained(fit, odd, names)]
+
+
+def _unsettled(names: Sequence[str]) -> str:
+    return (
+        f"The calibration did not settle within {rules.MAX_STEPS} steps, so its numbers are not to be used: "
+        f"{', '.join(names)} leave too much open. Add a recording of another motion."
+    )
+
+
+def _unexplained(fit: Fit, odd: Sequence[int], names: Sequence[str]) -> str:
     worst = max(odd, key=lambda k: fit.trials[k].all.c)
-    changes = sorted(_changes(fit, names), key=lambda change: _worth(fit, change), reverse=True)
-    if changes and _worth(fit, changes[0]) > 0 and _suffices(fit, changes[0]):
-        best = changes[0]
-        rest = "the other recordings" if len(names) > 2 else "the other recording"
-        return [f"{names[best.trial]} contradicts {rest}: {best.what}. Leave it out, or record it again."]
     parts = []
     for k in odd:
-        loops, balance = _ratio(fit.trials[k].loops), _ratio(fit.trials[k].balance)
+        loops, balance = fit.trials[k].loops.ratio, fit.trials[k].balance.ratio
         parts.append(f"{names[k]} ({loops:.3g} in its loops, {balance:.3g} in its balance)")
-    return [
+    return (
         f"No calibration explains {'; '.join(parts)}: chi2/n is 1 where robots, payload and noise are all there is, "
         f"and {rules.MISFIT} at most. Something else acts on these robots, most in {names[worst]}; the numbers are not "
         "to be trusted before mocobot diagnose has named it."
-    ]
-
-
-def _ratio(part: Quadratic) -> float:
-    return part.c / max(1, part.count)
+    )
 
 
 def _suffices(fit: Fit, change: Change) -> bool:

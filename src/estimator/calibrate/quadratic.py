@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
 from estimator.arrays import Array
+from estimator.calibrate import rules
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +36,16 @@ class Quadratic:
         flat = white.reshape(residual.size, -1)
         gram = flat.T @ flat
         return cls(index, gram[:-1, :-1], gram[:-1, -1], float(gram[-1, -1]), residual.size)
+
+    @property
+    def ratio(self) -> float:
+        """chi2 over the number of rows; 0 without rows."""
+        return self.c / max(1, self.count)
+
+    @property
+    def misfits(self) -> bool:
+        """Whether that is more than noise leaves."""
+        return self.ratio > max(rules.MISFIT, 1.0 + rules.MISFIT_SIGMAS * np.sqrt(2.0 / max(1, self.count)))
 
     def plus(self, other: Quadratic) -> Quadratic:
         """The sum of both, of the same unknowns."""

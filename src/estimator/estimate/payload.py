@@ -1,6 +1,7 @@
 """The pipeline: from recordings of one payload to its estimate."""
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Literal
 
@@ -73,15 +74,26 @@ def estimate_payload(
     """
     trials: list[Trial] = []
     names: list[str] = []
+    with within_arithmetic(names):
+        for recording in recordings:
+            names.append(recording.name)
+            trials.append(trial_of(recording, cutoff_hz, trim_s))
+            del recording  # or the next one would be read before this one is let go
+        return estimate_from_trials(
+            trials, method, window_s, say, compare_masses=compare_masses, withhold=withhold
+        )
+
+
+@contextmanager
+def within_arithmetic(names: Sequence[str]) -> Iterator[None]:
+    """Where numbers beyond arithmetic are the recordings' fault, whose names are known by the time it happens.
+
+    Raises:
+        InputError: there are some.
+    """
     try:
         with np.errstate(over="raise", divide="raise"):
-            for recording in recordings:
-                names.append(recording.name)
-                trials.append(trial_of(recording, cutoff_hz, trim_s))
-                del recording  # or the next one would be read before this one is let go
-            return estimate_from_trials(
-                trials, method, window_s, say, compare_masses=compare_masses, withhold=withhold
-            )
+            yield
     except (FloatingPointError, np.linalg.LinAlgError) as error:
         raise InputError(
             f"{', '.join(names)}: the equations cannot be solved ({error}); are the numbers in 'design' plausible?"
@@ -170,7 +182,7 @@ def estimate_from_trials(
             records[k] = replace(records[k], force_residual=force, moment_residual_m=moment)
             flags += balance_flags(trial.name, force, moment, grasps)
     if inertia is not None:
-        flags += _inertia_flags(inertia)
+        flags += inertia_flags(inertia)
     doubts = {weak.reason for step in steps for weak in step.weak if CONTRADICTION in weak.reason}
     flags += [f"No centre of mass: {doubt}." for doubt in sorted(doubts)[:1]]
     if mass is None and inertia is None and (grasps is None or grasps.robots == 1):
@@ -240,7 +252,8 @@ def _alone(
     return estimate_inertia([trial.data], grasps, com.p_1c, upstream, window_s)[0]
 
 
-def _inertia_flags(inertia: InertiaEstimate) -> list[str]:
+def inertia_flags(inertia: InertiaEstimate) -> list[str]:
+    """What a reader must know of an inertia before trusting it, one sentence each."""
     flags = []
     if inertia.projected:
         flags.append("The least-squares inertia had a negative eigenvalue, which was replaced by zero.")

@@ -4,7 +4,8 @@
 determine.
 
 format, version            "mocobot-estimate", 1
-payload, robots, method    label or null; N; "staged", "joint" or "calibrated" (found with the robots' calibration)
+payload, robots, method    label or null; N; "fit" (one fit of loops and balance), "staged", "joint" or "calibrated"
+                           (found with the robots' calibration)
 grasps                     null, or
     pairs                  list over i < j of {i, j, R_axis_angle_deg [3], R_se_deg [3], p_m [3], p_se_m [3],
                            distance_m, distance_se_m, angular_residual_radps, linear_residual_mps}
@@ -31,6 +32,7 @@ recordings                 list of {name, trial, duration_s, holds, grasps, iner
 contradicts                true if some of these are beyond noise: standard errors are too small then; null if not known
 flags                      list of sentences
 open                       only where there are any: sentences on what the robots' calibration does not decide
+why_not_fit                only where one fit was wanted and could not be made: a sentence on why
 calibrated                 only where robots were not taken as designed: {design, units}, as in a recording's metadata
 
 ``mocobot estimate`` adds ``provenance``: versions, options and hashes of the recordings (``mocobot.files.provenance``).
@@ -118,7 +120,8 @@ class PayloadEstimate:
     Attributes:
         payload: the recordings' payload label, or None.
         robots: number of robots N.
-        method: ``"staged"`` (the paper's), ``"joint"``, or ``"calibrated"`` (found with the robots' calibration).
+        method: ``"fit"`` (one fit of loops and balance), ``"staged"`` (the paper's), ``"joint"``, or ``"calibrated"``
+            (found with the robots' calibration).
         grasps: grasp frames pooled over the recordings.
         mass: mass with its standard error.
         p_1c: centre of mass in {1} [m], shape (3,).
@@ -129,6 +132,7 @@ class PayloadEstimate:
         flags: what a reader should know before trusting the numbers, one sentence each.
         units: the robots as they were taken to be, or None for robots as designed.
         open: what the robots' calibration does not decide, one sentence each; the standard errors have it in them.
+        why_not_fit: why it is another method, where one fit was wanted and could not be made; else empty.
     """
 
     payload: str | None
@@ -144,6 +148,7 @@ class PayloadEstimate:
     flags: tuple[str, ...]
     units: ArmUnit | None = None
     open: tuple[str, ...] = ()
+    why_not_fit: str = ""
 
     @property
     def p_1c_se_m(self) -> Array | None:
@@ -180,6 +185,10 @@ class PayloadEstimate:
                 "covariance_m2": self.p_1c_covariance.tolist(),
             }
         more: dict[str, Any] = {} if self.units is None else {"calibrated": _calibrated(self.units)}
+        if self.open:
+            more["open"] = list(self.open)
+        if self.why_not_fit:
+            more["why_not_fit"] = self.why_not_fit
         return {
             "format": FORMAT,
             "version": VERSION,
@@ -195,7 +204,7 @@ class PayloadEstimate:
             "recordings": [recording.to_dict() for recording in self.recordings],
             "contradicts": self.contradicts,
             "flags": list(self.flags),
-        } | (more | {"open": list(self.open)} if self.open else more)
+        } | more
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> PayloadEstimate:
@@ -222,6 +231,7 @@ class PayloadEstimate:
                 flags=tuple(values["flags"]),
                 units=_if_given(values.get("calibrated"), _units),
                 open=tuple(values.get("open", ())),
+                why_not_fit=str(values.get("why_not_fit", "")),
             )
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise InputError(f"not a complete estimate ({type(error).__name__}: {error})") from error

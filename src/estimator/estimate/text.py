@@ -12,7 +12,7 @@ from estimator.leftover.contradiction import beyond_noise
 from estimator.numbers import measured
 
 _ZERO_SIGMAS = 2.0
-HOW = {"calibrated": "self-calibrated"}
+HOW = {"calibrated": "self-calibrated", "fit": "one-fit"}
 """Methods that are called otherwise."""
 
 
@@ -24,6 +24,7 @@ def format_estimate(estimate: PayloadEstimate) -> str:
         f"{HOW.get(estimate.method, estimate.method)} estimate, "
         f"{len(estimate.recordings)} recording{'s' * (len(estimate.recordings) > 1)}"
     ]
+    lines += [f"    {estimate.why_not_fit}"] if estimate.why_not_fit else []
     lines += _grasps(estimate)
     lines += ["[[Mass and centre of mass in {1}]]"]
     mass = estimate.mass

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from estimator.calibrate.calibrate import calibrate
+from estimator.calibrate.outcome import one_fit
 from estimator.calibrate.outcome.estimate import estimate_calibrated, estimate_on, one_payload
 from estimator.errors import InputError
-from estimator.estimate.payload import Method, estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.text import format_estimate
 from estimator.files import write_json
@@ -54,7 +54,7 @@ def estimate(
     map: Path | str | None = None,
     calibration: GivenCalibration | None = None,
     self_calibrate: bool = False,
-    method: Method = "auto",
+    method: one_fit.Asked = "auto",
     cutoff_hz: float = 5.0,
     say: Callable[[str], object] = lambda _: None,
 ) -> Estimate:
@@ -66,8 +66,10 @@ def estimate(
         calibration: the robots as they are, or its file; None for what the recordings say of them.
         self_calibrate: calibrate the robots on these recordings, free trials among them perhaps, and take what they
             carry from the same fit.
-        method: ``"staged"``, the paper's sequence; ``"joint"``, one least squares; ``"auto"``, staged where static
-            holds determine the centre of mass; with a calibration, its own least squares with the robots held.
+        method: ``"fit"``, one least squares of closed loops and balance of wrenches; ``"staged"``, the paper's
+            sequence; ``"joint"``, its grasps and one least squares for the rest; ``"auto"``, the fit where the
+            recordings determine everything and noise is all that it leaves, else staged where static holds determine
+            the centre of mass, else joint (``why_not_fit`` says why). With a calibration, its robots are held.
         cutoff_hz: cut-off of the low-pass filter [Hz].
         say: takes the name of the stage that begins.
 
@@ -83,7 +85,7 @@ def estimate(
     robots = Robots(calibration)
     given = recordings_of(recordings, map, robots)
     if robots.calibration is None:
-        return public(Estimate, estimate_payload(given, method, cutoff_hz, say=say))
+        return public(Estimate, one_fit.estimate(given, method, cutoff_hz, say))
     return public(Estimate, estimate_on(robots.calibration, list(given), method, cutoff_hz, say))
 
 

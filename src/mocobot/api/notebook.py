@@ -33,7 +33,8 @@ def estimate_html(estimate: PayloadEstimate) -> str:
     rows += [[quantity(f"distance p_1{j}"), distance(e, 1, j), "mm"] for j in range(2, e.robots + 1)]
     title = f"Payload ({e.payload})" if e.payload is not None else "Payload"
     said = f"{len(e.recordings)} recording{'s' * (len(e.recordings) != 1)}, {e.method}; p in {{1}}"
-    doubts = [*e.flags, *(f"Not determined: {weak}." for weak in e.undetermined)]
+    why = [e.why_not_fit] if e.why_not_fit else []
+    doubts = [*why, *e.flags, *(f"Not determined: {weak}." for weak in e.undetermined)]
     return _whole(
         table(title, ["", "value ± standard error", "unit"], rows, note=said),
         bullets(doubts) if doubts else None,

@@ -15,7 +15,7 @@ from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import NONE, percent, plain, with_error
 from mocobot_report.blocks.payload import distance, mass, moment, place
 from mocobot_report.blocks.pictures import ASPECT
-from mocobot_report.blocks.prose import bullets, folded, paragraph, tiles, verdict
+from mocobot_report.blocks.prose import bullets, folded, paragraph, tidy, tiles, verdict
 from mocobot_report.blocks.sections import section
 from mocobot_report.blocks.tables import Entry, Num, component, measurement, quantity, table, value
 from mocobot_report.estimate.charts import excitation_chart, grasp_charts, moment_chart
@@ -43,18 +43,20 @@ def answer(estimated: Estimated) -> list[Node]:
     trials = [r.trial for r in e.recordings]
     kinds = ", ".join(f"{trials.count(kind)} {kind}" for kind in dict.fromkeys(trials))
     how = {
+        "fit": "in one fit of closed loops and balance of wrenches",
         "staged": "in stages as in the paper",
         "joint": "by one joint least squares",
         "calibrated": "in one least squares with the robots' own calibration",
     }.get(e.method, e.method)
     if e.units is not None and e.method != "calibrated":
         how += ", on robots as a calibration has them"
+    why = [paragraph(tidy(e.why_not_fit))] if e.why_not_fit else []
     said = (
         f"Estimated from {len(trials)} recording{'s' * (len(trials) != 1)} ({kinds}; "
         f"{sum(r.duration_s for r in e.recordings):.0f} s in all) of {e.robots} robot{'s' * (e.robots != 1)} that "
         f"hold{'s' * (e.robots == 1)} the payload together, {how}. Values are given with their standard errors."
     )
-    return [paragraph(said, kind="lede"), tiles(_tiles(e)), _doubts(e)]
+    return [paragraph(said, kind="lede"), tiles(_tiles(e)), *why, _doubts(e)]
 
 
 def _tiles(e: PayloadEstimate) -> list[tuple[str, str, str]]:

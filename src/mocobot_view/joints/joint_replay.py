@@ -22,6 +22,7 @@ SMOOTH_HZ, SMOOTH_SHARE = 20.0, 0.1
 """Low-pass of the positions that the model's torques are computed from; a share of the rate where that is less."""
 BONE_M, BONE_RGBA = 0.02, (0.75, 0.77, 0.80, 1.0)
 """What is drawn between the joints of a model that shows nothing."""
+_POINT = 1e-6  # shorter bones are none [m]
 _TURN = [1, 2, 3, 0]  # MuJoCo's quaternions are (w, x, y, z), the viewer's (x, y, z, w)
 
 
@@ -127,8 +128,10 @@ def _bones(model: mujoco.MjModel, names: list[str]) -> dict[str, Shape]:
     bones = {}
     for b in range(1, model.nbody):
         children = np.flatnonzero(model.body_parentid == b)
-        ends = [model.body_pos[c] for c in children if c != b] or [model.body_ipos[b]]
-        rods = [_rod(end) for end in ends if np.linalg.norm(end) > 1e-6]
+        ends = [end for end in model.body_pos[children] if np.linalg.norm(end) > _POINT] or [
+            model.body_ipos[b]
+        ]
+        rods = [_rod(end) for end in ends if np.linalg.norm(end) > _POINT]
         if rods:
             bones[names[b]] = Shape.of(join(rods), BONE_RGBA)
     return bones

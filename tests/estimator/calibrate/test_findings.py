@@ -75,19 +75,45 @@ def test_friction_in_all_recordings_is_no_calibration(team: Team) -> None:
     assert "mocobot diagnose" in found[0]
 
 
-def test_a_recording_of_other_robots_is_told(team: Team) -> None:
-    _, held, recordings = team
+@pytest.fixture(scope="module")
+def stranger(team: Team) -> Recording:
+    """The same payload and other robots."""
     rng = np.random.default_rng(33)
-    stranger = _trial(draw_units(3, Prior(), rng), held, rng, "stranger")
-    assert "stranger" in _said([*recordings[:2], stranger])
+    return _trial(draw_units(3, Prior(), rng), team[1], rng, "stranger")
 
 
-def _said(recordings: list[Recording]) -> str:
-    """What is found, or why it is refused."""
-    try:
-        return " ".join(calibrate(recordings).findings)
-    except InputError as error:
-        return str(error)
+def test_a_recording_of_other_robots_is_told(team: Team, stranger: Recording) -> None:
+    found = calibrate([team[2][0], stranger, team[2][1]]).findings
+    assert len(found) == 1
+    assert found[0].startswith(
+        "stranger contradicts the other recordings: the others fit one team of robots, and it fits another."
+    )
+
+
+def test_of_two_recordings_neither_is_the_wrong_one(team: Team, stranger: Recording) -> None:
+    found = calibrate([team[2][0], stranger]).findings
+    assert len(found) == 1
+    assert found[0].startswith("first and stranger contradict each other: without either")
+
+
+def test_a_recording_of_other_robots_that_rub_fits_no_team(team: Team, stranger: Recording) -> None:
+    tau = stranger.tau.copy()
+    tau[:, 0, 1] += 0.1 * np.sign(np.gradient(low_pass(stranger.phi[:, 0, 1], 100.0, 5.0)))
+    found = calibrate([team[2][0], replace(stranger, tau=tau), team[2][1]]).findings
+    assert len(found) == 1
+    assert found[0].startswith(
+        "stranger contradicts the other recordings: the others fit one team of robots, and it fits none."
+    )
+
+
+def test_robots_in_another_order_are_told(team: Team) -> None:
+    """Grasps on a regular triangle stay where they are when the robots go round; the centre of mass does not."""
+    order, third = [1, 2, 0], team[2][2]
+    turned = replace(
+        third, phi=third.phi[:, order], theta=third.theta[:, order], tau=third.tau[:, order], name="turned"
+    )
+    with pytest.raises(InputError, match=r"contradict each other.*same robots, in the same order"):
+        calibrate([*team[2][:2], turned])
 
 
 def test_what_stays_open_is_said(team: Team) -> None:

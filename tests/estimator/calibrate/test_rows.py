@@ -80,14 +80,15 @@ def test_a_hold_of_encoders_without_noise_has_one_rounding_error():
     time = np.arange(0, 20, 0.01)
     rows = Rows.of(recording_of(np.where(time < 10, 0.1, 0.1 + 0.02 * (time - 10))))
     moving, held = sensing.variances(rows)
-    floor = rules.ANGLE_FLOOR_RAD**2
+    floor = rules.PHI_FLOOR_RAD**2
+    resting = rules.AT_REST**2 * floor
     hold = rows.moving  # the first hold
-    assert held[hold, 0, 0] == pytest.approx(1e-8 / 12 + floor)
+    assert held[hold, 0, 0] == pytest.approx(1e-8 / 12 + resting, rel=1e-9)
     # In motion a joint at 0.02 rad/s makes 200 steps a second: every sample's error is its own.
-    assert moving[rows.moving // 2, 0, 0] == pytest.approx(1e-8 / 12 + floor)
+    assert moving[rows.moving // 2, 0, 0] == pytest.approx(1e-8 / 12 + floor, rel=1e-9)
     dithered = Sensing(np.full((2, 9), 1e-4), np.full((2, 9), 1e-4)).variances(rows)[1]
     length = rows.length[hold]
-    assert dithered[hold, 0, 0] == pytest.approx((1e-8 + 1e-8 / 12) / length + floor)
+    assert dithered[hold, 0, 0] == pytest.approx((1e-8 + 1e-8 / 12) / length + resting, rel=1e-9)
 
 
 def test_sensing_finds_steps_and_noise():

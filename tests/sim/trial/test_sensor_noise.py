@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from discrepancy.rules import ANGLE_FLOOR_RAD, TORQUE_FLOOR_NM
+from discrepancy.rules import MODEL_ABOVE, MODEL_BELOW_HZ, MODEL_PHI_RAD, MODEL_TAU_NM, MODEL_THETA_RAD
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.signals import Signals
 
@@ -83,23 +83,26 @@ def test_grid_finer_than_motion_shows_at_rest_only(rng):
 
 
 def test_exact_sensors_leave_what_the_model_leaves(rng):
-    """The model's own errors are drawn besides; at rest they stay what they are."""
+    """The model's own errors are drawn besides: white below a cut-off, little above it; the same at rest."""
     exact = trial(rng)
     noise = Noise.of([exact])
     np.testing.assert_allclose(noise.sigma, 0.0, atol=1e-9)
     errors = next(noise.draws(exact, rng, 1))
     for found, floor in (
-        (errors.phi, ANGLE_FLOOR_RAD),
-        (errors.theta, ANGLE_FLOOR_RAD),
-        (errors.tau, TORQUE_FLOOR_NM),
+        (errors.phi, MODEL_PHI_RAD),
+        (errors.theta, MODEL_THETA_RAD),
+        (errors.tau, MODEL_TAU_NM),
     ):
-        assert np.std(found) == pytest.approx(floor, rel=0.05)
+        power = np.mean(np.abs(np.fft.rfft(found, axis=0)) ** 2, axis=(1, 2)) / SAMPLES
+        hz = np.fft.rfftfreq(SAMPLES, 1.0 / RATE)
+        assert np.mean(power[hz < 0.7 * MODEL_BELOW_HZ]) == pytest.approx(floor**2 * RATE / 100.0, rel=0.15)
+        assert np.mean(power[hz > 2.0 * MODEL_BELOW_HZ]) == pytest.approx((MODEL_ABOVE * floor) ** 2, rel=0.1)
     still = Signals(
         TIME, *(np.tile(x[:1], (SAMPLES, 1, 1)) for x in (exact.phi, exact.theta, exact.tau)), RATE
     )
     errors = next(noise.draws(still, rng, 1))
-    np.testing.assert_array_less(np.std(errors.phi, axis=0), 0.01 * ANGLE_FLOOR_RAD)
-    assert np.any(np.abs(errors.phi) > 0.2 * ANGLE_FLOOR_RAD)
+    np.testing.assert_array_less(np.std(errors.phi, axis=0), 0.01 * MODEL_PHI_RAD)
+    assert np.any(np.abs(errors.phi) > 0.2 * MODEL_PHI_RAD)
 
 
 def test_torques_may_be_rounded_too(rng):
@@ -182,4 +185,4 @@ def test_channels_have_resolutions_of_their_own(rng):
     assert noise.sigma[0, 0, 1] == pytest.approx(0.0, abs=1e-9)
     errors = next(noise.draws(Signals(TIME, phi, x.theta, x.tau, RATE), rng, 1))
     assert np.std(errors.phi[:, 0, 0]) == pytest.approx(1e-3, rel=0.1)
-    assert np.std(errors.phi[:, 0, 1]) == pytest.approx(ANGLE_FLOOR_RAD, rel=0.1)
+    assert np.std(errors.phi[:, 0, 1]) < MODEL_PHI_RAD

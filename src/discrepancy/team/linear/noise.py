@@ -112,13 +112,15 @@ def _read(x: Array, step: Array, sigma: Array, rng: np.random.Generator) -> Arra
 
 
 def _model_errors(x: Array, rate_hz: float, rng: np.random.Generator) -> Array:
-    """What the model itself leaves, shape (Q, N, 9): nearly white in motion, and the same while all rests.
+    """What the model itself leaves, shape (Q, N, 9): slow in motion, and the same while all rests.
 
-    Rounding does so, too, and is drawn for it: to a step that scatters by the floor.
+    Rounding does so, too, and is drawn for it: to a step that scatters by the floor; of what is quick, little stays.
     """
-    floor = np.repeat([rules.ANGLE_FLOOR_RAD, rules.ANGLE_FLOOR_RAD, rules.TORQUE_FLOOR_NM], 3)
-    step = floor * np.sqrt(12.0 * rate_hz / rules.FLOOR_HZ)
-    return _read(x, step, np.zeros_like(step), rng)
+    floor = np.repeat([rules.MODEL_PHI_RAD, rules.MODEL_THETA_RAD, rules.MODEL_TAU_NM], 3)
+    step = floor * np.sqrt(12.0 * rate_hz / rules.MODEL_HZ)
+    errors = _read(x, step, np.zeros_like(step), rng)
+    slow = low_pass(errors, rate_hz, rules.MODEL_BELOW_HZ)
+    return slow + rules.MODEL_ABOVE * (errors - slow)
 
 
 def _phase(x: Array, rng: np.random.Generator) -> Array:

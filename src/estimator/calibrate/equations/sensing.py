@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
@@ -13,6 +14,25 @@ from estimator.calibrate import rules
 from estimator.calibrate.equations.rows import Rows
 from estimator.quantisation import rounding_step
 from estimator.recording.model import Recording
+
+
+class Resolution(NamedTuple):
+    """What one recording says of its sensors; arrays of shape (N, 9): phi, theta, tau.
+
+    Attributes:
+        step: rounding step, 0 for a continuous channel [rad, N m].
+        white: standard deviation of all that is white in a sample, rounding included [rad, N m].
+        share: as in ``Sensing``, shape (N, 1).
+    """
+
+    step: Array
+    white: Array
+    share: Array
+
+    @classmethod
+    def of(cls, recording: Recording) -> Resolution:
+        """Of one recording."""
+        return cls(_steps(recording), _white(recording), _share(recording))
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,20 +53,25 @@ class Sensing:
     @classmethod
     def of(cls, recordings: Sequence[Recording]) -> Sensing:
         """Resolution of the sensors behind some recordings of the same robots, read and converted alike."""
-        step = np.median([_steps(recording) for recording in recordings], axis=0)
-        white = np.sqrt(np.mean([_white(recording) ** 2 for recording in recordings], axis=0))
-        share = np.mean([_share(recording) for recording in recordings], axis=0)
+        return cls.pooled([Resolution.of(recording) for recording in recordings])
+
+    @classmethod
+    def pooled(cls, found: Sequence[Resolution]) -> Sensing:
+        """The same from what each says."""
+        step = np.median([one.step for one in found], axis=0)
+        white = np.sqrt(np.mean([one.white**2 for one in found], axis=0))
+        share = np.mean([one.share for one in found], axis=0)
         return cls(step, np.sqrt(np.maximum(white**2 - share * step**2 / 12.0, 0.0)), share)
 
     @classmethod
-    def of_each(cls, recordings: Sequence[Recording]) -> list[Sensing]:
-        """The same for each, from all that were read and converted alike."""
-        rates = [tuple(np.round(_share(recording).ravel(), 3)) for recording in recordings]
-        found = {
-            rate: cls.of([one for one, its in zip(recordings, rates, strict=True) if its == rate])
+    def of_each(cls, found: Sequence[Resolution]) -> list[Sensing]:
+        """The same for each recording, from all that were read and converted alike."""
+        rates = [tuple(np.round(one.share.ravel(), 3)) for one in found]
+        pools = {
+            rate: cls.pooled([one for one, its in zip(found, rates, strict=True) if its == rate])
             for rate in set(rates)
         }
-        return [found[rate] for rate in rates]
+        return [pools[rate] for rate in rates]
 
     def variances(self, rows: Rows) -> tuple[Array, Array]:
         """Variance of one sample in motion, and of a row's mean in a hold, shape (n, N, 9) each.
@@ -54,8 +79,8 @@ class Sensing:
         In motion a joint that makes few steps while a row is averaged has few independent rounding errors; at rest it
         has one, unless noise moves the reading to and fro.
         """
-        floor = np.repeat([rules.ANGLE_FLOOR_RAD, rules.ANGLE_FLOOR_RAD, rules.TORQUE_FLOOR_NM], 3)
-        floor = floor**2 * rows.rate_hz / rules.FLOOR_HZ
+        least = np.repeat([rules.PHI_FLOOR_RAD, rules.THETA_FLOOR_RAD, rules.TORQUE_FLOOR_NM], 3) ** 2
+        floor = least * rows.rate_hz / rules.FLOOR_HZ
         rounding, noise = self.step**2 / 12.0, self.sigma**2
         step = np.maximum(self.step, 1e-300)
         dithered = self.sigma > rules.DITHER * step * np.sqrt(self.share)
@@ -68,7 +93,7 @@ class Sensing:
         long = np.maximum(rows.length, 1)[:, None, None]
         lasting = np.clip(1.0 + way / step, 1.0, long)
         lasting[..., 6:] = 1.0
-        held = noise / long + rounding / np.where(dithered, long, lasting) + floor
+        held = noise / long + rounding / np.where(dithered, long, lasting) + rules.AT_REST**2 * least
         return moving, np.broadcast_to(held, moving.shape)
 
 

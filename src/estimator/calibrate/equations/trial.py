@@ -81,21 +81,23 @@ class TrialEquations:
         variances: of one sample in motion, as it counts, and of a hold's mean, shape (n, N, 9) each.
         shown: the same, as it shows.
         mean: averaged readings, shape (n, N, ``SLOTS``).
+        held: whether derivatives by the robots' lengths and masses are left out (0), for nobody asks.
     """
 
     rows: Rows
     variances: tuple[Array, Array]
     shown: tuple[Array, Array]
     mean: Array
+    held: bool = False
 
     @classmethod
-    def of(cls, rows: Rows, sensing: Sensing) -> TrialEquations:
+    def of(cls, rows: Rows, sensing: Sensing, *, held: bool = False) -> TrialEquations:
         """Of a trial whose sensors are known."""
         mean = rows(rows.s)
         # A hold is at rest: what rates it shows are noise.
         mean[rows.moving :, :, 3:9] = mean[rows.moving :, :, 12:18] = 0.0
         shown = sensing.variances(replace(rows, repeats=1.0))
-        return cls(rows, sensing.variances(rows), shown, mean)
+        return cls(rows, sensing.variances(rows), shown, mean, held)
 
     def residual(self, units: ArmUnit, shared: Shared, bases: Bases) -> Array:
         """Rows of the residual, shape (n, C)."""
@@ -143,7 +145,7 @@ class TrialEquations:
         if adjustment is not None:
             s = s + adjustment
         residual = self.residual(units, shared, bases)
-        by_signals, by_units, by_carried, by_bases = _derivatives(s, units, shared, bases)
+        by_signals, by_units, by_carried, by_bases = _derivatives(s, units, shared, bases, held=self.held)
         # Loops alone hardly tell a common scale of all lengths, and an error of a thousandth in one derivative would
         # hide it: theirs are averaged exactly.
         poses = pose_derivatives(self.rows, units, shared, bases)
@@ -193,7 +195,9 @@ def _balance(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
     return np.concatenate([force, moment], axis=1) - needed
 
 
-def _derivatives(s: Array, units: ArmUnit, shared: Shared, bases: Bases) -> tuple[Array, Array, Array, Array]:
+def _derivatives(
+    s: Array, units: ArmUnit, shared: Shared, bases: Bases, *, held: bool = False
+) -> tuple[Array, Array, Array, Array]:
     """By signals (n, C, N, ``SLOTS``), units (n, C, N, ``COUNT``), ``Shared.moved`` and ``Bases.moved``."""
     n, N = s.shape[:2]
     C = 6 * N
@@ -209,10 +213,8 @@ def _derivatives(s: Array, units: ArmUnit, shared: Shared, bases: Bases) -> tupl
     by_units = np.zeros((n, C, N, COUNT))
     for i in range(N):
         base = ArmData(*(part[:, i] for part in data))
-        for slots, changed, steps in (
-            (np.arange(SLOTS), by_signals, STEPS),
-            (_BY_UNIT, by_units, _UNIT_STEPS),
-        ):
+        by_unit = [] if held else [(_BY_UNIT, by_units, _UNIT_STEPS)]
+        for slots, changed, steps in [(np.arange(SLOTS), by_signals, STEPS), *by_unit]:
             moved = _moved(s[:, i], ArmUnit(units.design, units.x[i]), slots, steps, changed is by_units)
             d = ArmData(*(
                 (after - before) / steps.reshape(-1, *[1] * before.ndim)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
+from contextlib import nullcontext, suppress
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -18,7 +19,12 @@ from estimator.estimate.consistency import Trial, wrench_balance
 from estimator.estimate.fusion import fuse
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.inertia import InertiaEstimate, inertia_regressor
-from estimator.estimate.payload import Method, estimate_from_trials, estimate_payload, trial_of
+from estimator.estimate.payload import (
+    estimate_from_trials,
+    estimate_payload,
+    inertia_flags,
+    trial_of,
+)
 from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import MassEstimate
@@ -27,6 +33,8 @@ from estimator.recording.model import Recording
 from estimator.statistics import rms
 
 METHOD = "calibrated"
+Asked = Literal["auto", "fit", "staged", "joint"]
+"""What may be asked for: one fit of loops and balance, a method of ``estimate_payload``, or the best there is."""
 
 
 def estimate_calibrated(
@@ -52,34 +60,52 @@ def estimate_calibrated(
     payload = _payload_of(calibration, recordings)
     trials = [trial_of(calibrated(recording, calibration), cutoff_hz) for recording in recordings]
     staged = estimate_from_trials(trials, say=say, withhold=False)
-    numbers = carried(payload, calibration.scale_sd)
-    grasps = _grasps(payload, calibration.scale_sd, staged)
+    estimate = replace(
+        with_payload(staged, trials, payload, calibration.scale_sd),
+        payload=payload.label,
+        method=METHOD,
+        units=calibration.units,
+        open=calibration.open,
+    )
+    estimate = replace(estimate, flags=(*calibration.findings, *estimate.flags))
+    return withheld(estimate, max(trial.team for trial in trials))
+
+
+def with_payload(
+    staged: PayloadEstimate, trials: Sequence[Trial], payload: CalibratedPayload, scale_sd: float
+) -> PayloadEstimate:
+    """An estimate with its numbers from a fit of loops and balance, and what each recording leaves of them.
+
+    Args:
+        staged: of the same recordings.
+        trials: these, processed.
+        payload: what the fit found.
+        scale_sd: standard deviation of a held common spring scale.
+    """
+    numbers = carried(payload, scale_sd)
+    grasps = _grasps(payload, scale_sd, staged)
     inertia = _inertia(trials, grasps, numbers)
     records = list(staged.recordings)
     for k, trial in enumerate(trials):
         force, moment = wrench_balance(trial.data, grasps, numbers.mass_kg, numbers.p_1c, inertia)
         records[k] = replace(records[k], force_residual=force, moment_residual_m=moment)
-    estimate = replace(
+    before = inertia_flags(staged.inertia) if staged.inertia else []
+    return replace(
         staged,
-        payload=payload.label,
-        method=METHOD,
         grasps=grasps,
         mass=MassEstimate(numbers.mass_kg, numbers.mass_se_kg, _force_residual(records, numbers, trials)),
         p_1c=numbers.p_1c,
         p_1c_covariance=numbers.covariance[1:4, 1:4],
         inertia=inertia,
         recordings=tuple(records),
-        units=calibration.units,
-        flags=(*calibration.findings, *staged.flags),
-        open=calibration.open,
+        flags=(*(flag for flag in staged.flags if flag not in before), *inertia_flags(inertia)),
     )
-    return withheld(estimate, max(trial.team for trial in trials))
 
 
 def estimate_on(
     calibration: Calibration,
     recordings: Sequence[Recording],
-    method: Method = "auto",
+    method: Asked = "auto",
     cutoff_hz: float = 5.0,
     say: Callable[[str], object] = lambda _: None,
 ) -> PayloadEstimate:
@@ -89,7 +115,7 @@ def estimate_on(
         calibration: of the same robots.
         recordings: of one payload.
         method: ``"auto"``, the calibration's own least squares with the robots held, where the recordings suffice for
-            it; else, and where it is asked for, as in ``estimate_payload``.
+            it, else as in ``estimate_payload``; ``"fit"``, the former in any case; or one of ``estimate_payload``.
         cutoff_hz: cut-off of the low-pass filter [Hz].
         say: takes the name of the stage that begins.
 
@@ -99,10 +125,12 @@ def estimate_on(
     one_payload(recordings)
     known = [calibrated(recording, calibration) for recording in recordings]
     held: Calibration | None = None
-    with suppress(InputError):  # what other methods need not, or say in their own words
+    # What other methods need not, or say in their own words.
+    with nullcontext() if method == "fit" else suppress(InputError):
         held = calibrate(known, robots=calibration, say=say)
-    if method == "auto" and held is not None:
+    if held is not None and method in ("auto", "fit"):
         return estimate_calibrated(replace(held, open=calibration.open), known, cutoff_hz, say)
+    method = "auto" if method == "fit" else method
     return _with_errors(estimate_payload(known, method, cutoff_hz, say=say), calibration, held)
 
 

@@ -1,0 +1,79 @@
+"""Steps of a calibration where whole ones go astray: recordings of two teams taken for one."""
+
+import numpy as np
+import pytest
+from scipy.linalg import block_diag
+
+from estimator.arm.unit import COUNT, ArmUnit
+from estimator.calibrate import rules
+from estimator.calibrate.descent import Descent
+from estimator.calibrate.equations.rows import Rows
+from estimator.calibrate.equations.sensing import Sensing
+from estimator.calibrate.prior import Prior
+from estimator.calibrate.problem import Problem, Trial
+from estimator.calibrate.quadratic import solved
+from estimator.calibrate.unknowns import Layout, Unknowns
+from omnid_design import DESIGN
+from synthetic_team import carry, draw_path, draw_units, load, with_noise
+
+
+def problem_of(teams: int) -> tuple[Problem, Unknowns]:
+    """Two trials of one payload, carried by one team or by two, and where a calibration begins."""
+    rng = np.random.default_rng(33)
+    held = load(3, rng)
+    units = [draw_units(3, Prior(), rng) for _ in range(teams)]
+    exact = [carry(units[k % teams], held, draw_path(held, rng), rng, 12.0) for k in range(2)]
+    recordings = [with_noise(one.recording, 2e-5, 0.01, rng) for one in exact]
+    sensing = Sensing.of(recordings)
+    layout = Layout(3, 1, 2)
+    factor = Prior().factor(3, hold_scale=True)
+    basis = np.asarray(block_diag(factor, np.eye(layout.size - len(factor))))
+    information = np.zeros(basis.shape[1])
+    information[: factor.shape[1]] = 1.0
+    trials = [Trial(Rows.of(one), 0, sensing) for one in recordings]
+    designed = ArmUnit(DESIGN, np.zeros((3, COUNT)))
+    start = Unknowns(designed, (held.shared,), tuple(one.bases for one in exact))
+    return Problem(trials, (), (), Prior(), layout, basis, information), start
+
+
+def test_steps_of_one_team_are_whole() -> None:
+    problem, at = problem_of(1)
+    descent, point = Descent(problem), problem.at(at, np.zeros(problem.basis.shape[1]))
+    for _ in range(3):
+        whole = solved(*problem.normal(point))[0]
+        lower, tried = descent.step(point, 5)
+        assert lower is not None
+        assert tried == 1
+        assert lower.z == pytest.approx(point.z + whole, rel=1e-12, abs=1e-15)
+        point = lower
+    assert point.value / point.count < 1.1
+
+
+def test_steps_between_two_teams_go_down_where_whole_ones_go_up() -> None:
+    problem, at = problem_of(2)
+    descent, point = Descent(problem), problem.at(at, np.zeros(problem.basis.shape[1]))
+    signals = problem.signals()
+    whole, highest = point, point.value
+    for _ in range(2):
+        whole = problem.moved(whole, solved(*problem.normal(whole))[0])
+    assert whole.value > 3.0 * highest
+    problem.put_back(signals)
+    damped = 0
+    for _ in range(4):
+        lower, tried = descent.step(point, 10)
+        assert lower is not None
+        assert lower.value < point.value * (1.0 + rules.RISE)
+        damped += tried > 1
+        point = lower
+    assert damped > 0
+    assert point.value < highest
+
+
+def test_where_no_step_goes_down_there_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    problem, at = problem_of(1)
+    point = problem.at(at, np.zeros(problem.basis.shape[1]))
+    signals = problem.signals()
+    monkeypatch.setattr(rules, "RISE", -1.0)
+    assert Descent(problem).step(point, 4) == (None, 4)
+    for now, was in zip(problem.signals(), signals, strict=True):
+        assert now is was
