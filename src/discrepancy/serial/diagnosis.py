@@ -12,6 +12,7 @@ from discrepancy.serial import rules
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.errors import with_errors
 from discrepancy.serial.model import SerialModel
+from discrepancy.serial.paired import PairedRig
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
 from discrepancy.serial.traces import traces
@@ -44,7 +45,8 @@ def diagnose_serial(
     """
     rig = SerialRig.of(model, logs, tolerances, excluded, reference)
     found = diagnose_rig(rig, jobs=jobs, say=say)
-    return Diagnosed(rig, found, SerialWords(), partial(traces, rig, found.explanation))
+    judged = PairedRig(rig) if rig.common else rig
+    return Diagnosed(judged, found, SerialWords(), partial(traces, rig, found.explanation))
 
 
 def diagnose_rig(rig: SerialRig, *, jobs: int = 1, say: Callable[[str], object] | None = None) -> Diagnosis:
@@ -54,7 +56,8 @@ def diagnose_rig(rig: SerialRig, *, jobs: int = 1, say: Callable[[str], object] 
         rig: the logs.
         jobs, say: as of ``diagnose``.
     """
-    found = diagnose(rig, most=rules.MOST_CAUSES, jobs=jobs, say=say)
+    judged = PairedRig(rig) if rig.common else rig
+    found = diagnose(judged, most=rules.MOST_CAUSES, jobs=jobs, say=say)
     rows = max(2, round(rules.ERROR_BLOCK_S * rig.row_rate_hz(0)))
     explanation = with_errors(found.explanation, rows)
     notes = (*(note for part in rig.parts for note in part.signals.log.notes), *found.notes, *_notes(rig))

@@ -19,7 +19,7 @@ def traces(rig: SerialRig, explanation: Explanation) -> list[Trace]:
     ]
     before, after = rig.physical_residual([], -nominal.shared), rig.physical_residual(causes, -fit.shared)
     out = []
-    for t in range(len(rig.trials)):
+    for t in range(len(problem.rows)):
         n = len(before[t])
         out.append(
             Trace(
@@ -30,8 +30,8 @@ def traces(rig: SerialRig, explanation: Explanation) -> list[Trace]:
                 before[t],
                 after[t],
                 rig.sigma(t),
-                nominal.remaining(t),
-                fit.remaining(t),
+                nominal.remaining(t)[:n],
+                fit.remaining(t)[:n],
                 rig.quantities(t),
             )
         )
