@@ -59,7 +59,7 @@ def crop(log: JointLog, start: float, stop: float) -> JointLog:
 
 
 def plain(rig: SerialRig, kinds: tuple[str, ...], trials: list[int]) -> np.ndarray:
-    """What plain least squares leaves of the last block: numbers of all kinds, fitted to some blocks by minimum norm."""
+    """What plain least squares leaves of the last block: numbers of all kinds, fitted to some blocks by least norm."""
     chosen = [c for c in rig.candidates() if c.cause in kinds]
     # Joints count by the size of their torques, as is usual.
     torques = [part.reduction(part.signals.torque)[k] for part in rig.parts for k in range(len(part.blocks))]
