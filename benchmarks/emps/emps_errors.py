@@ -21,7 +21,8 @@ BLOCKS_S = (0.25, 0.5, 1.0, 2.0, 3.0)
 def bootstrap(fit: Fit, rows_per_block: int, rng: np.random.Generator, draws: int = DRAWS) -> np.ndarray:
     """Standard deviations of a fit's solution over resampled blocks of rows, in units, shape (used,)."""
     grams = []
-    for rows in fit.problem.rows:
+    for t in fit.problem.trials:
+        rows = fit.problem.weighted(t)
         count = max(1, round(len(rows) / rows_per_block))
         for part in np.array_split(np.arange(len(rows)), count):
             flat = rows[part].reshape(-1, rows.shape[2])

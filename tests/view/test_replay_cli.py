@@ -244,7 +244,10 @@ def test_bad_truth(
     ("change", "words"),
     [
         (put("emps", "format"), "not a diagnosis"),
-        (put("maybe", "verdict"), "verdict is 'maybe'; it must be one of consistent, explained"),
+        (
+            put("maybe", "verdict"),
+            "verdict is 'maybe'; it must be one of consistent, miscalibrated, explained",
+        ),
         (drop("causes"), "not a complete diagnosis (KeyError: 'causes')"),
         (put({}, "causes", 0), "not a complete diagnosis (KeyError: 'cause')"),
         (put(4, "causes", 0, "joint"), "joint is 4"),

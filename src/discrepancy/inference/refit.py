@@ -23,6 +23,7 @@ def exact(
     """
     own, trials = rig.local_unknowns, hypothesis.problem.trials
     start = [nothing.fit.local(t)[:own] for t in trials]
+    linear, last = hypothesis, np.inf
     for _ in range(rounds):
         fit = hypothesis.fit
         shared = fit.shared - nothing.fit.shared
@@ -40,8 +41,11 @@ def exact(
         new = Hypothesis.of(fit.problem.with_residual(back), hypothesis.free, hypothesis.allowed)
         if new.learnt.log_evidence < hypothesis.learnt.log_evidence - rules.DIVERGED_NATS:
             break  # it diverges: the linear answer is the better one
-        moved = np.abs(new.fit.solution - fit.solution) / np.sqrt(np.diag(new.fit.covariance))
-        hypothesis = new
-        if moved.max(initial=0.0) < rules.SETTLED_SE:
+        step = np.abs(new.fit.solution - fit.solution) / np.sqrt(np.diag(new.fit.covariance))
+        moved = float(step.max(initial=0.0))
+        if moved > max(last, 1.0):
+            return linear  # steps grow: columns take up whatever a value that runs away leaves
+        hypothesis, last = new, moved
+        if moved < rules.SETTLED_SE:
             break
     return hypothesis

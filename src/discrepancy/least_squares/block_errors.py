@@ -30,8 +30,8 @@ def block_covariance(fit: Fit, rows_per_block: int) -> Array:
 def block_scores(fit: Fit, rows_per_block: int) -> Iterator[Array]:
     """Score of every block: its columns times what the fit leaves in it, one number per column in the fit."""
     for t in fit.problem.trials:
-        rows = fit.problem.rows(t)
-        left = fit.remaining(t)
+        rows = fit.problem.weighted(t)
+        left = rows @ np.append(-fit.coefficients, 1.0)
         count = max(1, round(len(rows) / rows_per_block))
         for part in np.array_split(np.arange(len(rows)), count):
             yield np.einsum("ncl,nc->l", rows[part][..., fit.used], left[part])

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import dct
+from scipy.fft import dct, idct
 
 from discrepancy import rules
 from estimator.arrays import Array
@@ -57,6 +57,13 @@ class Cells:
         out = np.array(x, dtype=np.float64)
         if self.moving:
             out[: self.moving] = np.asarray(dct(out[: self.moving], axis=0, norm="ortho"))
+        return out
+
+    def series(self, x: Array) -> Array:
+        """The rows of a cosine transform, shape (n, C, ...) -> the same."""
+        out = np.array(x, dtype=np.float64)
+        if self.moving:
+            out[: self.moving] = np.asarray(idct(out[: self.moving], axis=0, norm="ortho"))
         return out
 
     def grams(self, a: Array, b: Array) -> Array:

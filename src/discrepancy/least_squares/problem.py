@@ -129,6 +129,10 @@ class Problem:
         """Rows without what the trial's own unknowns can explain, in time, shape (n, C, columns)."""
         return self.without_own(trial, self.raw[trial])
 
+    def weighted(self, trial: int) -> Array:
+        """The same as a fit weighs them: every cell of the noise over its power, shape (n, C, columns)."""
+        return self.cells[trial].series(self.spectra[trial] * np.sqrt(self.weights[trial]))
+
     def without_own(self, trial: int, x: Array) -> Array:
         """Rows without what the trial's own unknowns, and those that causes leave open, can explain, (n, C, k)."""
         return through([each[trial] for each in self.opened.values()], project(x, self.explicable[trial]))

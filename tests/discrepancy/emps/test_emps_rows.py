@@ -18,6 +18,7 @@ from discrepancy.emps.recording.signals import Signals, at_delay
 from discrepancy.emps.reduction import Reduction
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.engine.block_errors import with_block_errors
+from discrepancy.engine.explanation import explain
 from discrepancy.inference.search import search
 from discrepancy.least_squares.block_errors import block_covariance
 from discrepancy.least_squares.fit import Fit
@@ -337,7 +338,7 @@ def test_block_errors_are_those_of_a_bootstrap() -> None:
 
 def test_a_transient_keeps_an_error() -> None:
     rig = EmpsRig.of(recorded(with_cause(nominal(), "push", *CASES["push"])))
-    explanation = with_block_errors(search(rig, 3), 100)
+    explanation = with_block_errors(explain(search(rig, 3)), 100)
     (found,) = explanation.found
     assert found.candidate.cause == "push"
     assert found.values[0] == pytest.approx(10.0, abs=1.0)

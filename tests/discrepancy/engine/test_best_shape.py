@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from discrepancy.engine.explanation import explain
 from discrepancy.inference.search import search
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
@@ -45,11 +46,12 @@ class Wave(FakeRig):
 
 
 def found_in(seed):
-    explanation = search(Wave({}, catalogue=(*CATALOGUE, WAVE), seed=seed))
+    explanation = explain(search(Wave({}, catalogue=(*CATALOGUE, WAVE), seed=seed)))
     (found,) = explanation.found
     return found
 
 
+@pytest.mark.slow
 def test_shape_is_found_between_the_grids_points_with_errors_as_stated():
     """Monte Carlo over noise, unknowns and the tolerances of all other causes."""
     runs = [found_in(seed) for seed in range(60)]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 
-from discrepancy.team.linear.start import linearised_trials
+from discrepancy.team.linear.start import linearised_trials, start_shared
 from discrepancy.team.rig import TeamRig
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.sampling import Sampling
@@ -28,7 +28,8 @@ def test_a_healthy_log_leaves_noise_alone(random_a, name):
     """Before errors were drawn at the readings these logs left 2 to 30 times the noise."""
     recording = LOGGERS[name].recorded(random_a, np.random.default_rng(7))
     estimate = estimate_payload([recording], "joint")
-    noise, (trial,), (white,) = linearised_trials([recording], estimate)
+    (trial,), sensed = linearised_trials([recording], start_shared(estimate), {})
+    noise, (white,) = sensed.noise, sensed.whitening
     np.testing.assert_allclose(noise.step[:2], 2 * np.pi / 2 ** LOGGERS[name].encoder_bits, rtol=1e-3)
     sigma = np.median(noise.sigma[2])
     assert sigma == pytest.approx(LOGGERS[name].tau_noise_Nm, rel=0.15)

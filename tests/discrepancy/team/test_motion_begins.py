@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from discrepancy.team.linear.start import linearised_trials
+from discrepancy.team.linear.start import linearised_trials, start_shared
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.parquet import read_recording
 
@@ -12,9 +12,9 @@ from estimator.recording.parquet import read_recording
 def test_no_misfit_where_a_motion_begins(biased_trials: list[Path]) -> None:
     """Only a torque is wrong, so the grasps' rotations and positions are noise from the first row on."""
     recordings = [read_recording(path) for path in biased_trials[1:]]
-    _, linear, whitening = linearised_trials(recordings, estimate_payload(recordings, "joint"))
-    poses = 12
-    (trial,), (white,) = linear, whitening
+    shared = start_shared(estimate_payload(recordings, "joint"))
+    (trial,), sensed = linearised_trials(recordings, shared, {})
+    poses, (white,) = 12, sensed.whitening
     power = np.mean(white(trial.residual)[:, :poses] ** 2, axis=1)
     assert power[:4].mean() < 1.6
     assert 0.8 < power[10 : white.moving].mean() < 1.2

@@ -13,6 +13,7 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.start import Sensed
 from discrepancy.team.linear.trial_linear import linearise
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances
@@ -270,7 +271,7 @@ def team_of(case, robots):
     bases = Bases(case.bases.R[which], case.bases.p[which])
     shared = Shared(held, case.shared.pi)
     linear = linearise(signals, shared, bases, DESIGN, Reduction.of(signals), full=True)
-    return TeamRig((), None, None, (linear,), (lambda x: x,), default_tolerances(), frozenset())
+    return TeamRig((), Sensed(None, (lambda x: x,), ()), (linear,), default_tolerances(), frozenset())
 
 
 @pytest.mark.parametrize("robots", [1, 2, 5])

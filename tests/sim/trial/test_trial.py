@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 
 from closed_loop import ClosedLoop, base_poses
 from estimator.errors import InputError
-from mocobot_sim.control.control import ControlGains, wrist
+from mocobot_sim.control.control import ControlGains
+from mocobot_sim.control.kernel import wrist
 from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.as_built import CalibrationSpread
 from mocobot_sim.scene.models import omnid_design

@@ -1,0 +1,72 @@
+"""Exact residuals: a cause whose effect is not straight, on a rig of pure numbers."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.refit import exact
+from discrepancy.least_squares.problem import Problem
+from fake_rig import CATALOGUE, FakeRig
+
+
+def bent(value, by):
+    return value + by * value**2
+
+
+@dataclass
+class Bent(FakeRig):
+    """A value acts as ``bent`` has it; its slope at nought is that of the columns."""
+
+    by: float = 0.0
+
+    def residual(self, shared, local, active):
+        return super().residual(shared, local, [(c, bent(v, self.by)) for c, v in active])
+
+
+def hypotheses(rig, free):
+    problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
+    return Hypothesis.of(problem, free), Hypothesis.of(problem, [])
+
+
+@pytest.mark.parametrize("by", [0.003, -0.003])
+def test_value_is_that_whose_effect_the_data_hold(by):
+    """The effect is what a straight fit finds; the value follows by solving for it."""
+    rig = Bent({2: 25.0}, by=by)
+    linear, nothing = hypotheses(rig, [2])
+    effect = linear.fit.part(2)[0][0]
+    expected = brentq(lambda v: bent(v, by) - effect, 0.0, 60.0)
+    assert abs(expected - effect) > 1.0
+    fit = exact(rig, linear, nothing).fit
+    assert fit.part(2)[0][0] == pytest.approx(expected, abs=0.25 * np.sqrt(fit.part(2)[1][0, 0]))
+    # Unknowns are what they were: the rest of the data is the same.
+    np.testing.assert_allclose(fit.shared, linear.fit.shared, atol=2e-2)
+    for t in linear.problem.trials:
+        np.testing.assert_allclose(fit.local(t), linear.fit.local(t), atol=2e-2)
+        np.testing.assert_allclose(fit.remaining(t), linear.fit.remaining(t), atol=0.1)
+
+
+def test_straight_effects_stay():
+    rig = Bent({2: 25.0, 5: [9.0, -7.0]})
+    linear, nothing = hypotheses(rig, [2, 5])
+    again = exact(rig, linear, nothing)
+    np.testing.assert_allclose(again.fit.solution, linear.fit.solution, rtol=1e-4, atol=1e-4)
+    assert again.score == pytest.approx(linear.score, abs=0.1)
+
+
+def test_step_that_diverges_is_not_taken():
+    """An effect that turns round: the straight answer is the better one."""
+    rig = Bent({2: 25.0}, by=-0.5)
+    linear, nothing = hypotheses(rig, [2])
+    assert exact(rig, linear, nothing) is linear
+
+
+def test_what_is_allowed_stays_allowed():
+    rig = Bent({2: 25.0}, by=0.003)
+    linear, nothing = hypotheses(rig, [2])
+    allowed = Hypothesis(linear.learnt, {2: 7.0})
+    assert exact(rig, allowed, nothing).allowed == {2: 7.0}
+    assert allowed.score == pytest.approx(linear.score - 7.0)
+    assert CATALOGUE[2] in linear.causes
