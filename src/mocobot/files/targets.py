@@ -58,7 +58,7 @@ def check_no_team(options: object, names: Sequence[str]) -> None:
     """
     for name in names:
         if getattr(options, name):
-            raise InputError(f"--{name} is of a team's recordings; with --model there is none")
+            raise InputError(f"--{name} is of a team's robots; with --model there is none")
 
 
 def map_file(name: str | None) -> list[Path]:
