@@ -11,7 +11,7 @@ from discrepancy.serial.rig import SerialRig
 def traces(rig: SerialRig, explanation: Explanation) -> list[Trace]:
     """Residuals of every block: ``before`` as modelled, ``after`` with the named causes and tolerances."""
     fit, problem = explanation.fit, explanation.problem
-    nominal = Fit.of(problem, background=False)
+    nominal = Fit.of(explanation.nothing.problem.as_whitened, background=False)
     causes = [
         (candidate, fit.coefficients[span] * candidate.units)
         for candidate, span in zip(problem.candidates, problem.spans, strict=True)
@@ -19,7 +19,7 @@ def traces(rig: SerialRig, explanation: Explanation) -> list[Trace]:
     ]
     before, after = rig.physical_residual([], -nominal.shared), rig.physical_residual(causes, -fit.shared)
     out = []
-    for t in range(len(problem.rows)):
+    for t in problem.trials:
         n = len(before[t])
         out.append(
             Trace(
