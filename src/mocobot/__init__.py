@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from mocobot import guiding as guiding
     from mocobot import pictures as pictures
     from mocobot import robots as robots
+    from mocobot import serial as serial
     from mocobot import trajectories as trajectories
     from mocobot.api.calibration import Calibration as Calibration
     from mocobot.api.calibration import calibrate as calibrate
@@ -62,7 +63,7 @@ _NAMES = {
     "estimator.errors": "InputError",
     "estimator.recording.model": "Recording",
     "estimator.recording.parquet": "read_recording write_recording",
-    "mocobot": "bases emps guiding pictures robots trajectories",
+    "mocobot": "bases emps guiding pictures robots serial trajectories",
     "mocobot.api.calibration": "Calibration calibrate read_calibration",
     "mocobot.api.comparison": "Comparison compare",
     "mocobot.api.conversion": "Conversion convert convert_parts",

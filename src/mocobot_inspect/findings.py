@@ -58,7 +58,7 @@ def _of_time(found: Inspection) -> Iterator[str]:
     # Robots of a table share its stamps and what is wrong with them.
     robots: dict[str, list[int]] = {}
     for robot, t in enumerate(timing):
-        for what in _of_stream(t):
+        for what in of_stream(t):
             robots.setdefault(what, []).append(robot + 1)
     for what, of in robots.items():
         yield f"robot{'s' * (len(of) > 1)} {listed([str(robot) for robot in of])}: {what}"
@@ -68,7 +68,8 @@ def _of_time(found: Inspection) -> Iterator[str]:
     yield from _ends(timing)
 
 
-def _of_stream(t: Timing) -> Iterator[str]:
+def of_stream(t: Timing) -> Iterator[str]:
+    """What is wrong with the stamps of one stream."""
     if t.rate_hz is None:
         yield f"{t.samples} samples are too few"
         return
@@ -132,12 +133,13 @@ def _of_samples(found: Inspection) -> Iterator[str]:
             if c.nans or c.infinities:
                 parts = [f"{n} {what}" for n, what in ((c.nans, "NaN"), (c.infinities, "infinite")) if n]
                 yield f"{who}: {' and '.join(parts)} of {found.survey.timing[robot].samples} samples"
-            yield from _stands(who, c, duration)
+            yield from stands(who, c, duration)
     for kind in ("phi", "theta", "tau"):
         yield from _limits(kind, found)
 
 
-def _stands(who: str, c: Channel, duration_s: float) -> Iterator[str]:
+def stands(who: str, c: Channel, duration_s: float) -> Iterator[str]:
+    """How a channel is stuck or clipped, in a stream of some length [s]."""
     stuck_s = sum(s.duration_s for s in c.stuck)
     if c.stuck and stuck_s > MOSTLY * duration_s:
         yield f"{who} stands at {c.stuck[0].value:.6g} for {stuck_s:.3g} of {duration_s:.3g} s while others move: stuck"

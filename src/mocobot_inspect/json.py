@@ -43,7 +43,7 @@ _STEP = ("step", "parameters", "unit", "rank", "condition", "singular_values", "
 def inspection_dict(found: Inspection) -> dict[str, Any]:
     """Plain JSON values."""
     seen, rested = found.survey, found.segments
-    return _plain(
+    return plain(
         {
             "format": FORMAT,
             "version": VERSION,
@@ -57,13 +57,13 @@ def inspection_dict(found: Inspection) -> dict[str, Any]:
                 "free": found.free,
             },
             "streams": [_timing(t, seen.origin_ns) for t in seen.timing],
-            "channels": [{c.name: _without(c, "name") for c in of_robot} for of_robot in seen.channels],
+            "channels": [{c.name: without(c, "name") for c in of_robot} for of_robot in seen.channels],
             "excerpt": {
                 "part_s": seen.excerpt_s,
                 "stretches": _stretches(found.checked),
                 "unchecked": found.unchecked,
             },
-            "segments": rested and (_without(rested, "rests") | {"rests": _stretches(rested.rests)}),
+            "segments": rested and (without(rested, "rests") | {"rests": _stretches(rested.rests)}),
             "clocks": _clocks(found),
             "wiring": found.wiring and _wiring(found.wiring),
             "excitation": {
@@ -76,20 +76,20 @@ def inspection_dict(found: Inspection) -> dict[str, Any]:
     )
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Objects for dataclasses, lists for tuples, None for what is not finite."""
     if is_dataclass(value):
-        return _plain(_without(value))
+        return plain(without(value))
     if isinstance(value, Mapping):
-        return {key: _plain(entry) for key, entry in value.items()}
+        return {key: plain(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
+        return [plain(entry) for entry in value]
     if isinstance(value, float):
         return float(value) if np.isfinite(value) else None
     return value
 
 
-def _without(record: Any, *left_out: str) -> dict[str, Any]:
+def without(record: Any, *left_out: str) -> dict[str, Any]:
     """Fields of a dataclass by name."""
     return {f.name: getattr(record, f.name) for f in fields(record) if f.name not in left_out}
 
@@ -100,7 +100,7 @@ def _stretches(told: tuple[tuple[float, float], ...]) -> list[dict[str, float]]:
 
 def _timing(t: Timing, origin_ns: int) -> dict[str, Any]:
     start = None if t.first_ns is None else (t.first_ns - origin_ns) * 1e-9
-    return {"start_s": start, "duration_s": t.duration_s} | _without(t, "first_ns", "last_ns")
+    return {"start_s": start, "duration_s": t.duration_s} | without(t, "first_ns", "last_ns")
 
 
 def _clocks(found: Inspection) -> list[dict[str, Any]] | None:

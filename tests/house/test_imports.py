@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from graphlib import CycleError, TopologicalSorter
+from itertools import permutations
 
 import pytest
 
@@ -24,6 +25,7 @@ LOWER = {
 }  # fmt: skip
 """What each package may import of the others."""
 
+RIGS = ("discrepancy.team.", "discrepancy.emps.", "discrepancy.serial.")
 SIMULATOR = {"mujoco", "dm_control", "mocobot_sim"}
 
 
@@ -67,9 +69,10 @@ UNWANTED = {
     "estimator": SIMULATOR | {"numba", "mocobot_logs"},
     "mocobot_logs": SIMULATOR | {"numba", "discrepancy", "mocobot"},
     "mocobot_inspect": SIMULATOR | {"numba", "discrepancy", "mocobot"},
-    "discrepancy.inference": SIMULATOR | {"discrepancy.team", "discrepancy.emps"},
+    "discrepancy.inference": SIMULATOR | {"discrepancy.team", "discrepancy.emps", "discrepancy.serial"},
     "discrepancy.emps.causes": SIMULATOR,
     "discrepancy.team.causes": SIMULATOR,
+    "discrepancy.serial.causes": SIMULATOR,
 }
 """What must not come along with a package, nor with those before it."""
 
@@ -97,12 +100,10 @@ def test_engine_of_the_diagnosis_knows_no_rig(package: str) -> None:
     for module, path in files.items():
         names = imported_modules(path)
         assert not roots(names) & SIMULATOR, module
-        assert not any(f"{name}.".startswith(("discrepancy.team.", "discrepancy.emps.")) for name in names), (
-            module
-        )
+        assert not any(f"{name}.".startswith(RIGS) for name in names), module
 
 
-@pytest.mark.parametrize(("rig", "least"), [("team", 20), ("emps", 15)])
+@pytest.mark.parametrize(("rig", "least"), [("team", 20), ("emps", 15), ("serial", 20)])
 def test_causes_need_no_simulator(rig: str, least: int) -> None:
     """Traces of causes come from mechanics, not from the simulator that the diagnosis is tried on."""
     files = module_files(f"discrepancy.{rig}.causes")
@@ -111,7 +112,7 @@ def test_causes_need_no_simulator(rig: str, least: int) -> None:
         assert not roots(imported_modules(path)) & SIMULATOR, module
 
 
-@pytest.mark.parametrize(("rig", "other"), [("team", "emps"), ("emps", "team")])
+@pytest.mark.parametrize(("rig", "other"), list(permutations(("team", "emps", "serial"), 2)))
 def test_rigs_do_not_know_each_other(rig: str, other: str) -> None:
     files = module_files(f"discrepancy.{rig}")
     assert len(files) > 20

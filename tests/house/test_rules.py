@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import ast
 
+import pytest
+
 from source_tree import SRC, module_files
 
+RULES = ("discrepancy.rules", "discrepancy.serial.rules")
 FREE = {
     "discrepancy.emps.recording.axis_log": {"FIRST_GUESS_KG", "LIMIT_V"},  # the nominal axis
     "discrepancy.result.evidence_list": {"CLOSELY", "MOST"},  # of a picture
@@ -53,15 +56,16 @@ def test_numbers_that_decide_are_in_one_file() -> None:
     elsewhere = {
         module: numbers(path.read_text(encoding="utf-8"))
         for module, path in module_files("discrepancy").items()
-        if module != "discrepancy.rules"
+        if module not in RULES
     }
     assert {module: names for module, names in elsewhere.items() if names} == FREE
 
 
-def test_every_rule_says_where_it_comes_from() -> None:
-    source = (SRC / "discrepancy" / "rules.py").read_text(encoding="utf-8")
+@pytest.mark.parametrize(("module", "least"), list(zip(RULES, (100, 60), strict=True)))
+def test_every_rule_says_where_it_comes_from(module: str, least: int) -> None:
+    source = SRC.joinpath(*module.split(".")).with_suffix(".py").read_text(encoding="utf-8")
     body = ast.parse(source).body[1:]
-    assert len(body) > 100
+    assert len(body) > least
     for rule, words in zip(body[::2], body[1::2], strict=True):
         assert isinstance(rule, ast.Assign), ast.unparse(rule)
         assert isinstance(words, ast.Expr), ast.unparse(rule)

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 TOKENS = {
     "Nm": "N m", "Nms": "N m s", "Ns": "N s", "mps": "m/s", "rad": "rad", "rad3": "rad^3", "m": "m", "N": "N", "s": "s",
-    "kg": "kg", "kgm": "kg m", "V": "V", "Vs": "V s", "Hz": "Hz", "deg": "deg", "m2": "m^2",
+    "kg": "kg", "kgm": "kg m", "V": "V", "Vs": "V s", "Hz": "Hz", "deg": "deg", "m2": "m^2", "kgm2": "kg m^2",
 }  # fmt: skip
 SMALL = {
     "m": ("mm", 1e3), "rad": ("mrad", 1e3), "N m": ("mN m", 1e3), "m/s": ("mm/s", 1e3), "V": ("mV", 1e3),

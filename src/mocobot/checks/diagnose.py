@@ -3,7 +3,14 @@
 from pathlib import Path
 
 from estimator.errors import InputError
-from mocobot.files.targets import calibration_file, check_folder, check_recordings, check_there, map_file
+from mocobot.files.targets import (
+    calibration_file,
+    check_folder,
+    check_no_team,
+    check_recordings,
+    check_there,
+    map_file,
+)
 from mocobot.options import Diagnose
 
 
@@ -18,12 +25,31 @@ def check(options: Diagnose) -> None:
     if options.jobs < 1:
         raise InputError(f"jobs is {options.jobs}; it must be at least 1")
     check_recordings(options.rec)
+    if options.model is not None:
+        _check_joints(options, options.model)
+        return
+    if options.reference:
+        raise InputError("--reference goes with --model: a healthy log of the same robot")
     if options.out is not None:
         inputs = [*options.rec, *([options.tolerances] if options.tolerances else []), *map_file(options.map)]
         inputs += calibration_file(options.calibration)
         check_folder(options.out, inputs, _is_diagnosis, "an earlier diagnosis", force=options.force)
     _check_rig(options)
     check_there(options.rec)
+
+
+def _check_joints(options: Diagnose, model: Path) -> None:
+    """What can be refused of logs of one robot's joints, but for maps that nobody named."""
+    if options.rig != "team":
+        raise InputError(f"--model and --rig {options.rig} are both given; choose one")
+    check_no_team(options, ("calibration", "scheduler"))
+    logs = [*options.rec, *options.reference]
+    check_recordings(logs)
+    if options.out is not None:
+        inputs = [*logs, model, *([options.tolerances] if options.tolerances else [])]
+        inputs += [Path(options.map)] if options.map is not None else []
+        check_folder(options.out, inputs, _is_diagnosis, "an earlier diagnosis", force=options.force)
+    check_there([*logs, model])
 
 
 def _check_rig(options: Diagnose) -> None:

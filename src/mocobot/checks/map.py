@@ -10,6 +10,7 @@ def check(options: Map) -> None:
     Raises:
         InputError: an output that cannot be written, or a missing file.
     """
+    inputs = [options.log, *([options.model] if options.model is not None else [])]
     if options.out is not None:
-        check_output(options.out, [options.log], force=options.force)
-    check_there([options.log])
+        check_output(options.out, inputs, force=options.force)
+    check_there(inputs)

@@ -21,6 +21,7 @@ from estimator.files import whole_folder
 from estimator.recording.model import Recording
 from mocobot.api.given import Logs, Robots
 from mocobot.cluster import workers_of
+from mocobot.commands import diagnose_joints
 from mocobot.files.provenance import file_facts, provenance
 from mocobot.files.targets import calibration_file, map_file
 from mocobot.options import Diagnose
@@ -47,6 +48,9 @@ def run(options: Diagnose) -> None:
         InputError: recordings, tolerances or options that cannot be used, or an output that cannot be written.
         NotGood: with ``strict``, the verdict is neither consistent nor explained.
     """
+    if options.model is not None:
+        diagnose_joints.run(options, options.model)
+        return
     rig = RIGS[options.rig]
     inputs = [*options.rec, *([options.tolerances] if options.tolerances else []), *map_file(options.map)]
     inputs += calibration_file(options.calibration)

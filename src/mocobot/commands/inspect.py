@@ -23,6 +23,9 @@ def run(options: Inspect) -> None:
         NotGood: with ``strict``, the log is ready for nothing.
         InputError: the log, map or design cannot be read, or the JSON cannot be written.
     """
+    if options.model is not None:
+        _run_joints(options, options.model)
+        return
     log_map = read_map(options.map) if options.map is not None else None
     design = load_design(options.design) if options.design is not None else omnid_design()
     robots = Robots(options.calibration)
@@ -37,3 +40,19 @@ def run(options: Inspect) -> None:
     ready = ready_line(found)
     if options.strict and (ready.startswith("ready for: nothing") or " yes" not in ready):
         raise NotGood(ready)
+
+
+def _run_joints(options: Inspect, model: Path) -> None:
+    """A log of one robot's joints, judged by its model."""
+    from mocobot import serial
+
+    robot = serial.read_model(model)
+    with bar(None, "reading", "") as advance, bar(None, "checking", "mistake") as tried:
+        found = serial.inspect(
+            options.rec, robot, map=options.map, episode=options.episode, advance=advance, tried=tried
+        )
+    if options.json is not None:
+        found.write(options.json)
+    print(found)
+    if options.strict and found.ready_for.startswith("ready for: nothing"):
+        raise NotGood(found.ready_for)

@@ -1,7 +1,12 @@
 """``mocobot replay``: recordings as moving scenes and time series, in the Rerun viewer, a browser or a file."""
 
+from __future__ import annotations
+
 import time
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from discrepancy.result.read import read_diagnosis
 from estimator.errors import InputError
@@ -13,6 +18,9 @@ from mocobot.options import Replay
 from mocobot.progress import bar
 from mocobot_view.facts.fact_files import read_estimate, read_truth
 from mocobot_view.replay.replay_trial import ReplayTrial, distinct_names, replay_trial
+
+if TYPE_CHECKING:
+    from mocobot_view.joints.joint_replay import JointReplay
 
 
 def run(options: Replay) -> None:
@@ -26,9 +34,9 @@ def run(options: Replay) -> None:
     from mocobot_view.replay.outputs import (
         check_enabled,
         has_display,
-        save_replay,
-        serve_replay,
-        show_replay,
+        save_content,
+        serve_content,
+        show_content,
     )
 
     check_enabled()
@@ -37,19 +45,20 @@ def run(options: Replay) -> None:
             "there is no display to open the viewer on; write a file with --save replay.rrd, or serve it to a browser "
             "with --web"
         )
-    trials = _trials(options)
+    trials = _trials(options) if options.model is None else _joint_replays(options, options.model)
     for trial in trials:
         for note in trial.notes:
             print(f"{trial.name}: {note}")
     with bar(len(trials), "logging", "recording") as advance:
+        content = partial(_log, trials, advance)
         if options.save is not None:
-            save_replay(trials, options.save, advance)
+            save_content(content, options.save)
             print(f"{options.save}: {_size(options.save)}; open it with: rerun {options.save}")
             return
         if not options.web:
-            show_replay(trials, advance)
+            show_content(content)
             return
-        stream, address = serve_replay(trials, advance)
+        stream, address = serve_content(content)
     print(f"Open {address} in a browser; Ctrl+C ends it.", flush=True)
     try:
         while True:
@@ -72,6 +81,34 @@ def _trials(options: Replay) -> list[ReplayTrial]:
             )
             advance(1)
     return trials
+
+
+def _joint_replays(options: Replay, model: Path) -> list[JointReplay]:
+    from mocobot import serial
+    from mocobot_view.joints.joint_replay import joint_replay
+
+    robot, replays = serial.read_model(model), []
+    with bar(len(options.rec), "reading", "log") as advance:
+        for path, name in zip(options.rec, distinct_names(options.rec), strict=True):
+            parts = serial.read_logs(path, robot, map=options.map)
+            for number, log in enumerate(parts, 1):
+                replays.append(joint_replay(robot, log, f"{name}-part{number}" if len(parts) > 1 else name))
+            advance(1)
+    return replays
+
+
+def _log(
+    trials: list[ReplayTrial] | list[JointReplay], advance: Callable[[int], object], stream: Any
+) -> None:
+    from mocobot_view.joints.joint_replay import JointReplay
+    from mocobot_view.joints.log_joints import log_joint_replay
+    from mocobot_view.replay.stream import log_replay
+
+    joints = [trial for trial in trials if isinstance(trial, JointReplay)]
+    if joints:
+        log_joint_replay(stream, joints, advance)
+    else:
+        log_replay(stream, [trial for trial in trials if isinstance(trial, ReplayTrial)], advance)
 
 
 def _payload(given: str | None) -> str | Path | None:

@@ -46,6 +46,21 @@ def check_there(paths: Sequence[Path]) -> None:
             continue
 
 
+def check_no_team(options: object, names: Sequence[str]) -> None:
+    """Refuse options of a team's recordings where a model of one robot is given.
+
+    Args:
+        options: of the command.
+        names: of those that must not be given.
+
+    Raises:
+        InputError: one is.
+    """
+    for name in names:
+        if getattr(options, name):
+            raise InputError(f"--{name} is of a team's robots; with --model there is none")
+
+
 def map_file(name: str | None) -> list[Path]:
     """The file that a map is read from, none for a built-in one."""
     if name is None or not Path(name).is_file():

@@ -14,6 +14,13 @@ Scheduler = Annotated[
         help="Run on the workers of a Dask scheduler, by its address or its scheduler file (docs/commands/cluster.md).",
     ),
 ]
+Model = Annotated[
+    Path | None,
+    tyro.conf.arg(
+        metavar="ROBOT.xml",
+        help="MJCF or URDF of one fixed-base robot whose joints were logged (docs/serial/guide.md), not a team.",
+    ),
+]
 Calibrated = Annotated[
     Path | None,
     tyro.conf.arg(

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from mocobot.options.common import Calibrated, Flag, Force
+from mocobot.options.common import Calibrated, Flag, Force, Model
 
 
 @dataclass(frozen=True)
@@ -52,6 +52,7 @@ class Map:
 
     log: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="LOG")]
     """Log of any format that ``convert`` reads."""
+    model: Model = None
     out: Annotated[Path | None, tyro.conf.arg(metavar="MAP.toml")] = None
     """Write the draft to a file instead of the terminal."""
     force: Force = False
@@ -67,6 +68,7 @@ class Inspect:
     """Recording or log of any format that ``convert`` reads; broken ones are looked at, too."""
     map: Annotated[str | None, tyro.conf.arg(metavar="MAP")] = None
     """Map file or the name of a built-in one; see docs/measured-data.md."""
+    model: Model = None
     json: Annotated[Path | None, tyro.conf.arg(metavar="FILE.json")] = None
     """Write the report as JSON, too."""
     force: Force = False

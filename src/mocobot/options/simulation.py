@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from mocobot.options.common import Calibrated, Force
+from mocobot.options.common import Calibrated, Force, Model
 
 Kind = Literal["random", "periodic", "static", "free"]
 """Of a trial."""
@@ -64,7 +64,10 @@ class Replay:
     """Watch recordings: the scene moving from the measured angles, estimate against truth, all signals (Rerun)."""
 
     rec: Annotated[tyro.conf.Positional[tuple[Path, ...]], tyro.conf.arg(metavar="REC...")]
-    """Recordings (Parquet); several are shown side by side."""
+    """Recordings (Parquet); several are shown side by side. Logs of a robot's joints with --model."""
+    model: Model = None
+    map: Annotated[str | None, tyro.conf.arg(metavar="MAP.toml")] = None
+    """With --model: map of the logs; log.toml beside log or model if not given."""
     estimate: Annotated[Path | None, tyro.conf.arg(metavar="EST.json")] = None
     """Estimate to show, as `mocobot estimate --out` writes it; made from each recording if not given."""
     calibration: Calibrated = None

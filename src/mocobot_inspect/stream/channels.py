@@ -65,10 +65,10 @@ class Channel:
 class ChannelTally:
     """Looks at one robot's samples block by block."""
 
-    def __init__(self, names: tuple[str, ...]) -> None:
-        """Start without any; ``names`` of the channels."""
+    def __init__(self, names: tuple[str, ...], sensors: int = SENSORS) -> None:
+        """Start without any; ``names`` of the channels, the first ``sensors`` of which are looked at for standing."""
         count = len(names)
-        self._names = names
+        self._names, self._sensors = names, sensors
         self._low, self._high = np.full(count, np.inf), np.full(count, -np.inf)
         self._nans, self._infinities = np.zeros(count, int), np.zeros(count, int)
         self._steps: list[list[float | None]] = [[] for _ in names]
@@ -97,7 +97,7 @@ class ChannelTally:
         if rate_hz is not None and whole.any():
             kept = time_s[whole]
             # Commands stand when they please.
-            for found in frozen(values[whole][:, :SENSORS], rate_hz):
+            for found in frozen(values[whole][:, : self._sensors], rate_hz):
                 self._keep(found, kept, rate_hz)
 
     def _keep(self, found: Frozen, time_s: Array, rate_hz: float) -> None:

@@ -11,7 +11,7 @@ from estimator.errors import InputError
 from mocobot_logs.bag.cdr import Selector
 from mocobot_logs.bag.messages import Topic, listed, printable
 from mocobot_logs.bag.types import MessageType, message_type
-from mocobot_logs.log import CHANNELS, REF
+from mocobot_logs.log import REF
 from mocobot_logs.map.log_map import ChannelMap, LogMap
 
 Names = Callable[[str], tuple[str, ...]]
@@ -89,13 +89,13 @@ def make_plan(
     log_map.require("field", "bags")
     robots = _count_robots(bag, topics, log_map, names)
     maps = [log_map.channels(robot) for robot in range(1, robots + 1)]
-    channels = CHANNELS[log_map.level]
+    channels = log_map.required
     if log_map.has_commands(robots, lambda c: (c.topic or "") in topics and spoken(c.topic or "")):
         channels += REF
     selected: dict[str, dict[Selector, str]] = {}
     for robot, channel_maps in enumerate(maps, 1):
         for name in channels:
-            channel, meaning = channel_maps[name], f"{name} of robot {robot}"
+            channel, meaning = channel_maps[name], log_map.meaning(name, robot)
             topic = channel.topic or ""
             if topic not in topics:
                 raise InputError(f"{bag}: {_missing(topic, meaning, topics, log_map)}")
@@ -147,7 +147,7 @@ def _count_robots(bag: str, topics: Mapping[str, Topic], log_map: LogMap, names:
 
     def is_there(robot: int) -> bool:
         channels, others = log_map.channels(robot), log_map.channels(robot + 1)
-        for name in CHANNELS[log_map.level]:
+        for name in log_map.required:
             channel, other = channels[name], others[name]
             # Robots that share a topic are told apart by their joints.
             is_own = channel.topic != other.topic or (

@@ -25,7 +25,7 @@ from mocobot_logs.bag.messages import Messages, listed_names
 from mocobot_logs.bag.plan import Plan, TopicPlan, make_plan
 from mocobot_logs.bag.storage.files import BagFiles, is_bag
 from mocobot_logs.bag.types import STRING, string_of, type_name
-from mocobot_logs.log import CHANNELS, REF, Level, Samples
+from mocobot_logs.log import REF, Level, Samples
 from mocobot_logs.map.log_map import LogMap
 
 __all__ = ["METADATA_TOPIC", "BagSource", "is_bag", "open_bag"]
@@ -99,7 +99,7 @@ class BagSource:
         found = make_plan(*arguments, self._files.has_messages)
         if any(len(topics) > 1 for topics in found.parts):  # all at once: the bag need not be looked at again
             self._look.stamps(tuple(found.topics), self._clock)
-        may_lack = found.channels != CHANNELS[self._map.level] and self._map.common[REF[0]].optional
+        may_lack = found.channels != self._map.required and self._map.common[REF[0]].optional
         if may_lack and not all(agree(self._look, topics, self._clock) for topics in found.parts):
             return make_plan(*arguments, lambda _: False)
         return found

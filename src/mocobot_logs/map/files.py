@@ -34,7 +34,7 @@ def read_map(path_or_name: Path | str) -> LogMap:
     if str(path_or_name) in MAPS:
         return builtin_map(str(path_or_name))
     path = Path(path_or_name)
-    return parse_map(_values(_read(path), f"map {path}"), str(path))
+    return parse_map(toml_values(path), str(path))
 
 
 @cache
@@ -56,6 +56,15 @@ def builtin_map_text(name: str) -> str:
     if name not in MAPS:
         raise InputError(f"map {name!r} does not exist; the built-in maps are {', '.join(MAPS)}")
     return (resources.files("mocobot_logs.map") / "builtin" / f"{name}.toml").read_text(encoding="utf-8")
+
+
+def toml_values(path: Path) -> dict[str, object]:
+    """Keys and values of a map's file.
+
+    Raises:
+        InputError: there is no such file, or it is not TOML.
+    """
+    return _values(_read(path), f"map {path}")
 
 
 def _read(path: Path) -> str:

@@ -113,6 +113,15 @@ class LogMap:
         """Mapped channels in the order of ``Samples.values``: those of the level, then the commands if mapped."""
         return tuple(name for name in (*CHANNELS[self.level], *REF) if name in self.common)
 
+    @property
+    def required(self) -> tuple[str, ...]:
+        """Channels that every log has."""
+        return CHANNELS[self.level]
+
+    def meaning(self, name: str, robot: int) -> str:
+        """What messages call a channel of one robot, counted from 1."""
+        return f"{name} of robot {robot}"
+
     def channels(self, robot: int) -> dict[str, ChannelMap]:
         """Every mapped channel of one robot, counted from 1, placeholders filled, in the order of ``names``."""
         own, channels = self.own.get(robot, {}), {}

@@ -20,7 +20,7 @@ _CSV = ("delimiter", "decimal")
 _CHANNEL = ("topic", "joint", "field", "column", "unit", "sign", "offset", "counts_per_turn", "optional")
 KEYS = (*_REQUIRED, *_OPTIONAL, *_TIME, *_CSV, *_CHANNEL)
 """Every key of a map but the channels' names."""
-_JOINT_FIELDS = ("position", "velocity", "effort")
+JOINT_FIELDS = ("position", "velocity", "effort")
 
 Values = Mapping[str, Any]
 
@@ -47,7 +47,7 @@ def parse_map(values: Values, name: str) -> LogMap:
     called = _names(top, values, robots)
     robots = len(called) or robots
     trial = top.one_of("trial", TRIALS) if "trial" in top else None
-    defaults = _table(values, "defaults", where)
+    defaults = table_of(values, "defaults", where)
     check_known(defaults, _CHANNEL, f"{where}: defaults")
     common, own = _channels(values, level, defaults, where), _overrides(values, robots, called, where)
     found = LogMap(
@@ -55,8 +55,8 @@ def parse_map(values: Values, name: str) -> LogMap:
         level=level,
         robots=robots,
         trial=trial,
-        time=_time(_table(values, "time", where), f"{where}: time"),
-        csv=_csv(_table(values, "csv", where), f"{where}: csv"),
+        time=time_map(table_of(values, "time", where), f"{where}: time"),
+        csv=csv_map(table_of(values, "csv", where), f"{where}: csv"),
         common={
             key: _channel(key, _merged(defaults, c), f"{where}: channels.{key}") for key, c in common.items()
         },
@@ -109,10 +109,10 @@ def _check_names(found: LogMap, where: str) -> None:
 
 
 def _channels(values: Values, level: Level, defaults: Values, where: str) -> dict[str, dict[str, Any]]:
-    tables, inside = _table(values, "channels", where), f"{where}: channels"
+    tables, inside = table_of(values, "channels", where), f"{where}: channels"
     with_commands = any(name in tables for name in REF)
     Fields(tables, (*CHANNELS[level], *(REF if with_commands else ())), inside, () if with_commands else REF)
-    found = {name: _table(tables, name, inside) for name in tables}
+    found = {name: table_of(tables, name, inside) for name in tables}
     for name, table in found.items():
         check_known(table, _CHANNEL, f"{inside}.{name}")
         if "unit" not in table and "unit" not in defaults:
@@ -125,7 +125,7 @@ def _overrides(
     values: Values, robots: int | None, called: tuple[str, ...], where: str
 ) -> dict[int, dict[str, Values]]:
     own: dict[int, dict[str, Values]] = {}
-    for key, table in _table(values, "robot", where).items():
+    for key, table in table_of(values, "robot", where).items():
         inside = f"{where}: robot.{key}"
         last = MAX_ROBOTS if robots is None else robots
         number = str(called.index(key) + 1) if key in called else key
@@ -137,8 +137,8 @@ def _overrides(
         if not isinstance(table, dict):
             raise InputError(f"{inside} is {table!r:.40}; it must be a table with the key channels")
         check_known(table, ("channels",), inside)
-        channels = _table(table, "channels", inside)
-        own[int(number)] = {name: _table(channels, name, f"{inside}.channels") for name in channels}
+        channels = table_of(table, "channels", inside)
+        own[int(number)] = {name: table_of(channels, name, f"{inside}.channels") for name in channels}
         for name, entry in own[int(number)].items():
             check_known(entry, _CHANNEL, f"{inside}.channels.{name}")
     return own
@@ -168,9 +168,9 @@ def _channel(name: str, values: Values, where: str) -> ChannelMap:
         raise InputError(
             f"{where}: missing key {missing!r}; a channel has a topic and a field (bags) or a column (tables)"
         )
-    if parts["joint"] is not None and parts["field"] not in _JOINT_FIELDS:
+    if parts["joint"] is not None and parts["field"] not in JOINT_FIELDS:
         raise InputError(
-            f"{where}: field is {parts['field']!r:.60}; with a joint it must be one of {', '.join(_JOINT_FIELDS)}"
+            f"{where}: field is {parts['field']!r:.60}; with a joint it must be one of {', '.join(JOINT_FIELDS)}"
         )
     sign = values.get("sign", 1)
     if type(sign) is not int or sign not in (1, -1):
@@ -193,7 +193,12 @@ def _channel(name: str, values: Values, where: str) -> ChannelMap:
     )
 
 
-def _time(values: Values, where: str) -> TimeMap:
+def time_map(values: Values, where: str) -> TimeMap:
+    """Where time is, by the table ``[time]``.
+
+    Raises:
+        InputError: a key is unknown, or a value not allowed.
+    """
     fields = Fields(values, ("unit",) if "column" in values else (), where, _TIME)
     return TimeMap(
         column=_text(fields, "column"),
@@ -202,7 +207,12 @@ def _time(values: Values, where: str) -> TimeMap:
     )
 
 
-def _csv(values: Values, where: str) -> CsvMap:
+def csv_map(values: Values, where: str) -> CsvMap:
+    """How a text table is written, by the table ``[csv]``.
+
+    Raises:
+        InputError: a key is unknown, or a value not allowed.
+    """
     fields = Fields(values, (), where, _CSV)
     delimiter = values.get("delimiter")
     decimal: Literal[".", ","] = fields.one_of("decimal", (".", ",")) if "decimal" in fields else "."
@@ -218,7 +228,12 @@ def _csv(values: Values, where: str) -> CsvMap:
     return CsvMap(delimiter, decimal)
 
 
-def _table(values: Values, key: str, where: str) -> dict[str, Any]:
+def table_of(values: Values, key: str, where: str) -> dict[str, Any]:
+    """A table inside another one, empty where there is none.
+
+    Raises:
+        InputError: it is no table.
+    """
     table = values.get(key, {})
     if not isinstance(table, dict):
         raise InputError(f"{where}: {key} is {table!r:.40}; it must be a table, [{key}]")

@@ -26,14 +26,14 @@ class Screen:
         log_ns: first and last time of the recorder [ns], None where the log has none.
     """
 
-    def __init__(self, name: str, robot: int, channels: tuple[str, ...]) -> None:
-        """Take the names that messages need; ``robot`` counts from 1."""
+    def __init__(self, where: str, channels: tuple[str, ...]) -> None:
+        """Take the names that messages need: of the log (and its robot), and of the channels."""
         self.rows = self.duplicates = self.blank = 0
         self.blank_channels: Counter[str] = Counter()
         self.first_ns: int | None = None
         self.last_ns: int | None = None
         self.log_ns: tuple[int, int] | None = None
-        self._where = f"{name}: robot {robot}"
+        self._where = where
         self._channels = channels
         self._last: Array | None = None
 

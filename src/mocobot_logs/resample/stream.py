@@ -45,8 +45,8 @@ class RobotStream:
         may_fit: bool = True,
     ) -> None:
         """``robot`` counts from 1; without ``may_fit`` no stamps count as lying on a grid."""
-        self.screen = Screen(name, robot, channels)
         self._where, self._robot = f"{name}: robot {robot}", robot
+        self.screen = Screen(self._where, channels)
         self._channels = channels
         self._rate_hz, self._max_gap_s, self._may_fit = rate_hz, max_gap_s, may_fit
         self._waiting: list[Samples] = []

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
 from mocobot_logs.faults import shown
-from mocobot_logs.log import CHANNELS, REF, Level, Samples, Stamps
+from mocobot_logs.log import REF, Level, Samples, Stamps
 from mocobot_logs.map.log_map import ChannelMap, LogMap
 
 SHOWN_COLUMNS = 12
@@ -106,7 +106,7 @@ class TableSource:
         self.level: Level = log_map.level
         self.robots = log_map.count_robots(self.name, self._has_robot, "column")
         has_commands = log_map.has_commands(self.robots, lambda channel: self._find(channel) is not None)
-        self.channels: tuple[str, ...] = CHANNELS[self.level] + (REF if has_commands else ())
+        self.channels: tuple[str, ...] = log_map.required + (REF if has_commands else ())
         self._places = [self._places_of(robot) for robot in range(1, self.robots + 1)]
         self._clocks = [self._clock_of(robot) for robot in range(1, self.robots + 1)]
         self._check_shared()
@@ -142,14 +142,14 @@ class TableSource:
 
     def _has_robot(self, robot: int) -> bool:
         channels = self._map.channels(robot)
-        return any(self._find(channels[name]) is not None for name in CHANNELS[self.level])
+        return any(self._find(channels[name]) is not None for name in self._map.required)
 
     def _places_of(self, robot: int) -> list[Place]:
         channels, places = self._map.channels(robot), []
         for name in self.channels:
             place = self._find(channels[name])
             if place is None:
-                raise InputError(self._missing(channels[name].column or "", f"{name} of robot {robot}"))
+                raise InputError(self._missing(channels[name].column or "", self._map.meaning(name, robot)))
             places.append(place)
         return places
 
@@ -202,7 +202,7 @@ class TableSource:
         seen: dict[Place, str] = {}
         for robot, places in enumerate(self._places, 1):
             for name, place in zip(self.channels, places, strict=True):
-                what = f"{name} of robot {robot}"
+                what = self._map.meaning(name, robot)
                 if place in seen:
                     raise InputError(
                         f"{self.name}: by map {self._map.name}, {seen[place]} and {what} are the same column "

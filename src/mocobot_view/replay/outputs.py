@@ -18,6 +18,7 @@ from mocobot_view.replay.replay_trial import ReplayTrial
 from mocobot_view.replay.stream import log_replay, new_stream
 
 Progress = Callable[[int], object] | None
+Content = Callable[[rr.RecordingStream], object]
 
 WEB_PORT, DATA_PORT = 9090, 9876
 """Ports of the web viewer and of its data: Rerun's own."""
@@ -50,17 +51,7 @@ def save_replay(trials: Sequence[ReplayTrial], path: Path, progress: Progress = 
     Raises:
         InputError: it cannot be written.
     """
-    with whole_file(path) as temporary:
-        temporary.touch(exist_ok=False)  # the SDK's message would name the temporary file
-        stream = new_stream()
-        try:
-            stream.save(temporary)
-            log_replay(stream, trials, progress)
-            stream.flush()
-            stream.disconnect()
-        except RuntimeError as error:  # the SDK's writer, which does not say what the system told it
-            raise InputError(f"{path}: cannot be written ({_line(error)}); is the disk full?") from error
-        _check_complete(temporary)
+    save_content(_content(trials, progress), path)
 
 
 def show_replay(trials: Sequence[ReplayTrial], progress: Progress = None) -> None:
@@ -69,17 +60,7 @@ def show_replay(trials: Sequence[ReplayTrial], progress: Progress = None) -> Non
     Raises:
         InputError: the viewer does not start.
     """
-    stream = new_stream()
-    beside = shutil.which("rerun", path=str(Path(sys.executable).parent))
-    try:
-        rr.spawn(executable_path=beside, hide_welcome_screen=True, recording=stream)
-        log_replay(stream, trials, progress)
-        stream.flush(timeout_sec=FLUSH_S)
-    except (RuntimeError, ValueError, OSError) as error:
-        raise InputError(
-            f"the Rerun viewer does not open ({_line(error)}); write a file with --save, or use --web"
-        ) from error
-    stream.disconnect()
+    show_content(_content(trials, progress))
 
 
 def serve_replay(trials: Sequence[ReplayTrial], progress: Progress = None) -> tuple[rr.RecordingStream, str]:
@@ -91,11 +72,65 @@ def serve_replay(trials: Sequence[ReplayTrial], progress: Progress = None) -> tu
     Raises:
         InputError: the servers do not start; another one may be using their ports.
     """
+    return serve_content(_content(trials, progress))
+
+
+def _content(trials: Sequence[ReplayTrial], progress: Progress) -> Content:
+    return lambda stream: log_replay(stream, trials, progress)
+
+
+def save_content(content: Content, path: Path) -> None:
+    """Write whatever logs itself into a stream as an .rrd file, as ``save_replay`` does.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    with whole_file(path) as temporary:
+        temporary.touch(exist_ok=False)  # the SDK's message would name the temporary file
+        stream = new_stream()
+        try:
+            stream.save(temporary)
+            content(stream)
+            stream.flush()
+            stream.disconnect()
+        except RuntimeError as error:  # the SDK's writer, which does not say what the system told it
+            raise InputError(f"{path}: cannot be written ({_line(error)}); is the disk full?") from error
+        _check_complete(temporary)
+
+
+def show_content(content: Content) -> None:
+    """Show whatever logs itself into a stream, as ``show_replay`` does.
+
+    Raises:
+        InputError: the viewer does not start.
+    """
+    stream = new_stream()
+    beside = shutil.which("rerun", path=str(Path(sys.executable).parent))
+    try:
+        rr.spawn(executable_path=beside, hide_welcome_screen=True, recording=stream)
+        content(stream)
+        stream.flush(timeout_sec=FLUSH_S)
+    except (RuntimeError, ValueError, OSError) as error:
+        raise InputError(
+            f"the Rerun viewer does not open ({_line(error)}); write a file with --save, or use --web"
+        ) from error
+    stream.disconnect()
+
+
+def serve_content(content: Content) -> tuple[rr.RecordingStream, str]:
+    """Serve whatever logs itself into a stream, as ``serve_replay`` does.
+
+    Returns:
+        The stream, to be kept, and the address to open.
+
+    Raises:
+        InputError: the servers do not start; another one may be using their ports.
+    """
     stream = new_stream()
     try:
         data = stream.serve_grpc()
         rr.serve_web_viewer(web_port=WEB_PORT, open_browser=False)
-        log_replay(stream, trials, progress)
+        content(stream)
         stream.flush(timeout_sec=FLUSH_S)
     except (RuntimeError, ValueError, OSError) as error:
         raise InputError(

@@ -1,0 +1,94 @@
+"""The catalogue as candidates, and what all of it together leaves."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from discrepancy.serial import rules
+from discrepancy.serial.candidate import SerialCandidate
+from discrepancy.serial.causes import CAUSES
+from discrepancy.serial.causes.base import Cause, Hints, last_link, partner
+from discrepancy.serial.mechanics.tree import Tree
+from discrepancy.serial.recording.joint_log import JointLog
+from discrepancy.serial.rows.signals import Signals
+from estimator.arrays import Array
+
+Tolerances = Mapping[str, Mapping[str, float]]
+
+
+def places(cause: Cause, tree: Tree, hints: Hints) -> list[int]:
+    """Joints (from 0) at which a cause may sit; -1 for the whole arm."""
+    if cause.part == "arm":
+        return [-1]
+    joints = range(len(tree.joint_body))
+    if cause.part == "link":
+        # A body of several joints is moved by the last of them.
+        moving = [j for j in joints if tree.joint_body[j] not in tree.joint_body[j + 1 :]]
+        if cause.name == "payload":
+            return [last_link(tree)]
+        return [j for j in moving if cause.name == "link_length" or tree.mass[tree.joint_body[j]] > 0]
+    travelled = [j for j in joints if hints.travel[j] > rules.LEAST_TRAVEL and cause.shapes(hints, j)]
+    if cause.part == "pair":
+        return [j for j in travelled if (before := partner(tree, j)) is not None and _alike(tree, j, before)]
+    return travelled
+
+
+def candidates(
+    tree: Tree, names: Sequence[str], hints: Hints, excluded: frozenset[str], tolerances: Tolerances
+) -> list[SerialCandidate]:
+    """Every lasting cause at every place, in its first shape."""
+    out = []
+    for name, cause in CAUSES.items():
+        if name in excluded or cause.transient:
+            continue
+        for at in places(cause, tree, hints):
+            out.append(cause.at(tree, names, at, cause.shapes(hints, at)[0], tolerances.get(name)))
+    return out
+
+
+def events() -> dict[str, dict[str, float]]:
+    """Tolerances of what differs between two days: none."""
+    return {name: dict.fromkeys(cause.parameters, 0.0) for name, cause in CAUSES.items()}
+
+
+def hints_of(parts: Sequence[Signals], logs: Sequence[JointLog]) -> Hints:
+    """Hints from all logs of one robot."""
+    typical = parts[0].typical
+    load = np.sqrt(np.mean(np.concatenate([s.inverse for s in parts]) ** 2, axis=0))
+    q = np.concatenate([s.q for s in parts])
+    tree = parts[0].tree
+    turns = []
+    for j in range(q.shape[1]):
+        each = {n * g for n in rules.RIPPLE_TURNS for g in {1.0, abs(float(logs[0].drive.gear[j]))}}
+        turns.append([] if tree.slides[j] else [t for t in sorted(each) if _passes(t, typical[j], logs)])
+    return Hints(
+        typical,
+        load,
+        np.ptp(q, axis=0),
+        0.5 * (q.max(axis=0) + q.min(axis=0)),
+        turns,
+        _couplings(tree, logs[0]),
+    )
+
+
+def _alike(tree: Tree, one: int, other: int) -> bool:
+    return bool(tree.slides[one] == tree.slides[other])
+
+
+def _passes(turns: float, typical: float, logs: Sequence[JointLog]) -> bool:
+    """Whether a ripple of so many periods a turn is slow enough for the rows; one a turn is a counterbalance."""
+    cutoff = min(rules.CUTOFF_HZ, rules.CUTOFF_SHARE * min(log.rate_hz for log in logs))
+    return turns > 1.0 and turns * typical / (2.0 * np.pi) < rules.MOST_RIPPLE_HZ * cutoff
+
+
+def _couplings(tree: Tree, log: JointLog) -> Array:
+    """Turns of every joint's motor per turn of the joint before it, over those per turn of its own; NaN if unknown."""
+    coupling = log.drive.coupling
+    out = np.full(len(tree.joint_body), np.nan)
+    if np.any(coupling - np.diag(np.diag(coupling))):
+        motor = np.linalg.inv(coupling)  # motor positions from joint positions
+        for j in range(len(out)):
+            before = partner(tree, j)
+            if before is not None and motor[j, j]:
+                out[j] = motor[j, before] / motor[j, j]
+    return out

@@ -1,0 +1,20 @@
+"""Rotors, as the joint feels them, have another inertia than the model says."""
+
+from discrepancy.serial.causes.base import Cause, at_joint
+
+
+class Armature(Cause):
+    """The rotor's inertia through the gear differs from the model's ``armature``."""
+
+    title = "rotor inertia of {joint}"
+    family = "inertia"
+    parameters = ("armature_kgm2",)
+    scales = (0.1,)
+    separate = "Fast short motions of this joint alone, in a pose where gravity does not load it."
+
+    def sentence(self, n):
+        more = n.either("armature_kgm2", "more", "less")
+        return f"the rotor adds {n('armature_kgm2', 'kg m^2')} {more} than modelled"
+
+    def columns(self, signals, at, shape):
+        return at_joint(signals, at, signals.ddq[:, at])

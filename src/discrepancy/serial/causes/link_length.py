@@ -1,0 +1,26 @@
+"""A link is longer or shorter than drawn."""
+
+from discrepancy.serial import rules
+from discrepancy.serial.causes.base import Cause
+from discrepancy.serial.mechanics.shift import by_displacement
+
+
+class LinkLength(Cause):
+    """The frame of a link sits elsewhere in the one before it."""
+
+    title = "seat of {link} in the one before it"
+    family = "geometry"
+    part = "link"
+    parameters = ("x_m", "y_m", "z_m")
+    tolerances = (rules.LENGTH_M,) * 3
+    separate = "A gauge."
+
+    def sentence(self, n):
+        x, y, z = (n(f"{axis}_m", "mm", 1e3, signed=True) for axis in "xyz")
+        return f"sits off by ({x}, {y}, {z}) in the frame of the link before it"
+
+    def possible(self, tree, at, values, se):
+        return bool(max(abs(values)) < rules.MOST_LENGTH_M)
+
+    def columns(self, signals, at, shape):
+        return by_displacement(signals.motion, int(signals.tree.joint_body[at]))

@@ -1,0 +1,33 @@
+"""A link is heavier or lighter than modelled."""
+
+from discrepancy.serial import rules
+from discrepancy.serial.causes.base import Cause
+from discrepancy.serial.mechanics.regressor import body_regressor, inertial_parameters
+
+
+class LinkMass(Cause):
+    """A link is denser or less dense: its mass is off, and its moments of inertia in proportion."""
+
+    title = "mass of {link}"
+    family = "inertia"
+    part = "link"
+    parameters = ("excess_kg",)
+    scales = (1.0,)
+    separate = "A scale; or a known weight, if torques may be off in scale."
+
+    def sentence(self, n):
+        return f"has {n('excess_kg', 'kg')} {n.either('excess_kg', 'more', 'less')} than modelled"
+
+    def normal(self, tree, at):
+        return [rules.INERTIA_SHARE * float(tree.mass[tree.joint_body[at]])]
+
+    def sizes(self, tree, at):
+        return self.normal(tree, at)
+
+    def possible(self, tree, at, values, se):
+        return abs(values[0]) < rules.MOST_INERTIA_SHARE * tree.mass[tree.joint_body[at]] + 2.0 * se[0]
+
+    def columns(self, signals, at, shape):
+        tree, b = signals.tree, int(signals.tree.joint_body[at])
+        each = inertial_parameters(tree.mass[b], tree.com[b], tree.inertia[b]) / tree.mass[b]
+        return (body_regressor(signals.motion, b) @ each)[..., None]

@@ -1,0 +1,24 @@
+"""The torque's reading is off in scale."""
+
+from discrepancy.serial import rules
+from discrepancy.serial.causes.base import Cause, at_joint
+
+
+class TorqueScale(Cause):
+    """The torque reads ``1 + scale`` times what it is, such as by a torque constant that is off."""
+
+    title = "scale of the torque of {joint}"
+    family = "torque_scale"
+    parameters = ("scale",)
+    tolerances = (rules.SCALE_SHARE,)
+    separate = "A known weight on the arm."
+
+    def sentence(self, n):
+        return f"the torque reads {n('scale', '%', 100.0)} {n.either('scale', 'too much', 'too little')}"
+
+    def possible(self, tree, at, values, se):
+        return abs(values[0]) < rules.MOST_SCALE
+
+    def columns(self, signals, at, shape):
+        # The model's torque, not the measured one: that would explain itself. Friction counts as it is read.
+        return at_joint(signals, at, signals.inverse[:, at])

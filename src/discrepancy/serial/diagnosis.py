@@ -1,0 +1,78 @@
+"""Diagnose logs of one serial robot."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from discrepancy.engine.diagnose import Diagnosis, diagnose
+from discrepancy.result.diagnosed import Diagnosed
+from discrepancy.serial import rules
+from discrepancy.serial.catalogue import Tolerances
+from discrepancy.serial.errors import with_errors
+from discrepancy.serial.model import SerialModel
+from discrepancy.serial.paired import PairedRig
+from discrepancy.serial.recording.joint_log import JointLog
+from discrepancy.serial.rig import SerialRig
+from discrepancy.serial.traces import traces
+from discrepancy.serial.words import SerialWords
+
+
+def diagnose_serial(
+    model: SerialModel,
+    logs: Sequence[JointLog],
+    tolerances: Tolerances | None = None,
+    excluded: Sequence[str] = (),
+    *,
+    reference: Sequence[JointLog] = (),
+    jobs: int = 1,
+    say: Callable[[str], object] | None = None,
+) -> Diagnosed:
+    """Find out what a model of a serial robot gets wrong.
+
+    Args:
+        model: the robot as described.
+        logs: of its joints.
+        tolerances: standard deviations by cause and parameter that are no news; None for the defaults.
+        excluded: causes left out of the catalogue.
+        reference: logs of the same robot while it was well: only what has changed since is news then, and tolerances
+            do not count.
+        jobs, say: as of ``diagnose``.
+
+    Raises:
+        InputError: a log cannot be used, or a cause to be excluded does not exist.
+    """
+    rig = SerialRig.of(model, logs, tolerances, excluded, reference)
+    found = diagnose_rig(rig, jobs=jobs, say=say)
+    judged = PairedRig(rig) if rig.common else rig
+    return Diagnosed(judged, found, SerialWords(), partial(traces, rig, found.explanation))
+
+
+def diagnose_rig(rig: SerialRig, *, jobs: int = 1, say: Callable[[str], object] | None = None) -> Diagnosis:
+    """The engine's diagnosis, with standard errors that allow for correlation, and notes on the logs.
+
+    Args:
+        rig: the logs.
+        jobs, say: as of ``diagnose``.
+    """
+    judged = PairedRig(rig) if rig.common else rig
+    found = diagnose(judged, most=rules.MOST_CAUSES, jobs=jobs, say=say)
+    rows = max(2, round(rules.ERROR_BLOCK_S * rig.row_rate_hz(0)))
+    explanation = with_errors(found.explanation, rows)
+    notes = (*(note for part in rig.parts for note in part.signals.log.notes), *found.notes, *_notes(rig))
+    return replace(found, explanation=explanation, notes=notes)
+
+
+def _notes(rig: SerialRig) -> Iterator[str]:
+    if rig.common:
+        yield (
+            "What is wrong with the model in the reference, too, is fitted to all logs together and is no news; what "
+            "is named has changed."
+        )
+    share = float(np.sqrt(np.mean(rig.level**2)))
+    if share < 0.99:
+        yield (
+            "Noise (what counts as 1 in chi2/n) is that of the sensors, read off where nothing moves; all causes of "
+            f"the catalogue together, each at will, would leave {1.0 / share:.1f} times as much."
+        )

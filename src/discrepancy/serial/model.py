@@ -1,0 +1,146 @@
+"""Read a robot's model, MJCF or URDF, and refuse what is no fixed-base tree of hinges and slides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+# mujoco's compiled modules come without types.
+# pyright: reportAttributeAccessIssue=false
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.arrays import Array
+from estimator.errors import InputError
+from mocobot_logs.faults import shown
+
+_OTHER = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
+_AT_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
+
+
+@dataclass(frozen=True, eq=False)
+class SerialModel:
+    """A robot as its maker or owner describes it.
+
+    Attributes:
+        path: the file.
+        model: compiled.
+        joints: names in the order of qpos, J of them; each has one position, so nq = nv = J.
+        bodies: name of the body that each joint moves.
+        slides: whether a joint slides, shape (J,); the others turn.
+        lower: least position [rad or m], -inf where the model gives no range, shape (J,).
+        upper: largest position, inf where it gives none, shape (J,).
+        torque_limit: largest torque of the joint's actuators [N m or N], inf where the model gives none, shape (J,).
+    """
+
+    path: Path
+    model: mujoco.MjModel
+    joints: tuple[str, ...]
+    bodies: tuple[str, ...]
+    slides: NDArray[np.bool_]
+    lower: Array
+    upper: Array
+    torque_limit: Array
+
+
+def load_spec(path: Path | str) -> mujoco.MjSpec:
+    """A model as MuJoCo's editable description; without its meshes if it does not compile with them.
+
+    Shapes do not matter to inverse dynamics once inertias are given, and many URDF files come without their meshes.
+
+    Raises:
+        InputError: MuJoCo cannot read the file, or not compile it.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such file; a model is an MJCF or URDF file")
+    try:
+        spec = mujoco.MjSpec.from_file(str(path))
+    except (ValueError, RuntimeError, OSError) as error:
+        raise InputError(f"{path}: MuJoCo cannot read it ({_sentence(error)})") from error
+    try:
+        spec.compile()
+    except (ValueError, RuntimeError, OSError) as error:
+        said = _sentence(error)
+        if spec.meshes:
+            _drop_meshes(spec)
+            try:
+                spec.compile()
+                return spec
+            except (ValueError, RuntimeError, OSError) as other:
+                said += f"; without its meshes: {_sentence(other)}"
+        raise InputError(f"{path}: MuJoCo cannot compile it ({said})") from error
+    return spec
+
+
+def _drop_meshes(spec: mujoco.MjSpec) -> None:
+    """Leave out meshes and what is drawn with them; a body whose inertia is to come from one then does not compile."""
+    for geom in [geom for geom in spec.geoms if geom.meshname]:
+        spec.delete(geom)
+    for mesh in list(spec.meshes):
+        spec.delete(mesh)
+
+
+def load_model(path: Path | str) -> SerialModel:
+    """A fixed-base tree of hinges and slides.
+
+    Raises:
+        InputError: MuJoCo cannot read the file, or the model is not of that kind: it has no joints, joints without a
+            name, free or ball joints, equality constraints (closed chains), tendons, or soft bodies.
+    """
+    model = load_spec(path).compile()
+    _check(Path(path), model)
+    joint = range(model.njnt)
+    limited = model.jnt_limited.astype(bool)
+    return SerialModel(
+        path=Path(path),
+        model=model,
+        joints=tuple(model.joint(j).name for j in joint),
+        bodies=tuple(model.body(model.jnt_bodyid[j]).name for j in joint),
+        slides=model.jnt_type == int(mujoco.mjtJoint.mjJNT_SLIDE),
+        lower=np.where(limited, model.jnt_range[:, 0], -np.inf),
+        upper=np.where(limited, model.jnt_range[:, 1], np.inf),
+        torque_limit=_torque_limits(model),
+    )
+
+
+def _check(path: Path, model: mujoco.MjModel) -> None:
+    allowed = "a diagnosis of joint logs needs a fixed-base tree of hinges and slides"
+    if not model.njnt:
+        raise InputError(f"{path}: the model has no joints; {allowed}")
+    for j in range(model.njnt):
+        name, word = model.joint(j).name, _OTHER.get(int(model.jnt_type[j]))
+        if word is not None:
+            raise InputError(f"{path}: joint {name or j + 1!r} is a {word} joint; {allowed}")
+        if not name:
+            body = model.body(model.jnt_bodyid[j]).name
+            raise InputError(
+                f"{path}: joint {j + 1} (of body {body!r}) has no name; the map names every joint"
+            )
+    for count, what in (
+        (int(model.neq), "equality constraint"),
+        (int(model.ntendon), "tendon"),
+        (int(model.nflex), "flexible body"),
+        (int(model.nplugin), "plugin"),
+    ):
+        if count:
+            plural = what[:-1] + "ies" if what.endswith("y") else what + "s"
+            raise InputError(f"{path}: the model has {count} {what if count == 1 else plural}; {allowed}")
+
+
+def _torque_limits(model: mujoco.MjModel) -> Array:
+    """By the joints' own limit on actuator forces, and by the force ranges of all actuators of a joint together."""
+    limits = np.where(model.jnt_actfrclimited.astype(bool), np.abs(model.jnt_actfrcrange).max(axis=1), np.inf)
+    at_joint = np.isin(model.actuator_trntype, _AT_JOINT)
+    for joint in range(model.njnt):
+        own = np.flatnonzero(at_joint & (model.actuator_trnid[:, 0] == joint))
+        if len(own) and model.actuator_forcelimited[own].all():
+            most = np.abs(model.actuator_forcerange[own]).max(axis=1) * np.abs(model.actuator_gear[own, 0])
+            limits[joint] = min(limits[joint], float(most.sum()))
+    return limits
+
+
+def _sentence(error: BaseException) -> str:
+    """MuJoCo's message on one line."""
+    return shown(" ".join(str(error).split()), 300) or type(error).__name__

@@ -1,0 +1,240 @@
+"""A serial robot as a rig: rows from blocks of its logs, candidates from the catalogue."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from discrepancy.causes.excluded import excluded_from
+from discrepancy.engine.explanation import Explanation
+from discrepancy.rig import Candidate, Channel, Rig, Rows
+from discrepancy.rules import LAW_SHARE
+from discrepancy.serial import catalogue, rules, shapes
+from discrepancy.serial.candidate import SerialCandidate
+from discrepancy.serial.catalogue import Tolerances
+from discrepancy.serial.causes import CAUSES
+from discrepancy.serial.logs import parts_of
+from discrepancy.serial.model import SerialModel, load_spec
+from discrepancy.serial.prediction import Within, unforetold
+from discrepancy.serial.recording.joint_log import JointLog
+from discrepancy.serial.rows.common import combinations
+from discrepancy.serial.rows.remainder import Key
+from discrepancy.serial.rows.whiten import whiten
+from discrepancy.serial.serial_rows import SerialRows, place_of
+from discrepancy.serial.undecidable import general, look_alikes
+from estimator.arrays import Array
+from mocobot_sim.serial.effects import RobotEffect
+from mocobot_sim.serial.extended import write_extended
+
+
+@dataclass(frozen=True, eq=False)
+class SerialRig(SerialRows, Rig):
+    """Logs of one robot as a rig; its attributes are those of ``SerialRows``."""
+
+    @classmethod
+    def of(
+        cls,
+        model: SerialModel,
+        logs: Sequence[JointLog],
+        tolerances: Tolerances | None = None,
+        excluded: Sequence[str] = (),
+        reference: Sequence[JointLog] = (),
+    ) -> SerialRig:
+        """Cut the logs and find their noise.
+
+        Args:
+            model, logs, tolerances, excluded: as of ``diagnose_serial``.
+            reference: logs of the robot while it was well. What is wrong with the model there, too, is no news; nothing
+                of what differs has a tolerance then.
+
+        Raises:
+            InputError: the logs cannot be used, or a cause to be excluded does not exist.
+        """
+        left_out = excluded_from(CAUSES, excluded)
+        parts, joints = parts_of(model, [*logs, *reference])
+        hints = catalogue.hints_of([part.signals for part in parts], logs)
+        given = catalogue.events() if reference else {} if tolerances is None else tolerances
+        every = catalogue.candidates(parts[0].signals.tree, model.joints, hints, left_out, given)
+        # What differs between the days must not look like noise, so each has its own.
+        apart = [group for group in (parts[: len(logs)], parts[len(logs) :]) if group]
+        whitened = [whiten(group, joints, every) for group in apart]
+        whitening = tuple(white for done in whitened for white in done[0])
+        spoilt = frozenset[Key]().union(*(done[2] for done in whitened))
+        changed = sum(len(part.blocks) for part in apart[0])
+        rig = cls(
+            model,
+            parts,
+            joints,
+            hints,
+            whitening,
+            whitened[0][1],
+            given,
+            left_out,
+            spoilt,
+            len(whitening),
+            (),
+        )
+        if not reference:
+            return rig
+        common = combinations([rig.physical(c) for c in rig.candidates()], whitening)
+        return replace(rig, changed=changed, common=common, _seen={})
+
+    @property
+    def channels(self) -> Sequence[Channel]:
+        """Measured torque of every joint minus what the model asks for."""
+        return [
+            Channel(
+                f"{self.model.joints[j]} torque",
+                f"joint {j + 1}",
+                None,
+                "N" if self.model.slides[j] else "N m",
+            )
+            for j in self.joints
+        ]
+
+    def row_rate_hz(self, trial: int) -> float:
+        part, _ = self._where[trial]
+        return part.signals.rate_hz / part.reduction.step
+
+    def quantities(self, trial: int) -> dict[str, Array]:
+        """Speed over every joint's typical one, and per joint position, per row of a block, shape (n,) each."""
+        part, k = self._where[trial]
+        at, s = part.reduction.samples[k], part.signals
+        share = s.dq[at] / s.typical
+        out = {"speed": np.sqrt(np.mean(share**2, axis=1))}
+        return out | {f"position of joint {j + 1}": s.q[at, j] for j in self.joints}
+
+    def directions(self, trial: int) -> dict[str, Array]:
+        """Every joint's own channel."""
+        white = self.whitening[trial]
+        own = white.rows_only(np.tile(np.eye(len(self.joints)), (white.moving, 1, 1)))
+        own /= np.linalg.norm(own, axis=1, keepdims=True)
+        return {f"the torque of joint {j + 1}": own[:, :, [c]] for c, j in enumerate(self.joints)}
+
+    def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
+        """Whitened rows of every block; where joints rest, their friction is an unknown of the block."""
+        columns = [self.columns(candidate) for candidate in candidates]
+        return [
+            Rows(
+                self.trials[t], residual, self.local_columns(t), self.common_columns(t),
+                [c[t] for c in columns], self.row_times(t),
+            )
+            for t, residual in enumerate(self.residual(np.zeros(0), [], []))
+        ]  # fmt: skip
+
+    def residual(
+        self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
+    ) -> list[Array]:
+        """Exact whitened residual of every block with causes taken out."""
+        left = self.physical_residual(active, shared)
+        return [white(r) for white, r in zip(self.whitening, left, strict=True)]
+
+    def candidates(self) -> list[Candidate]:
+        """Every cause at every place; pushes come from ``transients``."""
+        tree = self.nominal.tree
+        every = catalogue.candidates(tree, self.model.joints, self.hints, self.excluded, self.tolerances)
+        return [c for c in every if c.key not in self.spoilt]
+
+    def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
+        """Whether such values can be: no negative mass, moments of inertia, compliance or play beyond the errors."""
+        se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        return CAUSES[candidate.cause].possible(self.nominal.tree, place_of(candidate), values, se)
+
+    def law_share(self, candidate: Candidate) -> float:
+        """A real robot: noise is the sensors', and every law leaves more than that."""
+        return LAW_SHARE if candidate.transient else rules.SERIAL_LAW_SHARE
+
+    def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
+        """Pushes at the intervals where the torques are worst."""
+        if "push" in self.excluded:
+            return []
+        times = [self.row_times(t) for t in range(self.changed)]
+        return shapes.pushes(self.nominal.tree, self.model.joints, times, remaining[: self.changed])
+
+    def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
+        """The candidate with every other shape of its cause; a push with its interval moved."""
+        return shapes.others(candidate, self.hints, finer=finer)
+
+    def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
+        """For every number of its shape that the data determine: a little less, a little more, and the difference."""
+        return shapes.steps(candidate)
+
+    def simulation(
+        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
+    ) -> Callable[[], dict[str, Array] | None]:
+        """What foretells one block's torques from its motion.
+
+        It returns measured minus foretold torque by joint, low-passed as the rows are, shape (n,) each.
+        """
+        return partial(self._unforetold, trial, [(c, v) for c, v in active if c.acts_in(trial)], shared)
+
+    def _unforetold(
+        self, trial: int, active: Sequence[tuple[Candidate, Array]], shared: Array
+    ) -> dict[str, Array]:
+        taken = {candidate.key for candidate, _ in active}
+        within = [c for c in self._normal if c.key not in taken]
+        left = self.physical_residual(active, shared)
+        if within:
+            physical = zip(*([x * c.units for x in self.physical(c)] for c in within), strict=True)
+            each = [
+                Within(np.concatenate(columns, axis=2), self.whitening[t], self.local_columns(t))
+                for t, columns in enumerate(physical)
+            ]
+            left[trial] = unforetold(trial, left, each)
+        return {channel.name: left[trial][:, c] for c, channel in enumerate(self.channels)}
+
+    @cached_property
+    def _normal(self) -> list[Candidate]:
+        """What is always in the model, within its tolerances."""
+        return [c for c in self.candidates() if all(p.tolerance > 0 for p in c.parameters)]
+
+    def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
+        """Noise of the rows, and the torque's own size."""
+        part, k = self._where[trial]
+        torque = part.reduction(part.signals.torque)[k][:, self.joints]
+        noise = np.sqrt(np.mean(self.sigma(trial) ** 2, axis=0))
+        return {
+            channel.name: (noise[[c]], np.array([np.sqrt(np.mean(torque[:, c] ** 2))]))
+            for c, channel in enumerate(self.channels)
+        }
+
+    def sigma(self, trial: int) -> Array:
+        """Standard deviation of the noise in every row of a block, shape (n, C)."""
+        white = self.whitening[trial]
+        return white.loudness * np.linalg.norm(white.chol_moving, axis=1)
+
+    def effect_parameters(
+        self, candidate: Candidate, values: Array, covariance: Array
+    ) -> tuple[dict[str, float], dict[str, float]]:
+        """Values with standard errors, and the shape, of which those have one that the data determine."""
+        names = [p.name for p in candidate.parameters]
+        se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+        found = dict(zip(names, map(float, values), strict=True)) | dict(candidate.shape)
+        fitted = [*names, *CAUSES[candidate.cause].steps(candidate.shape)]
+        errors = {name: float("nan") for name in candidate.shape}
+        return found, errors | dict(zip(fitted, map(float, se), strict=False))
+
+    def write_extended(self, explanation: Explanation, folder: Path) -> None:
+        """Write the model with the named causes in it.
+
+        Raises:
+            InputError: the folder cannot be written, or MuJoCo refuses the model.
+        """
+        effects = []
+        for found in explanation.found:
+            candidate = found.candidate
+            values, _ = self.effect_parameters(candidate, found.values, found.covariance)
+            more = {"gyration_m": rules.PAYLOAD_GYRATION_M} if candidate.cause == "payload" else {}
+            before = candidate.partner if isinstance(candidate, SerialCandidate) else None
+            effects.append(RobotEffect(candidate.cause, candidate.joint, before, values | more))
+        write_extended(load_spec(self.model.path), effects, folder, self.trials)
+
+    def undecidable(self) -> list[dict[str, Any]]:
+        """What such logs cannot decide, and what these cannot."""
+        every = self.candidates()
+        return [*general(), *look_alikes(every, [self.columns(c) for c in every])]

@@ -1,0 +1,1 @@
+"""From samples of a log to rows of a linear problem."""

@@ -1,0 +1,138 @@
+"""Smooth signals of one log: positions and their derivatives, torques, and what the nominal model asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.serial import rules
+from discrepancy.serial.mechanics.motion import Motion
+from discrepancy.serial.mechanics.tree import Tree
+from discrepancy.serial.recording.joint_log import JointLog
+from estimator.arrays import Array
+from estimator.filtering import differentiate, low_pass
+
+
+@dataclass(frozen=True, eq=False)
+class Nominal:
+    """What the model says that inverse dynamics leaves out.
+
+    Attributes:
+        tree: its rigid bodies.
+        coulomb, viscous: dry friction [N m or N] and damping per rad/s or m/s of every joint, shape (J,).
+        armature: inertia of the rotors as the joints feel it, shape (J,).
+    """
+
+    tree: Tree
+    coulomb: Array
+    viscous: Array
+    armature: Array
+
+    @classmethod
+    def of(cls, model: Any) -> Nominal:
+        """From a compiled ``mujoco.MjModel``."""
+        friction, viscous = np.array(model.dof_frictionloss), np.array(model.dof_damping)
+        return cls(Tree.of(model), friction, viscous, np.array(model.dof_armature))
+
+
+@dataclass(frozen=True, eq=False)
+class Signals:
+    """Of W samples at the rate of the mechanics, J joints.
+
+    Attributes:
+        log: what they are of.
+        nominal: of the model.
+        rate_hz: of the samples.
+        time: [s], shape (W,).
+        q, dq, ddq: smoothed joint positions and their derivatives, shape (W, J).
+        torque: through the same filter, shape (W, J).
+        usable: samples and joints whose torque and motion are what they seem, shape (W, J).
+        inverse: torques that the nominal model asks for without friction, shape (W, J).
+        typical: speed of every joint while it moves, over all logs (root mean square), shape (J,).
+    """
+
+    log: JointLog
+    nominal: Nominal
+    rate_hz: float
+    time: Array
+    q: Array
+    dq: Array
+    ddq: Array
+    torque: Array
+    usable: NDArray[np.bool_]
+    inverse: Array
+    typical: Array
+
+    @classmethod
+    def of(
+        cls, log: JointLog, nominal: Nominal, inverse_torque: Callable[[Array, Array, Array], Array]
+    ) -> Signals:
+        """Smooth, differentiate at the full rate, and keep as many samples as the filter leaves.
+
+        Args:
+            log: what to smooth.
+            nominal: of the model.
+            inverse_torque: torques of the model without friction from positions and their derivatives.
+        """
+        rate = log.rate_hz
+        step = work_step(rate)
+        q = low_pass(log.q, rate, smoothing_hz(rate))
+        dq = differentiate(q, rate)
+        ddq = differentiate(dq, rate)
+        torque, known = _filled(log)
+        torque = low_pass(torque, rate, smoothing_hz(rate))
+        here = slice(None, None, step)
+        q, dq, ddq, torque = q[here], dq[here], ddq[here], torque[here]
+        inverse = inverse_torque(q, dq, ddq)
+        typical = np.maximum(np.sqrt(np.mean(dq**2, axis=0)), rules.LEAST_SPEED)
+        return cls(
+            log, nominal, rate / step, log.time[here], q, dq, ddq, torque, known[here], inverse, typical
+        )
+
+    @property
+    def tree(self) -> Tree:
+        """The nominal tree."""
+        return self.nominal.tree
+
+    @cached_property
+    def motion(self) -> Motion:
+        """Of the nominal tree's bodies."""
+        return Motion.of(self.tree, self.q, self.dq, self.ddq)
+
+    @property
+    def residual(self) -> Array:
+        """Measured torque minus what the nominal model asks for, its friction included, shape (W, J)."""
+        dry = self.nominal.coulomb * self.direction(rules.SLOW_SHARES[0] * self.typical)
+        return self.torque - self.inverse - dry - self.nominal.viscous * self.dq
+
+    def direction(self, slow: Array) -> Array:
+        """Direction of motion in [-1, 1], shape (W, J); it fades below the speeds ``slow``, shape (J,) or ()."""
+        return np.clip(self.dq / slow, -1.0, 1.0)
+
+
+def smoothing_hz(rate_hz: float) -> float:
+    """Cut-off of the first filter."""
+    return min(rules.SMOOTH_HZ, rules.SMOOTH_SHARE * rate_hz)
+
+
+def work_step(rate_hz: float) -> int:
+    """Samples of a log to one of the mechanics."""
+    return max(1, int(rate_hz / (rules.WORK_RATIO * smoothing_hz(rate_hz))))
+
+
+def _filled(log: JointLog) -> tuple[Array, NDArray[np.bool_]]:
+    """Torques with what is missing interpolated, and where nothing was missing, shape (Q, J) each."""
+    if log.torque is None:
+        return np.zeros_like(log.q), np.zeros(log.q.shape, dtype=bool)
+    known = np.isfinite(log.torque)
+    torque = np.where(known, log.torque, 0.0)
+    for j in range(torque.shape[1]):
+        good = known[:, j]
+        if good.any() and not good.all():
+            torque[:, j] = np.interp(log.time, log.time[good], torque[good, j])
+    return torque, known & log.usable[:, None]

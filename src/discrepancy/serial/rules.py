@@ -1,0 +1,124 @@
+"""Constants that can change a verdict on a serial robot: *Derived*, *Measured* or *Chosen* (``discrepancy.rules``)."""
+
+MOST_CAUSES = 60
+"""A nominal model that says nothing of friction lacks four or five causes a joint. Chosen: no limit for seven axes."""
+
+# Filters and rows.
+
+SMOOTH_HZ = 60.0
+"""Cut-off before the nonlinear formulas. Chosen: three times the rows', so that filtering and they commute."""
+SMOOTH_SHARE = 0.2
+"""The same over the sampling rate, at most. Chosen: a cut-off must stay below half of it."""
+WORK_RATIO = 4.0
+"""Rate of the mechanics over ``SMOOTH_HZ``, about. Derived: what it folds back has been damped to 1/80."""
+CUTOFF_HZ = 20.0
+"""Cut-off of the rows. Chosen: arms move below 5 Hz, and bend from some 10 Hz on."""
+CUTOFF_SHARE = 0.15
+"""The same over the sampling rate, at most. Chosen."""
+ROWS_RATIO = 2.5
+"""Rows a second over the cut-off. Chosen: filtered noise is then nearly white."""
+HALF_PERIODS = 2.5
+"""Half of the filter's length in periods of its cut-off. Derived: it has died to 1e-3 there."""
+EDGE_PERIODS = 6.0
+"""Left out at both ends of a log, in periods of the first cut-off. Derived: padding is forgotten there, to 1e-8."""
+BLOCK_S, FEWEST_BLOCKS = 6.0, 3
+"""Length of a block of one log, and blocks at least. Chosen: long enough to hold most of a motion's poses."""
+LEAST_ROWS = 40
+"""That a block must have to be one. Chosen."""
+ERROR_BLOCK_S = 0.5
+"""Blocks of the standard errors. Chosen: a reversal takes less."""
+
+# Noise.
+
+AR_ORDER = 4
+"""Of the whitening. Chosen."""
+NOISE_BAND = (1.5, 6.0)
+"""Where the torque's noise is read off, over the rows' cut-off. Chosen: next to the rows, where little moves."""
+TOP_BAND = (0.25, 0.45)
+"""Where the position's is, over the sampling rate. Chosen: motion is least there, whose noise is differentiated."""
+FILTERED_BAND = (0.1, 0.2)
+"""The same of a log that was low-passed when it was resampled. Derived: ``mocobot_logs`` keeps as much."""
+SPOILT_SHARE = 0.01
+"""Of a trace's square, that noise of the positions may be. Derived: a fit would be off by as much."""
+SPOILT_GAIN = 8.0
+"""Of chi-square, that noise in a trace may have by meeting itself in the residual. Derived: a third of the 24 from
+which a single number is significant."""
+STICKING_SHARE = 0.03
+"""Of a joint's typical speed, by which its smoothed velocity is off where it turns round. Derived: sticking takes some
+10 ms there, in which a joint that takes 0.3 s from one speed to the other would have gone on by as much."""
+LEAST_FREEDOM = 0.1
+"""Of the rows, that a fit of all causes leaves. Chosen: with less the logs are too short to be told noise from."""
+SEGMENT_S = 0.5
+"""Of the spectra whose median over time is the noise: bursts, such as reversals, are not. Chosen."""
+NOISE_SEED = 8113
+"""Of drawn noise. Chosen: any will do; fixed, so that a verdict can be had again."""
+LEAST_LEVEL = 1e-3
+"""Noise of a channel over its motion, at least. Chosen: no drive tells its torque better than to a thousandth."""
+
+# Speeds.
+
+SLOW_SHARES = (0.01, 0.003, 0.03, 0.1)
+"""Of a joint's typical speed, below which the direction of friction fades; the first is the catalogue's. Chosen."""
+STRIBECK_SHARES = (0.05, 0.1, 0.2)
+"""The same, over which low-speed friction may fade. Chosen: slower is how dry friction fades, faster is viscous."""
+EXPONENTS = (0.5, 0.3, 0.7)
+"""Of the speed in friction that grows more slowly than it. Chosen: between Coulomb (0) and viscous (1)."""
+LEAST_SPEED = 1e-6
+"""Typical speed of a joint that does not move [rad/s or m/s]. Chosen: no more than a number to divide by."""
+LEAST_TRAVEL = 1e-3
+"""Of a joint, in rad or m, below which nothing is asked of its friction. Chosen: ten steps of a coarse encoder."""
+
+REST_KNOTS_S, SHORTEST_REST_S = 0.5, 0.1
+"""Between knots of friction at rest, which follows the load, and rests for which it is left open. Chosen."""
+LEAST_REST_SHARE = 1e-6
+"""Of a unit, that such a friction must leave in the rows. Chosen: rounding is less."""
+
+# What is normal of a model.
+
+INERTIA_SHARE = 0.1
+"""Of masses, lengths to centres of mass, and moments of inertia, by which a CAD model is off. Chosen: drawings leave
+out cables, grease and screws."""
+MOST_INERTIA_SHARE = 1.0
+"""Of the same, beyond which a link is not off but another. Chosen: rotors and payloads add more, and are themselves."""
+LEAST_LINK_M = 0.02
+"""Size of a link, at least, of which its centre of mass is off by that share. Chosen."""
+ZERO_RAD, ZERO_M = 2e-3, 5e-4
+"""By which a joint's zero is off. Chosen: an arm that was mastered with its marks, not measured."""
+LENGTH_M = 1e-3
+"""By which lengths of a link are off. Chosen: castings."""
+LEVEL_RAD = 5e-3
+"""By which a base is not level. Chosen: a bubble's worth."""
+SCALE_SHARE = 0.02
+"""By which torques are off in scale. Chosen: torque constants are given to two digits."""
+MOST_ZERO_RAD, MOST_LENGTH_M = 0.2, 0.02
+"""Beyond which a zero or a length is not off but that of another pose or model. Chosen: 11 degrees, 2 cm."""
+DELAY_S = 5e-4
+"""By which torques are late or early. Chosen: half a period of a drive's loop at 1 kHz."""
+MOST_SCALE = 0.5
+"""From which a scale is none, but a wrong unit or gear. Chosen."""
+
+# Shapes and searches.
+
+RIPPLE_TURNS = (1.0, 2.0)
+"""Periods of a ripple in one turn of joint or motor. Chosen: eccentricity, and a gear's or a rotor's two sides."""
+MOST_RIPPLE_HZ = 0.5
+"""Of the rows' cut-off: at which a ripple may pass at the joint's typical speed. Chosen: faster ones are filtered."""
+PAYLOAD_M, PAYLOAD_FINER_M, PAYLOAD_STEP_M = (0.1, 0.25), (-0.03, -0.01, 0.01, 0.03), 0.02
+"""Where a payload's centre is looked for in the last link's frame, and differences by it. Chosen: hands are as long."""
+PAYLOAD_GYRATION_M = 0.04
+"""Radius of gyration of a payload. Chosen: a ball of 6 cm; what it differs by is within what a link's inertia may."""
+SOFT_LOAD_SHARE = 0.03
+"""Of a joint's typical torque, over which play changes sides. Chosen."""
+PUSH_S, SHORTEST_PUSH_S = (0.2, 0.4, 0.8, 1.6), 0.1
+"""Durations searched, and what refining may leave. Chosen: octaves."""
+STEP_RAD, STEP_M = 1e-4, 1e-5
+"""Of differences by joint positions and by lengths. Derived: squares of the step and rounding are both below 1e-6."""
+ALIKE_SHARE, MOST_UNITS = 0.02, 30.0
+"""Of a trace's square, that another cause may leave of it to be the same, and how many units of that it may take.
+Chosen: a seventh of the trace itself; what would take more is no imitation."""
+REDUNDANT = 1e-9
+"""Of the largest singular value, below which columns depend on each other. Derived: rounding is 1e-12."""
+
+SERIAL_LAW_SHARE = 1.0
+"""Standard deviation of what the law of a lasting cause leaves of its trace, in amplitude. Derived: noise is that of
+the sensors, less than gears leave whatever is named; as much as of the EMPS axis (``discrepancy.rules``)."""

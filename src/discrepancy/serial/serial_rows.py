@@ -1,0 +1,132 @@
+"""Rows of one robot's logs: residuals, and what causes add to them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from discrepancy.least_squares.whitening import Whitening
+from discrepancy.rig import Candidate
+from discrepancy.serial.catalogue import Tolerances
+from discrepancy.serial.causes import CAUSES
+from discrepancy.serial.causes.base import Cause, Hints
+from discrepancy.serial.logs import Part
+from discrepancy.serial.model import SerialModel
+from discrepancy.serial.rows.remainder import Key
+from discrepancy.serial.rows.signals import Nominal
+from estimator.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class SerialRows:
+    """Logs of one robot, cut into blocks that validate each other, as rows of a linear problem.
+
+    Attributes:
+        model: the robot as described.
+        parts: the logs with their rows.
+        joints: which joints have torques, and so channels, from 0, shape (C,).
+        hints: where shapes begin.
+        whitening: of every block.
+        level: sensors' noise over what the whole catalogue leaves, of every joint with torques, shape (C,).
+        tolerances: given standard deviations by cause and parameter; causes that are not in it have their own.
+        excluded: causes left out of the catalogue.
+        spoilt: cause and place of what noise of the positions hides.
+        changed: blocks in which causes act; those of a reference come after them.
+        common: what may be wrong with the model in all logs, where there is a reference: rows (n, C, s) per block.
+    """
+
+    model: SerialModel
+    parts: tuple[Part, ...]
+    joints: NDArray[np.intp]
+    hints: Hints
+    whitening: tuple[Whitening, ...]
+    level: Array
+    tolerances: Tolerances
+    excluded: frozenset[str]
+    spoilt: frozenset[Key]
+    changed: int
+    common: tuple[Array, ...]
+    _seen: dict[Any, list[Array]] = field(default_factory=dict, repr=False)
+
+    @property
+    def trials(self) -> Sequence[str]:
+        """Names of the blocks."""
+        return [name for part in self.parts for name in part.names]
+
+    @property
+    def nominal(self) -> Nominal:
+        """The model's numbers."""
+        return self.parts[0].signals.nominal
+
+    @cached_property
+    def _where(self) -> list[tuple[Part, int]]:
+        """Log and number in it of every block."""
+        return [(part, k) for part in self.parts for k in range(len(part.blocks))]
+
+    def row_times(self, trial: int) -> Array:
+        """Time of every row of a block on its log's clock [s], shape (n,)."""
+        part, k = self._where[trial]
+        return part.signals.time[part.reduction.samples[k]]
+
+    def physical(self, candidate: Candidate) -> list[Array]:
+        """Columns of one candidate in N m or N, rows (n, C, k) of every block."""
+        cause, at = CAUSES[candidate.cause], place_of(candidate)
+        key = (candidate.key, tuple(sorted(candidate.shape.items())))
+        if key not in self._seen:
+            done = [part.reduction(cause.columns(part.signals, at, candidate.shape)) for part in self.parts]
+            rows = [block[:, self.joints] for blocks in done for block in blocks]
+            rows = [block * (t < self.changed and candidate.acts_in(t)) for t, block in enumerate(rows)]
+            if candidate.transient:
+                return rows
+            self._seen[key] = rows
+        return self._seen[key]
+
+    def columns(self, candidate: Candidate) -> list[Array]:
+        """Whitened columns of one candidate, shape (n, C, k) per block."""
+        return [white(c) for white, c in zip(self.whitening, self.physical(candidate), strict=True)]
+
+    def common_columns(self, trial: int) -> Array:
+        """Whitened columns of what may be wrong in all logs, shape (n, C, s); none without a reference."""
+        if self.common:
+            return self.whitening[trial](self.common[trial])
+        part, k = self._where[trial]
+        return np.zeros((len(part.reduction.samples[k]), len(self.joints), 0))
+
+    def local_columns(self, trial: int) -> Array:
+        """Whitened columns of the friction that joints may have while they rest, shape (n, C, l)."""
+        part, k = self._where[trial]
+        rests = [rest[:, self.joints] for rest in part.rests(k)]
+        none = np.zeros((len(part.reduction.samples[k]), len(self.joints), 0))
+        return self.whitening[trial](np.stack(rests, axis=2)) if rests else none
+
+    def physical_residual(
+        self, active: Sequence[tuple[Candidate, Array]], shared: Array | None = None
+    ) -> list[Array]:
+        """The same in N m or N, rows (n, C) of every block."""
+        out = []
+        for part in self.parts:
+            left = part.reduction(part.signals.residual)
+            out += [rows[:, self.joints] for rows in left]
+        for candidate, values in active:
+            cause = CAUSES[candidate.cause]
+            if type(cause).exact is Cause.exact:  # linear
+                taken = [columns @ values for columns in self.physical(candidate)]
+            else:
+                at = place_of(candidate)
+                done = [p.reduction(cause.exact(p.signals, at, values, candidate.shape)) for p in self.parts]
+                taken = [block[:, self.joints] for blocks in done for block in blocks]
+            acts = [t < self.changed and candidate.acts_in(t) for t in range(len(out))]
+            out = [r - x * acting for r, x, acting in zip(out, taken, acts, strict=True)]
+        if shared is not None and shared.size:
+            out = [r + columns @ shared for r, columns in zip(out, self.common, strict=True)]
+        return out
+
+
+def place_of(candidate: Candidate) -> int:
+    """Which joint a candidate is at, from 0; -1 of the whole arm."""
+    return -1 if candidate.joint is None else candidate.joint - 1

@@ -1,0 +1,53 @@
+"""A serial robot's causes in words."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from discrepancy.causes.numbers import Numbers
+from discrepancy.causes.words import Words
+from discrepancy.rig import Candidate
+from discrepancy.serial.candidate import SerialCandidate
+from discrepancy.serial.causes import CAUSES
+from discrepancy.serial.causes.base import parameter_name
+
+SHOWN = {
+    "N m s/rad": "N s/m",
+    "N m/rad": "N/m",
+    "mrad per N m": "mm per N",
+    "N m": "N",
+    "mrad": "mm",
+    "rad/s": "m/s",
+    "kg m^2": "kg",
+}
+"""Units as sentences show them, of a joint that turns and of one that slides."""
+
+
+@dataclass(frozen=True)
+class SlideNumbers(Numbers):
+    """Numbers of a joint that slides, for sentences about one that turns."""
+
+    def __call__(self, name: str, unit: str, scale: float = 1.0, *, signed: bool = False) -> str:
+        return super().__call__(parameter_name(name, slide=True), SHOWN.get(unit, unit), scale, signed=signed)
+
+    def either(self, name: str, more: str, less: str) -> str:
+        return super().either(parameter_name(name, slide=True), more, less)
+
+
+class SerialWords(Words):
+    """Sentences about the robot."""
+
+    causes = CAUSES
+    units = {"speed": "typical speeds"}  # noqa: RUF012
+
+    def describe(self, candidate: Candidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
+        """What a cause does at its place, one sentence with its numbers; standard errors may be NaN."""
+        slide = isinstance(candidate, SerialCandidate) and candidate.slide
+        numbers = SlideNumbers(values, se) if slide else Numbers(values, se)
+        cause = CAUSES[candidate.cause]
+        return f"{cause.place(candidate)}: {cause.sentence(numbers)}."
+
+    def unit(self, name: str) -> str:
+        """Unit of a channel, or of a quantity that a misfit may depend on."""
+        if name.startswith("position of joint"):
+            return "rad"
+        return self.units.get(name, "N m")

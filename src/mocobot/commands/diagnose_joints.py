@@ -1,0 +1,63 @@
+"""``mocobot diagnose --model``: logs of one robot's joints against its MJCF or URDF."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import asdict
+from pathlib import Path
+
+from discrepancy.serial.causes import CAUSES
+from estimator.errors import InputError
+from estimator.files import whole_folder
+from mocobot import serial
+from mocobot.files.provenance import provenance
+from mocobot.options import Diagnose
+from mocobot.progress import bar, stages
+from mocobot.strict import NotGood
+
+
+def run(options: Diagnose, model: Path) -> None:
+    """Run the command.
+
+    Args:
+        options: of the command.
+        model: the robot's file.
+
+    Raises:
+        InputError: model, map, logs, tolerances or options that cannot be used, or an output that cannot be written.
+        NotGood: with ``strict``, the verdict is neither consistent nor explained.
+    """
+    _check(options.exclude)
+    robot = serial.read_model(model)
+    maps = {serial.map_path(robot, log, options.map) for log in (*options.rec, *options.reference)}
+    inputs = [model, *sorted(maps), *options.rec, *options.reference]
+    inputs += [options.tolerances] if options.tolerances else []
+    tolerances = serial.serial_tolerances(options.tolerances)
+    with whole_folder(options.out) if options.out else nullcontext() as folder:
+        with bar(len(options.rec) + len(options.reference), "reading", "file") as advance:
+            logs = serial.read_logs(options.rec, robot, map=options.map, advance=advance)
+            reference = serial.read_logs(options.reference, robot, map=options.map, advance=advance)
+        made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
+        with stages() as (say, _):
+            found = serial.diagnosed(
+                robot, logs, reference, tolerances, options.exclude, jobs=options.jobs, say=say
+            )
+            if folder is not None:
+                say("write")
+                found.write_into(folder, provenance=made_with)
+    print(found)  # after the folder is in place: whoever reads may close the pipe
+    if options.out:
+        print(f"\nWritten to {options.out}.")
+    verdict = found.diagnosis.verdict
+    if options.strict and verdict not in ("consistent", "explained"):
+        raise NotGood(f"the verdict is {verdict.replace('_', ' ')}")
+
+
+def _check(excluded: Sequence[str]) -> None:
+    """Causes that do not exist, or are all excluded."""
+    for name in excluded:
+        if name not in CAUSES:
+            raise InputError(f"cause {name!r} does not exist; the causes are {', '.join(CAUSES)}")
+    if set(CAUSES) <= set(excluded):
+        raise InputError("every cause is excluded; nothing is left to look for")

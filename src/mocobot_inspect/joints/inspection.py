@@ -1,0 +1,192 @@
+"""A look at a joint log before anyone trusts a number of it: stamps, channels, units, signs, order, delays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from estimator.arrays import Array
+from estimator.errors import InputError
+from mocobot_inspect.joints.lags import (
+    Follows,
+    command_follows,
+    exchanged_commands,
+    torque_delay,
+    velocity_follows,
+)
+from mocobot_inspect.joints.motion import Motion, motion_of
+from mocobot_inspect.joints.robot import Robot
+from mocobot_inspect.joints.samples import wrapped
+from mocobot_inspect.joints.wiring import Wiring, check_wiring, fit
+from mocobot_inspect.stream.channels import Channel, ChannelTally, seconds
+from mocobot_inspect.stream.timing import Timing, TimingTally
+from mocobot_logs.joints.joint_log import JointLog
+from mocobot_logs.joints.joint_map import JointMap, label
+from mocobot_logs.joints.quantities import EFFORTS, POSITIONS, VELOCITIES
+from mocobot_logs.joints.read import joint_logs_of
+from mocobot_logs.log import LogSource, Samples, collect
+
+LEAST_ROWS = 50
+"""Fewer samples of smooth motion tell nothing."""
+
+
+@dataclass(frozen=True)
+class TorqueDelay:
+    """How torques lag behind the motion.
+
+    Attributes:
+        delay_s: of all torques [s].
+        before, after: share of their variance that model and friction leave, without and with it.
+    """
+
+    delay_s: float
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, eq=False)
+class JointInspection:
+    """What was found in a joint log.
+
+    Attributes:
+        name: of the log.
+        robot: its model.
+        log_map: how it was read.
+        timing: its stamps.
+        channels: every column of the map, in the map's order.
+        signs_lost: columns that must have been signed numbers, sentences.
+        logs: its parts on even grids, none if it cannot be read so.
+        unchecked: why motion and torques could not be looked at, or None.
+        moves: whether each joint moves, shape (J,).
+        wiring: signs, order and units against the model, or None without torques.
+        gains: of the model's torque in each joint's, NaN where it does not show, shape (J,).
+        velocities, commands: how they follow the motion, part by part.
+        crossed: pairs of joints whose commands are exchanged, from 0.
+        delay: of the torques, or None.
+    """
+
+    name: str
+    robot: Robot
+    log_map: JointMap
+    timing: Timing
+    channels: tuple[Channel, ...]
+    signs_lost: tuple[str, ...]
+    logs: tuple[JointLog, ...]
+    unchecked: str | None
+    moves: NDArray[np.bool_]
+    wiring: Wiring | None = None
+    gains: Array | None = None
+    velocities: tuple[Follows, ...] = ()
+    commands: tuple[Follows, ...] = ()
+    crossed: tuple[tuple[int, int], ...] = ()
+    delay: TorqueDelay | None = None
+
+
+def inspect_joints(
+    source: LogSource,
+    log_map: JointMap,
+    robot: Robot,
+    advance: Callable[[int], object] = lambda _: None,
+    try_advance: Callable[[int], object] = lambda _: None,
+) -> JointInspection:
+    """Look at a log; whatever is wrong with its samples is reported and not refused.
+
+    Args:
+        source: the log.
+        log_map: its map.
+        robot: its model.
+        advance: takes the progress made in reading, in the source's units.
+        try_advance: takes the number of mistakes tried.
+
+    Raises:
+        InputError: the log cannot be read.
+    """
+    samples = collect(source, advance).streams[0]
+    timing = TimingTally()
+    timing.add(samples.stamp_ns, samples.log_ns)
+    keys = list(log_map.channels)
+    found = JointInspection(
+        name=source.name,
+        robot=robot,
+        log_map=log_map,
+        timing=timing.finish(),
+        channels=_channels(samples, log_map),
+        signs_lost=tuple(wrapped(keys, samples.values, log_map)),
+        logs=(),
+        unchecked=None,
+        moves=np.zeros(len(robot.joints), dtype=bool),
+    )
+    try:
+        logs = joint_logs_of(source.name, samples, log_map)
+    except InputError as error:
+        return replace(found, unchecked=str(error).removeprefix(f"{source.name}: "))
+    motions = [motion_of(log) for log in logs]
+    whole = [(log, motion) for log, motion in zip(logs, motions, strict=True) if len(motion.q) >= LEAST_ROWS]
+    found = replace(found, logs=tuple(logs))
+    if not whole:
+        return replace(found, unchecked="no part of it is long enough for its motion to be looked at")
+    return _with_motion(found, whole, try_advance)
+
+
+def _channels(samples: Samples, log_map: JointMap) -> tuple[Channel, ...]:
+    """Sensors first: commands stand when they please, and so does a supply."""
+    keys = list(log_map.channels)
+    sensing = [k for k, (name, _) in enumerate(keys) if name in (*POSITIONS, *VELOCITIES, *EFFORTS)]
+    order = [*sensing, *(k for k in range(len(keys)) if k not in sensing)]
+    tally = ChannelTally(tuple(label(*keys[k]) for k in order), len(sensing))
+    if len(samples.stamp_ns):
+        time_s = seconds(samples.stamp_ns, int(samples.stamp_ns[0]))
+        forward = np.diff(time_s)
+        forward = forward[forward > 0]
+        rate_hz = 1.0 / float(np.median(forward)) if len(forward) else None
+        with np.errstate(all="ignore"):  # absurd values overflow; they are reported by their range
+            tally.add(time_s, samples.values[:, order], rate_hz)
+    told = dict(zip(order, tally.finish(), strict=True))
+    return tuple(told[k] for k in range(len(keys)))
+
+
+def _with_motion(
+    found: JointInspection,
+    whole: Sequence[tuple[JointLog, Motion]],
+    advance: Callable[[int], object],
+) -> JointInspection:
+    robot = found.robot
+    log, motion = max(whole, key=lambda part: len(part[1].q))
+    moves = np.any([part.moves for _, part in whole], axis=0)
+    wiring = check_wiring([part for _, part in whole], robot, advance)
+    gains, delay = None, None
+    if wiring is not None and not wiring.found:
+        asked = robot.inverse(motion.q, motion.dq, motion.ddq)
+        gains = _gains(motion, asked)
+        late = torque_delay(log, motion, asked)
+        delay = None if late is None else TorqueDelay(*late)
+    return replace(
+        found,
+        moves=moves,
+        wiring=wiring,
+        gains=gains,
+        velocities=tuple(velocity_follows(log, motion)),
+        commands=tuple(command_follows(log, motion)),
+        crossed=tuple(exchanged_commands(log, motion)),
+        delay=delay,
+    )
+
+
+SHOWS = 0.3
+"""Share of a torque's variance that the model's must make up for its gain to be known."""
+
+
+def _gains(motion: Motion, asked: Array) -> Array:
+    """Gain of the model's torque in each joint's, NaN where friction hides it, shape (J,)."""
+    out = np.full(asked.shape[1], np.nan)
+    for j in range(asked.shape[1]):
+        torque = motion.torque[:, j]
+        if not np.isfinite(torque).all() or np.std(torque) == 0 or not motion.moves[j]:
+            continue
+        values, _ = fit(asked[:, j], motion.dq[:, j], motion.ddq[:, j], torque)
+        if np.var(values[0] * asked[:, j]) > SHOWS * np.var(torque):
+            out[j] = values[0]
+    return out

@@ -1,0 +1,274 @@
+"""Exchanged joints and wrong signs: each is undone, alone, and what lets the model explain the torques is reported.
+
+A joint's torque is what the model asks for, times a gain, plus rotor inertia, plus friction of either kind, plus an
+offset; gain, inertia and friction cannot be negative. What is left of its variance is the joint's misfit: small where
+signs and joints are right, however wrong masses are, near 1 where they are not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+from scipy.optimize import nnls
+
+from estimator.arrays import Array
+from mocobot_inspect.joints.motion import Motion
+from mocobot_inspect.joints.robot import Robot
+
+Kind = Literal[
+    "torque_sign", "position_sign", "both_signs", "torque_exchange", "position_exchange", "both_exchange",
+    "position_degrees", "position_radians",
+]  # fmt: skip
+SUSPICIOUS = 0.2
+"""Misfit above which a joint is suspected. Measured on healthy logs: 0.003 to 0.01 at joints of a real arm, 0.11 and
+0.27 at two whose drives are coupled; up to 0.08 on 24 simulated arms of seven joints with masses and centres off by
+10 or 50 %, none of which was suspected of anything."""
+DECISIVE, DECISIVE_UNSUSPECTED = 3.0, 5.0
+"""So many times smaller must undoing a mistake make the misfit of the joints that it concerns; the second where none of
+them is suspected: rubbing joints hide that they are exchanged as wholes, 7 to 12 times on a real arm."""
+SAME = 2.0
+"""Mistakes whose misfits, multiplied over the joints, differ by less cannot be told apart."""
+_FLOOR = 1e-4  # of a misfit
+_PLAUSIBLE = (
+    "torque_sign", "position_sign", "torque_exchange", "position_exchange", "both_exchange", "both_signs",
+    "position_degrees", "position_radians",
+)  # fmt: skip
+"""What is named first of mistakes that cannot be told apart."""
+_CHANGED = 1.5  # a joint is concerned by a mistake that changes its misfit by so much
+_SLOW = 0.05  # of the rms speed, below which the sign of a speed means nothing
+_LEAST_TORQUE = 1e-9
+_LEAST_ROWS = 20
+_TURN = 2.0 * np.pi  # hardly any joint moves farther, and hardly any log is of less than so many degrees
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """Something wrong with the columns of one joint, of two, or of all.
+
+    Attributes:
+        kind: what it is; degrees are taken for radians, or radians for degrees.
+        joints: of the model, from 0.
+    """
+
+    kind: Kind
+    joints: tuple[int, ...]
+
+    @property
+    def of_positions(self) -> bool:
+        """Whether positions are concerned, and with them all torques that the model asks for."""
+        return not self.kind.startswith("torque")
+
+    @property
+    def of_torques(self) -> bool:
+        """Whether torques are concerned."""
+        return self.kind.startswith(("torque", "both"))
+
+    def moved(self, values: Array) -> Array:
+        """Positions, or a derivative of theirs, without it, shape (Q, J)."""
+        return self._undone(values) if self.of_positions else values
+
+    def torques(self, values: Array) -> Array:
+        """Torques without it, shape (Q, J)."""
+        return self._undone(values) if self.of_torques else values
+
+    def _undone(self, values: Array) -> Array:
+        out, own = values.copy(), list(self.joints)
+        if self.kind.endswith("exchange"):
+            out[:, own] = values[:, own[::-1]]
+        elif self.kind == "position_degrees":
+            out[:, own] *= np.pi / 180.0
+        elif self.kind == "position_radians":
+            out[:, own] *= 180.0 / np.pi
+        else:
+            out[:, own] *= -1.0
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """A mistake that explains what is wrong.
+
+    Attributes:
+        mistake: what it is.
+        before, after: misfit of its joints as they are and with it undone.
+        alternatives: mistakes of the same joints that the log cannot tell from it.
+    """
+
+    mistake: Mistake
+    before: float
+    after: float
+    alternatives: tuple[Mistake, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Wiring:
+    """What torques and motion say of each other.
+
+    Attributes:
+        misfit: of every joint as it is, NaN without a torque or motion, shape (J,).
+        undone: the same with all found mistakes undone, shape (J,).
+        found: the mistakes.
+        tried: how many were tried.
+    """
+
+    misfit: Array
+    undone: Array
+    found: tuple[Found, ...]
+    tried: int
+
+
+@dataclass(frozen=True, eq=False)
+class _Case:
+    """Signals as they are believed to be.
+
+    Attributes:
+        q, dq, ddq, torque: shape (Q, J).
+        asked: torques of the model, shape (Q, J).
+        misfit: of every joint, shape (J,).
+    """
+
+    q: Array
+    dq: Array
+    ddq: Array
+    torque: Array
+    asked: Array
+    misfit: Array
+
+    @classmethod
+    def of(cls, robot: Robot, motions: Sequence[Motion]) -> _Case:
+        """All parts of a log, one after the other."""
+        q, dq, ddq, torque = (
+            np.concatenate([getattr(motion, name) for motion in motions])
+            for name in ("q", "dq", "ddq", "torque")
+        )
+        asked = robot.inverse(q, dq, ddq)
+        return cls(q, dq, ddq, torque, asked, misfits(asked, dq, ddq, torque))
+
+    def without(self, mistake: Mistake, robot: Robot) -> _Case:
+        """The same with a mistake undone."""
+        q, dq, ddq = (mistake.moved(x) for x in (self.q, self.dq, self.ddq))
+        torque = mistake.torques(self.torque)
+        asked = robot.inverse(q, dq, ddq) if mistake.of_positions else self.asked
+        return _Case(q, dq, ddq, torque, asked, misfits(asked, dq, ddq, torque))
+
+    @property
+    def score(self) -> float:
+        """Logarithm of the product of all misfits."""
+        return float(np.nansum(np.log(self.misfit + _FLOOR)))
+
+
+def check_wiring(
+    motions: Sequence[Motion], robot: Robot, advance: Callable[[int], object] = lambda _: None
+) -> Wiring | None:
+    """Try every mistake; None where no joint with a torque moves.
+
+    Args:
+        motions: of every part of the log.
+        robot: its model.
+        advance: takes the number of mistakes tried.
+    """
+    case = _Case.of(robot, motions)
+    as_is, found, tried = case.misfit, [], 0
+    if np.isnan(as_is).all():
+        return None
+    while len(found) < len(robot.joints):
+        better: dict[Mistake, tuple[_Case, float, float]] = {}
+        for mistake in _candidates(case, robot):
+            undone = case.without(mistake, robot)
+            tried += 1
+            advance(1)
+            judged = _judged(mistake, case.misfit, undone.misfit)
+            if judged is not None:
+                better[mistake] = (undone, *judged)
+        if not better:
+            break
+        level = min(undone.score for undone, _, _ in better.values()) + np.log(SAME)
+        same = [mistake for mistake, (undone, _, _) in better.items() if undone.score <= level]
+        best = min(same, key=lambda each: _PLAUSIBLE.index(each.kind))
+        undone, before, after = better[best]
+        others = (mistake for mistake in same if mistake != best and set(mistake.joints) & set(best.joints))
+        found.append(Found(best, before, after, tuple(others)))
+        case = undone
+    return Wiring(as_is, case.misfit, tuple(found), tried)
+
+
+def misfits(asked: Array, dq: Array, ddq: Array, torque: Array) -> Array:
+    """Share of each joint's torque that model, rotor inertia and friction leave unexplained, NaN where unknown, (J,).
+
+    Args:
+        asked: torques of the model, shape (Q, J).
+        dq, ddq: motion, shape (Q, J).
+        torque: measured, shape (Q, J).
+    """
+    out = np.full(dq.shape[1], np.nan)
+    for j in range(dq.shape[1]):
+        given = np.isfinite(torque[:, j])
+        if given.sum() < _LEAST_ROWS or np.std(torque[given, j]) < _LEAST_TORQUE or not np.any(dq[:, j]):
+            continue
+        _, left = fit(asked[given, j], dq[given, j], ddq[given, j], torque[given, j])
+        out[j] = np.var(left) / np.var(torque[given, j])
+    return out
+
+
+def fit(asked: Array, dq: Array, ddq: Array, torque: Array) -> tuple[Array, Array]:
+    """Gain of the model, rotor inertia, dry and viscous friction (none negative) and two offsets; what they leave.
+
+    Args:
+        asked, dq, ddq, torque: of one joint, shape (Q,) each.
+    """
+    speed = float(np.sqrt(np.mean(dq**2)))
+    direction = np.clip(dq / max(_SLOW * speed, 1e-12), -1.0, 1.0)
+    columns = np.column_stack([asked, ddq, direction, dq, np.ones_like(dq), -np.ones_like(dq)])
+    size = np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
+    values, _ = nnls(columns / size, torque)
+    values = values / size
+    return values, torque - columns @ values
+
+
+def _candidates(case: _Case, robot: Robot) -> Iterator[Mistake]:
+    """Mistakes that concern at least one suspected joint, and exchanges of whole joints."""
+    suspected = {int(j) for j in np.flatnonzero(case.misfit > SUSPICIOUS)}
+    moving = [int(j) for j in np.flatnonzero(np.any(case.dq, axis=0))]
+    turning = tuple(j for j in moving if not robot.slides[j])
+    spans = np.ptp(case.q[:, turning], axis=0)
+    if len(spans) and spans.max() > _TURN:
+        yield Mistake("position_degrees", turning)
+    if len(spans) and np.degrees(spans.max()) < 2.0 * _TURN:
+        yield Mistake("position_radians", turning)
+    if len(suspected) > 1:
+        yield Mistake("torque_sign", tuple(range(len(robot.joints))))
+    for j in moving if suspected else ():
+        # A sign of a position shows in the torques of other joints, too.
+        yield Mistake("position_sign", (j,))
+        if j in suspected:
+            yield Mistake("torque_sign", (j,))
+            yield Mistake("both_signs", (j,))
+    for pair in combinations(range(len(robot.joints)), 2):
+        if robot.slides[pair[0]] == robot.slides[pair[1]]:
+            yield Mistake("both_exchange", pair)
+            if suspected & set(pair):
+                yield Mistake("torque_exchange", pair)
+                yield Mistake("position_exchange", pair)
+
+
+def _judged(mistake: Mistake, before: Array, after: Array) -> tuple[float, float] | None:
+    """Misfit before and after of the joints that a mistake concerns, if undoing it mends them and harms no other."""
+    known = np.isfinite(before) & np.isfinite(after)
+    if np.any(after[known] > np.maximum(2.0 * before[known], SUSPICIOUS)):
+        return None
+    own = np.zeros(len(before), dtype=bool)
+    if mistake.of_torques or len(mistake.joints) <= 2:  # not every joint shows that all positions are wrong
+        own[list(mistake.joints)] = True
+    if mistake.of_positions:
+        ratio = np.divide(after, before, out=np.ones_like(after), where=known)
+        own |= (ratio > _CHANGED) | (ratio < 1.0 / _CHANGED)
+    own &= known
+    if not own.any():
+        return None
+    was, left = float(before[own].mean()), float(after[own].mean())
+    factor = DECISIVE if np.any(before[own] > SUSPICIOUS) else DECISIVE_UNSUSPECTED
+    return (was, left) if left < was / factor else None

@@ -1,0 +1,1 @@
+"""Logs of one serial robot: joint positions with torques, currents or commands."""

@@ -1,0 +1,1 @@
+"""A serial robot with effects that its model lacked."""

@@ -1,0 +1,1 @@
+"""Replays of logs of one robot's joints."""

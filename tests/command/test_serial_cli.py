@@ -1,0 +1,190 @@
+"""The commands with ``--model``: outputs, exit codes, and that nothing is written where something is refused."""
+
+from __future__ import annotations
+
+import json
+import random
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rerun.chunk import RrdReader
+
+from command import refused, run
+from joint_logs import write_csv
+from made_arm import JOINTS, MAP, MODEL, made, write_log, write_map, write_model
+from mocobot import serial
+
+
+@pytest.fixture(scope="module")
+def values() -> dict[str, np.ndarray]:
+    return made(seconds=4.0)
+
+
+@pytest.fixture
+def log(tmp_path, values) -> Path:
+    """A log with model and map beside it."""
+    return write_log(tmp_path, values)
+
+
+def files(folder: Path) -> set[str]:
+    return {path.name for path in folder.iterdir()}
+
+
+def test_inspect_says_and_writes_what_it_finds(tmp_path, capsys, log) -> None:
+    code, out, _ = run(
+        capsys, "inspect", log, "--model", tmp_path / "arm.xml", "--json", tmp_path / "found.json", "--strict"
+    )
+    assert code == 0
+    assert "[[Motion and torques]]" in out
+    assert out.endswith("ready for: a diagnosis from torques of 3 joints\n")
+    assert json.loads((tmp_path / "found.json").read_text())["ready"].startswith("ready for: a diagnosis")
+
+
+def test_inspect_strict_fails_where_something_is_reversed(tmp_path, capsys, values) -> None:
+    log = write_log(tmp_path, values | {"shoulder torque": -values["shoulder torque"]})
+    code, out, err = run(capsys, "inspect", log, "--model", tmp_path / "arm.xml", "--strict")
+    assert code == 1
+    assert "torque of shoulder has the wrong sign" in out
+    assert err.startswith("mocobot: ready for: nothing as it is; with the mistake above undone")
+
+
+def test_a_drafted_map_reads_the_log(tmp_path, capsys, values) -> None:
+    write_model(tmp_path)
+    log = write_csv(tmp_path / "log.csv", values)
+    code, _, err = run(capsys, "map", log, "--model", tmp_path / "arm.xml", "--out", tmp_path / "log.toml")
+    assert code == 0
+    assert "3 joints" in err
+    (read,) = serial.read_logs(log, tmp_path / "arm.xml")
+    for j, joint in enumerate(JOINTS):
+        np.testing.assert_array_equal(read.q[:, j], values[f"{joint} q"])
+        np.testing.assert_array_equal(read.torque[:, j], values[f"{joint} torque"])
+        np.testing.assert_array_equal(read.dq[:, j], values[f"{joint} dq"])
+
+
+def test_drafts_by_numbers_and_units_in_names(tmp_path, capsys, values) -> None:
+    write_model(tmp_path)
+    named = {"t_ms": 1e3 * values["time"], "unrelated": values["time"]}
+    for k, joint in enumerate(JOINTS):
+        named |= {f"motor_pos_{k}_deg": np.degrees(50 * values[f"{joint} q"])}
+        named |= {
+            f"motor_current_{k}_mA": 1e3 * values[f"{joint} torque"],
+            f"goal_pos_{k}_deg": np.degrees(values[f"{joint} q"]),
+        }
+    log = write_csv(tmp_path / "log.csv", named)
+    _, out, _ = run(capsys, "map", log, "--model", tmp_path / "arm.xml")
+    drafted = tomllib.loads(out)
+    assert drafted["time"] == {"column": "t_ms", "unit": "ms"}
+    assert drafted["channels"]["motor_position"] == {"column": "motor_pos_{index}_deg", "unit": "deg"}
+    assert drafted["channels"]["current"] == {"column": "motor_current_{index}_mA", "unit": "mA"}
+    assert drafted["channels"]["command"] == {"column": "goal_pos_{index}_deg", "unit": "deg"}
+    assert drafted["control"] == {"command": "position"}
+    assert "# not used: unrelated" in out
+    assert "# gear = [ ... ]" in out
+
+
+def test_replay_writes_bodies_and_series(tmp_path, capsys, log) -> None:
+    code, out, _ = run(capsys, "replay", log, "--model", tmp_path / "arm.xml", "--save", tmp_path / "log.rrd")
+    assert code == 0
+    assert "open it with: rerun" in out
+    entities = {str(path) for path in RrdReader(tmp_path / "log.rrd").store().schema().entity_paths()}
+    assert {f"/log/robot/{body}/shape" for body in ("turret", "upper", "fore")} <= entities
+    assert {f"/log/series/{joint}/torque/model" for joint in JOINTS} <= entities
+
+
+REFUSED = {
+    "no map": (["diagnose", "{log}", "--model", "{model}"], "no map was given (--map)", ["log.toml"]),
+    "no model": (["diagnose", "{log}", "--model", "{folder}/none.xml"], "none.xml: there is no such file", []),
+    "log as model": (["diagnose", "{log}", "--model", "{log}"], "MuJoCo cannot read it", []),
+    "no log": (["diagnose", "{folder}/none.csv", "--model", "{model}"], "none.csv: there is no such file", []),
+    "log twice": (["diagnose", "{log}", "{log}", "--model", "{model}"], "is given twice, and would count twice", []),
+    "log as its reference": (
+        ["diagnose", "{log}", "--reference", "{log}", "--model", "{model}"], "is given twice", []
+    ),
+    "another rig": (
+        ["diagnose", "{log}", "--model", "{model}", "--rig", "emps"], "--model and --rig emps are both given", []
+    ),
+    "reference without model": (["diagnose", "{log}", "--reference", "{log}"], "--reference goes with --model", []),
+    "unknown cause": (
+        ["diagnose", "{log}", "--model", "{model}", "--exclude", "sorcery"], "cause 'sorcery' does not exist", []
+    ),
+    "calibration": (
+        ["diagnose", "{log}", "--model", "{model}", "--calibration", "c.json"], "--calibration is of a team's", []
+    ),
+    "jobs": (["diagnose", "{log}", "--model", "{model}", "--jobs", "0"], "jobs is 0; it must be at least 1", []),
+    "output over the model": (["inspect", "{log}", "--model", "{model}", "--json", "{model}"], "is an input", []),
+    "design": (["inspect", "{log}", "--model", "{model}", "--design", "d.toml"], "--design is of a team's robots", []),
+    "map over the log": (["map", "{log}", "--model", "{model}", "--out", "{log}"], "is an input", []),
+    "replay of a truth": (
+        ["replay", "{log}", "--model", "{model}", "--truth", "--save", "{folder}/x.rrd"], "--truth is of a team's", []
+    ),
+    "map of a replay": (
+        ["replay", "{log}", "--map", "log.toml", "--save", "{folder}/x.rrd"], "--map goes with --model", []
+    ),
+    "folder of the log": (
+        ["diagnose", "{log}", "--model", "{model}", "--out", "{folder}"], "which would be lost; name another folder", []
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", list(REFUSED))
+def test_refused_and_nothing_written(tmp_path, capsys, log, case) -> None:
+    arguments, said, without = REFUSED[case]
+    for name in without:
+        (tmp_path / name).unlink()
+    before = {path.name: path.read_bytes() for path in tmp_path.iterdir()}
+    filled = [a.format(log=log, model=tmp_path / "arm.xml", folder=tmp_path) for a in arguments]
+    assert said in refused(capsys, *filled)
+    assert {path.name: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+def test_a_log_without_torques_or_a_model_with_other_joints(tmp_path, capsys, values) -> None:
+    log = write_log(tmp_path, values)
+    write_map(tmp_path, MAP.replace('torque = { column = "{joint} torque", unit = "Nm" }\n', ""))
+    assert "no joint has a torque, a current, a command or a duty" in refused(
+        capsys, "diagnose", log, "--model", tmp_path / "arm.xml", "--out", tmp_path / "verdict"
+    )
+    write_map(tmp_path)
+    (tmp_path / "arm.xml").write_text(MODEL.replace('name="elbow"', 'name="ellbow"'), encoding="utf-8")
+    assert "unknown joint 'elbow' (did you mean 'ellbow'?)" in refused(
+        capsys, "diagnose", log, "--model", tmp_path / "arm.xml", "--out", tmp_path / "verdict"
+    )
+    assert files(tmp_path) == {"arm.xml", "log.toml", "log.csv"}
+
+
+def test_damaged_logs_maps_and_models_leave_nothing_behind(tmp_path, capsys, values) -> None:
+    """One of the three is damaged so that it cannot be read; see tests/logs/joints for hundreds of them."""
+    log = write_log(tmp_path, values)
+    originals = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    count = 0
+    for seed in range(30):
+        rng = random.Random(seed)
+        path = rng.choice(sorted(originals))
+        content = bytearray(originals[path])
+        at = rng.randrange(len(content) // 2)
+        content[at : at + 40] = bytes(rng.randrange(256) for _ in range(40))
+        path.write_bytes(content)
+        code, _, err = run(
+            capsys, "inspect", log, "--model", tmp_path / "arm.xml", "--json", tmp_path / "found.json"
+        )
+        assert code in (0, 2), err
+        if code == 2:
+            count += 1
+            assert err.startswith("mocobot: ")
+            assert err.isprintable()
+            assert files(tmp_path) == {"arm.xml", "log.toml", "log.csv"}
+        else:
+            (tmp_path / "found.json").unlink()
+        path.write_bytes(originals[path])
+    assert count > 10
+
+
+def test_tolerances_of_the_causes_that_a_file_names(tmp_path) -> None:
+    path = tmp_path / "tolerances.toml"
+    path.write_text("[torque_scale]\nscale_percent = 2.0\n", encoding="utf-8")
+    with pytest.raises(serial.InputError, match="torque_scale has no 'scale_percent'; its parameters are"):
+        serial.serial_tolerances(path)
+    path.write_text("[torque_scale]\nscale = 0.02\n", encoding="utf-8")
+    assert serial.serial_tolerances(path) == {"torque_scale": {"scale": 0.02}}
+    assert serial.serial_tolerances(None) is None

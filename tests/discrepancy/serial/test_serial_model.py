@@ -1,0 +1,120 @@
+"""Which models are read, and what is said of the others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from discrepancy.serial.model import load_model
+from estimator.errors import InputError
+
+MODELS = Path(__file__).resolve().parents[3] / "models"
+BODY = '<inertial pos="0 0 0.1" mass="1" diaginertia="0.01 0.01 0.01"/>'
+LINKS = f"""
+<body name="a">{BODY}<joint name="one" range="-1 2" actuatorfrcrange="-5 5"/>
+  <body name="b" pos="0 0 0.2">{BODY}<joint name="two" type="slide"/>
+    <site name="end"/></body></body>
+"""
+URDF = """<?xml version="1.0"?>
+<robot name="r">
+  <link name="base"><collision><geometry><mesh filename="package://r/base.stl"/></geometry></collision></link>
+  <link name="a">
+    <inertial><origin xyz="0 0 0.1"/><mass value="1"/>
+      <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><mesh filename="package://r/a.stl"/></geometry></collision>
+  </link>
+  <joint name="j1" type="revolute"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/>
+    <limit lower="-1" upper="2" effort="5" velocity="3"/></joint>
+</robot>
+"""
+
+
+def written(folder: Path, text: str, name: str = "robot.xml") -> Path:
+    path = folder / name
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def mjcf(bodies: str, more: str = "") -> str:
+    return f'<mujoco><compiler angle="radian"/><worldbody>{bodies}</worldbody>{more}</mujoco>'
+
+
+def test_a_tree_of_hinges_and_slides_is_read(tmp_path) -> None:
+    more = (
+        '<actuator><motor joint="two" gear="3" forcerange="-2 2"/><motor joint="two" forcerange="-1 1"/>'
+        '<motor joint="one" forcerange="-7 7"/></actuator>'
+    )
+    found = load_model(written(tmp_path, mjcf(LINKS, more)))
+    assert found.joints == ("one", "two")
+    assert found.bodies == ("a", "b")
+    assert found.slides.tolist() == [False, True]
+    assert found.lower.tolist() == [-1.0, -np.inf]
+    assert found.upper.tolist() == [2.0, np.inf]
+    assert found.torque_limit.tolist() == [5.0, 7.0]
+
+
+def test_urdf_without_its_meshes_is_read(tmp_path) -> None:
+    found = load_model(written(tmp_path, URDF, "robot.urdf"))
+    assert found.joints == ("j1",)
+    assert found.model.body("a").mass[0] == 1.0
+    assert found.torque_limit.tolist() == [5.0]
+
+
+def test_urdf_whose_inertia_is_in_its_meshes_is_refused(tmp_path) -> None:
+    without = URDF[: URDF.index("<inertial>")] + URDF[URDF.index("</inertial>") + 11 :]
+    with pytest.raises(
+        InputError, match=r"MuJoCo cannot compile it \(.*base.stl.*; without its meshes: .*inertia"
+    ):
+        load_model(written(tmp_path, without, "robot.urdf"))
+
+
+@pytest.mark.parametrize("name", ["tx40", "xl330", "panda", "emps"])
+def test_own_models_are_read(name) -> None:
+    assert load_model(MODELS / name / f"{name}.xml").joints
+
+
+REFUSED = {
+    "no joints": (mjcf(f"<body>{BODY}</body>"), "the model has no joints"),
+    "free": (mjcf(f'<body><freejoint name="f"/>{BODY}</body>'), "joint 'f' is a free joint"),
+    "ball": (mjcf(f'<body><joint type="ball"/>{BODY}</body>'), "joint 1 is a ball joint"),
+    "nameless": (mjcf(f'<body name="a"><joint/>{BODY}</body>'), r"joint 1 \(of body 'a'\) has no name"),
+    "closed": (mjcf(LINKS, '<equality><joint joint1="one" joint2="two"/></equality>'), "1 equality constraint;"),
+    "tendons": (
+        mjcf(
+            LINKS,
+            '<tendon><fixed><joint joint="one" coef="1"/></fixed><fixed><joint joint="two" coef="1"/></fixed></tendon>',
+        ),
+        "2 tendons;",
+    ),
+    "text": ("robot", "MuJoCo cannot read it"),
+    "empty": ("", "MuJoCo cannot read it"),
+    "other": ("<robot_description/>", "MuJoCo cannot read it"),
+    "massless": (mjcf('<body name="a"><joint name="one"/></body>'), "MuJoCo cannot compile it"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", list(REFUSED))
+def test_others_are_refused_in_one_sentence(tmp_path, case) -> None:
+    text, said = REFUSED[case]
+    path = written(tmp_path, text)
+    with pytest.raises(InputError, match=said) as refused:
+        load_model(path)
+    assert str(refused.value).startswith(f"{path}: ")
+    assert "\n" not in str(refused.value)
+
+
+def test_no_file_and_no_model(tmp_path) -> None:
+    with pytest.raises(InputError, match="there is no such file"):
+        load_model(tmp_path / "none.xml")
+    with pytest.raises(InputError, match="there is no such file"):
+        load_model(tmp_path)
+    (tmp_path / "bytes.xml").write_bytes(bytes(range(256)) * 8)
+    with pytest.raises(InputError, match="MuJoCo cannot read it"):
+        load_model(tmp_path / "bytes.xml")
+
+
+def test_shipped_omnid_is_refused_for_its_closed_chains() -> None:
+    with pytest.raises(InputError, match="3 equality constraints; a diagnosis of joint logs needs"):
+        load_model(MODELS / "omnid" / "omnid.xml")

@@ -1,0 +1,71 @@
+"""What has changed between two logs of one arm, whose model is off by a tenth everywhere and knows no friction."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+import pytest
+
+from discrepancy.result.diagnosed import Diagnosed
+from discrepancy.serial.diagnosis import diagnose_serial
+from discrepancy.serial.model import SerialModel
+from discrepancy.serial.recording.joint_log import JointLog
+from serial_made import a_little_off, nominal, simulated, spec
+
+FRICTION = {"waist": 1.0, "shoulder": 1.5, "elbow": 0.8, "roll": 0.2}
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> SerialModel:
+    return nominal(tmp_path_factory.mktemp("arm"))
+
+
+def real() -> mujoco.MjSpec:
+    made = a_little_off(spec(), np.random.default_rng(7))
+    for name, size in FRICTION.items():
+        joint = made.joint(name)
+        joint.frictionloss, joint.damping = size, [size, 0.0, 0.0]
+        joint.solref_friction, joint.solimp_friction = [0.002, 1.0], [0.99, 0.999, 0.001, 0.5, 2.0]
+    return made
+
+
+@pytest.fixture(scope="module")
+def healthy() -> JointLog:
+    return simulated(real().compile(), 0)
+
+
+def named(found: Diagnosed) -> list[tuple[str, int | None]]:
+    return [(f.candidate.cause, f.candidate.joint) for f in found.diagnosis.causes]
+
+
+def test_doubled_friction(model: SerialModel, healthy: JointLog) -> None:
+    changed = real()
+    changed.joint("elbow").frictionloss *= 2.0
+    found = diagnose_serial(model, [simulated(changed.compile(), 1)], reference=[healthy])
+    assert named(found) == [("friction", 3)]
+    assert found.diagnosis.verdict == "explained"
+    assert found.diagnosis.causes[0].values[0] == pytest.approx(0.8, abs=0.03)
+    assert abs(found.diagnosis.causes[0].values[1]) < 0.03
+    assert len(found.traces()) == 4
+
+
+@pytest.mark.slow
+def test_moved_zero_and_payload(model: SerialModel, healthy: JointLog) -> None:
+    moved = simulated(real().compile(), 1, read=lambda q, torque: (q + np.array([0.0, 0.0, 0.005, 0.0]), torque))
+    found = diagnose_serial(model, [moved], reference=[healthy])
+    assert named(found) == [("joint_zero", 3)]
+    assert found.diagnosis.causes[0].values[0] == pytest.approx(-5e-3, abs=1.5e-3)
+    loaded = real()
+    load = loaded.body("hand").add_body()
+    load.mass, load.ipos, load.fullinertia = 2.0, [0.0, 0.0, 0.1], [4e-3, 4e-3, 3e-3, 0.0, 0.0, 0.0]
+    load.explicitinertial = True
+    found = diagnose_serial(model, [simulated(loaded.compile(), 1)], reference=[healthy])
+    assert named(found) == [("payload", 4)]
+    assert found.diagnosis.causes[0].values[0] == pytest.approx(2.0, abs=0.02)
+    assert found.diagnosis.causes[0].candidate.shape["z_m"] == pytest.approx(0.1, abs=2e-3)
+
+
+@pytest.mark.slow
+def test_nothing_has_changed(model: SerialModel, healthy: JointLog) -> None:
+    found = diagnose_serial(model, [simulated(real().compile(), 1)], reference=[healthy])
+    assert found.diagnosis.verdict == "consistent"

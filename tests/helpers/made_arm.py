@@ -1,0 +1,103 @@
+"""A simulated three-joint arm: its logs, made by MuJoCo from a heavier arm that rubs, and the map that reads them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from joint_logs import write_csv
+
+MODEL = """
+<mujoco model="arm">
+  <compiler angle="radian"/>
+  <worldbody>
+    <body name="turret" pos="0 0 0.3">
+      <inertial mass="4" pos="0.02 0 -0.05" diaginertia="0.05 0.05 0.04"/>
+      <joint name="turret" axis="0 0 1" range="-2.5 2.5"/>
+      <geom type="capsule" fromto="0 0 -0.2 0 0 0" size="0.05" mass="0"/>
+      <body name="upper">
+        <inertial mass="3" pos="0 0.03 0.2" diaginertia="0.04 0.04 0.01"/>
+        <joint name="shoulder" axis="0 1 0" range="-2 2" actuatorfrcrange="-60 60"/>
+        <geom type="capsule" fromto="0 0 0 0 0 0.4" size="0.04" mass="0"/>
+        <body name="fore" pos="0 0 0.4">
+          <inertial mass="2" pos="0.02 0 0.15" diaginertia="0.02 0.02 0.005"/>
+          <joint name="elbow" axis="0 1 0" range="-2.4 2.4" actuatorfrcrange="-40 40"/>
+          <geom type="capsule" fromto="0 0 0 0 0 0.3" size="0.03" mass="0"/>
+        </body>
+      </body>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+JOINTS = ("turret", "shoulder", "elbow")
+MAP = """
+version = 1
+joints = ["turret", "shoulder", "elbow"]
+time = { column = "time", unit = "s" }
+[channels]
+q = { column = "{joint} q", unit = "rad" }
+dq = { column = "{joint} dq", unit = "rad/s" }
+torque = { column = "{joint} torque", unit = "Nm" }
+"""
+RATE_HZ = 250.0
+
+
+def write_model(folder: Path) -> Path:
+    """The arm as its maker describes it."""
+    path = folder / "arm.xml"
+    path.write_text(MODEL, encoding="utf-8")
+    return path
+
+
+def write_map(folder: Path, text: str = MAP) -> Path:
+    """The map of its logs."""
+    path = folder / "log.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def made(
+    seconds: float = 8.0, seed: int = 0, heavier: float = 1.3, rate_hz: float = RATE_HZ
+) -> dict[str, np.ndarray]:
+    """Columns of a log: the arm's masses are off, and its joints rub and have rotors.
+
+    Args:
+        seconds: how long.
+        seed: of motion and noise.
+        heavier: factor of masses and inertias.
+        rate_hz: of the log.
+    """
+    rng = np.random.default_rng(seed)
+    time = np.arange(round(seconds * rate_hz)) / rate_hz
+    model = mujoco.MjModel.from_xml_string(MODEL)
+    model.body_mass[:] *= heavier
+    model.body_inertia[:] *= heavier
+    rate = 2.0 * np.pi * rng.uniform(0.2, 0.7, (3, 3))
+    size = np.array([0.6, 0.5, 0.7]) * rng.uniform(0.4, 0.8, (3, 3))
+    phase = np.multiply.outer(time, rate) + rng.uniform(0.0, 6.0, (3, 3))
+    q = (size * np.sin(phase)).sum(axis=1)
+    dq = (size * rate * np.cos(phase)).sum(axis=1)
+    ddq = -(size * rate**2 * np.sin(phase)).sum(axis=1)
+    data = mujoco.MjData(model)
+    torque = np.empty_like(q)
+    for k in range(len(time)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = q[k], dq[k], ddq[k]
+        mujoco.mj_inverse(model, data)
+        torque[k] = data.qfrc_inverse
+    torque += np.array([1.5, 2.0, 1.0]) * np.tanh(dq / 0.01) + np.array([1.0, 1.5, 0.5]) * dq
+    torque += np.array([0.2, 0.2, 0.1]) * ddq + 0.1
+    values = {"time": time}
+    for j, joint in enumerate(JOINTS):
+        values[f"{joint} q"] = q[:, j] + 1e-5 * rng.standard_normal(len(time))
+        values[f"{joint} dq"] = dq[:, j] + 1e-3 * rng.standard_normal(len(time))
+        values[f"{joint} torque"] = torque[:, j] + 0.05 * rng.standard_normal(len(time))
+    return values
+
+
+def write_log(folder: Path, values: dict[str, np.ndarray], name: str = "log.csv") -> Path:
+    """A log, model and map beside it."""
+    write_model(folder)
+    write_map(folder)
+    return write_csv(folder / name, values)

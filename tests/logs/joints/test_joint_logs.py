@@ -1,0 +1,231 @@
+"""Joint logs of every format, through units, signs, gears and coupled drives, against the motion in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from joint_logs import (
+    JOINTS,
+    MAP,
+    TURNS,
+    columns,
+    motion,
+    read,
+    torques,
+    write_csv,
+    write_lerobot,
+    write_table,
+)
+
+TIME = np.arange(1500) / 500.0
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".npz", ".parquet"])
+def test_tables_are_read_as_they_are(tmp_path, suffix) -> None:
+    (log,) = read(write_table(tmp_path / f"log{suffix}", columns(TIME)))
+    q, dq = motion(TIME)
+    assert log.joints == JOINTS
+    assert log.rate_hz == log.native_hz == 500.0
+    assert not log.resampled
+    assert log.usable.all()
+    assert log.notes == ()
+    np.testing.assert_allclose(log.q, q, rtol=1e-14)
+    np.testing.assert_array_equal(log.dq, dq)
+    np.testing.assert_array_equal(log.torque, torques(TIME))
+    np.testing.assert_allclose(log.time, TIME, atol=1e-12)
+    assert log.command is None
+    assert log.drive.command == "none"
+    assert not log.drive.link_side.any()
+
+
+def test_joints_come_in_the_models_order_whatever_the_maps(tmp_path) -> None:
+    """A map that lists the joints as the log numbers them."""
+    time, (q, _) = TIME, motion(TIME)
+    order = (2, 0, 1)
+    values = {"t": time} | {f"x{n}": q[:, k] for n, k in enumerate(order)}
+    values |= {f"f{n}": torques(time)[:, k] for n, k in enumerate(order)}
+    text = """
+joints = ["lift", "hip", "knee"]
+time = { column = "t", unit = "s" }
+channels.q = { column = "x{index}", unit = "rad" }
+channels.torque = { column = "f{index}", unit = "Nm" }
+joint.lift.channels = { q.unit = "m", torque.unit = "N" }
+drive.zero = [0.01, 0.2, -0.3]
+"""
+    (log,) = read(write_csv(tmp_path / "log.csv", values), text)
+    np.testing.assert_allclose(log.q, q + np.array([0.2, -0.3, 0.01]), rtol=1e-14)
+    np.testing.assert_array_equal(log.torque, torques(time))
+
+
+MOTORS = """
+joints = ["hip", "knee", "lift"]
+time = { column = "t", unit = "s" }
+channels.motor_position = { column = "m{number}", unit = "turn", sign = -1, offset = 0.25 }
+channels.motor_velocity = { column = "w{number}", unit = "rpm" }
+channels.current = { column = "i{number}", unit = "mA" }
+[drive]
+zero = [0.1, -0.2, 0.03]
+torque_constant = [0.05, 0.06, 0.07]
+"""
+SPARSE = MOTORS + "gear = [50, -40, 300]\ncoupling.knee = { hip = 20 }\n"
+MATRIX = MOTORS + "coupling = [[50, 0, 0], [20, -40, 0], [0, 0, 300]]\n"
+
+
+def motor_columns(time: np.ndarray) -> dict[str, np.ndarray]:
+    """Motors by the gears' own kinematics, torques by their power."""
+    q, dq = motion(time)
+    position, speed = q @ TURNS.T, dq @ TURNS.T
+    torque = torques(time) @ np.linalg.inv(TURNS)  # power: motor torque . TURNS dq = torque . dq
+    np.testing.assert_allclose(
+        (torque * speed).sum(axis=1), (torques(time) * dq).sum(axis=1), rtol=1e-9, atol=1e-9
+    )
+    found = {"t": time}
+    for k in range(3):
+        found[f"m{k + 1}"] = -position[:, k] / (2 * np.pi) - 0.25
+        found[f"w{k + 1}"] = speed[:, k] * 30 / np.pi
+        found[f"i{k + 1}"] = 1e3 * torque[:, k] / (0.05, 0.06, 0.07)[k]
+    return found
+
+
+@pytest.mark.parametrize("text", [SPARSE, MATRIX], ids=["gears and coupling", "matrix"])
+def test_coupled_drives_become_joints(tmp_path, text) -> None:
+    (log,) = read(write_csv(tmp_path / "log.csv", motor_columns(TIME)), text)
+    q, dq = motion(TIME)
+    np.testing.assert_allclose(log.q, q + np.array([0.1, -0.2, 0.03]), atol=1e-12)
+    np.testing.assert_allclose(log.dq, dq, atol=1e-11)
+    np.testing.assert_allclose(log.torque, torques(TIME), atol=1e-10)
+    np.testing.assert_allclose(log.drive.coupling @ TURNS, np.eye(3), atol=1e-14)
+    np.testing.assert_array_equal(log.drive.gear, [50, -40, 300])
+    np.testing.assert_array_equal(log.drive.torque_constant, [0.05, 0.06, 0.07])
+
+
+def test_a_free_torque_constant_leaves_amperes_times_gear(tmp_path) -> None:
+    text = MOTORS.replace("[0.05, 0.06, 0.07]", '[0.05, 0.06, "free"]') + "gear = [50, -40, 300]\n"
+    values = motor_columns(TIME)
+    (log,) = read(write_csv(tmp_path / "log.csv", values), text)
+    assert np.isnan(log.drive.torque_constant).tolist() == [False, False, True]
+    np.testing.assert_allclose(log.torque[:, 2], 300 * values["i3"] * 1e-3, rtol=1e-12)
+    np.testing.assert_allclose(log.torque[:, 0], 50 * 0.05 * values["i1"] * 1e-3, rtol=1e-12)
+
+
+def test_both_sides_of_a_gear_are_kept(tmp_path) -> None:
+    """Position at the link, and the motor's beside it: what twists between them shows."""
+    q, _ = motion(TIME)
+    twist = 1e-3 * np.sin(TIME)
+    values = {"t": TIME, "m": 100 * (q[:, 0] + twist)}
+    values |= {f"q{k}": q[:, k] for k in range(3)} | {f"f{k}": torques(TIME)[:, k] for k in range(3)}
+    text = """
+joints = ["hip", "knee", "lift"]
+time = { column = "t", unit = "s" }
+channels.q = { column = "q{index}", unit = "rad" }
+channels.link_torque = { column = "f{index}", unit = "Nm" }
+joint.hip = { gear = 100, zero = 0.5, channels.motor_position = { column = "m", unit = "rad" } }
+joint.lift.channels = { q.unit = "m", link_torque.unit = "N" }
+"""
+    (log,) = read(write_csv(tmp_path / "log.csv", values), text)
+    np.testing.assert_allclose(log.q[:, 0], q[:, 0] + 0.5, atol=1e-14)
+    np.testing.assert_allclose(log.motor[:, 0] - log.q[:, 0], twist, atol=1e-12)
+    assert np.isnan(log.motor[:, 1:]).all()
+    assert log.drive.link_side.all()
+
+
+def test_a_joint_without_a_torque_has_none(tmp_path) -> None:
+    text = MAP + "torque = false\n"
+    (log,) = read(write_csv(tmp_path / "log.csv", columns(TIME)), text.replace('torque.unit = "N"\n', ""))
+    assert np.isnan(log.torque[:, 2]).all()
+    np.testing.assert_array_equal(log.torque[:, :2], torques(TIME)[:, :2])
+
+
+def test_lerobot_states_and_actions(tmp_path) -> None:
+    """Positions and commands in degrees at 50 frames a second, no torque."""
+    time = np.arange(300) / 50.0
+    (q, _), (late, _) = motion(time), motion(time - 0.04)
+    text = """
+joints = ["hip", "knee", "lift"]
+channels.q = { column = "observation.state.{joint}.pos", unit = "deg" }
+channels.command = { column = "action.{joint}.pos", unit = "deg" }
+joint.lift.channels = { q.unit = "m", command.unit = "m" }
+control = { command = "position", position_gain = [30, 20, 900] }
+"""
+    scale = np.array([np.degrees(1), np.degrees(1), 1.0])
+    folder = write_lerobot(tmp_path / "set", late * scale, q * scale, 50.0)
+    (log,) = read(folder, text)
+    assert log.rate_hz == 50.0
+    assert log.torque is None
+    np.testing.assert_allclose(log.q, late, atol=1e-6)
+    np.testing.assert_allclose(log.command, q, atol=1e-6)
+    assert log.drive.command == "position"
+    assert log.drive.position_gain.tolist() == [30, 20, 900]
+    assert np.isnan(log.drive.velocity_gain).all()
+
+
+SERVO = """
+joints = ["hip", "knee", "lift"]
+time = { column = "t", unit = "s" }
+[channels]
+q = { column = "{joint}.pos", unit = "deg" }
+duty = { column = "{joint}.pwm", unit = "counts", bits = 16, full_scale = 885 }
+command = { column = "{joint}.goal", unit = "deg" }
+supply = { column = "volts", unit = "V" }
+enabled = { column = "on" }
+[joint.lift.channels]
+q.unit = "mm"
+command.unit = "mm"
+duty = false
+motor_voltage = { column = "lift.volts", unit = "mV" }
+[control]
+command = "position"
+gain_of = "firmware"
+position_gain = 100
+[[log]]
+match = "kp400_*"
+position_gain = 400
+velocity_gain = [1, 2, 3]
+"""
+
+
+def servo_columns() -> dict[str, np.ndarray]:
+    values = columns(TIME)
+    duty = np.round(800 * np.sin(3 * TIME))
+    values |= {f"{joint}.goal": values[f"{joint}.pos"] for joint in JOINTS}
+    values |= {f"{joint}.pwm": np.where(duty < 0, duty + 65536, duty) for joint in JOINTS[:2]}
+    values |= {"volts": 7.0 + 0.1 * np.cos(TIME), "on": (TIME < 1.0) * 1.0, "lift.volts": 500 * np.sin(TIME)}
+    return values
+
+
+def test_duty_supply_and_gains_by_the_name_of_the_file(tmp_path) -> None:
+    values = servo_columns()
+    (log,) = read(write_csv(tmp_path / "kp400_up.csv", values), SERVO)
+    np.testing.assert_allclose(log.drive.duty[:, 0], np.round(800 * np.sin(3 * TIME)) / 885, atol=1e-15)
+    np.testing.assert_allclose(log.drive.duty[:, 2], 0.5 * np.sin(TIME) / values["volts"], atol=1e-15)
+    np.testing.assert_array_equal(log.drive.supply_V, values["volts"])
+    np.testing.assert_array_equal(log.enabled, TIME < 1.0)
+    assert log.drive.position_gain.tolist() == [400.0] * 3
+    assert log.drive.velocity_gain.tolist() == [1.0, 2.0, 3.0]
+    (other,) = read(write_csv(tmp_path / "kp100_up.csv", values), SERVO)
+    assert other.drive.position_gain.tolist() == [100.0] * 3
+    assert np.isnan(other.drive.velocity_gain).all()
+
+
+def test_rated_torques_and_counts(tmp_path) -> None:
+    """What a drive on a field bus tells: counts of an encoder, and torque in thousandths of the rated one."""
+    q, _ = motion(TIME)
+    values = {"t": TIME} | {f"c{k}": np.round((q @ TURNS.T)[:, k] / (2 * np.pi) * 2**20) for k in range(3)}
+    values |= {f"r{k}": torques(TIME)[:, k] for k in range(3)}
+    text = """
+joints = ["hip", "knee", "lift"]
+time = { column = "t", unit = "s" }
+channels.motor_position = { column = "c{index}", unit = "counts", counts_per_turn = 1048576 }
+channels.motor_torque = { column = "r{index}", unit = "permille", rated = 2.4 }
+[drive]
+gear = [50, -40, 300]
+coupling.knee = { hip = 20 }
+"""
+    (log,) = read(write_csv(tmp_path / "log.csv", values), text)
+    np.testing.assert_allclose(log.q, q, atol=1e-6)
+    np.testing.assert_allclose(log.torque, torques(TIME) * 0.0024 @ TURNS, rtol=1e-12, atol=1e-12)
+    # One count of each motor; the knee's reading holds the rounding of two.
+    step = 2 * np.pi / 2**20
+    inverse = np.linalg.inv(TURNS)
+    np.testing.assert_allclose(log.position_step, step * np.sqrt((inverse**2).sum(axis=1)), rtol=1e-6)
