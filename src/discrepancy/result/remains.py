@@ -9,7 +9,7 @@ from discrepancy.engine.explanation import Scatter
 from discrepancy.result.read import kind_of
 
 Values = Mapping[str, Any]
-REMEDY = '"mocobot calibrate" finds the robots as they are; diagnose again with what it writes.'
+REMEDY = 'Find the machine as it is ("mocobot calibrate" does so for a team), and diagnose again with that.'
 
 
 def remains(values: Values) -> list[str]:

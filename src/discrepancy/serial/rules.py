@@ -120,5 +120,5 @@ REDUNDANT = 1e-9
 """Of the largest singular value, below which columns depend on each other. Derived: rounding is 1e-12."""
 
 SERIAL_LAW_SHARE = 1.0
-"""Standard deviation of what the law of a lasting cause leaves of its trace, in amplitude. Derived: noise is that of
+"""Standard deviation of what the law of a lasting cause leaves of its trace, in amplitude. Chosen: noise is that of
 the sensors, less than gears leave whatever is named; as much as of the EMPS axis (``discrepancy.rules``)."""

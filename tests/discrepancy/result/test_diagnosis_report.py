@@ -75,7 +75,7 @@ def test_miscalibrated_robots_are_to_be_calibrated() -> None:
     assert max(map(len, text.splitlines())) <= WIDTH
     said = " ".join(text.split())
     assert "Zero of a gimbal axis: a spread of 5.2 mrad over 9 places (tolerance 0.1 mrad)." in said
-    assert '"mocobot calibrate" finds the robots as they are' in said
+    assert '"mocobot calibrate" does so for a team' in said
     assert "with nothing named and everything a little off, as far as its kind scatters" in said
     assert "What would have been noticed" in text
 

@@ -51,7 +51,9 @@ def test_doubled_friction(model: SerialModel, healthy: JointLog) -> None:
 
 @pytest.mark.slow
 def test_moved_zero_and_payload(model: SerialModel, healthy: JointLog) -> None:
-    moved = simulated(real().compile(), 1, read=lambda q, torque: (q + np.array([0.0, 0.0, 0.005, 0.0]), torque))
+    moved = simulated(
+        real().compile(), 1, read=lambda q, torque: (q + np.array([0.0, 0.0, 0.005, 0.0]), torque)
+    )
     found = diagnose_serial(model, [moved], reference=[healthy])
     assert named(found) == [("joint_zero", 3)]
     assert found.diagnosis.causes[0].values[0] == pytest.approx(-5e-3, abs=1.5e-3)
