@@ -52,9 +52,11 @@ def workers_of(scheduler: str | None) -> Iterator[None]:
         raise InputError(
             f"--scheduler is {scheduler!r}; it must be an address such as tcp://host:8786, or a scheduler file"
         )
-    place: dict[str, str] = {"scheduler_file" if is_file else "address": scheduler}
     try:
-        client = Client(**place, timeout=REACH_S, set_as_default=True)
+        if is_file:
+            client = Client(scheduler_file=scheduler, timeout=REACH_S, set_as_default=True)
+        else:
+            client = Client(scheduler, timeout=REACH_S, set_as_default=True)
     except (OSError, ValueError, TypeError) as error:  # a time that ran out is an OSError
         raise InputError(f"scheduler {scheduler}: cannot be reached ({_line(error)})") from error
     with client:

@@ -103,7 +103,7 @@ def test_existing_targets_are_replaced_whole(
         raise OSError(28, "No space left on device")
 
     before = target.read_bytes()
-    monkeypatch.setattr("mocobot_view.replay.outputs.log_replay", broken)
+    monkeypatch.setattr("mocobot_view.replay.stream.log_replay", broken)
     message = refused(capsys, folder / "rec.parquet", "--save", target, "--force")
     assert f"{target}: cannot be written (No space left on device)" in message
     assert target.read_bytes() == before

@@ -50,9 +50,10 @@ def findings(fit: Fit, given: Given, names: Sequence[str]) -> list[str]:
     if not odd:
         return [] if fit.converged else [_unsettled(names)]
     if fit.converged:  # elsewhere, derivatives say nothing of what would explain it
-        changes = sorted(_changes(fit, names), key=lambda change: _worth(fit, change), reverse=True)
-        if changes and _worth(fit, changes[0]) > 0 and _suffices(fit, changes[0]):
-            best = changes[0]
+        enough = [c for c in _changes(fit, names) if _worth(fit, c) > 0 and _suffices(fit, c)]
+        if enough:
+            # A slip of a last gimbal turns a grasp, too: of what is enough, the simplest.
+            best = min(enough, key=lambda change: (change.unknowns, -_worth(fit, change)))
             rest = "the other recordings" if len(names) > 2 else "the other recording"
             return [f"{names[best.trial]} contradicts {rest}: {best.what}. Leave it out, or record it again."]
     sentence = contradicting(given, names)

@@ -5,7 +5,7 @@ from typing import Any
 
 from discrepancy.causes.units import one_each, parameter
 from discrepancy.result.read import name_of
-from mocobot_report.blocks.html import Node
+from mocobot_report.blocks.html import Node, el
 from mocobot_report.blocks.numbers import NONE, plain, spelled
 from mocobot_report.blocks.prose import bullets, facts, folded, tidy, verdict
 from mocobot_report.blocks.tables import Entry, Num, measurement, table, value
@@ -66,17 +66,18 @@ def _rivals(causes: Sequence[Values]) -> list[Node]:
             gap, chi2 = value(rival["evidence_gap"]), value(rival["chi2_per_n"])
             chance = Num(chance_of(rival["probability"]))
             said = "cannot be told apart" if rival["ambiguous"] else "fits worse"
-            named, other = tidy(name_of(cause)) if k == 0 else "", cause_name(name_of(rival), rival["cause"])
-            rows.append([named, other, said, chance, gap, chi2])
+            named = tidy(name_of(cause)) if k == 0 else ""
+            other = el("span", cause_name(name_of(rival), rival["cause"]), " ", el("em", said))
+            rows.append([named, other, chance, gap, chi2])
         named = "" if cause["alternatives"] else tidy(name_of(cause))
         for which, words in (
-            ("unlisted", "something unlisted that looks like it"),
+            ("unlisted", "something unlisted"),
             ("nothing", "nothing at all"),
         ):
             behind = value(cause["over_nothing"] if which == "nothing" else None)
-            rows.append([named, words, NONE, Num(chance_of(cause["instead"][which])), behind, Num(NONE)])
+            rows.append([named, words, Num(chance_of(cause["instead"][which])), behind, Num(NONE)])
             named = ""
-    head = ["named", "what else", "verdict", "probability [%]", "behind by [nats]", "closed loop chi²/n"]
+    head = ["named", "what else", "chance [%]", "behind [nats]", "loop chi²/n"]
     note = "probability and nats: by the rows; with that of the cause the probabilities add up to 100 %"
     out = [table("What else it might be", head, rows, note=note, groups=True, stack=True)]
     return [*out, verdict("warn", "What would tell them apart", bullets(list(advice)))] if advice else out

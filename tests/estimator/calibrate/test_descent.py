@@ -46,7 +46,7 @@ def test_steps_of_one_team_are_whole() -> None:
         assert tried == 1
         assert lower.z == pytest.approx(point.z + whole, rel=1e-12, abs=1e-15)
         point = lower
-    assert point.value / point.count < 1.1
+    assert point.value / point.rows < 1.1
 
 
 def test_steps_between_two_teams_go_down_where_whole_ones_go_up() -> None:
