@@ -51,7 +51,7 @@ class Opened:
 
     def __call__(self, x: Array) -> Array:
         """Rows that are white with these unknowns integrated out, shape (n, C, l) -> the same."""
-        if not len(self.shrink):
+        if not len(self.shrink) or not x.size:
             return x
         q, flat = self.basis.reshape(-1, len(self.shrink)), x.reshape(-1, x.shape[2])
         return np.asarray(flat - q @ (self.shrink[:, None] * (q.T @ flat))).reshape(x.shape)

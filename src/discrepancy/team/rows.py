@@ -30,6 +30,7 @@ from discrepancy.team.linear.start import Sensed, exact_residual, linearised_tri
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
+from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from estimator.rigid_team.residual import Shared
@@ -110,7 +111,10 @@ class TeamRows(Rig):
 
     def relinearised(self, nothing: Hypothesis) -> Self | None:
         """The rig at the robots as a fit with tolerances finds them, where straight columns do not reach that far."""
-        there = found_at(self.linear, self.whitening, nothing, self.origin)
+        try:
+            there = found_at(self.linear, self.whitening, nothing, self.origin)
+        except InputError:  # no such robots: what acts on these is something else
+            return None
         resting = resting_of(nothing)
         same = all(0.5 < resting[kind] / self.resting[kind] < 2.0 for kind in resting)
         if there.curvature < rules.STRAIGHT_CHI2_PER_N and same:

@@ -133,3 +133,9 @@ def test_what_changes_later_is_transformed_too(rng, rows):
     )
     event = CANDIDATES[2]
     same_problem(opened.extended(event, columns), problem.extended(event, columns).with_unknowns(ONE, U, 3.0))
+
+
+def test_nothing_stays_nothing() -> None:
+    """A trial in which another cause leaves nothing open beside one that does."""
+    opened = Opened.of(np.random.default_rng(0).standard_normal((5, 2, 3)), 2.0)
+    assert opened(np.zeros((5, 2, 0))).shape == (5, 2, 0)
