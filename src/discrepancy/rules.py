@@ -135,6 +135,8 @@ PLAY_FORCE_N = 0.4
 """Below which a payload may be anywhere in its play. Chosen."""
 PLAY_KNOTS_S = 0.2
 """Between knots of the travel that play leaves open at small forces. Chosen."""
+LENGTH_MOST_M = 0.02
+"""By which a leg's lengths may be off. Chosen: a thousand tolerances; as large, columns are no straight lines."""
 PULL_SE = 5.0
 """Standard errors that the stiffness of a payload's tether must be. Measured: uncalibrated robots without one leave up
 to 3, with a constant force of 2 N."""
