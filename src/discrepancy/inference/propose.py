@@ -32,7 +32,7 @@ def proposals(rig: Rig, base: Hypothesis, *, events: bool = True) -> list[Hypoth
     likely = []
     for item in _chosen(ranked, rules.LEADERS):
         near = item.score > ranked[0].score - rules.CLOSE_NATS
-        new = _sharpened(rig, base, item, near=near)
+        new = sharpened(rig, base, item, near=near)
         if new.possible(rig, new.free[-1]) and not imitated(rig, base, new.causes[-1]):
             likely.append(new)
     return sorted(likely, key=lambda new: -new.score)
@@ -95,7 +95,7 @@ def _events(rig: Rig, fit: Fit) -> list[Scanned]:
     return sorted(found, key=lambda item: -item.score)[: rules.WORST_EVENTS]
 
 
-def _sharpened(rig: Rig, base: Hypothesis, item: Scanned, *, near: bool) -> Hypothesis:
+def sharpened(rig: Rig, base: Hypothesis, item: Scanned, *, near: bool) -> Hypothesis:
     """A candidate beside what is there, in its best shape where it is near the likeliest, and with what it opens."""
     shaped = _best_shape(rig, base, item) if near else item.candidate
     problem, index = _with(rig, base.problem, shaped, item)
