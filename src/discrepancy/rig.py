@@ -170,12 +170,7 @@ class Channel:
 
 
 class Rig(ABC):
-    """A machine and its simulation, seen by the diagnosis.
-
-    What a machine may lack (unknowns of every trial, transients, shapes) has defaults that say so.
-    """
-
-    # Recordings.
+    """A machine and its simulation, seen by the diagnosis; what a machine may lack has defaults that say so."""
 
     @property
     @abstractmethod
@@ -273,10 +268,8 @@ class Rig(ABC):
 
     @property
     def bench(self) -> Any:
-        """What the search for laws needs (``discrepancy.laws.bench.Bench``); None where a rig has no such."""
+        """What the search for laws needs (``laws.bench.Bench``); None where a rig has no such."""
         return None
-
-    # The simulator.
 
     def can_resimulate(self) -> str | None:
         """Why the recordings cannot be resimulated, or None."""

@@ -9,6 +9,8 @@ from discrepancy.engine.explanation import Explanation, Found, explain
 from discrepancy.engine.gain import Gain, responses
 from discrepancy.engine.verdict import Verdict, verdict_of
 from discrepancy.inference.search import search
+from discrepancy.laws.search import with_laws
+from discrepancy.laws.where import Located
 from discrepancy.rig import Rig
 
 
@@ -24,6 +26,7 @@ class Diagnosis:
         gain: closed-loop responses without and with the causes, or None.
         not_simulated: why there is no closed-loop comparison, or None.
         notes: sentences about what the data could not decide or validate.
+        located: where something unlisted was looked for, the likeliest place first; empty where nothing unlisted is.
     """
 
     rig: Rig
@@ -33,6 +36,7 @@ class Diagnosis:
     gain: Gain | None
     not_simulated: str | None
     notes: tuple[str, ...]
+    located: tuple[Located, ...] = ()
 
     @property
     def causes(self) -> tuple[Found, ...]:
@@ -45,6 +49,7 @@ def diagnose(
     *,
     closed_loop: bool = True,
     most: int = rules.MOST_CAUSES,
+    laws: bool = True,
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
     simulated: Callable[[int], object] | None = None,
@@ -55,12 +60,19 @@ def diagnose(
         rig: recordings and causes.
         closed_loop: whether to resimulate the recorded commands.
         most: largest number of causes.
+        laws: whether to look for a law where something unlisted is left.
         jobs: parallel processes of the simulations.
         say: called with what is being done.
         simulated: called with 1 for every simulated trial.
     """
     searched = search(rig, most, progress=say)
-    rig, explanation = searched.rig, explain(searched)
+    explanation = explain(searched)
+    located: tuple[Located, ...] = ()
+    if laws and not explanation.clean:
+        lawful = with_laws(searched, most, say)
+        searched, located = lawful.searched, lawful.places
+        explanation = explain(searched)
+    rig = searched.rig
     notes: list[str] = []
     why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"
     alternatives = tuple(not_simulated(found) for found in explanation.found)
@@ -85,4 +97,4 @@ def diagnose(
         )
     if len(rig.trials) == 1:
         notes.append("One trial only: nothing could be validated on data that was not used for the fit.")
-    return Diagnosis(rig, verdict, explanation, alternatives, gain, why_not, tuple(notes))
+    return Diagnosis(rig, verdict, explanation, alternatives, gain, why_not, tuple(notes), located)

@@ -35,9 +35,7 @@ class Lawful:
     places: tuple[Located, ...]
 
 
-def with_laws(
-    searched: Searched, most: int, progress: Callable[[str], object] | None = None
-) -> Lawful:
+def with_laws(searched: Searched, most: int, progress: Callable[[str], object] | None = None) -> Lawful:
     """Go on with a search until what is left is noise, or no law helps on trials that it was not fitted to.
 
     Args:
@@ -48,31 +46,52 @@ def with_laws(
     say = progress or (lambda what: None)
     bench: Bench | None = searched.rig.bench
     first: tuple[Located, ...] = ()
-    laws: dict[tuple[object, ...], list[Rival]] = {}
+    rivals: dict[tuple[object, ...], list[Rival]] = {}
     for _ in range(rules.LAW_MOST if bench is not None else 0):
-        best = searched.best
-        if len(best.free) >= most or unlisted_nats(best) < rules.UNLISTED_NATS:
+        if len(searched.best.free) >= most or unlisted_nats(searched.best) < rules.UNLISTED_NATS:
             break
         assert bench is not None
-        say("locate what nobody lists")
-        places = located(best.fit, bench, bench.places)
-        first = first or tuple(places)
-        proposed = _proposals(searched, bench, places, say)
-        if not proposed or proposed[0].score - best.score < rules.NAMED_NATS:
+        starts = [searched]
+        if searched.best.free and not rivals:
+            # Causes that were named may have stood for what nobody lists.
+            starts.append(Searched(searched.rig, searched.nothing, searched.nothing, ()))
+        found = []
+        for start in starts:
+            places = located_in(start, bench, say)
+            first = first or tuple(places)
+            step = _with_one(start, bench, places, say)
+            if step is not None:
+                found.append((continued(step[0], most, say), step[1]))
+        if not found:
             break
-        added = proposed[0]
-        say(f"refit {added.causes[-1].label}")
-        refitted = exact(searched.rig, added, searched.nothing)
-        if not helps(refitted, refitted.free[-1]):
+        best, more = max(found, key=lambda one: one[0].best.score)
+        if best.best.score < searched.best.score + rules.NAMED_NATS:
             break
-        law = refitted.causes[-1]
-        laws[law.key] = _rivals(bench, proposed)
-        now, rivals = settled(searched.rig, refitted, searched.nothing)
-        found = Searched(
-            searched.rig, searched.nothing, now, tuple(tuple(rivals.get(i, ())) for i in now.free)
-        )
-        searched = continued(found, most, say)
-    return Lawful(_with_rivals(searched, laws), first)
+        searched, rivals = best, rivals | more
+    return Lawful(_with_rivals(searched, rivals), first)
+
+
+def located_in(searched: Searched, bench: Bench, say: Callable[[str], object]) -> list[Located]:
+    """Every place with the error that it would have to have, the likeliest first."""
+    say("locate what nobody lists")
+    return located(searched.best.fit, bench, bench.places)
+
+
+def _with_one(
+    searched: Searched, bench: Bench, places: Sequence[Located], say: Callable[[str], object]
+) -> tuple[Searched, dict[tuple[object, ...], list[Rival]]] | None:
+    """The search with one law more, and that law's rivals among laws; None where no law pays and helps."""
+    proposed = _proposals(searched, bench, places, say)
+    if not proposed or proposed[0].score - searched.best.score < rules.NAMED_NATS:
+        return None
+    say(f"refit {proposed[0].causes[-1].label}")
+    refitted = exact(searched.rig, proposed[0], searched.nothing)
+    if not helps(refitted, refitted.free[-1]):
+        return None
+    law = refitted.causes[-1]
+    now, rivals = settled(searched.rig, refitted, searched.nothing)
+    each = tuple(tuple(rivals.get(i, ())) for i in now.free)
+    return Searched(searched.rig, searched.nothing, now, each), {law.key: _rivals(bench, proposed)}
 
 
 def helps(hypothesis: Hypothesis, index: int) -> bool:
@@ -127,7 +146,9 @@ def _candidate(item: Judged, bench: Bench) -> LawCandidate:
     own = {variable.name for variable in item.place.own} | {"time"}
     others = 1 if own.issuperset(item.term.variables) else len(bench.variables)
     unit = item.place.unit
-    return candidate_of(item.place, item.term, rules.LAW_SCALES[unit], len(bench.places) * rules.LAW_FORMS * others)
+    inside = 1 if item.term.function == "spline" else rules.LAW_INSIDE ** len(item.term.numbers)
+    among = len(bench.places) * rules.LAW_FORMS * others * inside
+    return candidate_of(item.place, item.term, rules.LAW_SCALES[unit], among)
 
 
 def _rivals(bench: Bench, proposed: Sequence[Hypothesis]) -> list[Rival]:

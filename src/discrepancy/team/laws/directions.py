@@ -91,7 +91,7 @@ def _of_payload(linear: TrialLinear, name: str) -> list[Array]:
     if name == "payload mass":  # a point mass at the centre that is known of
         needed = felt + np.cross(alpha, com) + np.cross(omega, np.cross(omega, com))
         return [_wrench(linear, -needed, -np.cross(com, needed))[:, None]]
-    axes = [np.tile(axis, (len(at), 1)) for axis in np.eye(3)]
+    axes = [np.tile(axis, (len(at), 1)) for axis in np.eye(3, dtype=np.float64)]
     if name == "payload centre":
         # d/dt^2 of R c m, and gravity's moment: value, rate and acceleration of the first moment in {1}.
         return [

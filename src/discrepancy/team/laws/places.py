@@ -57,7 +57,12 @@ def _joint(
 
 
 def _payload(
-    name: str, targets: tuple[str, ...], axes: tuple[str, ...], unit: str, title: str, own: tuple[Variable, ...]
+    name: str,
+    targets: tuple[str, ...],
+    axes: tuple[str, ...],
+    unit: str,
+    title: str,
+    own: tuple[Variable, ...],
 ) -> Place:
     return Place(name, None, None, targets, axes, unit, title, own)
 
