@@ -48,23 +48,19 @@ class PayloadCable(Form):
     anchor_z_m: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
         point, distance = near(ground.p_1c, REACH_M, rng), rng.uniform(0.5, 1.5)
-        return cls(
-            stiffness_N_per_m=size,
-            length_m=float(distance - rng.uniform(*TRAVEL_M)),
-            **vector("point", "m", point),
-            **vector("anchor", "m", point + distance * direction(rng)),
-        )
+        length = float(distance - rng.uniform(*TRAVEL_M))
+        anchor = point + distance * direction(rng)
+        return {"length_m": length} | vector("point", "m", point) | vector("anchor", "m", anchor)
 
     def _edit(self, scene: TeamScene) -> TeamScene:
-        point = [self.point_x_m, self.point_y_m, self.point_z_m]
         site = scene.root.find("body", "omnid1/payload/payload").add(
-            "site", name="cable", pos=point, group=4, size=[0.006]
+            "site", name="cable", pos=self.xyz("point"), group=4, size=[0.006]
         )
         rest = scene.X_Wb[0].apply(scene.wrist_home_b[0])  # origin of {1} at home
         R_W1 = (scene.X_Wb[0].rotation * _home_turn(scene)).as_matrix()
-        anchor = rest + R_W1 @ [self.anchor_x_m, self.anchor_y_m, self.anchor_z_m]
+        anchor = rest + R_W1 @ self.xyz("anchor")
         return _hang(scene, "payload_cable", site, anchor, self.stiffness_N_per_m, self.length_m)
 
 
@@ -87,19 +83,15 @@ class RobotCable(Form):
     anchor_z_m: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
         distance, home = rng.uniform(0.5, 1.5), np.array([0.0, 0.0, omnid_design().home_height_m])
-        return cls(
-            **place,
-            stiffness_N_per_m=size,
-            length_m=float(distance - rng.uniform(*TRAVEL_M)),
-            **vector("anchor", "m", home + distance * direction(rng)),
-        )
+        length = float(distance - rng.uniform(*TRAVEL_M))
+        return {"length_m": length} | vector("anchor", "m", home + distance * direction(rng))
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         platform = scene.root.find("body", f"omnid{self.robot}/platform")
         site = platform.add("site", name="cable", pos=[0.0, 0.0, 0.0], group=4, size=[0.006])
-        anchor = scene.X_Wb[self.robot - 1].apply([self.anchor_x_m, self.anchor_y_m, self.anchor_z_m])
+        anchor = scene.X_Wb[self.robot - 1].apply(self.xyz("anchor"))
         return _hang(
             scene, f"cable{self.robot}", site, np.asarray(anchor), self.stiffness_N_per_m, self.length_m
         )

@@ -14,7 +14,8 @@ from discrepancy.causes.excluded import excluded_from
 from discrepancy.engine.explanation import Explanation
 from discrepancy.rig import Candidate, Channel, Rig, Rows
 from discrepancy.rules import LAW_SHARE
-from discrepancy.serial import catalogue, rules, shapes
+from discrepancy.rules import serial as rules
+from discrepancy.serial import catalogue, shapes
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
