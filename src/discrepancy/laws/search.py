@@ -115,10 +115,11 @@ def _proposals(
     say("try formulas")
     ranked = judged(base.fit, bench, [one.place for one in places[: rules.LAW_PLACES]])
     out = []
-    for item in _leaders(ranked, base):
+    leaders = _leaders(ranked, base)
+    for item in leaders:
         candidate = _candidate(item, bench)
         scanned = Scanned(None, candidate, item.nats, tuple(searched.rig.columns(candidate)))
-        out.append(sharpened(searched.rig, base, scanned, near=True))
+        out.append(sharpened(searched.rig, base, scanned, near=item.nats > rules.LAW_NEAR * leaders[0].nats))
     return sorted(out, key=lambda new: -new.score)
 
 

@@ -52,6 +52,10 @@ def judged(fit: Fit, bench: Bench, places: Sequence[Place]) -> list[Judged]:
         spread = lambda variable: np.concatenate([signal(t, variable) for t in trials])  # noqa: E731
         terms = terms_at(place, bench.variables, spread) + hums(peaks)
         out += _at_place(beside, bench, place, terms, signal, trials)
+    # A hum is too fast to be seen in the error of a place over time.
+    for place in bench.places if peaks else ():
+        if place not in places:
+            out += _at_place(beside, bench, place, hums(peaks), signal, trials)
     return sorted(out, key=lambda one: -one.nats)
 
 

@@ -47,3 +47,5 @@ LAW_SIZES = tuple(4.0**k for k in range(-3, 2))
 """Of an error over ten times what one value alone is known to, of which the likeliest is taken. Chosen."""
 LAW_CHUNK = 240
 """Columns that are judged at a time. Chosen: memory."""
+LAW_NEAR = 0.5
+"""Share of the likeliest formula's nats from which the numbers inside another are sharpened. Chosen: time."""

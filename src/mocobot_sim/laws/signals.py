@@ -15,7 +15,7 @@ from mocobot_sim.trial.actors import Stage
 JOINT = re.compile(
     r"(phi|phi_rate|phi_acceleration|theta|theta_rate|theta_acceleration|tau)_([1-9][0-9]*)_([123])"
 )
-PAYLOAD = re.compile(r"payload_(position|velocity|acceleration|rate|up)_([xyz])")
+PAYLOAD = re.compile(r"payload_(position|velocity|acceleration|felt|rate|up)_([xyz])")
 WORDS = "time, phi_2_1 (robot, joint), phi_rate_2_1, phi_acceleration_2_1, the same of theta, tau_2_1, payload_position_x"
 Value = Callable[[], float]
 
@@ -37,6 +37,7 @@ class PayloadMotion:
     Attributes:
         position, velocity: of the origin of {1}, in robot 1's {b} without any tilt [m], [m/s].
         acceleration: of the same, in {1} [m/s^2].
+        felt: that less gravity: what a scale would feel, in {1} [m/s^2].
         omega, alpha: angular velocity and acceleration in {1} [rad/s], [rad/s^2].
         up: unit vector against gravity in {1}.
         R: axes of {1} in the world, shape (3, 3).
@@ -78,6 +79,7 @@ class PayloadMotion:
         before, turn_before = (velocity, spin) if first else self._last
         self.acceleration = self.R.T @ (velocity - before) / self._dt
         self.alpha = self.R.T @ (spin - turn_before) / self._dt
+        self.felt = self.acceleration + 9.81 * self.up
         self._last = velocity.copy(), spin.copy()
 
 

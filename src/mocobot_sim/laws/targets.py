@@ -115,7 +115,7 @@ class Acts:
     def _on_payload(self, value: float) -> tuple[np.ndarray, np.ndarray]:
         """Force and moment at the origin of {1}, in {1}."""
         motion, kind, none = self._signals.motion, self.target.removeprefix("payload_"), np.zeros(3)
-        felt = motion.acceleration + 9.81 * motion.up
+        felt = motion.felt
         if kind == "mass":
             lever = np.cross(motion.alpha, motion.com) + np.cross(
                 motion.omega, np.cross(motion.omega, motion.com)

@@ -34,7 +34,9 @@ def places_of(robots: int) -> list[Place]:
         )  # fmt: skip
     own = tuple(payload_variable(n, a) for n in ("payload_position", "payload_velocity") for a in XYZ)
     inner = tuple(
-        payload_variable(n, a) for n in ("payload_acceleration", "payload_rate", "payload_up") for a in XYZ
+        payload_variable(n, a)
+        for n in ("payload_felt", "payload_acceleration", "payload_rate", "payload_up")
+        for a in XYZ
     )
     out += [
         _payload("force on payload", (*(f"payload_force_{a}" for a in XYZ), *(f"payload_moment_{a}" for a in XYZ)),
