@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from discrepancy import rules
 from discrepancy.engine.confirm import Alternative, confirm, not_simulated
@@ -12,6 +13,8 @@ from discrepancy.inference.search import search
 from discrepancy.laws.search import with_laws
 from discrepancy.laws.where import Located
 from discrepancy.rig import Rig
+
+When = Literal["auto", "always", "never"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +52,7 @@ def diagnose(
     *,
     closed_loop: bool = True,
     most: int = rules.MOST_CAUSES,
-    laws: bool = True,
+    laws: When = "auto",
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
     simulated: Callable[[int], object] | None = None,
@@ -60,7 +63,7 @@ def diagnose(
         rig: recordings and causes.
         closed_loop: whether to resimulate the recorded commands.
         most: largest number of causes.
-        laws: whether to look for a law where something unlisted is left.
+        laws: whether to look for laws that the catalogue lacks: where something unlisted is left, always, or never.
         jobs: parallel processes of the simulations.
         say: called with what is being done.
         simulated: called with 1 for every simulated trial.
@@ -68,8 +71,8 @@ def diagnose(
     searched = search(rig, most, progress=say)
     explanation = explain(searched)
     located: tuple[Located, ...] = ()
-    if laws and not explanation.clean:
-        lawful = with_laws(searched, most, say)
+    if laws == "always" or (laws == "auto" and not explanation.clean):
+        lawful = with_laws(searched, most, say, always=laws == "always")
         searched, located = lawful.searched, lawful.places
         explanation = explain(searched)
     rig = searched.rig

@@ -130,4 +130,6 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
                     break
         if not changed:
             break
+    for index in set(best.free) - set(rivals):  # exchanged in the last round
+        rivals[index] = [Rival(None, best.score - best.without(index).score)]
     return best, rivals

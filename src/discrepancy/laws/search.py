@@ -35,20 +35,24 @@ class Lawful:
     places: tuple[Located, ...]
 
 
-def with_laws(searched: Searched, most: int, progress: Callable[[str], object] | None = None) -> Lawful:
+def with_laws(
+    searched: Searched, most: int, progress: Callable[[str], object] | None = None, *, always: bool = False
+) -> Lawful:
     """Go on with a search until what is left is noise, or no law helps on trials that it was not fitted to.
 
     Args:
         searched: what the catalogue can do.
         most: largest number of causes, laws among them.
         progress: called with what is being done.
+        always: also where what is left is noise.
     """
     say = progress or (lambda what: None)
     bench: Bench | None = searched.rig.bench
     first: tuple[Located, ...] = ()
     rivals: dict[tuple[object, ...], list[Rival]] = {}
     for _ in range(rules.LAW_MOST if bench is not None else 0):
-        if len(searched.best.free) >= most or unlisted_nats(searched.best) < rules.UNLISTED_NATS:
+        left = always or unlisted_nats(searched.best) >= rules.UNLISTED_NATS
+        if len(searched.best.free) >= most or not left:
             break
         assert bench is not None
         starts = [searched]

@@ -21,7 +21,7 @@ class Law(Effect):
     the payload's (``payload_force_x`` in robot 1's {b}, ``payload_moment_x``, ``payload_mass``,
     ``payload_first_moment_x``, ``payload_spin_x`` in {1}). ``of`` and ``times`` are signals: ``time``, ``phi_2_1``,
     ``phi_rate_2_1``, ``phi_acceleration_2_1``, the same of ``theta``, ``tau_2_1``, ``payload_position_x`` (and
-    ``velocity``, ``acceleration``, ``felt``, ``rate``, ``up``). Everything is in SI; readings are as the sensors see them.
+    ``velocity``, ``acceleration``, ``felt``, ``rate``, ``up``). All in SI; readings are as seen.
 
     ``number``, ``second`` and ``phase_rad`` are what the function has inside: a knee, the periods a turn of a sine, a
     time constant, half the width of a play (docs/diagnosis/laws.md).

@@ -16,7 +16,7 @@ JOINT = re.compile(
     r"(phi|phi_rate|phi_acceleration|theta|theta_rate|theta_acceleration|tau)_([1-9][0-9]*)_([123])"
 )
 PAYLOAD = re.compile(r"payload_(position|velocity|acceleration|felt|rate|up)_([xyz])")
-WORDS = "time, phi_2_1 (robot, joint), phi_rate_2_1, phi_acceleration_2_1, the same of theta, tau_2_1, payload_position_x"
+WORDS = "time, phi_2_1 (robot, joint), phi_rate_2_1, phi_acceleration_2_1, same of theta, tau_2_1, payload_position_x"
 Value = Callable[[], float]
 
 
