@@ -20,6 +20,10 @@ PUSH_S = 1.0
 """How long a push lasts whose limit is told; others need more or less force."""
 EVERY_S = 5.0
 """From one push to the next of those whose limits are taken the median of."""
+FORCE = {"force_x_N", "force_y_N", "force_z_N"}
+TETHER = FORCE | {"stiffness_N_per_m"}
+NEEDED = {"slosh": {"mass_kg"}, "tether": TETHER, "payload_tether": TETHER}
+"""Parameters without whose limits an effect cannot be drawn."""
 
 Json = dict[str, Any]
 
@@ -63,7 +67,7 @@ def push_limits(rig: TeamRig, tolerance: Mapping[str, float]) -> list[Json]:
     Everything else is taken to be within its tolerance, which hardly matters to what lasts a second.
 
     Returns:
-        {trial, parameters: {name: size}} for every trial that is long enough; trials count from 1.
+        {trial, parameters: {name: size or None}} for every trial that is long enough; trials count from 1.
     """
     events = pushes(rig, tolerance)
     candidates = [*rig.candidates(), *events]
@@ -74,9 +78,13 @@ def push_limits(rig: TeamRig, tolerance: Mapping[str, float]) -> list[Json]:
         found.setdefault(event.transient.trial + 1, []).append(size)
     names = [parameter.name for parameter in events[0].parameters] if events else []
     return [
-        {"trial": trial, "parameters": dict(zip(names, np.median(values, axis=0).tolist(), strict=True))}
+        {"trial": trial, "parameters": dict(zip(names, _medians(values), strict=True))}
         for trial, values in sorted(found.items())
     ]
+
+
+def _medians(values: Sequence[Array]) -> list[float | None]:
+    return [float(m) if np.isfinite(m) else None for m in np.median(values, axis=0)]
 
 
 @dataclass(frozen=True)
@@ -115,13 +123,11 @@ class MeasuredLimits:
             moving: trials (from 1) in which a push may act.
         """
         if cause == "push":
-            return [(None, None)] if all(self.at(cause, trial=trial) for trial in moving) and moving else []
+            told = [set(self.at(cause, trial=trial)) >= FORCE for trial in moving]
+            return [(None, None)] if told and all(told) else []
         places = [(entry["robot"], entry["joint"]) for entry in self.places if entry["cause"] == cause]
         return [place for place in places if self._shows(cause, place)]
 
     def _shows(self, cause: str, place: tuple[int | None, int | None]) -> bool:
         seen = set(self.at(cause, *place))
-        needed = {"slosh": {"mass_kg"}}
-        for tether in ("tether", "payload_tether"):
-            needed[tether] = {"force_x_N", "force_y_N", "force_z_N", "stiffness_N_per_m"}
-        return needed.get(cause, set()) <= seen and bool(seen)
+        return bool(seen) and NEEDED.get(cause, set()) <= seen
