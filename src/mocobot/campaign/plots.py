@@ -10,10 +10,12 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from estimator.files import whole_file
-from mocobot.campaign.text import background_words
 from mocobot_report.blocks.palette import LIGHT
+from mocobot_report.campaign.words import background_words
 
 COLOURS = {"calibrated": LIGHT["after"], "uncalibrated": LIGHT["before"], "units": LIGHT["after"]}
+APART = 1.03
+"""By how much a background's points are moved to the right, so that bars do not hide each other."""
 MARKERS = {"calibrated": "o", "uncalibrated": "s", "units": "o"}
 
 Json = Mapping[str, Any]
@@ -80,9 +82,9 @@ def _limits(axis: Axes, summary: Json) -> None:
 
 
 def _found(axis: Axes, summary: Json) -> None:
-    for background in dict.fromkeys(entry["background"] for entry in summary["found"]):
+    for k, background in enumerate(dict.fromkeys(entry["background"] for entry in summary["found"])):
         own = [entry for entry in summary["found"] if entry["background"] == background]
-        at = np.array([entry["factor"] for entry in own])
+        at = np.array([entry["factor"] * APART**k for entry in own])
         share = np.array([entry["right"]["hits"] / entry["right"]["of"] for entry in own])
         bounds = np.array([entry["right"]["interval"] for entry in own])
         axis.errorbar(

@@ -28,8 +28,9 @@ import numpy as np
 from discrepancy.team.causes import CAUSES
 from mocobot.campaign.score import Matched, match
 from mocobot.campaign.shares import reliability, share
+from mocobot_report.campaign.words import FORMAT
 
-FORMAT, VERSION = "mocobot-campaign", 1
+VERSION = 1
 NOTHING = "nothing"
 
 Json = dict[str, Any]

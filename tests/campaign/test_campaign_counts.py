@@ -10,12 +10,14 @@ import numpy as np
 import pytest
 from scipy.stats import binomtest
 
+from estimator.errors import InputError
 from invented import named, result
 from mocobot.campaign.plan import CampaignPlan, CampaignSet
 from mocobot.campaign.plots import save_plots
 from mocobot.campaign.shares import interval, reliability
 from mocobot.campaign.summary import summarise
 from mocobot.campaign.text import COLUMNS, csv_table, format_campaign
+from mocobot_report.page import write_report
 
 
 def hidden(number: int, cause: str, factor: float) -> CampaignSet:
@@ -135,6 +137,20 @@ def test_pictures(summary, tmp_path):
     names = [path.name for path in save_plots(summary, tmp_path)]
     assert names == ["limits.png", "found.png", "confusion.png", "reliability.png"]
     assert all((tmp_path / name).read_bytes().startswith(b"\x89PNG") for name in names)
+
+
+def test_page(summary, tmp_path):
+    summary = summary | {"records": [{"key": "</script>"}]}
+    (tmp_path / "campaign.json").write_text(json.dumps(summary))
+    text = write_report(tmp_path).read_text(encoding="utf-8")
+    assert "<h1>A blind campaign</h1>" in text
+    assert "1 sets were not diagnosed" in text
+    assert text.count('class="chart"') == 2
+    assert text.count("<table") >= 6
+    del summary["limits"]
+    (tmp_path / "campaign.json").write_text(json.dumps(summary))
+    with pytest.raises(InputError, match=r"campaign\.json: not complete \('limits' is missing\)"):
+        write_report(tmp_path)
 
 
 def test_a_campaign_in_which_nothing_was_named():

@@ -11,6 +11,7 @@ import pytest
 
 from command import refused, run
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.tolerances import default_tolerances
 from estimator.errors import InputError
 from invented import LIMITS, quiet
 from mocobot.campaign.draw import draw_at
@@ -19,6 +20,7 @@ from mocobot.campaign.limits import MeasuredLimits
 from mocobot.campaign.plan import CampaignPlan
 from mocobot.campaign.run import run_campaign
 from mocobot.campaign.store import CampaignStore
+from mocobot.campaign.summary import summarise
 from mocobot.commands import campaign as command
 
 PLAN = CampaignPlan(backgrounds=("calibrated",), causes=("sea_bias", "drag"), teams=2, sets=5)
@@ -52,6 +54,28 @@ def test_effects_are_as_large_as_the_limits_of_their_place_say():
     assert abs(effect.bias_Nm) == pytest.approx(0.12)
     assert limits.where("push", [1]) == []  # along z nothing shows it
     assert limits.where("slosh", [1]) == []
+
+
+@pytest.mark.parametrize("cause", CAUSES)
+def test_every_cause_can_be_hidden_by_the_limits_of_its_own_parameters(cause):
+    """Names in a diagnosis' limits are those that the simulator's effect takes, or that make them up."""
+    place = {
+        "robot": 2 if CAUSES[cause].per != "payload" else None,
+        "joint": 1 if CAUSES[cause].per == "joint" else None,
+    }
+    sizes = dict.fromkeys(CAUSES[cause].parameters, 1e-4)
+    limits = MeasuredLimits(
+        [{"cause": cause, **place, "parameters": sizes}],
+        [{"trial": 1, "parameters": sizes}] if cause == "push" else [],
+    )
+    ground = Ground(3, np.zeros(3), [(1, 5.0, 30.0)], limits)
+    ((robot, joint),) = limits.where(cause, [1])
+    assert (robot, joint) == (place["robot"], place["joint"])
+    effect = draw_at(cause, 2.0, robot, joint, ground, np.random.default_rng(1))
+    assert effect.cause == cause
+    if "tether" not in cause and cause not in ("push", "slosh", "link_length"):
+        drawn = [getattr(effect, name) for name in sizes]
+        assert np.linalg.norm(drawn) == pytest.approx(2e-4)
 
 
 def test_an_interrupted_campaign_goes_on_with_the_same_bits(tmp_path):
@@ -162,3 +186,29 @@ def test_a_folder_of_something_else_is_refused(tmp_path, capsys):
     (tmp_path / "notes.txt").write_text("mine")
     assert "is not a campaign" in refused(capsys, "campaign", "--out", tmp_path)
     assert "is not a campaign" in refused(capsys, "campaign", "--out", tmp_path, "--force")
+
+
+@pytest.mark.slow
+def test_what_is_hidden_is_found_and_a_clean_team_is_clean(tmp_path):
+    """From end to end: a team within its tolerances, as it is, and with a torque zero at eight times its limit."""
+    few = ("sea_bias", "sea_scale", "phi_zero", "push")  # of a short catalogue, to save time
+    plan = CampaignPlan(
+        tolerances={cause: default_tolerances()[cause] for cause in few},
+        exclude=tuple(cause for cause in CAUSES if cause not in few),
+        payload="b", trials=("random", "periodic"), vias=8, duration_s=10.0, backgrounds=("calibrated",),
+        causes=("sea_bias",), sizes=(8.0,), teams=1, sets=1,
+    )  # fmt: skip
+    clean, hidden = run_campaign(plan, CampaignStore(tmp_path / "out", CONFIG))
+    assert clean["error"] is hidden["error"] is None
+    assert clean["verdict"]["causes"] == clean["truth"]["effects"] == []
+    limits = MeasuredLimits(clean["limits"]["places"], clean["limits"]["pushes"])
+    assert len(limits.where("sea_bias", [1])) == 9
+    assert set(limits.at("push", trial=1)) == set(limits.at("push", trial=2))
+    assert 0.03 < limits.at("push", trial=1)["force_x_N"] < 1.0
+    (effect,) = hidden["truth"]["effects"]
+    limit = limits.at("sea_bias", effect["robot"], effect["joint"])["bias_Nm"]
+    assert abs(effect["parameters"]["bias_Nm"]) == pytest.approx(8.0 * limit)
+    (record,) = [r for r in summarise([clean, hidden])["records"] if r["cause"]]
+    assert record["right"]
+    assert record["extras"] == []
+    assert record["error"] < 0.2
