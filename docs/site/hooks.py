@@ -1,7 +1,7 @@
 """What MkDocs needs besides docs/: README and the models' pages at their places, the reference, and links that hold.
 
-Pages link as they do in the repository, so that they work there, too. Where a link leads out of the pages (to a source file, a
-folder), its text stays.
+Pages link as they do in the repository, so that they work there, too. Where a link leads out of the pages (to a source
+file, a folder), its text stays.
 """
 
 from __future__ import annotations
@@ -20,14 +20,15 @@ LINK = re.compile(r"(!?)\[((?:[^\[\]]|\[[^\]]*\])*)\]\(([^)\s]+)\)")
 FENCE = re.compile(r"(^```.*?^```)", re.DOTALL | re.MULTILINE)
 REFERENCE = {
     "Recordings, teams and trials": (
-        "mocobot.api.simulation", "estimator.recording", "mocobot_sim.trial", "mocobot_sim.scene", "mocobot_sim.effects",
+        "mocobot.api.simulation", "estimator.recording", "mocobot_sim.trial", "mocobot_sim.scene",
+        "mocobot_sim.effects",
     ),
     "Estimate, calibrate, compare": ("mocobot.api.estimation", "mocobot.api.calibration", "mocobot.api.comparison"),
     "Inspect and diagnose": ("mocobot.api.inspection", "mocobot.api.diagnosis"),
     "Convert and replay": ("mocobot.api.conversion", "mocobot.api.replay"),
     "Errors": ("estimator.errors", "mocobot_sim.errors"),
 }  # fmt: skip
-"""Pages of the reference, and where the modules are whose public names they show; those of mocobot itself have their own."""
+"""Pages of the reference, and where the modules are whose public names they show; mocobot's own modules have theirs."""
 NAV = {
     "Start": ["index.md", "notation.md", "model.md", "models"],
     "Simulate": ["simulation.md", "base.md", "effects.md"],
