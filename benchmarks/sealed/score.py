@@ -10,8 +10,6 @@ import numpy as np
 
 from discrepancy.team.causes import CAUSES
 from hidden.score import PARALLEL
-from sealed.forms.base import Form
-from sealed.registry import FORMS
 
 Item = Mapping[str, Any]
 HEALTHY = ("consistent", "miscalibrated")
@@ -186,14 +184,3 @@ def _errors(item: Item, effect: Item) -> tuple[float | None, tuple[float, ...]]:
 def _alike(names: Sequence[str]) -> bool:
     """Whether parameters have one unit, so that small ones do not count beside large ones."""
     return len({name.rsplit("_", 1)[-1] for name in names}) == 1
-
-
-def form_of(effect: Item) -> str:
-    """Name under which an effect is counted."""
-    return effect["cause"]
-
-
-def is_other_form(effect: Item) -> bool:
-    """Whether it has another form than the catalogue's."""
-    form: type[Form] | None = FORMS.get(effect["cause"])
-    return form is not None and form.answer is not None
