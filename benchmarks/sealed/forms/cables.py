@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mocobot.campaign.draw import REACH_M
+from mocobot_sim.effects.spring import add_site, tie
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from sealed.forms.base import Form, Place, direction, near, vector
@@ -16,18 +17,6 @@ from sealed.ground import Ground
 
 TRAVEL_M = (0.01, 0.05)
 """How far a cable is stretched at home: the payload moves by as much, so it goes slack at times."""
-
-
-def _hang(
-    scene: TeamScene, name: str, site: Any, anchor_W: np.ndarray, stiffness: float, length: float
-) -> TeamScene:
-    fixed = scene.root.worldbody.add("site", name=name, pos=anchor_W.tolist(), group=4, size=[0.006])
-    tendon = scene.root.tendon.add(
-        "spatial", name=name, stiffness=stiffness, springlength=[0.0, length], width=0.002
-    )
-    tendon.add("site", site=site)
-    tendon.add("site", site=fixed)
-    return scene
 
 
 @dataclass(frozen=True)
@@ -55,13 +44,12 @@ class PayloadCable(Form):
         return {"length_m": length} | vector("point", "m", point) | vector("anchor", "m", anchor)
 
     def _edit(self, scene: TeamScene) -> TeamScene:
-        site = scene.root.find("body", "omnid1/payload/payload").add(
-            "site", name="cable", pos=self.xyz("point"), group=4, size=[0.006]
-        )
+        site = add_site(scene.root.find("body", "omnid1/payload/payload"), "cable", self.xyz("point"))
         rest = scene.X_Wb[0].apply(scene.wrist_home_b[0])  # origin of {1} at home
         R_W1 = (scene.X_Wb[0].rotation * _home_turn(scene)).as_matrix()
         anchor = rest + R_W1 @ self.xyz("anchor")
-        return _hang(scene, "payload_cable", site, anchor, self.stiffness_N_per_m, self.length_m)
+        tie(scene, "payload_cable", site, anchor, self.stiffness_N_per_m, self.length_m)
+        return scene
 
 
 def _home_turn(scene: TeamScene) -> Rotation:
@@ -90,8 +78,7 @@ class RobotCable(Form):
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         platform = scene.root.find("body", f"omnid{self.robot}/platform")
-        site = platform.add("site", name="cable", pos=[0.0, 0.0, 0.0], group=4, size=[0.006])
+        site = add_site(platform, "cable", [0.0, 0.0, 0.0])
         anchor = scene.X_Wb[self.robot - 1].apply(self.xyz("anchor"))
-        return _hang(
-            scene, f"cable{self.robot}", site, np.asarray(anchor), self.stiffness_N_per_m, self.length_m
-        )
+        tie(scene, f"cable{self.robot}", site, anchor, self.stiffness_N_per_m, self.length_m)
+        return scene

@@ -34,12 +34,14 @@ class Misread(Form):
         error = self.error_of_trial()
 
         def change(readings: RobotReadings, seen: np.ndarray, time: float) -> None:
-            value = getattr(readings, self.channel)(seen, self.joint)
-            off = error(readings, seen, value, time)
             if self.channel == "tau":
-                readings.set_tau(seen, self.joint, value + off)
-            else:
-                getattr(readings, f"add_{self.channel}")(seen, self.joint, off)
+                tau = readings.tau(seen, self.joint)
+                readings.set_tau(seen, self.joint, tau + error(readings, seen, tau, time))
+                return
+            phi = self.channel == "phi"
+            angle = (readings.phi if phi else readings.theta)(seen, self.joint)
+            add = readings.add_phi if phi else readings.add_theta
+            add(seen, self.joint, error(readings, seen, angle, time))
 
         return [Misreading(self.robot, change)]
 
