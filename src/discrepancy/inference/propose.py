@@ -32,7 +32,7 @@ def proposals(rig: Rig, base: Hypothesis, *, events: bool = True) -> list[Hypoth
     found = []
     for item in _chosen(ranked, rules.LEADERS):
         near = item.score > ranked[0].score - rules.CLOSE_NATS
-        found.append(_beside(rig, base, base.problem, item, near=near))
+        found.append(sharpened(rig, base, item, near=near))
     likely: dict[tuple[object, ...], Hypothesis] = {}
     for new in sorted([*found, *_with_kinds_narrow(rig, base)], key=lambda new: -new.score):
         last = new.causes[-1]
@@ -113,12 +113,23 @@ def _with_kinds_narrow(rig: Rig, base: Hypothesis) -> list[Hypothesis]:
         if index not in base.free and not narrow.has_tolerance(index) and rig.steps(candidate):
             item = _in_best_shape(rig, fit, Scanned(index, candidate, score_of(fit, index)))
             if item.score > rules.LOOKED_AT_NATS:
-                found.append(_beside(rig, base, narrow, item, near=True))
+                found.append(sharpened(rig, base, item, near=True, start=narrow))
     return found
 
 
-def _beside(rig: Rig, base: Hypothesis, start: Problem, item: Scanned, *, near: bool) -> Hypothesis:
-    """A candidate beside what is there; spreads and powers are learnt from those of a start."""
+def sharpened(
+    rig: Rig, base: Hypothesis, item: Scanned, *, near: bool, start: Problem | None = None
+) -> Hypothesis:
+    """A candidate beside what is there, in its best shape where it is near the likeliest, and with what it opens.
+
+    Args:
+        rig: for columns of other shapes.
+        base: what is there already.
+        item: the candidate.
+        near: whether it is near the likeliest.
+        start: the problem with the spreads and powers from which those with the candidate are learnt; None for base's.
+    """
+    start = base.problem if start is None else start
     shaped = _best_shape(rig, start, base.free, item) if near else item.candidate
     problem, index = _with(rig, start, shaped, item)
     new = Hypothesis.of(problem, [*base.free, index], base.allowed)

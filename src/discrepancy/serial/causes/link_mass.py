@@ -1,6 +1,6 @@
 """A link is heavier or lighter than modelled."""
 
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause
 from discrepancy.serial.mechanics.regressor import body_regressor, inertial_parameters
 

@@ -1,4 +1,4 @@
-"""Constants that can change a verdict on a serial robot: *Derived*, *Measured* or *Chosen* (``discrepancy.rules``)."""
+"""A serial robot: its logs, rows, noise and causes; origins are named as in ``discrepancy.rules``."""
 
 MOST_CAUSES = 60
 """A nominal model that says nothing of friction lacks four or five causes a joint. Chosen: no limit for seven axes."""
