@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,8 +17,21 @@ from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
 
 
-def proposals(rig: Rig, base: Hypothesis, *, events: bool = True) -> list[Hypothesis]:
-    """Hypotheses with one cause more, the likeliest first; the added one is the last of its ``free``.
+@dataclass(frozen=True, eq=False)
+class Proposed:
+    """Hypotheses with one cause more.
+
+    Attributes:
+        best: the likeliest; the added cause is the last of its ``free``. None where none is possible.
+        scores: what is added, in its shape, and how likely that is [nats], the likeliest first.
+    """
+
+    best: Hypothesis | None
+    scores: tuple[tuple[Candidate, float], ...]
+
+
+def proposals(rig: Rig, base: Hypothesis, *, events: bool = True) -> Proposed:
+    """Hypotheses with one cause more.
 
     Args:
         rig: for columns of other shapes.
@@ -29,13 +42,15 @@ def proposals(rig: Rig, base: Hypothesis, *, events: bool = True) -> list[Hypoth
     ranked = [_in_best_shape(rig, fit, item) for item in _with_kinds_held(base)]
     ranked += _events(rig, fit) if events else []
     ranked.sort(key=lambda item: -item.score)
-    likely = []
+    best, scores = None, []  # each has its own columns: all together would be gigabytes
     for item in _chosen(ranked, rules.LEADERS):
         near = item.score > ranked[0].score - rules.CLOSE_NATS
         new = _sharpened(rig, base, item, near=near)
         if new.possible(rig, new.free[-1]) and not imitated(rig, base, new.causes[-1]):
-            likely.append(new)
-    return sorted(likely, key=lambda new: -new.score)
+            scores.append((new.causes[-1], new.score))
+            if best is None or new.score > best.score:
+                best = new
+    return Proposed(best, tuple(sorted(scores, key=lambda one: -one[1])))
 
 
 def _with_kinds_held(base: Hypothesis) -> list[Scanned]:
