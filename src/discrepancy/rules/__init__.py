@@ -9,4 +9,5 @@ The rules of serial robots have names of their own: ``from discrepancy.rules imp
 
 from discrepancy.rules.axis import *  # noqa: F403
 from discrepancy.rules.inference import *  # noqa: F403
+from discrepancy.rules.laws import *  # noqa: F403
 from discrepancy.rules.team import *  # noqa: F403

@@ -13,6 +13,7 @@ class LinkCom(Cause):
     title = "centre of mass of {link}"
     family = "inertia"
     part = "link"
+    built = True
     parameters = ("x_m", "y_m", "z_m")
     scales = (0.01,) * 3
     separate = "The link balanced on an edge."

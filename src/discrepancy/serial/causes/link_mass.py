@@ -11,6 +11,7 @@ class LinkMass(Cause):
     title = "mass of {link}"
     family = "inertia"
     part = "link"
+    built = True
     parameters = ("excess_kg",)
     scales = (1.0,)
     separate = "A scale; or a known weight, if torques may be off in scale."
