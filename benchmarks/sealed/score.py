@@ -8,10 +8,8 @@ from typing import Any
 
 from discrepancy.team.causes import CAUSES
 from mocobot.campaign.score import Score, family_of, match
-from sealed.forms.base import Form
-from sealed.registry import FORMS
 
-__all__ = ["HEALTHY", "Score", "Scored", "family_of", "form_of", "is_other_form", "score"]
+__all__ = ["HEALTHY", "Score", "Scored", "family_of", "score"]
 
 Item = Mapping[str, Any]
 HEALTHY = ("consistent", "miscalibrated")
@@ -69,12 +67,3 @@ def _factors(request: Item, effects: Sequence[Item]) -> list[float]:
     return [request["factors"][0]] * len(effects)  # pushes: one factor for all
 
 
-def form_of(effect: Item) -> str:
-    """Name under which an effect is counted."""
-    return effect["cause"]
-
-
-def is_other_form(effect: Item) -> bool:
-    """Whether it has another form than the catalogue's."""
-    form: type[Form] | None = FORMS.get(effect["cause"])
-    return form is not None and form.answer is not None

@@ -179,9 +179,13 @@ def _swaps(rig: Rig, explanation: Explanation) -> tuple[Problem, list[_Swap]]:
     for found in explanation.found:
         for rival, gap in found.rivals:
             index = problem.index_of(rival)
-            if index is None or index in free or gap > rules.AMBIGUOUS_NATS or rival.transient:
+            if index in free or gap > rules.AMBIGUOUS_NATS or rival.transient:
                 continue
-            problem = problem.with_columns(index, rival, rig.columns(rival))
+            if index is None:  # a law: those are not listed beforehand
+                index = len(problem.candidates)
+                problem = problem.extended(rival, rig.columns(rival))
+            else:
+                problem = problem.with_columns(index, rival, rig.columns(rival))
             swapped = tuple(index if i == found.index else i for i in free)
             swaps.append(_Swap(found, rival, index, gap, swapped))
     return problem, swaps

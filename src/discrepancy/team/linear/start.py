@@ -143,12 +143,10 @@ def gauss_newton(linear: Sequence[TrialLinear], whitening: Sequence[Whitening]) 
     ]
 
 
-def noise_rows(
-    trial: TrialLinear, noise: Noise, rng: np.random.Generator, draws: int = rules.NOISE_DRAWS
-) -> tuple[Array, Array]:
+def noise_rows(trial: TrialLinear, noise: Noise, rng: np.random.Generator) -> tuple[Array, Array]:
     """What the sensors' errors alone would leave: residuals (draws, n, C), and the torques' own (draws, n, N, 3)."""
     out, torques = [], []
-    for errors in noise.draws(trial.signals, rng, draws):
+    for errors in noise.draws(trial.signals, rng, rules.NOISE_DRAWS):
         out.append(
             sum(
                 trial.of_signals(i, errors.phi[:, i], errors.theta[:, i], errors.tau[:, i])

@@ -142,7 +142,7 @@ class TrialLinear:
     def _of_wrong_motion(self, robot: int, wrist: Array) -> Array:
         """Wrench balance, shape (Q, 6), of a wrist that does not move with the payload: by ``wrist`` [m], in {b_i}."""
         rates = np.concatenate(with_rates(wrist, self.signals.rate_hz)[1:], axis=1)
-        return np.asarray((self._by_wrist[robot] @ rates[..., None])[..., 0])
+        return np.asarray((self.by_wrist[robot] @ rates[..., None])[..., 0])
 
     @cached_property
     def by_clocks(self) -> Array:
@@ -164,7 +164,7 @@ class TrialLinear:
         return np.stack(columns, axis=2) if columns else np.zeros((*self.residual.shape, 0))
 
     @cached_property
-    def _by_wrist(self) -> Array:
+    def by_wrist(self) -> Array:
         """Derivative of the balance by velocity and acceleration of a wrist in {b_i}, shape (N, Q, 6, 6).
 
         Only by the payload's motion, which is taken from all wrists; the arm really moves so.
