@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from discrepancy.engine.explanation import Explanation
+from discrepancy.engine.gain import fit_to_simulate
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.report import report
-from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Candidate
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
@@ -26,8 +27,11 @@ from discrepancy.team.closed_loop import (
 )
 from discrepancy.team.laws.effects import effects_of
 from discrepancy.team.laws.rows import LawfulRows
+from discrepancy.team.linear.origin import origin_of, places_of
 from discrepancy.team.undecidable import statements
+from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
+from estimator.recording.model import Recording
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.extended.extended import write_extended
 
@@ -62,9 +66,27 @@ class TeamRig(LawfulRows):
     def can_resimulate(self) -> str | None:
         return next(filter(None, map(why_not, self.recordings)), None)
 
+    def carried(self, candidate: Candidate) -> bool:
+        return origin_of(candidate, self.origin) is not None
+
+    def _robots(self, trial: int, healthy: Sequence[tuple[Candidate, Array]]) -> Recording:
+        """The recording of a trial with its robots off by as much as they are found beside the causes."""
+        recording = self.recordings[trial]
+        units = recording.metadata.units
+        if not healthy or units is None:
+            return recording
+        x = units.x.copy()
+        for candidate, values in healthy:
+            place = places_of(candidate)
+            if place is not None:
+                x[place] += self.beyond(candidate, values)
+        known = replace(recording.metadata, units=ArmUnit(units.design, x))
+        return replace(recording, metadata=known)
+
     def simulation(
-        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
-    ) -> Callable[[], dict[str, Array] | None]:
+        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]],
+        healthy: Sequence[tuple[Candidate, Array]] = (),
+    ) -> Callable[[], dict[str, Array] | None]:  # fmt: skip
         """What resimulates one trial's commands, with the unknowns moved and causes in the simulation.
 
         It returns recorded minus simulated ``phi``, ``theta`` [rad] and ``tau`` [N m], shape (Q, N, 3), or None if
@@ -79,7 +101,7 @@ class TeamRig(LawfulRows):
             effects += own
         return partial(
             resimulation_errors,
-            self.recordings[trial],
+            self._robots(trial, healthy),
             linear.shared.moved(shared),
             linear.bases.moved(local),
             effects,
@@ -100,10 +122,10 @@ class TeamRig(LawfulRows):
         effects: list[Effect] = []
         for found in explanation.found:
             effects += named_effects(found.candidate, self.effects(found.candidate, found.values))
-        fit = Fit.of(explanation.problem, explanation.fit.free, background=False)
+        fit, healthy = fit_to_simulate(self, explanation.problem, explanation.fit.free)
         shared = self.linear[0].shared.moved(-fit.shared)
         bases = self.linear[0].bases.moved(-fit.local(0)[: self.local_unknowns])
-        scene = team_of(shared, bases, effects, *posture(self.recordings[0]))
+        scene = team_of(shared, bases, effects, *posture(self._robots(0, healthy)))
         causes = [found.candidate.label for found in explanation.found]
         write_extended(scene, effects, folder, {"recordings": list(self.trials), "causes": causes})
 
