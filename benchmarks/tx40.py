@@ -19,7 +19,7 @@ import numpy as np
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.diagnosis import diagnose_rig
 from discrepancy.serial.errors import with_errors
 from discrepancy.serial.model import SerialModel, load_model

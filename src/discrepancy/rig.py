@@ -67,6 +67,7 @@ class Candidate:
         transient: when it acts, of an event; None of what lasts.
         where: the place in words, of what sits at no robot and no joint.
         title: the cause in words (``causes.base.Cause``).
+        among: of how many of its kind it is one, where the problem does not list them; 0 where it does.
     """
 
     cause: str
@@ -78,6 +79,7 @@ class Candidate:
     transient: Transient | None = None
     where: str = "payload"
     title: str = ""
+    among: int = 0
 
     def acts_in(self, trial: int) -> bool:
         """Whether it can act in a trial (index from 0)."""
@@ -168,12 +170,7 @@ class Channel:
 
 
 class Rig(ABC):
-    """A machine and its simulation, seen by the diagnosis.
-
-    What a machine may lack (unknowns of every trial, transients, shapes) has defaults that say so.
-    """
-
-    # Recordings.
+    """A machine and its simulation, seen by the diagnosis; what a machine may lack has defaults that say so."""
 
     @property
     @abstractmethod
@@ -269,7 +266,10 @@ class Rig(ABC):
         """The same rig linear around where a fit (``engine.hypothesis.Hypothesis``) finds it; None where it is near."""
         return None
 
-    # The simulator.
+    @property
+    def bench(self) -> Any:
+        """What the search for laws needs (``laws.bench.Bench``); None where a rig has no such."""
+        return None
 
     def can_resimulate(self) -> str | None:
         """Why the recordings cannot be resimulated, or None."""

@@ -25,6 +25,7 @@ COMMANDS = {
     "inspect": options.Inspect,
     "report": options.Report,
     "compare": options.Compare,
+    "campaign": options.Campaign,
     "simulate": options.Simulate,
     "effects": options.Effects,
 }

@@ -14,10 +14,9 @@ from discrepancy.serial.diagnosis import diagnose_serial
 from discrepancy.serial.mechanics.nominal import inverse_torque
 from discrepancy.serial.model import SerialModel, load_model
 from estimator.errors import InputError
-from estimator.files import write_json
 from mocobot.api.diagnosis import Diagnosis
+from mocobot.api.look import Look
 from mocobot.api.public import public
-from mocobot_inspect.findings import Finding
 from mocobot_inspect.joints import inspection
 from mocobot_inspect.joints.findings import joint_findings
 from mocobot_inspect.joints.json import joint_inspection_dict
@@ -106,41 +105,15 @@ def map_of(model: SerialModel, log: Path, given: Path | str | None) -> JointMap:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class JointInspection(inspection.JointInspection):
+class JointInspection(Look, inspection.JointInspection):
     """Stamps, columns, signs, order, units and delays of a joint log, judged by the robot's model: printable.
 
-    The attributes are those of ``mocobot_inspect.joints.inspection.JointInspection``.
+    The attributes are those of ``mocobot_inspect.joints.inspection.JointInspection``, the JSON's keys those of
+    ``mocobot_inspect.joints.json``.
     """
 
-    @property
-    def findings(self) -> list[Finding]:
-        """All that is wrong: ``topic`` and ``sentence`` each."""
-        return joint_findings(self)
-
-    @property
-    def ready_for(self) -> str:
-        """What the log can be used for, one line."""
-        return joint_ready_line(self)
-
-    def __str__(self) -> str:
-        """The text report."""
-        return format_joint_inspection(self)
-
-    def __repr__(self) -> str:
-        """One line."""
-        return f"<JointInspection of {self.name}: {self.ready_for}>"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Strict JSON with units in the keys; see ``mocobot_inspect.joints.json`` for the keys."""
-        return joint_inspection_dict(self)
-
-    def write(self, path: Path | str) -> None:
-        """Write it as JSON.
-
-        Raises:
-            InputError: the file cannot be written.
-        """
-        write_json(Path(path), self.to_dict())
+    _findings, _ready_line = joint_findings, joint_ready_line
+    _text, _dict = format_joint_inspection, joint_inspection_dict
 
 
 def inspect(

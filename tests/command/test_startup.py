@@ -28,6 +28,7 @@ REFUSED = {
     "report": "report none",
     "compare": "compare none.json none.json",
     "simulate": "simulate --payload z --out rec.parquet",
+    "campaign": "campaign --payload z --out blind",
 }
 """A mistake of every command that refuses something at once."""
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from discrepancy import rules
 from discrepancy.engine.confirm import Alternative, confirm, not_simulated
@@ -9,7 +10,11 @@ from discrepancy.engine.explanation import Explanation, Found, explain
 from discrepancy.engine.gain import Gain, responses
 from discrepancy.engine.verdict import Verdict, verdict_of
 from discrepancy.inference.search import search
+from discrepancy.laws.search import with_laws
+from discrepancy.laws.where import Located
 from discrepancy.rig import Rig
+
+When = Literal["auto", "always", "never"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +29,7 @@ class Diagnosis:
         gain: closed-loop responses without and with the causes, or None.
         not_simulated: why there is no closed-loop comparison, or None.
         notes: sentences about what the data could not decide or validate.
+        located: where something unlisted was looked for, the likeliest place first; empty where nothing unlisted is.
     """
 
     rig: Rig
@@ -33,6 +39,7 @@ class Diagnosis:
     gain: Gain | None
     not_simulated: str | None
     notes: tuple[str, ...]
+    located: tuple[Located, ...] = ()
 
     @property
     def causes(self) -> tuple[Found, ...]:
@@ -45,6 +52,7 @@ def diagnose(
     *,
     closed_loop: bool = True,
     most: int = rules.MOST_CAUSES,
+    laws: When = "auto",
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
     simulated: Callable[[int], object] | None = None,
@@ -55,12 +63,19 @@ def diagnose(
         rig: recordings and causes.
         closed_loop: whether to resimulate the recorded commands.
         most: largest number of causes.
+        laws: whether to look for laws that the catalogue lacks: where something unlisted is left, always, or never.
         jobs: parallel processes of the simulations.
         say: called with what is being done.
         simulated: called with 1 for every simulated trial.
     """
     searched = search(rig, most, progress=say)
-    rig, explanation = searched.rig, explain(searched)
+    explanation = explain(searched)
+    located: tuple[Located, ...] = ()
+    if laws == "always" or (laws == "auto" and not explanation.clean):
+        lawful = with_laws(searched, most, say, always=laws == "always")
+        searched, located = lawful.searched, lawful.places
+        explanation = explain(searched)
+    rig = searched.rig
     notes: list[str] = []
     why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"
     alternatives = tuple(not_simulated(found) for found in explanation.found)
@@ -85,4 +100,4 @@ def diagnose(
         )
     if len(rig.trials) == 1:
         notes.append("One trial only: nothing could be validated on data that was not used for the fit.")
-    return Diagnosis(rig, verdict, explanation, alternatives, gain, why_not, tuple(notes))
+    return Diagnosis(rig, verdict, explanation, alternatives, gain, why_not, tuple(notes), located)

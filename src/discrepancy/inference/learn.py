@@ -127,8 +127,8 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
     for one, gram in zip(grams, filled, strict=True):
         np.take(gram[both], both, axis=1, out=one, mode="clip")
     parts = _Parts(
-        grams.reshape(len(grams), -1), np.concatenate(sizes).astype(float), group[used], np.array(least), np.array(most),
-        np.array(weight), np.array(own, dtype=bool),
+        grams.reshape(len(grams), -1), np.concatenate(sizes).astype(float), group[used], np.array(least),
+        np.array(most), np.array(weight), np.array(own, dtype=bool),
     )  # fmt: skip
     return names, parts
 

@@ -15,6 +15,8 @@ def log_prior_odds(problem: Problem, candidate: Candidate) -> float:
     """
     if candidate.transient is not None:
         places = rules.INTERVALS
+    elif candidate.among:
+        places = candidate.among
     else:
         places = sum(
             other.cause == candidate.cause and other.transient is None for other in problem.candidates

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -42,15 +42,25 @@ def proposals(rig: Rig, base: Hypothesis, *, events: bool = True) -> Proposed:
     ranked = [_in_best_shape(rig, fit, item) for item in _with_kinds_held(base)]
     ranked += _events(rig, fit) if events else []
     ranked.sort(key=lambda item: -item.score)
-    best, scores = None, []  # each has its own columns: all together would be gigabytes
-    for item in _chosen(ranked, rules.LEADERS):
-        near = item.score > ranked[0].score - rules.CLOSE_NATS
-        new = _sharpened(rig, base, item, near=near)
-        if new.possible(rig, new.free[-1]) and not imitated(rig, base, new.causes[-1]):
-            scores.append((new.causes[-1], new.score))
+    best: Hypothesis | None = None  # each has its own columns: all together would be gigabytes
+    scores: dict[tuple[object, ...], tuple[Candidate, float]] = {}
+    for new in _hypotheses(rig, base, ranked):
+        last = new.causes[-1]
+        which = (last.key, last.transient)
+        if which in scores and scores[which][1] >= new.score:
+            continue
+        if new.possible(rig, new.free[-1]) and not imitated(rig, base, last):
+            scores[which] = last, new.score
             if best is None or new.score > best.score:
                 best = new
-    return Proposed(best, tuple(sorted(scores, key=lambda one: -one[1])))
+    return Proposed(best, tuple(sorted(scores.values(), key=lambda one: -one[1])))
+
+
+def _hypotheses(rig: Rig, base: Hypothesis, ranked: Sequence[Scanned]) -> Iterator[Hypothesis]:
+    """One after the other, each with one cause more in its best shape."""
+    for item in _chosen(ranked, rules.LEADERS):
+        yield sharpened(rig, base, item, near=item.score > ranked[0].score - rules.CLOSE_NATS)
+    yield from _with_kinds_narrow(rig, base)
 
 
 def _with_kinds_held(base: Hypothesis) -> list[Scanned]:
@@ -110,12 +120,59 @@ def _events(rig: Rig, fit: Fit) -> list[Scanned]:
     return sorted(found, key=lambda item: -item.score)[: rules.WORST_EVENTS]
 
 
-def _sharpened(rig: Rig, base: Hypothesis, item: Scanned, *, near: bool) -> Hypothesis:
-    """A candidate beside what is there, in its best shape where it is near the likeliest, and with what it opens."""
-    shaped = _best_shape(rig, base, item) if near else item.candidate
-    problem, index = _with(rig, base.problem, shaped, item)
+def _with_kinds_narrow(rig: Rig, base: Hypothesis) -> list[Hypothesis]:
+    """What has a shape that the data determine, found with every kind within its tolerance, if any scatters.
+
+    Kinds that scatter to explain a cause take its shape from it: a payload is then whatever masses leave of it.
+    """
+    wide = base.problem.spread > rules.HELD_FACTOR
+    if not wide.any():
+        return []
+    narrow = replace(base.problem, spread=np.where(wide, 1.0, base.problem.spread))
+    fit, found = Fit.of(narrow, base.free), []
+    for index, candidate in enumerate(narrow.candidates):
+        if index not in base.free and not narrow.has_tolerance(index) and rig.steps(candidate):
+            item = _in_best_shape(rig, fit, Scanned(index, candidate, score_of(fit, index)))
+            if item.score > rules.LOOKED_AT_NATS:
+                found.append(sharpened(rig, base, item, near=True, start=narrow))
+    return found
+
+
+def sharpened(
+    rig: Rig, base: Hypothesis, item: Scanned, *, near: bool, start: Problem | None = None
+) -> Hypothesis:
+    """A candidate beside what is there, in its best shape where it is near the likeliest, and with what it opens.
+
+    Args:
+        rig: for columns of other shapes.
+        base: what is there already.
+        item: the candidate.
+        near: whether it is near the likeliest.
+        start: the problem with the spreads and powers from which those with the candidate are learnt; None for base's.
+    """
+    start = base.problem if start is None else start
+    shaped = _best_shape(rig, start, base.free, item) if near else item.candidate
+    problem, index = _with(rig, start, shaped, item)
     new = Hypothesis.of(problem, [*base.free, index], base.allowed)
+    if near and not shaped.transient:
+        new = _settled_shape(rig, new)
+        problem, shaped = new.problem, new.causes[-1]
     return _beyond_tolerance(base, problem, new) if shaped.transient else _opened(rig, base, problem, new)
+
+
+def _settled_shape(rig: Rig, new: Hypothesis) -> Hypothesis:
+    """The last cause in the shape that suits the noise left with it; without it, all misfit counted as noise."""
+    index = new.free[-1]
+    for _ in range(rules.POLISH_ROUNDS if rig.steps(new.causes[-1]) else 0):
+        values, candidate = new.fit.part(index)[0], new.causes[-1]
+        without = Fit.of(new.problem, new.free[:-1], fixed=(index, np.zeros(len(values))))
+        moved = nearest_shape(rig, without, candidate, values * candidate.units)
+        problem = new.problem.with_columns(index, moved, rig.columns(moved))
+        other = Hypothesis.of(problem, new.free, new.allowed)
+        if other.score <= new.score:
+            break
+        new = other
+    return new
 
 
 def _beyond_tolerance(base: Hypothesis, problem: Problem, new: Hypothesis) -> Hypothesis:
@@ -160,12 +217,12 @@ def _with(rig: Rig, problem: Problem, shaped: Candidate, item: Scanned) -> tuple
     return problem.with_columns(item.index, shaped, rig.columns(shaped)), item.index
 
 
-def _best_shape(rig: Rig, base: Hypothesis, item: Scanned) -> Candidate:
-    """The shape that the data make likeliest, ever finer around the best."""
-    problem, fit, spike = base.problem, base.fit, 0.0
+def _best_shape(rig: Rig, problem: Problem, free: Sequence[int], item: Scanned) -> Candidate:
+    """The shape that the data make likeliest beside what is there, ever finer around the best."""
+    fit, spike = Fit.of(problem, free), 0.0
     if item.index is not None and problem.has_tolerance(item.index):
         # What it would add to a model without it: no need to build the problem anew for every shape.
-        fit = Fit.of(problem, base.free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
+        fit = Fit.of(problem, free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
         spike = float(problem.spread[problem.columns_of(item.index)][0])
     start = item.candidate
     if start.transient and start.parameters[0].tolerance:

@@ -58,8 +58,13 @@ def search(
     say = progress or (lambda what: None)
     rig, nothing = _based(rig, say)
     say("scan")
-    best = nothing
-    rivals: dict[int, list[Rival]] = {}
+    return continued(Searched(rig, nothing, nothing, ()), most, say)
+
+
+def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Searched:
+    """Go on from what was found, until nothing pays."""
+    rig, nothing, best = searched.rig, searched.nothing, searched.best
+    rivals = dict(zip(best.free, map(list, searched.rivals), strict=True))
     doubtful = 0
     while len(best.free) < most and doubtful < rules.DOUBTFUL:
         added = proposals(rig, best).best
@@ -67,7 +72,7 @@ def search(
             break
         say(f"refit {added.causes[-1].label}")
         little = added.score - best.score < rules.LITTLE_SHARE * nats_left(best)
-        best, rivals = _settled(rig, exact(rig, added, nothing), nothing)
+        best, rivals = settled(rig, exact(rig, added, nothing), nothing)
         last = best.free[-1] if best.free else None
         likely = last is None or _law_holds(rig, best, last)
         doubtful = doubtful + 1 if little and not likely else 0
@@ -100,7 +105,7 @@ def _nothing(rig: Rig, say: Callable[[str], object]) -> Hypothesis:
     return Hypothesis.of(Problem.of(rig.rows(candidates), candidates), ())
 
 
-def _settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis, dict[int, list[Rival]]]:
+def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis, dict[int, list[Rival]]]:
     """Exchange and take away causes until none is likelier, and what could be there instead of each."""
     rivals: dict[int, list[Rival]] = {}
     for _ in range(rules.EXCHANGES):
@@ -114,7 +119,9 @@ def _settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesi
             # Its own shape may be another beside what was found since.
             others = proposals(rig, less, events=candidate.transient is None)
             rivals[index] = [
-                Rival(other, best.score - score) for other, score in others.scores if other.key != candidate.key
+                Rival(other, best.score - score)
+                for other, score in others.scores
+                if other.key != candidate.key
             ]
             rivals[index].append(Rival(None, best.score - less.score))
             if others.best is not None and others.best.score > best.score + rules.EXCHANGED_NATS:
@@ -124,4 +131,6 @@ def _settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesi
                     break
         if not changed:
             break
+    for index in set(best.free) - set(rivals):  # exchanged in the last round
+        rivals[index] = [Rival(None, best.score - best.without(index).score)]
     return best, rivals

@@ -236,7 +236,9 @@ class Problem:
         """The problem with one candidate more."""
         start, count = self.shared + len(self.tolerant), len(candidate.parameters)
         # Before the residual.
-        wider = self._with(start, [c * candidate.units for c in columns], (*self.candidates, candidate), count)
+        wider = self._with(
+            start, [c * candidate.units for c in columns], (*self.candidates, candidate), count
+        )
         return replace(
             wider,
             spans=(*self.spans, slice(start, start + count)),

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.base import Cause, Hints, last_link, partner
@@ -16,8 +16,13 @@ from estimator.arrays import Array
 Tolerances = Mapping[str, Mapping[str, float]]
 
 
-def places(cause: Cause, tree: Tree, hints: Hints) -> list[int]:
-    """Joints (from 0) at which a cause may sit; -1 for the whole arm."""
+def places(cause: Cause, tree: Tree, hints: Hints, *, change: bool = False) -> list[int]:
+    """Joints (from 0) at which a cause may sit, or, where it is a change between two days, may have come; -1: the arm.
+
+    A link is as heavy as it was; what has changed is what it carries.
+    """
+    if change and cause.built:
+        return []
     if cause.part == "arm":
         return [-1]
     joints = range(len(tree.joint_body))
@@ -25,7 +30,7 @@ def places(cause: Cause, tree: Tree, hints: Hints) -> list[int]:
         # A body of several joints is moved by the last of them.
         moving = [j for j in joints if tree.joint_body[j] not in tree.joint_body[j + 1 :]]
         if cause.name == "payload":
-            return [last_link(tree)]
+            return moving if change else [last_link(tree)]
         return [j for j in moving if cause.name == "link_length" or tree.mass[tree.joint_body[j]] > 0]
     travelled = [j for j in joints if hints.travel[j] > rules.LEAST_TRAVEL and cause.shapes(hints, j)]
     if cause.part == "pair":
@@ -34,14 +39,20 @@ def places(cause: Cause, tree: Tree, hints: Hints) -> list[int]:
 
 
 def candidates(
-    tree: Tree, names: Sequence[str], hints: Hints, excluded: frozenset[str], tolerances: Tolerances
+    tree: Tree,
+    names: Sequence[str],
+    hints: Hints,
+    excluded: frozenset[str],
+    tolerances: Tolerances,
+    *,
+    change: bool = False,
 ) -> list[SerialCandidate]:
-    """Every lasting cause at every place, in its first shape."""
+    """Every lasting cause at every place, in its first shape; of what has changed between two days, or is wrong."""
     out = []
     for name, cause in CAUSES.items():
         if name in excluded or cause.transient:
             continue
-        for at in places(cause, tree, hints):
+        for at in places(cause, tree, hints, change=change):
             out.append(cause.at(tree, names, at, cause.shapes(hints, at)[0], tolerances.get(name)))
     return out
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from discrepancy.engine.diagnose import Diagnosis, diagnose
 from discrepancy.result.diagnosed import Diagnosed
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.errors import with_errors
 from discrepancy.serial.model import SerialModel

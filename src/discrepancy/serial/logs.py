@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.causes.free_while import free_while
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.mechanics.nominal import inverse_torque
 from discrepancy.serial.model import SerialModel
 from discrepancy.serial.recording.joint_log import JointLog

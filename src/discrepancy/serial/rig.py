@@ -14,7 +14,8 @@ from discrepancy.causes.excluded import excluded_from
 from discrepancy.engine.explanation import Explanation
 from discrepancy.rig import Candidate, Channel, Rig, Rows
 from discrepancy.rules import LAW_SHARE
-from discrepancy.serial import catalogue, rules, shapes
+from discrepancy.rules import serial as rules
+from discrepancy.serial import catalogue, shapes
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
@@ -137,13 +138,17 @@ class SerialRig(SerialRows, Rig):
     def candidates(self) -> list[Candidate]:
         """Every cause at every place; pushes come from ``transients``."""
         tree = self.nominal.tree
-        every = catalogue.candidates(tree, self.model.joints, self.hints, self.excluded, self.tolerances)
+        every = catalogue.candidates(
+            tree, self.model.joints, self.hints, self.excluded, self.tolerances, change=bool(self.common)
+        )
         return [c for c in every if c.key not in self.spoilt]
 
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         """Whether such values can be: no negative mass, moments of inertia, compliance or play beyond the errors."""
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        return CAUSES[candidate.cause].possible(self.nominal.tree, place_of(candidate), values, se)
+        cause, tree, at = CAUSES[candidate.cause], self.nominal.tree, place_of(candidate)
+        gone = bool(self.common) and cause.reversible and cause.possible(tree, at, -values, se)
+        return gone or cause.possible(tree, at, values, se)
 
     def law_share(self, candidate: Candidate) -> float:
         """A real robot: noise is the sensors', and every law leaves more than that."""

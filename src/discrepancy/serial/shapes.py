@@ -7,7 +7,7 @@ import numpy as np
 
 from discrepancy.causes.intervals import intervals_near, worst_intervals
 from discrepancy.rig import Candidate
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.base import Hints
 from discrepancy.serial.mechanics.tree import Tree

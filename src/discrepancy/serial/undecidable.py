@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from discrepancy.rig import Candidate
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.causes import CAUSES
 from estimator.arrays import Array
 

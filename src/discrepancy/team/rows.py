@@ -26,6 +26,7 @@ from discrepancy.team.imitators import wrong_torques
 from discrepancy.team.linear.elsewhere import HEALTHY, found_at, resting_of
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.origin import origin_of
+from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, start_shared
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.unit import ArmUnit
@@ -169,16 +170,27 @@ class TeamRows(Rig):
         linear = self.linear[trial]
         if not candidate.acts_in(trial):
             return np.zeros((*linear.residual.shape, len(candidate.parameters)))
-        cause = CAUSES[candidate.cause]
-        robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-        again = candidate.transient is None and len(cause.shapes) > 1 and candidate.shape in cause.shapes
+        cause = CAUSES.get(candidate.cause)
+        shapes = () if cause is None else cause.shapes
+        again = candidate.transient is None and len(shapes) > 1 and candidate.shape in shapes
         key = (trial, *candidate.key, *candidate.shape.items())
         if again and key in self.kept:
             return self.kept[key]
-        columns = self.whitening[trial](cause.columns(linear, robot, joint, candidate.shape))
+        columns = self.whitening[trial](self._unwhitened(trial, candidate))
         if again:
             self.kept[key] = columns
         return columns
+
+    def _unwhitened(self, trial: int, candidate: Candidate) -> Array:
+        """What one unit of each parameter adds to a trial's residual, shape (n, C, k)."""
+        robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
+        return CAUSES[candidate.cause].columns(self.linear[trial], robot, joint, candidate.shape)
+
+    def _undo(self, trial: int, candidate: Candidate, values: Array, signals: Signals) -> Signals | None:
+        """A trial's signals as they would be without a cause, or None where it is not an error of the signals."""
+        robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
+        cause, beyond = CAUSES[candidate.cause], self.beyond(candidate, values)
+        return cause.undo(signals, self.linear[trial], robot, joint, beyond, candidate.shape)
 
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         """Whether such values can be: no negative stiffness or friction, no mass that swings outside the payload."""
@@ -237,11 +249,9 @@ class TeamRows(Rig):
             for candidate, values in active:
                 if not candidate.acts_in(t):
                     continue
-                cause, beyond = CAUSES[candidate.cause], self.beyond(candidate, values)
-                robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-                corrected = cause.undo(signals, linear, robot, joint, beyond, candidate.shape)
+                corrected = self._undo(t, candidate, values, signals)
                 if corrected is None:
-                    modelled += cause.columns(linear, robot, joint, candidate.shape) @ beyond
+                    modelled += self._unwhitened(t, candidate) @ self.beyond(candidate, values)
                 else:
                     signals = corrected
             residual = exact_residual(

@@ -91,6 +91,8 @@ class Diagnose:
     """Causes not to consider."""
     closed_loop: bool = True
     """Run the recorded commands again, without and with what is found."""
+    laws: Literal["auto", "always", "never"] = "auto"
+    """Look for laws that the catalogue lacks: where something unlisted is left, always, or never."""
 
 
 @dataclass(frozen=True)

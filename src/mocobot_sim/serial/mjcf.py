@@ -56,8 +56,9 @@ def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
     elif effect.cause == "payload":
         load = body.add_body(name=f"payload_at_{body.name}")
         load.mass, load.ipos = effect.number("mass"), [effect.number(axis) for axis in "xyz"]
-        moment = effect.number("mass") * effect.number("gyration") ** 2
-        load.fullinertia, load.explicitinertial = [moment, moment, moment, 0.0, 0.0, 0.0], True
+        ball = effect.number("mass") * effect.number("gyration") ** 2 * np.array([1, 1, 1, 0, 0, 0])
+        own = [effect.number(f"inertia_{axes}") for axes in INERTIA]
+        load.fullinertia, load.explicitinertial = ball + own, True
     else:
         return False
     return True

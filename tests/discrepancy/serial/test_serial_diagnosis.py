@@ -89,9 +89,6 @@ def test_coupled_drive_is_found(model: SerialModel) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(
-    strict=True, reason="a payload without a reference is shared with the last link's own tolerance"
-)
 def test_payload_is_found(model: SerialModel, tmp_path: Path) -> None:
     hidden = real(104)
     load = hidden.body("hand").add_body()

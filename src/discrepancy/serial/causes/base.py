@@ -54,11 +54,15 @@ class Cause(base.Cause):
     Attributes:
         part: where it sits.
         dry: whether it jumps where a joint turns round.
+        built: whether it is how the robot was made, and so the same on two days.
+        reversible: whether, between two days, it may as well have gone as come.
     """
 
     where = "arm"
     part: ClassVar[Part] = "joint"
     dry: ClassVar[bool] = False
+    built: ClassVar[bool] = False
+    reversible: ClassVar[bool] = False
 
     @abstractmethod
     def columns(self, signals: Signals, at: int, shape: Shape) -> Array:

@@ -1,6 +1,6 @@
 """Dry and viscous friction, the same in both directions: what every geared joint has."""
 
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause, at_joint, direction, slow_shapes
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause
 from discrepancy.serial.mechanics.regressor import body_regressor, inertial_parameters
 
@@ -13,6 +13,7 @@ class LinkCom(Cause):
     title = "centre of mass of {link}"
     family = "inertia"
     part = "link"
+    built = True
     parameters = ("x_m", "y_m", "z_m")
     scales = (0.01,) * 3
     separate = "The link balanced on an edge."

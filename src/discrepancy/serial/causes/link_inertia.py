@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause
 from discrepancy.serial.mechanics.regressor import body_regressor
 
@@ -15,6 +15,7 @@ class LinkInertia(Cause):
     title = "inertia of {link}"
     family = "inertia"
     part = "link"
+    built = True
     parameters = tuple(f"inertia_{axes}_kgm2" for axes in AXES)
     scales = (0.01,) * 6
     separate = "The link swung as a pendulum."

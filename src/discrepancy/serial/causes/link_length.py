@@ -1,6 +1,6 @@
 """A link is longer or shorter than drawn."""
 
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause
 from discrepancy.serial.mechanics.shift import by_displacement
 

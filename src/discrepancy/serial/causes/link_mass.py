@@ -1,6 +1,6 @@
 """A link is heavier or lighter than modelled."""
 
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause
 from discrepancy.serial.mechanics.regressor import body_regressor, inertial_parameters
 
@@ -11,6 +11,7 @@ class LinkMass(Cause):
     title = "mass of {link}"
     family = "inertia"
     part = "link"
+    built = True
     parameters = ("excess_kg",)
     scales = (1.0,)
     separate = "A scale; or a known weight, if torques may be off in scale."

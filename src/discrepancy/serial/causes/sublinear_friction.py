@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause, at_joint, direction
 
 

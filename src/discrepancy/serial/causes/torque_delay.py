@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause, at_joint
 from estimator.filtering import differentiate
 

@@ -1,6 +1,6 @@
 """The torque's reading is off in scale."""
 
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause, at_joint
 
 

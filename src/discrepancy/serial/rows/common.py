@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from estimator.arrays import Array
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal import welch
 
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.mechanics.regressor import rigid_torque, torque_of
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rows.reduction import Reduction, cutoff_hz

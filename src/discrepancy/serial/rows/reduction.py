@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.rows.signals import Signals, smoothing_hz
 from estimator.arrays import Array
 from estimator.filtering import low_pass

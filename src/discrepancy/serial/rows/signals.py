@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.mechanics.motion import Motion
 from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.recording.joint_log import JointLog

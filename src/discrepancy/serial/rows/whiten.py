@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.serial import rules
+from discrepancy.rules import serial as rules
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.logs import Part
 from discrepancy.serial.rows.noise import SensorNoise, draws_of, whitening_of

@@ -18,8 +18,6 @@ from estimator.signals.arm_data import ArmData, arm_data
 from estimator.signals.grasp_data import GraspData
 from estimator.so3 import cross
 
-_PHI, _THETA = PHI.start // 3, THETA.start // 3
-
 
 @dataclass(frozen=True, eq=False)
 class BySignals:
@@ -61,6 +59,13 @@ class BySignals:
         out += after @ (each * weight).reshape(len(J), -1, parts * self.every)
         out = np.moveaxis(out.reshape(len(J), rows, parts, self.every), 3, 1)
         return out.reshape(-1, rows, *several)[: self.samples]
+
+    def at(self, robot: int, slots: slice, samples: NDArray[np.intp]) -> Array:
+        """Of one robot at some samples, shape (k,) -> (k, C, s)."""
+        J = self.knots[robot][..., slots]
+        low, rest = np.divmod(samples, self.every)
+        after = J[np.minimum(low + 1, len(J) - 1)]
+        return J[low] + (after - J[low]) * (rest / self.every)[:, None, None]
 
     def dense(self, slots: slice = slice(None)) -> Array:
         """At every sample, shape (N, Q, C, s)."""
@@ -117,11 +122,14 @@ def _changes(s: Array, arm: Arms) -> ArmData:
     Q, kinds = len(s), COUNT // 3
     at = list(np.moveaxis(s.reshape(Q, kinds, 3), 1, 0))
     fields = [np.zeros((COUNT, Q, *size)) for size in ((3, 3), (3,), (6,), (6,), (6,))]
-    for some in ((_PHI,), (_THETA,), tuple(k for k in range(kinds) if k not in (_PHI, _THETA))):
+    phi, theta = PHI.start // 3, THETA.start // 3
+    for some in ((phi,), (theta,), tuple(k for k in range(kinds) if k not in (phi, theta))):
         slots = np.concatenate([np.arange(3 * k, 3 * k + 3) for k in some])
         steps, ends = STEPS[slots], []
         for sign in (1.0, -1.0):
-            moved = [x if k in (_PHI, _THETA) else np.broadcast_to(x, (len(slots), Q, 3)) for k, x in enumerate(at)]
+            moved = [
+                x if k in (phi, theta) else np.broadcast_to(x, (len(slots), Q, 3)) for k, x in enumerate(at)
+            ]
             for n, k in enumerate(some):
                 change = np.zeros((len(slots), 1, 3))
                 change[3 * n : 3 * n + 3, 0] = sign * np.diag(STEPS[3 * k : 3 * k + 3])

@@ -17,7 +17,6 @@ from estimator.filtering import differentiate, low_pass
 from estimator.rigid_team.slots import TAU, THETA
 
 Tolerances = Mapping[str, Mapping[str, float]]
-_AT_A_TIME = 8  # draws, for the sake of memory
 
 
 class Resting:
@@ -45,8 +44,8 @@ class Resting:
     def __call__(self, rng: np.random.Generator, draws: int = 1) -> Array:
         """Draws of it, shape (draws, n, C)."""
         out = []
-        for first in range(0, draws, _AT_A_TIME):
-            some = [self._drawn(rng) for _ in range(min(_AT_A_TIME, draws - first))]
+        for first in range(0, draws, rules.DRAWS_AT_A_TIME):
+            some = [self._drawn(rng) for _ in range(min(rules.DRAWS_AT_A_TIME, draws - first))]
             out.append(self._rows(*(np.stack(part, axis=-1) for part in zip(*some, strict=True))))
         return np.concatenate(out)
 
@@ -60,7 +59,7 @@ class Resting:
     def _rows(self, driven: Array, gimbal: Array, places: Array) -> Array:
         """What draws (Q, N, 3, D) of them leave, shape (D, n, C)."""
         trial, (samples, N, _, D) = self._trial, driven.shape
-        rows = trial.reduction(sum(trial.J(i, TAU, driven[:, i]) for i in range(N)))
+        rows = trial.reduction(np.sum([trial.J(i, TAU, driven[:, i]) for i in range(N)], axis=0))
         moment = self._moments @ gimbal.reshape(samples, 3 * N, D)
         rows += trial.of_wrench(np.zeros_like(moment), moment)
         for i in range(N if self._play_m else 0):

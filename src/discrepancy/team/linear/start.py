@@ -144,13 +144,11 @@ def gauss_newton(linear: Sequence[TrialLinear], whitening: Sequence[Whitening]) 
     ]
 
 
-def noise_rows(
-    trial: TrialLinear, noise: Noise, rng: np.random.Generator, draws: int = rules.NOISE_DRAWS
-) -> tuple[Array, Array]:
+def noise_rows(trial: TrialLinear, noise: Noise, rng: np.random.Generator) -> tuple[Array, Array]:
     """What the sensors' errors alone would leave: residuals (draws, n, C), and the torques' own (draws, n, N, 3)."""
     out, torques = [], []
-    errors = noise.draws(trial.signals, rng, draws)
-    while some := list(islice(errors, 8)):  # not all at once, for the sake of memory
+    errors = noise.draws(trial.signals, rng, rules.NOISE_DRAWS)
+    while some := list(islice(errors, rules.DRAWS_AT_A_TIME)):  # not all at once, for the sake of memory
         phi, theta, tau = (np.array([getattr(e, kind) for e in some]) for kind in ("phi", "theta", "tau"))
         out.append(trial.of_all_signals(phi, theta, tau))
         torques += [trial.reduction(x) for x in tau]

@@ -116,7 +116,7 @@ class TrialLinear:
             ],
             axis=2,
         )
-        total = sum(self.J(i, slice(None), parts[:, i]) for i in range(N))
+        total = np.sum([self.J(i, slice(None), parts[:, i]) for i in range(N)], axis=0)
         return np.moveaxis(self.reduction(total), -1, 0)
 
     def of_wrench(self, force: Array, moment: Array) -> Array:
@@ -155,10 +155,10 @@ class TrialLinear:
         return self.reduction(total)
 
     def _of_wrong_motion(self, robot: int, moved: Array) -> Array:
-        """Wrench balance (Q, 6, k) of a wrist that does not move with the payload: by ``moved`` (Q, 3, k) [m] in {b1}."""
+        """Wrench balance (Q, 6, k) of a wrist that moves apart from the payload, by (Q, 3, k) [m] in {b1}."""
         wrist = self.bases.R[robot].T @ moved
         rates = np.concatenate(with_rates(wrist, self.signals.rate_hz)[1:], axis=1)
-        return np.asarray(self._by_wrist[robot] @ rates)
+        return np.asarray(self.by_wrist[robot] @ rates)
 
     @cached_property
     def by_clocks(self) -> Array:
@@ -180,7 +180,7 @@ class TrialLinear:
         return np.stack(columns, axis=2) if columns else np.zeros((*self.residual.shape, 0))
 
     @cached_property
-    def _by_wrist(self) -> Array:
+    def by_wrist(self) -> Array:
         """Derivative of the balance by velocity and acceleration of a wrist in {b_i}, shape (N, Q, 6, 6).
 
         Only by the payload's motion, which is taken from all wrists; the arm really moves so.

@@ -1,4 +1,4 @@
-"""Constants that can change a verdict on a serial robot: *Derived*, *Measured* or *Chosen* (``discrepancy.rules``)."""
+"""A serial robot: its logs, rows, noise and causes; origins are named as in ``discrepancy.rules``."""
 
 MOST_CAUSES = 60
 """A nominal model that says nothing of friction lacks four or five causes a joint. Chosen: no limit for seven axes."""
@@ -43,9 +43,10 @@ SPOILT_SHARE = 0.01
 SPOILT_GAIN = 8.0
 """Of chi-square, that noise in a trace may have by meeting itself in the residual. Derived: a third of the 24 from
 which a single number is significant."""
-STICKING_SHARE = 0.03
+STICKING_SHARE = 0.06
 """Of a joint's typical speed, by which its smoothed velocity is off where it turns round. Derived: sticking takes some
-10 ms there, in which a joint that takes 0.3 s from one speed to the other would have gone on by as much."""
+10 ms there and a period of ``SMOOTH_HZ`` 17 ms, in which a joint that takes 0.3 s from one speed to the other would
+have gone on by as much."""
 LEAST_FREEDOM = 0.1
 """Of the rows, that a fit of all causes leaves. Chosen: with less the logs are too short to be told noise from."""
 SEGMENT_S = 0.5
@@ -105,8 +106,9 @@ MOST_RIPPLE_HZ = 0.5
 """Of the rows' cut-off: at which a ripple may pass at the joint's typical speed. Chosen: faster ones are filtered."""
 PAYLOAD_M, PAYLOAD_FINER_M, PAYLOAD_STEP_M = (0.1, 0.25), (-0.03, -0.01, 0.01, 0.03), 0.02
 """Where a payload's centre is looked for in the last link's frame, and differences by it. Chosen: hands are as long."""
-PAYLOAD_GYRATION_M = 0.04
-"""Radius of gyration of a payload. Chosen: a ball of 6 cm; what it differs by is within what a link's inertia may."""
+PAYLOAD_GYRATION_M, PAYLOAD_INERTIA_SHARE = 0.04, 0.5
+"""Radius of gyration of a payload, and the share of its square by which its moments and products differ from those of
+such a ball. Chosen: a ball of 6 cm, within 30 %."""
 SOFT_LOAD_SHARE = 0.03
 """Of a joint's typical torque, over which play changes sides. Chosen."""
 PUSH_S, SHORTEST_PUSH_S = (0.2, 0.4, 0.8, 1.6), 0.1

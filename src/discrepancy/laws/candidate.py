@@ -1,0 +1,71 @@
+"""A law as a candidate of the diagnosis: a place and a formula."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from discrepancy import rules
+from discrepancy.laws.dictionary import nearby
+from discrepancy.laws.place import Place
+from discrepancy.laws.term import Term
+from discrepancy.rig import Candidate, Parameter
+
+CAUSE, FAMILY = "law", "unlisted"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class LawCandidate(Candidate):
+    """Something that nobody has listed: an error at a place that is a function of a signal.
+
+    Attributes:
+        at: the place.
+        term: the function; its numbers are the candidate's shape.
+    """
+
+    at: Place
+    term: Term
+
+    @property
+    def key(self) -> tuple[str, int | None, int | None]:
+        """Place and signal: another function of the same signal is another form of the same thing."""
+        return f"{CAUSE}: {self.at.name} by {' '.join(self.term.variables)}", self.robot, self.joint
+
+    def shaped(self, numbers: dict[str, float]) -> LawCandidate:
+        """The same with other numbers inside the function."""
+        return replace(self, term=replace(self.term, numbers=numbers), shape=numbers)
+
+
+def candidate_of(place: Place, term: Term, scale: float, among: int) -> LawCandidate:
+    """A law at a place.
+
+    Args:
+        place: where.
+        term: which function of what.
+        scale: a typical size of the error [the place's unit].
+        among: how many laws it was chosen from.
+    """
+    count = rules.LAW_KNOTS if term.function == "spline" else 2 if term.function in ("sine", "hum") else 1
+    parts = ["amplitude"] if count == 1 else [f"amplitude_{k + 1}" for k in range(count)]
+    if place.offset and term.function not in ("constant", "spline"):
+        parts.append("offset")
+    names = [f"{part}_{axis}".strip("_").replace(" ", "_") for part in parts for axis in place.axes]
+    parameters = tuple(Parameter(name, 0.0, scale) for name in names)
+    return LawCandidate(
+        CAUSE, FAMILY, place.robot, place.joint, parameters, dict(term.numbers), title=place.title, among=among,
+        at=place, term=term,
+    )  # fmt: skip
+
+
+def refined(candidate: LawCandidate, *, finer: bool) -> list[Candidate]:
+    """The law with other numbers inside its function; ``finer`` ones around its own."""
+    return [candidate.shaped(dict(term.numbers)) for term in nearby(candidate.term, finer=finer)]
+
+
+def law_steps(candidate: LawCandidate) -> list[tuple[Candidate, Candidate, float]]:
+    """The law with each number that the data determine changed both ways, and by how much."""
+    numbers, out = dict(candidate.term.numbers), []
+    for name, share in candidate.term.law.fitted.items():
+        value = numbers[name]
+        less, more = (candidate.shaped({**numbers, name: x * value}) for x in (1.0 - share, 1.0 + share))
+        out.append((less, more, 2.0 * share * value))
+    return out

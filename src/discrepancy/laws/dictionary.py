@@ -1,0 +1,115 @@
+"""Which formulas are tried at a place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discrepancy import rules
+from discrepancy.laws.functions import knots_of
+from discrepancy.laws.place import Place
+from discrepancy.laws.term import Term
+from discrepancy.laws.variable import TIME, Kind, Variable
+from estimator.arrays import Array
+
+PLAIN: dict[Kind, tuple[str, ...]] = {
+    "time": ("linear", "square"),
+    "angle": ("linear", "square", "cube", "absolute"),
+    "rate": ("linear", "signed_square", "absolute"),
+    "acceleration": ("linear",),
+    "torque": ("linear", "square", "cube", "absolute"),
+    "position": ("linear", "square"),
+    "velocity": ("linear", "signed_square", "absolute"),
+    "tilt": ("linear",),
+}
+"""Functions without a number inside, by kind of signal."""
+
+
+def terms_at(place: Place, variables: Sequence[Variable], spread: Callable[[Variable], Array]) -> list[Term]:
+    """Every formula that is tried at a place.
+
+    Args:
+        place: where.
+        variables: all signals.
+        spread: values of a signal in all trials, shape (Q,), for knees and widths.
+    """
+    out = [Term("constant", TIME)] if not place.offset else []
+    out += of_time()
+    for variable in place.own:
+        out += of_own(variable, spread(variable))
+    torques = [v for v in place.own if v.kind == "torque"]
+    for torque in torques:
+        out += [Term("warming", TIME, {"time_s": t}, torque) for t in rules.LAW_WARMING_S]
+        out += [Term("linear", TIME, {}, torque)]
+        for other in place.own:
+            if other.kind == "rate":
+                out += [Term("sign", other, {"slow": rules.LAW_SLOW_RAD_PER_S}, torque)]
+            elif other.kind == "angle":
+                out.append(Term("linear", other, {}, torque))
+    out += [Term("linear", v) for v in variables if v not in place.own and v.kind != "time"]
+    return out
+
+
+def of_time() -> list[Term]:
+    """Functions of time; frequencies come from what is left."""
+    slow = [Term("warming", TIME, {"time_s": time}) for time in rules.LAW_WARMING_S]
+    return [*(Term(name, TIME) for name in PLAIN["time"]), *slow]
+
+
+def of_own(variable: Variable, values: Array) -> list[Term]:
+    """Functions of a signal of the place itself.
+
+    Args:
+        variable: the signal.
+        values: in all trials, shape (Q,).
+    """
+    out = [Term(name, variable) for name in PLAIN[variable.kind]]
+    low, *inner, high = np.quantile(values, rules.LAW_QUANTILES).tolist()
+    sigma = float(np.std(values))
+    if variable.kind in ("angle", "torque"):
+        out += [Term(side, variable, {"knee": knee}) for knee in inner for side in ("above", "below")]
+        out += [Term("play", variable, {"half_width": sigma * w}) for w in rules.LAW_PLAY_SHARES]
+    if variable.kind == "torque":
+        sizes = np.quantile(np.abs(values), rules.LAW_QUANTILES[1:-1]).tolist()
+        out += [Term("beyond", variable, {"knee": knee}) for knee in sizes]
+        out += [Term("lag", variable, {"time_s": time}) for time in rules.LAW_LAG_S]
+    if variable.kind == "angle":
+        out += [Term("sine", variable, {"times": float(k)}) for k in range(1, rules.LAW_MOST_TIMES + 1)]
+    if variable.kind == "rate":
+        out += [Term(side, variable, {"knee": 0.0}) for side in ("above", "below")]
+        out.append(Term("sign", variable, {"slow": rules.LAW_SLOW_RAD_PER_S}))
+    if variable.kind in ("acceleration", "tilt"):
+        out += [
+            Term("second_order", variable, {"frequency_hz": f, "damping": zeta})
+            for f in rules.LAW_RESONANCE_HZ
+            for zeta in rules.LAW_DAMPING
+        ]
+    if high > low:
+        out.append(Term("spline", variable, knots_of(low, high)))
+    return out
+
+
+def hums(frequencies_hz: Iterable[float]) -> list[Term]:
+    """Sines of time."""
+    return [Term("hum", TIME, {"frequency_hz": float(f)}) for f in frequencies_hz]
+
+
+def nearby(term: Term, *, finer: bool) -> list[Term]:
+    """The formula with other numbers inside; ``finer`` ones around its own."""
+    step = 1.15 if finer else 1.6
+    if term.function == "sine":
+        times = term.numbers["times"]
+        steps = (-2.0, -1.0, 1.0, 2.0) if not finer else ()
+        return [replace(term, numbers={"times": times + d}) for d in steps if times + d >= 1.0]
+    if term.function == "hum":
+        f, width = term.numbers["frequency_hz"], rules.LAW_HUM_STEP_HZ / (8.0 if finer else 2.0)
+        return [replace(term, numbers={"frequency_hz": f + d}) for d in (-width, width) if f + d > 0]
+    if term.function == "spline" or not term.numbers:
+        return []
+    out = []
+    for name, value in term.numbers.items():
+        for factor in (1.0 / step, step):
+            out.append(replace(term, numbers={**term.numbers, name: value * factor}))
+    return out

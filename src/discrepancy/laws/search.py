@@ -1,0 +1,184 @@
+"""The search goes on where no listed cause is enough: laws are added while they help on trials left out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from discrepancy import rules
+from discrepancy.engine.held_out import held_out_gains
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.propose import Proposed, sharpened
+from discrepancy.inference.refit import exact
+from discrepancy.inference.remainder import unlisted_nats
+from discrepancy.inference.scan import Scanned
+from discrepancy.inference.search import Rival, Searched, continued, settled
+from discrepancy.laws.bench import Bench
+from discrepancy.laws.candidate import LawCandidate, candidate_of
+from discrepancy.laws.what import Judged, judged
+from discrepancy.laws.where import Located, located
+from discrepancy.least_squares.fit import Fit
+
+
+@dataclass(frozen=True, eq=False)
+class Lawful:
+    """What became of a search that went on with laws.
+
+    Attributes:
+        searched: with the laws among its causes.
+        places: where the first law was looked for, the likeliest first; empty where none was.
+    """
+
+    searched: Searched
+    places: tuple[Located, ...]
+
+
+def with_laws(
+    searched: Searched, most: int, progress: Callable[[str], object] | None = None, *, always: bool = False
+) -> Lawful:
+    """Go on with a search until what is left is noise, or no law helps on trials that it was not fitted to.
+
+    Args:
+        searched: what the catalogue can do.
+        most: largest number of causes, laws among them.
+        progress: called with what is being done.
+        always: also where what is left is noise.
+    """
+    say = progress or (lambda what: None)
+    bench: Bench | None = searched.rig.bench
+    first: tuple[Located, ...] = ()
+    rivals: dict[tuple[object, ...], list[Rival]] = {}
+    for _ in range(rules.LAW_MOST if bench is not None else 0):
+        left = always or unlisted_nats(searched.best) >= rules.UNLISTED_NATS
+        if len(searched.best.free) >= most or not left:
+            break
+        assert bench is not None
+        starts = [searched]
+        if searched.best.free and not rivals:
+            # Causes that were named may have stood for what nobody lists.
+            starts.append(Searched(searched.rig, searched.nothing, searched.nothing, ()))
+        found = []
+        for start in starts:
+            places = located_in(start, bench, say)
+            first = first or tuple(places)
+            step = _with_one(start, bench, places, say)
+            if step is not None:
+                found.append((continued(step[0], most, say), step[1]))
+        if not found:
+            break
+        best, more = max(found, key=lambda one: one[0].best.score)
+        if best.best.score < searched.best.score + rules.NAMED_NATS:
+            break
+        searched, rivals = best, rivals | more
+    return Lawful(_with_rivals(searched, rivals), first)
+
+
+def located_in(searched: Searched, bench: Bench, say: Callable[[str], object]) -> list[Located]:
+    """Every place with the error that it would have to have, the likeliest first."""
+    say("locate what nobody lists")
+    return located(searched.best.fit, bench, bench.places)
+
+
+def _with_one(
+    searched: Searched, bench: Bench, places: Sequence[Located], say: Callable[[str], object]
+) -> tuple[Searched, dict[tuple[object, ...], list[Rival]]] | None:
+    """The search with one law more, and that law's rivals among laws; None where no law pays and helps."""
+    proposed = _proposals(searched, bench, places, say)
+    added = proposed.best
+    if added is None or added.score - searched.best.score < rules.NAMED_NATS:
+        return None
+    say(f"refit {added.causes[-1].label}")
+    refitted = exact(searched.rig, added, searched.nothing)
+    if not helps(refitted, refitted.free[-1]):
+        return None
+    law = refitted.causes[-1]
+    now, rivals = settled(searched.rig, refitted, searched.nothing)
+    each = tuple(tuple(rivals.get(i, ())) for i in now.free)
+    return Searched(searched.rig, searched.nothing, now, each), {law.key: _rivals(bench, proposed)}
+
+
+def helps(hypothesis: Hypothesis, index: int) -> bool:
+    """Whether a law helps where it was not fitted: most trials, and by much of what it explains in sample."""
+    others = [i for i in hypothesis.free if i != index]
+    folds = held_out_gains(hypothesis.problem, others, index)
+    if not folds:
+        return False
+    nothing = np.zeros(len(hypothesis.problem.candidates[index].parameters))
+    without = Fit.of(hypothesis.problem, others, fixed=(index, nothing))
+    in_sample = sum(without.held_out(t) - hypothesis.fit.held_out(t) for t in hypothesis.problem.trials)
+    better = np.mean(np.array(folds) > 0.0)
+    return bool(sum(folds) > rules.LAW_HELD_OUT * in_sample and better > rules.LAW_FOLDS)
+
+
+def _proposals(
+    searched: Searched, bench: Bench, places: Sequence[Located], say: Callable[[str], object]
+) -> Proposed:
+    """Hypotheses with one law more, each with the best numbers inside."""
+    base = searched.best
+    say("try formulas")
+    ranked = judged(base.fit, bench, [one.place for one in places[: rules.LAW_PLACES]])
+    best, scores = None, []
+    leaders = _leaders(ranked, base)
+    for item in leaders:
+        candidate = _candidate(item, bench)
+        scanned = Scanned(None, candidate, item.nats, tuple(searched.rig.columns(candidate)))
+        new = sharpened(searched.rig, base, scanned, near=item.nats > rules.LAW_NEAR * leaders[0].nats)
+        scores.append((new.causes[-1], new.score))
+        if best is None or new.score > best.score:
+            best = new
+    return Proposed(best, tuple(sorted(scores, key=lambda one: -one[1])))
+
+
+def _leaders(ranked: Sequence[Judged], base: Hypothesis) -> list[Judged]:
+    """The likeliest formulas, one of each kind, that are not in the model yet."""
+    there = {cause.key for cause in base.causes}
+    chosen: dict[tuple[object, ...], Judged] = {}
+    for item in ranked:
+        kind = item.place.key, item.term.function, item.term.variables
+        # A sine has as many forms as it has periods a turn.
+        kinds = (*kind, 0), (*kind, 1)
+        if candidate_of(item.place, item.term, 1.0, 1).key in there:
+            continue
+        for kind_ in kinds[: 2 if item.term.function in ("sine", "hum") else 1]:
+            if kind_ not in chosen:
+                chosen[kind_] = item
+                break
+        if len(chosen) == rules.LAW_LEADERS:
+            break
+    return list(chosen.values())
+
+
+def _candidate(item: Judged, bench: Bench) -> LawCandidate:
+    """With its prior: what depends on the place's own signals, or on time, is likelier beforehand."""
+    own = {variable.name for variable in item.place.own} | {"time"}
+    others = 1 if own.issuperset(item.term.variables) else len(bench.variables)
+    unit = item.place.unit
+    inside = 1 if item.term.function == "spline" else rules.LAW_INSIDE ** len(item.term.numbers)
+    among = len(bench.places) * rules.LAW_FORMS * others * inside
+    return candidate_of(item.place, item.term, rules.LAW_SCALES[unit], among)
+
+
+def _rivals(bench: Bench, proposed: Proposed) -> list[Rival]:
+    """What else could be there instead of the first, and the place that the rows cannot tell from it."""
+    (law, score), *others = proposed.scores
+    out: dict[tuple[object, ...], Rival] = {}
+    assert isinstance(law, LawCandidate)
+    twin = bench.twin(law.at)
+    if twin is not None:
+        other = replace(law, at=twin, title=twin.title)
+        out[other.key] = Rival(other, 0.0)
+    for candidate, less in others:
+        if candidate.key != law.key and candidate.key not in out:
+            out[candidate.key] = Rival(candidate, score - less)
+    return list(out.values())
+
+
+def _with_rivals(searched: Searched, laws: dict[tuple[object, ...], list[Rival]]) -> Searched:
+    """The search with every law's rivals among laws, besides those of the catalogue."""
+    out = []
+    for cause, rivals in zip(searched.best.causes, searched.rivals, strict=True):
+        more = [r for r in laws.get(cause.key, []) if r.candidate is not None]
+        out.append(tuple(sorted((*rivals, *more), key=lambda rival: rival.gap)))
+    return replace(searched, rivals=tuple(out))

@@ -1,0 +1,117 @@
+"""Of what the error is a function: every formula of the dictionary at the likeliest places, by its evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.signal import find_peaks
+
+from discrepancy import rules
+from discrepancy.inference.scan import log_bayes_factor
+from discrepancy.laws.bench import Bench
+from discrepancy.laws.dictionary import hums, terms_at
+from discrepancy.laws.place import Place
+from discrepancy.laws.term import Term
+from discrepancy.laws.told import Beside
+from discrepancy.laws.variable import Variable
+from discrepancy.least_squares.fit import Fit
+from estimator.arrays import Array
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A formula at a place.
+
+    Attributes:
+        place, term: which.
+        nats: log Bayes factor that it is there beside all in the model.
+    """
+
+    place: Place
+    term: Term
+    nats: float
+
+
+def judged(fit: Fit, bench: Bench, places: Sequence[Place]) -> list[Judged]:
+    """Every formula at every one of some places, the likeliest first."""
+    beside = Beside(fit)
+    signals: dict[tuple[int, str], Array] = {}
+
+    def signal(trial: int, variable: Variable) -> Array:
+        key = trial, variable.name
+        if key not in signals:
+            signals[key] = bench.signal(trial, variable)
+        return signals[key]
+
+    trials = fit.problem.trials
+    out, peaks = [], _peaks(fit, bench)
+    for place in places:
+        spread = lambda variable: np.concatenate([signal(t, variable) for t in trials])  # noqa: E731
+        terms = terms_at(place, bench.variables, spread) + hums(peaks)
+        out += _at_place(beside, bench, place, terms, signal, trials)
+    # A hum is too fast to be seen in the error of a place over time.
+    for place in bench.places if peaks else ():
+        if place not in places:
+            out += _at_place(beside, bench, place, hums(peaks), signal, trials)
+    return sorted(out, key=lambda one: -one.nats)
+
+
+def _at_place(
+    beside: Beside,
+    bench: Bench,
+    place: Place,
+    terms: Sequence[Term],
+    signal: Callable[[int, Variable], Array],
+    trials: Sequence[int],
+) -> list[Judged]:
+    directions = [bench.directions(t, place) for t in trials]
+    rates = directions[0].shape[2] == 3
+    offset = [np.ones((bench.length(t), 1)) for t in trials]
+    out, at = [], 0
+    while at < len(terms):
+        chunk, errors, groups = [], [[] for _ in trials], []
+        while at < len(terms) and sum(groups) < rules.LAW_CHUNK:
+            term = terms[at]
+            at += 1
+            values = [term.values(lambda v, t=t: signal(t, v), bench.rate_hz(t)) for t in trials]
+            if place.offset and term.function not in ("constant", "spline"):
+                values = [np.concatenate([v, o], axis=1) for v, o in zip(values, offset, strict=True)]
+            groups.append(values[0].shape[1] * len(place.axes))
+            chunk.append(term)
+            for own, value in zip(errors, values, strict=True):
+                own.append(value)
+        blocks = []
+        for t, own in zip(trials, errors, strict=True):
+            moved = bench.at_rows(t, np.concatenate(own, axis=1), rates=rates)
+            columns = np.einsum("narc,nrk->ncka", directions[t], moved, optimize=True)
+            blocks.append(bench.white(t, columns.reshape(*columns.shape[:2], -1)))
+        for term, (information, score) in zip(chunk, beside.each(blocks, groups), strict=True):
+            out.append(Judged(place, term, _nats(information, score)))
+    return out
+
+
+def _nats(information: Array, score: Array) -> float:
+    """Log Bayes factor, every column in units in which it is just seen."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    return log_bayes_factor(information * np.outer(scale, scale), score * scale, 0.0)
+
+
+def _peaks(fit: Fit, bench: Bench) -> list[float]:
+    """Frequencies [Hz] at which most is left, of all trials and channels, over its surroundings."""
+    top = 0.5 * min(
+        fit.problem.cells[t].moving / max(bench.row_times(t)[-1], 1.0) for t in fit.problem.trials
+    )
+    grid = np.arange(rules.LAW_HUM_LEAST_HZ, max(top, 2.0 * rules.LAW_HUM_LEAST_HZ), rules.LAW_HUM_STEP_HZ)
+    power = np.zeros(len(grid))
+    for t in fit.problem.trials:
+        moving = fit.problem.cells[t].moving
+        if moving:
+            turned = np.exp(-2j * np.pi * grid[:, None] * bench.row_times(t)[:moving])
+            power += np.sum(np.abs(turned @ fit.remaining(t)[:moving]) ** 2, axis=1)
+    prominence = power / np.maximum(median_filter(power, size=41, mode="nearest"), 1e-300)
+    peaks, _ = find_peaks(prominence)
+    best = peaks[np.argsort(-prominence[peaks])][: rules.LAW_HUM_PEAKS]
+    return [float(f) for f in grid[best]]

@@ -1,0 +1,121 @@
+"""Noise, priors, search and verdict of any machine; origins are named as in ``discrepancy.rules``."""
+
+# What the data say about one candidate.
+
+LEAST_INFORMATION = 1e-3
+"""Inverse variance (in units of tolerance) below which a direction is undecidable. Chosen."""
+CLEAN_CHI2_PER_N = 1.15
+"""Nothing is left to explain below that. Measured: clean teams leave 1.02 to 1.08, tolerances in use up to 1.13."""
+NOTICED_SE = 1.2816
+"""Standard errors by which noise lessens a value one time in ten. Derived: a quantile of the normal distribution."""
+ABSURD_UNITS = 1e3
+"""A detection limit of so many tolerances (or typical sizes) is none. Chosen."""
+
+# Whitening.
+
+AR_ORDER = 2
+"""Autoregression of whitened channels, unless a rig says otherwise. Chosen: rows are nearly white already."""
+ROWS_PER_COEFFICIENT = 10
+"""A series must have more rows than so many for each coefficient, or stays as it is. Chosen."""
+LOUD_POWER = 2.25
+"""Noise of a row, in squares of that of the others, above which it has a weight of its own. Derived: four standard
+deviations of a mean square of 24 draws (a team's ``NOISE_DRAWS``), sqrt(2/24) = 0.29, above 1."""
+SHRINKAGE_SHARE = 0.05
+"""By which the channels' covariance is drawn to its diagonal at least. Chosen."""
+
+# Search: which candidates are compared, how their shapes are sharpened.
+
+MOST_CAUSES = 12
+"""Of one verdict. Chosen: no more than a guard; the benchmark's first axis takes eight."""
+LEADERS = 8
+"""Candidates of a scan that are looked at closely, and as many more that are the likeliest of their cause. Chosen."""
+FINER_ROUNDS = 4
+"""Refinements of a shape around the best so far. Chosen."""
+POLISH_ROUNDS = 3
+"""Gauss-Newton steps of a shape after the grid. Chosen."""
+REFIT_ROUNDS = 3
+"""Gauss-Newton steps of causes and unknowns with exact residuals. Chosen."""
+PUSH_MOVES = (-0.4, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2, 0.4)
+"""By which ends of a push are moved to refine it, in its duration. Chosen."""
+WORST_INTERVALS = 2
+"""Per trial and duration that become candidates. Chosen."""
+
+# Verdict and closed loop.
+
+RESPONSE_SHARE = 0.8
+"""Of the response's excess error that causes must remove, or what is left of a visible one is said beside the verdict.
+Chosen."""
+CLOSE_NATS = 20.0
+"""Shapes are sharpened of candidates that a scan puts closer to its likeliest. Chosen: it costs time."""
+AMBIGUOUS_NATS = CLOSE_NATS / 4.0
+"""Rivals that the rows put closer are simulated; what the closed loop does not part either cannot be told apart.
+Chosen."""
+MARGIN_SHARE = 0.02
+"""Simulations whose chi-square differs by less are equally good. Chosen."""
+VISIBLE_CHI2_PER_N = 3.0
+"""Of the closed loop, from which something is said of it beside the verdict. Chosen."""
+
+# Inference: what is learnt from the data, and with what priors.
+
+CELL_BANDS = 6
+"""Octaves of frequency in which the noise has powers of its own, of every group of channels and trial. Chosen."""
+POWER_NUMBERS = 20.0
+"""Numbers that the prior of a power counts for, at 1: whitening is right to 30 % without data. Chosen."""
+SPREAD_NUMBERS = 4.0
+"""Numbers that the tolerance counts for when a kind's spread is learnt. Chosen: that a kind scatters is no likelier
+beforehand than that one of its places is at fault."""
+MOST_SPREAD = 1e3
+"""Of a kind over its tolerance. Chosen: an encoder's zero of 6 deg."""
+LEAST_SLAB = 4.0
+"""Size of what counts as a fault over the tolerance, at least. Chosen."""
+LEAST_SIZE = 1e-6
+"""Of a cause without a tolerance over its typical size. Derived: not to divide by nought."""
+LEARN_ROUNDS, LEARN_NATS = 30, 0.05
+"""Steps of powers and spreads at most, and the gain of evidence below which they have settled. Chosen."""
+LEAST_POWER = 0.5
+"""Of a cell over that of its whitening. Chosen: some noise of healthy robots is drawn larger than it is."""
+FLAT_SHARE = 1e-10
+"""Information that shared unknowns have beforehand, over that of the data. Derived: as good as none."""
+PRIOR_ODDS = 0.05
+"""Of any cause of the catalogue being there, at all its places together. Chosen: one in a team, of twenty causes."""
+SLAB_OCTAVES = 10.0
+"""In which the size of a fault is equally likely. Chosen: from the tolerance to a thousand times that."""
+INTERVALS = 1000.0
+"""At which an event may be. Derived: about so many are searched."""
+LOOKED_AT_NATS = -5.0
+"""Log odds in the scan, from which a candidate is looked at closely. Chosen: what it leaves open may make up for it."""
+HELD_FACTOR = 1.5
+"""Spread of a kind from which it is scanned within its tolerance, too. Chosen."""
+WORST_EVENTS = 3
+"""Intervals looked at closely. Chosen."""
+NAMED_NATS = 5.0
+"""Log odds from which a cause is named. Derived: a false alarm costs as much as 150 misses, ln 150."""
+EXCHANGES = 4
+"""Rounds in which causes are exchanged and taken away after one was added. Chosen."""
+EXCHANGED_NATS = 1.0
+"""By which another cause, or another shape, must be likelier to be taken instead. Chosen: less is a matter of steps."""
+DIVERGED_NATS = 50.0
+"""Fall of the evidence from which a Gauss-Newton step is not taken. Chosen."""
+SETTLED_SE = 0.05
+"""Standard errors: a value that moves less has settled. Chosen."""
+CELL_NATS = 4.0
+"""What a process of its own in a cell costs. Chosen: about a hundred cells are looked at, ln 100."""
+UNLISTED_NATS = 60.0
+"""Of all such processes, from which what is left is not noise. Chosen."""
+LAW_SHARE = 0.2
+"""Standard deviation of what the law of a cause that is there leaves of its trace, in amplitude. Chosen."""
+LISTED_ODDS = 4.0
+"""That a cause is one of the catalogue rather than an unlisted one that looks like it. Chosen."""
+LAW_ERROR_SHARE = 0.02
+"""By which the law of a cause puts its size off; part of every standard error. Chosen."""
+LEAST_PROBABILITY = 0.5
+"""From which a cause is named; below, it is a suspicion. Derived: it is then likelier than all else together."""
+SCATTER_FACTOR = 3.0
+"""Spread of a kind over its tolerance, from which a team is said to be off in it. Chosen."""
+CONTRADICTED = 0.5
+"""By which causes that make the closed loop's response worse lose probability. Chosen: as likely wrong as not."""
+BASE_ROUNDS = 4
+"""Linearisations at most. Measured: robots 1 deg off take two."""
+DOUBTFUL, LITTLE_SHARE = 2, 0.05
+"""Causes in a row that are less likely than not when they are added, and the share of what is left (in nats) that they
+explain at most, after which no more are looked for. Chosen: one may become likely beside the next."""

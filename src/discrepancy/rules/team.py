@@ -1,0 +1,94 @@
+"""A team that carries one payload: its rows, noise and causes; origins are named as in ``discrepancy.rules``."""
+
+# What is accepted.
+
+LEAST_S = 5.0
+"""Of all recordings together below which nothing is diagnosed. Chosen."""
+GOOD_S = 30.0
+"""With which a diagnosis starts to be of use; only said. Chosen."""
+
+# Filters and rows.
+
+TEAM_PRE_HZ = 20.0
+"""Cut-off before the nonlinear formulas. Derived: high enough that filtering and they commute to within the noise."""
+TEAM_CUTOFF_HZ = 5.0
+"""Cut-off of the rows. Chosen."""
+TEAM_ROWS_HZ = 12.5
+"""Chosen with the cut-off: it leaves filtered noise nearly white."""
+TEAM_JACOBIAN_HZ = 25.0
+"""Rate of derivatives, interpolated between. Chosen: twice the rows'."""
+TEAM_TRIM_S = 2.0
+"""Left out at both ends of a recording. Chosen."""
+STILL_RAD_PER_S = 1e-3
+"""Joints slower than that rest. Derived: twenty times what rounding does below ``HOLD_CUTOFF_HZ``."""
+HOLD_CUTOFF_HZ = 2.0
+"""Cut-off of the speed that tells rest. Chosen."""
+SETTLING_S = 0.3
+"""Left out at both ends of a hold. Chosen."""
+SHORTEST_HOLD_S = 1.2
+"""Left of a hold, to be one row. Chosen."""
+STRAIGHT_CHI2_PER_N = 0.01
+"""What curvature adds to chi-square, from which all is linearised again. Chosen: a hundredth of the noise."""
+
+# Noise of the sensors.
+
+MODEL_PHI_RAD, MODEL_THETA_RAD, MODEL_TAU_NM, MODEL_HZ = 2e-6, 7e-7, 3e-4, 100.0
+"""What the model itself leaves beside any sensor, as noise of readings at ``MODEL_HZ``; as much in a band at any
+other rate. Measured: what soft rods, welds and the integrator leave of trials with ideal sensors weighs as much as 1 to
+3 urad of phi below 0.5 Hz and a third of that to 2 Hz, 0.1 to 2 urad of theta, and, at the motion's own frequencies,
+0.1 to 0.2 mN m in random trials."""
+MODEL_BELOW_HZ, MODEL_ABOVE = 2.5, 0.2
+"""Up to where, and the share of it that is left above. Measured: of the same, a twentieth of the power from 3 Hz on,
+and hardly anything from 4 Hz."""
+NOISE_ABOVE_HZ = 25.0
+"""Where nothing moves, so that what is there is noise. Chosen."""
+TEAM_SMOOTH_HZ = 12.0
+"""Cut-off of signals when their rounding is drawn anew, and of rates that say where friction slides. Chosen."""
+SLOW_HZ, SMOOTHER_OCTAVES = 1.0, 3
+"""Where rounding shows as stairs: cut-off of the speed that tells their frequency, and how far that of the signal
+falls with it. Chosen: the trajectory need only be one that the stairs may have come from."""
+PHASE_TRAVEL = 4.0
+"""Steps of travel after which a rounding error is drawn anew. Chosen: independent from one rest to the next, and
+changes an encoder's speed by half at most."""
+DRAWS_AT_A_TIME = 8
+"""Of noise. Chosen: memory."""
+NOISE_DRAWS = 24
+"""From which the rows' covariance is made. Chosen."""
+NOISE_SEED = 20250
+"""Of these draws. Chosen: any will do; fixed, so that a verdict can be had again."""
+PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4
+"""Of the closed loop. Measured: the integrator at 1 and at 0.25 ms; docs/diagnosis/validation.md, 'Integration'."""
+TEAM_TIMESTEP_S = 1e-3
+"""Of the closed loop's simulation. Measured: with it the integrator's error stays below the sensors' noise (ibid.)."""
+LEAST_MOMENT_RATIO = 1e-3
+"""Least principal moment of a simulated payload over the largest: a body needs some. Chosen."""
+
+# Its causes.
+
+TEAM_PUSH_S = (0.4, 0.8, 1.6, 3.2, 6.4)
+"""Durations searched. Chosen: octaves."""
+TEAM_SHORTEST_PUSH_S = 0.1
+"""That refining may leave. Chosen."""
+TEAM_SHORTEST_REST_S = 0.15
+"""Rests for which friction is left open. Chosen."""
+REST_RAD_PER_S, REST_NM_PER_S = 1e-3, 0.2
+"""Below which a joint, or a spring's torque, rests and its friction is noise. Chosen: as of the causes."""
+REST_KNOTS_S = 0.5
+"""Between knots of friction at rest, which follows the load. Chosen."""
+PLAY_FORCE_N = 0.4
+"""Below which a payload may be anywhere in its play. Chosen."""
+PLAY_KNOTS_S = 0.2
+"""Between knots of the travel that play leaves open at small forces. Chosen."""
+LENGTH_MOST_M = 0.02
+"""By which a leg's lengths may be off. Chosen: a thousand tolerances; as large, columns are no straight lines."""
+PULL_SE = 5.0
+"""Standard errors that the stiffness of a payload's tether must be. Measured: uncalibrated robots without one leave up
+to 3, with a constant force of 2 N."""
+SLOSH_LENGTHS_M = (0.04, 1.0)
+"""Derived: pendulums of 2.5 to 0.5 Hz; slower and faster ones look like drag or play."""
+SLOSH_MOST_DAMPED = 0.3
+"""Largest damping ratio tried. Chosen."""
+SLOSH_SWINGS = 0.25
+"""Largest damping ratio named. Chosen, after one of 0.29 had been named for drag."""
+SLOSH_REACH_M = 1.5
+"""From the centre of mass to where it hangs at most. Chosen: no payload of three robots is larger."""

@@ -1,0 +1,1 @@
+"""Laws at the places of a team of Omnids."""

@@ -1,0 +1,98 @@
+"""A team of Omnids for the search for laws."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from discrepancy.laws.candidate import LawCandidate
+from discrepancy.laws.place import Place
+from discrepancy.laws.variable import Variable
+from discrepancy.least_squares.whitening import Whitening
+from discrepancy.team.causes.base import one_joint, one_robot
+from discrepancy.team.laws.directions import directions_at
+from discrepancy.team.laws.places import READINGS, places_of, twin_of
+from discrepancy.team.laws.variables import signals_of, variables_of
+from discrepancy.team.linear.signals import with_rates
+from discrepancy.team.linear.trial_linear import TrialLinear
+from estimator.arrays import Array
+
+
+class TeamBench:
+    """Places, signals and rows of a team; see ``discrepancy.laws.bench.Bench``.
+
+    Args:
+        linear: linearised trials.
+        whitening: of every trial.
+    """
+
+    def __init__(self, linear: Sequence[TrialLinear], whitening: Sequence[Whitening]) -> None:
+        self._linear, self._whitening = linear, whitening
+        self._signals: dict[int, dict[str, Array]] = {}
+        self.places = places_of(linear[0].robots)
+        self.variables = variables_of(linear[0].robots)
+
+    def rate_hz(self, trial: int) -> float:
+        return self._linear[trial].signals.rate_hz
+
+    def length(self, trial: int) -> int:
+        return len(self._linear[trial].signals.time)
+
+    def row_times(self, trial: int) -> Array:
+        linear = self._linear[trial]
+        return linear.reduction.time - linear.signals.time[0]
+
+    def signal(self, trial: int, variable: Variable) -> Array:
+        if trial not in self._signals:
+            self._signals[trial] = signals_of(self._linear[trial])
+        return self._signals[trial][variable.name]
+
+    def at_rows(self, trial: int, errors: Array, *, rates: bool) -> Array:
+        linear = self._linear[trial]
+        if not rates:
+            return linear.reduction(errors)[:, None]
+        parts = with_rates(errors, linear.signals.rate_hz)
+        return np.stack([linear.reduction(part) for part in parts], axis=1)
+
+    def values(self, trial: int, candidate: LawCandidate) -> Array:
+        """What one unit of each amplitude is, as a function of time, shape (Q, k)."""
+        term = candidate.term
+        values = term.values(lambda variable: self.signal(trial, variable), self.rate_hz(trial))
+        if candidate.at.offset and term.function not in ("constant", "spline"):
+            values = np.concatenate([values, np.ones((len(values), 1))], axis=1)
+        return values
+
+    def columns(self, trial: int, candidate: LawCandidate) -> Array:
+        """What a law adds to the residual, one column an amplitude, components side by side, shape (n, C, k)."""
+        linear, place = self._linear[trial], candidate.at
+        values = self.values(trial, candidate)
+        if place.name in READINGS and place.robot and place.joint:
+            kind, joint = READINGS[place.name], place.joint - 1
+            return np.stack(
+                [linear.of_signals(place.robot - 1, **{kind: one_joint(x, joint)}) for x in values.T], axis=2
+            )
+        directions = self.directions(trial, place)
+        moved = self.at_rows(trial, values, rates=directions.shape[2] == 3)
+        columns = np.einsum("narc,nrk->ncka", directions, moved, optimize=True)
+        return np.asarray(columns.reshape(*columns.shape[:2], -1))
+
+    def reading_error(
+        self, trial: int, candidate: LawCandidate, amplitudes: Array
+    ) -> dict[str, Array] | None:
+        """What a law of a reading adds to ``phi``, ``theta`` or ``tau``, shape (Q, N, 3); None of another place."""
+        place = candidate.at
+        if place.name not in READINGS or not place.robot or not place.joint:
+            return None
+        error = one_joint(self.values(trial, candidate) @ amplitudes, place.joint - 1)
+        return {READINGS[place.name]: one_robot(error, self._linear[trial].robots, place.robot - 1)}
+
+    def directions(self, trial: int, place: Place) -> Array:
+        return directions_at(self._linear[trial], place)
+
+    def white(self, trial: int, columns: Array) -> Array:
+        return self._whitening[trial](columns)
+
+    def twin(self, place: Place) -> Place | None:
+        """Another place whose rows are the same, minus these."""
+        return twin_of(place)
