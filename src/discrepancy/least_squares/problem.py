@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.least_squares.cells import Cells
 from discrepancy.least_squares.gram import gram_of, orthonormal, project
 from discrepancy.least_squares.opened import Opened, through
@@ -39,6 +40,7 @@ class Problem:
         tolerant: which candidate columns have a tolerance and are no event, shape (all candidate columns,).
         spread: standard deviation of the candidates' parameters in units, shape (all candidate columns,).
         opened: what causes leave open in every trial, by cause.
+        odds: of any cause being there before the data are seen, at all its places together.
     """
 
     candidates: tuple[Candidate, ...]
@@ -54,6 +56,7 @@ class Problem:
     tolerant: NDArray[np.bool_]
     spread: Array
     opened: Mapping[Key, tuple[Opened, ...]] = field(default_factory=dict)
+    odds: float = rules.PRIOR_ODDS
 
     @classmethod
     def of(cls, trials: Sequence[Rows], candidates: Sequence[Candidate]) -> Problem:
@@ -222,6 +225,7 @@ class Problem:
             self.candidates, self.raw, self.local, self.cells, self.power, self.shared, self.spans, self.tolerant,
             self.spread,
         )  # fmt: skip
+        again = replace(again, odds=self.odds)
         for key, own in self.opened.items():
             if key in keep:
                 again = again.with_unknowns(key, [one.columns for one in own], 1.0)
