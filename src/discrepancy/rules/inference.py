@@ -1,7 +1,5 @@
 """Noise, priors, search and verdict of any machine; origins are named as in ``discrepancy.rules``."""
 
-import math
-
 # What the data say about one candidate.
 
 LEAST_INFORMATION = 1e-3
@@ -95,8 +93,9 @@ HELD_FACTOR = 1.5
 """Spread of a kind from which it is scanned within its tolerance, too. Chosen."""
 WORST_EVENTS = 3
 """Intervals looked at closely. Chosen."""
-NAMED_NATS = math.log(FALSE_ALARM_COST)
-"""Log odds from which a cause is named, 5.0. Derived: named, it costs false alarms times 1 - p; missed, 1 times p."""
+NAMED_NATS = 5.0
+"""Log odds from which a cause is named. Derived: ln of ``FALSE_ALARM_COST``; named, a cause costs that much times 1 - p,
+and silence 1 times p."""
 EXCHANGES = 4
 """Rounds in which causes are exchanged and taken away after one was added. Chosen."""
 EXCHANGED_NATS = 1.0

@@ -39,6 +39,7 @@ def test_odds_multiply_those_of_every_cause(odds):
 
 def test_thresholds_are_the_costs():
     """Of a false alarm against a miss: silence is cheaper up to p / (1 - p) = 150."""
+    assert pytest.approx(np.log(rules.FALSE_ALARM_COST), abs=0.05) == rules.NAMED_NATS
     for p in (0.99, 0.995):
         named = (1.0 - p) * rules.FALSE_ALARM_COST < p
         assert (np.log(p / (1.0 - p)) > rules.NAMED_NATS) == named
