@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from discrepancy import rules
 from discrepancy.causes.tolerances_file import read_tolerances
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.diagnosis import diagnose_serial
@@ -156,6 +157,7 @@ def diagnose(
     reference: GivenLogs = (),
     tolerances: Path | str | None = None,
     exclude: Iterable[str] = (),
+    odds: float = rules.PRIOR_ODDS,
     jobs: int = 1,
     say: Callable[[str], object] = lambda _: None,
 ) -> Diagnosis:
@@ -168,11 +170,12 @@ def diagnose(
         reference: logs of the same robot while it was well: what is wrong with the model there, too, is no news.
         tolerances: TOML file: how far a robot may be off without that being news.
         exclude: causes not to consider.
+        odds: of any cause being there before the data are seen, at all its places together.
         jobs: parallel processes.
         say: takes the name of the stage that begins.
 
     Raises:
-        InputError: model, logs, map, tolerances or causes that cannot be used.
+        InputError: model, logs, map, tolerances, causes or odds that cannot be used.
     """
     robot = _model(model)
     return public(
@@ -183,6 +186,7 @@ def diagnose(
             read_logs(reference, robot, map=map),
             serial_tolerances(Path(tolerances) if tolerances is not None else None),
             tuple(exclude),
+            odds=odds,
             jobs=jobs,
             say=say,
         ),
@@ -192,11 +196,11 @@ def diagnose(
 def diagnosed(
     model: SerialModel, logs: list[JointLog], reference: list[JointLog],
     tolerances: Mapping[str, Mapping[str, float]] | None, exclude: tuple[str, ...],
-    *, jobs: int, say: Callable[[str], object],
+    *, odds: float, jobs: int, say: Callable[[str], object],
 ) -> Any:  # fmt: skip
     """``diagnose_serial``, with the reference where there is one."""
     more: dict[str, Any] = {"reference": reference} if reference else {}
-    return diagnose_serial(model, logs, tolerances, exclude, jobs=jobs, say=say, **more)
+    return diagnose_serial(model, logs, tolerances, exclude, odds=odds, jobs=jobs, say=say, **more)
 
 
 def serial_tolerances(path: Path | None) -> dict[str, dict[str, float]] | None:

@@ -28,6 +28,7 @@ def diagnose_emps(
     *,
     closed_loop: bool = True,
     laws: When = "auto",
+    odds: float = rules.PRIOR_ODDS,
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
     simulated: Callable[[int], object] | None = None,
@@ -38,13 +39,15 @@ def diagnose_emps(
         log: the recording.
         tolerances: standard deviations by cause and parameter; None for the defaults.
         excluded: causes left out of the catalogue.
-        closed_loop, laws, jobs, say, simulated: as of ``diagnose``.
+        closed_loop, laws, odds, jobs, say, simulated: as of ``diagnose``.
 
     Raises:
         InputError: the recording cannot be used, or a cause to be excluded does not exist.
     """
     rig = EmpsRig.of(log, tolerances, excluded)
-    found = diagnose_axis(rig, closed_loop=closed_loop, laws=laws, jobs=jobs, say=say, simulated=simulated)
+    found = diagnose_axis(
+        rig, closed_loop=closed_loop, laws=laws, odds=odds, jobs=jobs, say=say, simulated=simulated
+    )
     return Diagnosed(rig, found, EmpsWords(), partial(traces, rig, found.explanation))
 
 
@@ -53,6 +56,7 @@ def diagnose_axis(
     *,
     closed_loop: bool = True,
     laws: When = "auto",
+    odds: float = rules.PRIOR_ODDS,
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
     simulated: Callable[[int], object] | None = None,
@@ -61,9 +65,11 @@ def diagnose_axis(
 
     Args:
         rig: the recording.
-        closed_loop, laws, jobs, say, simulated: as of ``diagnose``.
+        closed_loop, laws, odds, jobs, say, simulated: as of ``diagnose``.
     """
-    found = diagnose(rig, closed_loop=closed_loop, laws=laws, jobs=jobs, say=say, simulated=simulated)
+    found = diagnose(
+        rig, closed_loop=closed_loop, laws=laws, odds=odds, jobs=jobs, say=say, simulated=simulated
+    )
     explanation = with_block_errors(found.explanation, block_rows(rig))
     notes = (*rig.log.notes, *found.notes, _noise(rig), *_loop(rig, found.explanation))
     return replace(found, explanation=explanation, notes=notes)

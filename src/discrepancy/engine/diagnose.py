@@ -9,6 +9,7 @@ from discrepancy.engine.confirm import Alternative, confirm, not_simulated
 from discrepancy.engine.explanation import Explanation, Found, explain
 from discrepancy.engine.gain import Gain, responses
 from discrepancy.engine.verdict import Verdict, verdict_of
+from discrepancy.inference.odds import check_odds
 from discrepancy.inference.search import search
 from discrepancy.laws.search import with_laws
 from discrepancy.laws.where import Located
@@ -53,6 +54,7 @@ def diagnose(
     closed_loop: bool = True,
     most: int = rules.MOST_CAUSES,
     laws: When = "auto",
+    odds: float = rules.PRIOR_ODDS,
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
     simulated: Callable[[int], object] | None = None,
@@ -64,11 +66,15 @@ def diagnose(
         closed_loop: whether to resimulate the recorded commands.
         most: largest number of causes.
         laws: whether to look for laws that the catalogue lacks: where something unlisted is left, always, or never.
+        odds: of any cause being there before the data are seen, at all its places together.
         jobs: parallel processes of the simulations.
         say: called with what is being done.
         simulated: called with 1 for every simulated trial.
+
+    Raises:
+        InputError: the odds are none.
     """
-    searched = search(rig, most, progress=say)
+    searched = search(rig, most, progress=say, odds=check_odds(odds))
     explanation = explain(searched)
     located: tuple[Located, ...] = ()
     if laws == "always" or (laws == "auto" and not explanation.clean):
@@ -77,6 +83,10 @@ def diagnose(
         explanation = explain(searched)
     rig = searched.rig
     notes: list[str] = []
+    if odds != rules.PRIOR_ODDS:
+        notes.append(
+            f"Every cause was taken to be there with odds of {odds:g} beforehand; otherwise it is {rules.PRIOR_ODDS:g}."
+        )
     why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"
     alternatives = tuple(not_simulated(found) for found in explanation.found)
     gain, contradicted = None, False

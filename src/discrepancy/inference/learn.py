@@ -120,13 +120,15 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
         own.append(True)
     used = np.flatnonzero(group > -2)
     both = np.append(used, count)
-    grams = [
-        g[c.sizes > 0][:, both][:, :, both] for g, c in zip(problem.cell_grams, problem.cells, strict=True)
-    ]
     sizes = [c.sizes[c.sizes > 0] for c in problem.cells]
+    grams = np.empty((sum(map(len, sizes)), len(both), len(both)))
+    pairs = zip(problem.cell_grams, problem.cells, strict=True)
+    filled = (gram[cell] for gram, c in pairs for cell in np.flatnonzero(c.sizes))
+    for one, gram in zip(grams, filled, strict=True):
+        np.take(gram[both], both, axis=1, out=one, mode="clip")
     parts = _Parts(
-        np.concatenate(grams).reshape(-1, len(both) ** 2), np.concatenate(sizes).astype(float), group[used],
-        np.array(least), np.array(most), np.array(weight), np.array(own, dtype=bool),
+        grams.reshape(len(grams), -1), np.concatenate(sizes).astype(float), group[used], np.array(least),
+        np.array(most), np.array(weight), np.array(own, dtype=bool),
     )  # fmt: skip
     return names, parts
 

@@ -199,6 +199,7 @@ def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hy
     # Its size is found with them, and is theirs.
     first = start.with_unknowns(shaped.key, unknowns, max(size, shaped.parameters[0].tolerance))
     size = abs(float(Hypothesis.of(first, new.free, base.allowed).fit.part(index)[0][0] * shaped.units[0]))
+    del first  # for the sake of memory
     opened = start.with_unknowns(shaped.key, unknowns, max(size, shaped.parameters[0].tolerance))
     other = Hypothesis.of(opened, new.free, base.allowed)
     if other.score <= new.score:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from discrepancy import rules
 from discrepancy.inference.hypothesis import Hypothesis
@@ -46,7 +46,10 @@ class Searched:
 
 
 def search(
-    rig: Rig, most: int = rules.MOST_CAUSES, progress: Callable[[str], object] | None = None
+    rig: Rig,
+    most: int = rules.MOST_CAUSES,
+    progress: Callable[[str], object] | None = None,
+    odds: float = rules.PRIOR_ODDS,
 ) -> Searched:
     """Find what is most probably there.
 
@@ -54,9 +57,11 @@ def search(
         rig: the rig.
         most: largest number of causes.
         progress: called with what is being done.
+        odds: of any cause being there before the data are seen.
     """
     say = progress or (lambda what: None)
     rig, nothing = _based(rig, say)
+    nothing = replace(nothing, learnt=replace(nothing.learnt, problem=replace(nothing.problem, odds=odds)))
     say("scan")
     return continued(Searched(rig, nothing, nothing, ()), most, say)
 

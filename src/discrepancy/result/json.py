@@ -2,6 +2,7 @@
 
 format, version     "mocobot-diagnosis", 2
 recordings          names of the trials
+prior_odds          of any cause being there before the data are seen, at all its places together
 verdict             "consistent", "miscalibrated", "explained", "partly_explained" or "unexplained"
 causes              list, in the order of discovery, of
     cause, family, robot, joint    robot and joint from 1, or null
@@ -110,6 +111,7 @@ def diagnosis_to_dict(
         "version": VERSION,
         "recordings": list(rig.trials),
         "verdict": diagnosis.verdict,
+        "prior_odds": explanation.problem.odds,
         "causes": [
             _cause(found, alternatives, rig, words)
             for found, alternatives in zip(diagnosis.causes, diagnosis.alternatives, strict=True)
