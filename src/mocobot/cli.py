@@ -9,6 +9,7 @@ from typing import Any, NoReturn
 
 from estimator.errors import InputError
 from mocobot import options
+from mocobot.config import with_config
 from mocobot.parsing import parse
 from mocobot.strict import NotGood
 from mocobot_sim.errors import TrialError
@@ -86,7 +87,7 @@ def _run(arguments: Sequence[str]) -> None:
     if "--version" in arguments:
         print(f"mocobot {_version()}")
         return
-    options = parse(COMMANDS, arguments)
+    options = parse(COMMANDS, with_config(COMMANDS, arguments))
     name = next(name for name, kind in COMMANDS.items() if isinstance(options, kind))
     if name not in UNCHECKED:
         import_module(f"mocobot.checks.{name}").check(options)
