@@ -67,7 +67,7 @@ def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Se
     rivals = dict(zip(best.free, map(list, searched.rivals), strict=True))
     doubtful = 0
     while len(best.free) < most and doubtful < rules.DOUBTFUL:
-        added = next(iter(proposals(rig, best)), None)
+        added = proposals(rig, best).best
         if added is None or added.score - best.score < rules.NAMED_NATS:
             break
         say(f"refit {added.causes[-1].label}")
@@ -93,7 +93,9 @@ def _based(rig: Rig, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
         if moved is None:
             break
         say("linearise")
-        rig, nothing = moved, _nothing(moved, say)
+        rig = moved
+        del nothing, moved  # for the sake of memory
+        nothing = _nothing(rig, say)
     return rig, nothing
 
 
@@ -116,15 +118,14 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
             candidate = best.problem.candidates[index]
             # Its own shape may be another beside what was found since.
             others = proposals(rig, less, events=candidate.transient is None)
-            last = [h.causes[-1] for h in others]
             rivals[index] = [
-                Rival(other, best.score - h.score)
-                for other, h in zip(last, others, strict=True)
+                Rival(other, best.score - score)
+                for other, score in others.scores
                 if other.key != candidate.key
             ]
             rivals[index].append(Rival(None, best.score - less.score))
-            if others and others[0].score > best.score + rules.EXCHANGED_NATS:
-                other = exact(rig, others[0], nothing)
+            if others.best is not None and others.best.score > best.score + rules.EXCHANGED_NATS:
+                other = exact(rig, others.best, nothing)
                 if other.score > best.score:
                     best, changed = other, True
                     break

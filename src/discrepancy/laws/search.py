@@ -10,7 +10,7 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.engine.held_out import held_out_gains
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.inference.propose import sharpened
+from discrepancy.inference.propose import Proposed, sharpened
 from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import unlisted_nats
 from discrepancy.inference.scan import Scanned
@@ -86,10 +86,11 @@ def _with_one(
 ) -> tuple[Searched, dict[tuple[object, ...], list[Rival]]] | None:
     """The search with one law more, and that law's rivals among laws; None where no law pays and helps."""
     proposed = _proposals(searched, bench, places, say)
-    if not proposed or proposed[0].score - searched.best.score < rules.NAMED_NATS:
+    added = proposed.best
+    if added is None or added.score - searched.best.score < rules.NAMED_NATS:
         return None
-    say(f"refit {proposed[0].causes[-1].label}")
-    refitted = exact(searched.rig, proposed[0], searched.nothing)
+    say(f"refit {added.causes[-1].label}")
+    refitted = exact(searched.rig, added, searched.nothing)
     if not helps(refitted, refitted.free[-1]):
         return None
     law = refitted.causes[-1]
@@ -113,18 +114,21 @@ def helps(hypothesis: Hypothesis, index: int) -> bool:
 
 def _proposals(
     searched: Searched, bench: Bench, places: Sequence[Located], say: Callable[[str], object]
-) -> list[Hypothesis]:
-    """Hypotheses with one law more, each with the best numbers inside, the likeliest first."""
+) -> Proposed:
+    """Hypotheses with one law more, each with the best numbers inside."""
     base = searched.best
     say("try formulas")
     ranked = judged(base.fit, bench, [one.place for one in places[: rules.LAW_PLACES]])
-    out = []
+    best, scores = None, []
     leaders = _leaders(ranked, base)
     for item in leaders:
         candidate = _candidate(item, bench)
         scanned = Scanned(None, candidate, item.nats, tuple(searched.rig.columns(candidate)))
-        out.append(sharpened(searched.rig, base, scanned, near=item.nats > rules.LAW_NEAR * leaders[0].nats))
-    return sorted(out, key=lambda new: -new.score)
+        new = sharpened(searched.rig, base, scanned, near=item.nats > rules.LAW_NEAR * leaders[0].nats)
+        scores.append((new.causes[-1], new.score))
+        if best is None or new.score > best.score:
+            best = new
+    return Proposed(best, tuple(sorted(scores, key=lambda one: -one[1])))
 
 
 def _leaders(ranked: Sequence[Judged], base: Hypothesis) -> list[Judged]:
@@ -156,20 +160,18 @@ def _candidate(item: Judged, bench: Bench) -> LawCandidate:
     return candidate_of(item.place, item.term, rules.LAW_SCALES[unit], among)
 
 
-def _rivals(bench: Bench, proposed: Sequence[Hypothesis]) -> list[Rival]:
+def _rivals(bench: Bench, proposed: Proposed) -> list[Rival]:
     """What else could be there instead of the first, and the place that the rows cannot tell from it."""
-    best, *others = proposed
-    law = best.causes[-1]
+    (law, score), *others = proposed.scores
     out: dict[tuple[object, ...], Rival] = {}
     assert isinstance(law, LawCandidate)
     twin = bench.twin(law.at)
     if twin is not None:
         other = replace(law, at=twin, title=twin.title)
         out[other.key] = Rival(other, 0.0)
-    for one in others:
-        candidate = one.causes[-1]
+    for candidate, less in others:
         if candidate.key != law.key and candidate.key not in out:
-            out[candidate.key] = Rival(candidate, best.score - one.score)
+            out[candidate.key] = Rival(candidate, score - less)
     return list(out.values())
 
 

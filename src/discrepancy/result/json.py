@@ -64,7 +64,7 @@ from typing import Any
 import numpy as np
 
 from discrepancy.causes.words import Words
-from discrepancy.engine.confirm import Alternative
+from discrepancy.engine.confirm import Alternative, decided_gap
 from discrepancy.engine.diagnose import Diagnosis
 from discrepancy.engine.explanation import Found
 from discrepancy.engine.gain import Gain, Response
@@ -137,7 +137,7 @@ def diagnosis_to_dict(
 
 
 def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: Words) -> dict[str, Any]:
-    candidate, instead = found.candidate, _Instead.of(found)
+    candidate, instead = found.candidate, _Instead.of(found, alternatives)
     values, se = rig.effect_parameters(candidate, found.values, found.covariance)
     return {
         **place_of(candidate),
@@ -194,9 +194,9 @@ class _Instead:
     unlisted: float
 
     @classmethod
-    def of(cls, found: Found) -> "_Instead":
+    def of(cls, found: Found, alternatives: Sequence[Alternative]) -> "_Instead":
         """What ``engine.probability`` weighs against a cause: what is so many nats less likely, by so much less."""
-        gaps = np.array([*(gap for _, gap in found.rivals), found.over_nothing], dtype=float)
+        gaps = np.array([*map(decided_gap, alternatives), found.over_nothing], dtype=float)
         listed = found.probability * np.exp(-np.clip(gaps, -50.0, 700.0))
         rest = 1.0 - found.probability - float(listed.sum())
         return cls(tuple(map(float, listed[:-1])), float(listed[-1]), max(rest, 0.0))

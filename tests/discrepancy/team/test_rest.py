@@ -131,7 +131,7 @@ def test_healthy_holds_leave_noise_alone():
 
     resting = Resting(trial, JOINT)
     noise = np.array([sensors() for _ in range(40)])
-    with_friction = noise + np.array([resting(rng) for _ in noise])
+    with_friction = noise + np.array([resting(rng)[0] for _ in noise])
     data = [sensors() + friction() for _ in range(8)]
 
     def left(draws):

@@ -25,11 +25,11 @@ def directions_at(linear: TrialLinear, place: Place) -> Array:
     robot, joint = (place.robot or 1) - 1, (place.joint or 1) - 1
     if place.name in ("phi reading", "theta reading"):
         slots = (PHI, PHI_DOT, PHI_DDOT) if place.name == "phi reading" else (THETA, THETA_DOT, THETA_DDOT)
-        J = linear.J[robot][at]
-        return np.stack([J[:, :, kind][:, :, joint] for kind in slots], axis=1)[:, None]
+        J = [linear.J.at(robot, kind, at)[..., joint] for kind in slots]
+        return np.stack(J, axis=1)[:, None]
     if place.name in ("tau reading", "driven torque"):
         sign = 1.0 if place.name == "tau reading" else -1.0  # a torque beside the spring is not read
-        return sign * linear.J[robot][at][:, :, TAU][:, None, None, :, joint]
+        return sign * linear.J.at(robot, TAU, at)[:, None, None, :, joint]
     if place.name == "gimbal torque":
         axes_T = np.swapaxes(rate_matrix(linear.s[at][:, robot, THETA]), -1, -2)
         unit = np.tile(np.eye(3)[joint][:, None], (len(at), 1, 1))

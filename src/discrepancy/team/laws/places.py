@@ -18,7 +18,7 @@ def places_of(robots: int) -> list[Place]:
             driven = tuple(joint_variable(n, i, j) for n in ("phi", "phi_rate", "phi_acceleration", "tau"))
             gimbal = tuple(joint_variable(n, i, j) for n in ("theta", "theta_rate", "theta_acceleration"))
             out += [
-                _joint("tau reading", i, j, "tau", "N m", "reading of torque sensor {driven joint}", driven,
+                _joint("tau reading", i, j, "tau", "N m", "reading of the torque sensor of {driven joint}", driven,
                        twin="driven torque"),
                 _joint("phi reading", i, j, "phi", "rad", "reading of the angle of {driven joint}", driven),
                 _joint("theta reading", i, j, "theta", "rad", "reading of the angle of {gimbal axis}", gimbal),
