@@ -1,6 +1,5 @@
 """What small changes of pose and motion do to loops and balance."""
 
-
 from estimator.arrays import Array
 from estimator.estimate.principal import inertia_matrix
 from estimator.so3 import cross
