@@ -65,5 +65,3 @@ def _factors(request: Item, effects: Sequence[Item]) -> list[float]:
     if len(request["factors"]) == len(effects):
         return list(request["factors"])
     return [request["factors"][0]] * len(effects)  # pushes: one factor for all
-
-

@@ -39,7 +39,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 def whole_folder(path: Path) -> Iterator[Path]:
     """A temporary folder that takes the place of ``path`` (with all it held) when the block ends without an error.
 
-    Missing folders above it are made.
+    Missing folders above it are made. What cannot be written inside is told by its place in ``path``.
 
     Raises:
         InputError: it cannot be created or put in place.
@@ -56,6 +56,10 @@ def whole_folder(path: Path) -> Iterator[Path]:
                 if real.exists():
                     real.rename(old)
                 temporary.rename(real)
+        except InputError as error:
+            if str(temporary) not in str(error):
+                raise
+            raise InputError(str(error).replace(str(temporary), str(path))) from error
         finally:
             if old.exists() and not real.exists():
                 with contextlib.suppress(OSError):
