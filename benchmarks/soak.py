@@ -191,10 +191,24 @@ def mounted(options: str) -> Iterator[Path]:
         here.rmdir()
 
 
+def fill(path: Path) -> None:
+    """Take all the room that a disk has."""
+    try:
+        with path.open("wb", buffering=0) as file:
+            while True:
+                file.write(bytes(1024))
+    except OSError:
+        return
+
+
 def fault(name: str, inputs: Path, disk: str) -> dict[str, Any]:
     """A disk that is full, or cannot be written."""
     with mounted({"full": "size=16k", "read-only": "ro"}[disk]) as where:
+        if disk == "full":
+            fill(where / "filler")
         code, said = ended(start(CASES[name], inputs, where))
+        if disk == "full":
+            (where / "filler").unlink()
         found, temporary = left(where)
     good = code == 2 and len(said.splitlines()) == 1 and "Traceback" not in said
     return {

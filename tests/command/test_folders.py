@@ -145,3 +145,16 @@ def test_a_file_that_cannot_be_written_is_named_by_its_place(tmp_path: Path) -> 
     with pytest.raises(InputError, match=re.escape(f"{tmp_path / 'out'}/a.txt: cannot be written")):
         write()
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_full_disk_is_one_sentence_whoever_writes(tmp_path: Path) -> None:
+    """Libraries that draw pictures raise errors of the system."""
+
+    def write() -> None:
+        with whole_folder(tmp_path / "out"), open("/dev/full", "w") as full:
+            full.write("words")
+
+    with pytest.raises(InputError, match=r"out: cannot be written \(No space left on device\)"):
+        write()
+    assert list(tmp_path.iterdir()) == []
