@@ -24,7 +24,7 @@ class Scored:
         result: what was scored.
         scores: one for every hidden effect.
         extras: what was named besides.
-        stated: probability and rightness of everything that was named with a probability.
+        stated: probability and rightness of everything that was named with a probability, laws left out.
     """
 
     result: Item
@@ -38,15 +38,22 @@ class Scored:
         return self.result["verdict"]["verdict"]
 
     @property
+    def laws(self) -> tuple[Item, ...]:
+        """Laws that were stated."""
+        return tuple(cause for cause in self.result["verdict"]["causes"] if cause["cause"] == "law")
+
+    @property
     def whole(self) -> bool:
         """Whether everything hidden was named right, or left unexplained if nobody lists it, and nothing else was."""
-        if self.extras:
+        if self.extras or (self.laws and all(score.listed for score in self.scores)):
             return False
         if not self.scores:
             return self.verdict in HEALTHY
         listed = [score for score in self.scores if score.listed]
         return all(score.right for score in listed) and (
-            len(listed) == len(self.scores) or self.verdict in ("unexplained", "partly_explained")
+            len(listed) == len(self.scores)
+            or self.verdict in ("unexplained", "partly_explained")
+            or bool(self.laws)
         )
 
 
@@ -54,8 +61,9 @@ def score(result: Item) -> Scored:
     """Score one result that ended without an error."""
     truth = result["truth"]
     excluded = set(result["set"]["names"]) if result["set"]["kind"] == "left-out" else set()
+    causes = [cause for cause in result["verdict"]["causes"] if cause["cause"] != "law"]
     found = match(
-        result["verdict"]["causes"], truth, _factors(result["set"], truth["effects"]),
+        causes, truth, _factors(result["set"], truth["effects"]),
         lambda cause: cause in CAUSES and cause not in excluded,
     )  # fmt: skip
     return Scored(result, found.scores, found.extras, found.stated)

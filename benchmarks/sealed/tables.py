@@ -28,7 +28,7 @@ def tables(results: Iterable[Mapping[str, Any]]) -> str:
         out += [_by_size(title, sets), _by_name(title, sets)]
     out.append(_several([one for kind in ("pairs", "triples", "pushes") for one in by_kind.get(kind, [])]))
     nobody = [one for one in scored if one.scores and not any(s.listed for s in one.scores)]
-    out += [_nobodys("Not in the catalogue", nobody), _reliability(scored), _cost(scored)]
+    out += [_nobodys("Not in the catalogue", nobody), _laws(scored), _reliability(scored), _cost(scored)]
     if failed := [result for result in results if result["error"]]:
         lines = Counter(result["error"].splitlines()[-1] for result in failed)
         out.append(
@@ -149,6 +149,36 @@ def _nobodys(title: str, sets: Sequence[Scored]) -> str:
         "named",
     ]
     return _markdown(title, header, rows)
+
+
+def _laws(scored: Sequence[Scored]) -> str:
+    """Laws stated of unlisted effects, and of sets that have none."""
+    rows = []
+    own = [one.result["law_score"] for one in scored if "law_score" in one.result]
+    if own:
+        stated = [score for score in own if score["stated"]]
+        sizes = [score["amplitude"] for score in own if score["amplitude"] is not None]
+        held = [score["held_out"] for score in stated if score["held_out"] is not None]
+        counts = [
+            _share(sum(bool(s[name]) for s in own), len(own))
+            for name in ("stated", "place", "variable", "formula")
+        ]
+        size = f"{100 * np.median(sizes):.1f}, {100 * max(sizes):.0f}" if sizes else "-"
+        rows.append(
+            [len(own), *counts, size, f"{100 * np.median(held):.0f}, {100 * min(held):.0f}" if held else "-"]
+        )
+    header = [
+        "unlisted effects", "a law stated", "place", "and signal", "and formula", "size off, median, most [%]",
+        "gain held out over in sample, median, least [%]",
+    ]  # fmt: skip
+    text = [_markdown("Laws", header, rows)] if rows else []
+    others = [one for one in scored if "law_score" not in one.result]
+    if others:
+        false = sum(bool(one.laws) for one in others)
+        text.append(
+            f"A law stated where nothing unlisted was hidden: {_share(false, len(others))} of {len(others)}."
+        )
+    return "\n\n".join(text)
 
 
 def _fate(own: Sequence[Scored]) -> list[Any]:
