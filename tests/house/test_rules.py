@@ -14,6 +14,7 @@ RULES = {"inference": 40, "team": 30, "axis": 40, "serial": 60, "laws": 20}
 FREE = {
     "discrepancy.emps.recording.axis_log": {"FIRST_GUESS_KG", "LIMIT_V"},  # the nominal axis
     "discrepancy.result.evidence_list": {"CLOSELY", "MOST"},  # of a picture
+    "discrepancy.result.json": {"MOST_PLACES"},
     "discrepancy.result.read": {"VERSION"},
     "discrepancy.result.pictures.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
     "discrepancy.result.sensitivity": {"HALVINGS", "LEARNT"},  # a grid

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.place import Place
 from discrepancy.laws.variable import Variable
 from estimator.arrays import Array
@@ -37,6 +38,10 @@ class Bench(Protocol):
 
     def signal(self, trial: int, variable: Variable) -> Array:
         """Values of a signal, shape (Q,)."""
+        ...
+
+    def values(self, trial: int, candidate: LawCandidate) -> Array:
+        """What one unit of each of a law's amplitudes is, as a function of time, shape (Q, k)."""
         ...
 
     def at_rows(self, trial: int, errors: Array, *, rates: bool) -> Array:

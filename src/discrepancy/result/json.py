@@ -18,12 +18,15 @@ causes              list, in the order of discovery, of
                                    alternatives they add up to 1
     folds                          gain of chi-square on every trial when fitted to the others
     law                            of what no catalogue lists {place, unit, targets, function, of, times, numbers,
-                                   formula}: an error at ``targets`` that is a function of signals; else null
+                                   formula}: an error at ``targets`` that is a function of signals, and ``traces`` of
+                                   the error as it was located beside it (``laws.trace``); else null
     shape                          numbers that change the cause's columns, such as a pendulum's length
     separate                       what would tell the cause from its look-alikes
     alternatives                   list of {cause, kind, name, family, robot, joint, place, probability,
                                    evidence_gap [nats], chi2_per_n, ambiguous, separate}; the probability by the rows;
                                    chi2_per_n of its closed loop, or null
+places              where something unlisted was looked for, the likeliest first: {place, robot, joint, nats}; empty
+                    where nothing unlisted is left
 suspected           what would explain some of it, but is not probable enough to be named: list of {cause, kind, name,
                     family, robot, joint, place, at, sentence, probability, over_nothing}
 scatter             kinds of which all places are off by more than the tolerance, the farthest first: list of
@@ -71,6 +74,8 @@ from discrepancy.engine.explanation import Found
 from discrepancy.engine.gain import Gain, Response
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.report import law_to_dict
+from discrepancy.laws.trace import places_to_dict, traces_of
+from discrepancy.laws.where import Located
 from discrepancy.least_squares.fit import Fit
 from discrepancy.result.evidence_list import at_of, evidence_list, place_of
 from discrepancy.result.read import FORMAT, VERSION
@@ -78,6 +83,9 @@ from discrepancy.result.remains import remains, scatter_to_dict
 from discrepancy.result.sensitivity import blind_spots, detection_limits
 from discrepancy.result.signature import signature
 from discrepancy.rig import Rig
+from estimator.arrays import Array
+
+MOST_PLACES = 8
 
 
 def diagnosis_to_dict(
@@ -113,9 +121,10 @@ def diagnosis_to_dict(
         "verdict": diagnosis.verdict,
         "prior_odds": explanation.problem.odds,
         "causes": [
-            _cause(found, alternatives, rig, words)
+            _cause(found, alternatives, rig, words, diagnosis.located)
             for found, alternatives in zip(diagnosis.causes, diagnosis.alternatives, strict=True)
         ],
+        "places": places_to_dict(diagnosis.located, MOST_PLACES),
         "suspected": [_suspected(found, rig, words) for found in explanation.suspected],
         "scatter": [scatter_to_dict(item) for item in explanation.scatter],
         "evidence": evidence_list(explanation),
@@ -138,7 +147,9 @@ def diagnosis_to_dict(
     return values | {"remains": remains(values)}
 
 
-def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: Words) -> dict[str, Any]:
+def _cause(
+    found: Found, alternatives: Sequence[Alternative], rig: Rig, words: Words, located: Sequence[Located]
+) -> dict[str, Any]:
     candidate, instead = found.candidate, _Instead.of(found, alternatives)
     values, se = rig.effect_parameters(candidate, found.values, found.covariance)
     return {
@@ -154,7 +165,7 @@ def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: W
         "instead": {"nothing": instead.nothing, "unlisted": instead.unlisted},
         "folds": [float(gain) for gain in found.folds],
         "shape": plain(dict(candidate.shape)),
-        "law": law_to_dict(candidate) if isinstance(candidate, LawCandidate) else None,
+        "law": _law(candidate, found.values, rig, located) if isinstance(candidate, LawCandidate) else None,
         "separate": words.separate(candidate),
         "alternatives": [
             {
@@ -168,6 +179,10 @@ def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: W
             for rival, probability in zip(alternatives, instead.rivals, strict=True)
         ],
     }
+
+
+def _law(candidate: LawCandidate, values: Array, rig: Rig, located: Sequence[Located]) -> dict[str, Any]:
+    return {**law_to_dict(candidate), "traces": traces_of(candidate, values, located, rig.bench)}
 
 
 def _suspected(found: Found, rig: Rig, words: Words) -> dict[str, Any]:

@@ -14,11 +14,12 @@ from matplotlib.figure import Figure
 from discrepancy.causes.words import Words
 from discrepancy.result.pictures.plots_against import AFTER, BEFORE, against_figure, scale_multiples, titled
 from discrepancy.result.pictures.plots_evidence import closed_loop_figure, evidence_figure
+from discrepancy.result.pictures.plots_law import law_figure
 from discrepancy.result.pictures.residual_statistics import multiples
 from discrepancy.result.traces import Group, Trace, group_units, groups
 from estimator.arrays import Array
 
-PLOTS = ("residual_*.png", "evidence.png", "closed_loop.png")
+PLOTS = ("residual_*.png", "evidence.png", "closed_loop.png", "law.png")
 CLEAN_BAND = "#d9dde3"
 COMPONENTS = ("#7a5195", "#d99a2b", "#2a9d8f")
 
@@ -38,7 +39,7 @@ def save_plots(
         channels: the rig's channels.
         words: the rig's units.
         folder: existing folder for ``residual_<trial>.png``, ``residual_against.png``, ``evidence.png`` and
-            ``closed_loop.png`` (the last only where the closed loop was simulated).
+            ``closed_loop.png`` and ``law.png`` (these only where the closed loop was simulated, and a law stated).
     """
     grouped, named = groups(channels), bool(values["causes"])
     paths = []
@@ -49,6 +50,9 @@ def save_plots(
     loop = closed_loop_figure(values)
     if loop is not None:
         paths.append(_save(loop, folder / "closed_loop.png"))
+    law = law_figure(values)
+    if law is not None:
+        paths.append(_save(law, folder / "law.png"))
     return paths
 
 

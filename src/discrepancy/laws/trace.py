@@ -1,0 +1,68 @@
+"""A law beside the error that was located at its place: what the formula was made from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from discrepancy.laws.bench import Bench
+from discrepancy.laws.candidate import LawCandidate
+from discrepancy.laws.where import Located
+from estimator.arrays import Array
+
+
+def traces_of(
+    candidate: LawCandidate, values: Array, located: Sequence[Located], bench: Bench
+) -> list[dict[str, Any]]:
+    """One entry a trial: ``time_s``, ``signal`` (of the law), and by component ``error``, ``se`` and ``law``.
+
+    The error is what explains most at that place over time, found without any formula; it is determined up to what
+    unknowns and tolerances can explain, such as a constant, and is shifted by a constant onto the law. None where the
+    place was not located.
+
+    Args:
+        candidate: the law.
+        values: of its parameters, shape (k,).
+        located: places with their errors.
+        bench: of the rig.
+    """
+    found = next((one for one in located if one.place.key == candidate.at.key), None)
+    if found is None:
+        return []
+    table, out, offset = values.reshape(-1, len(candidate.at.axes)), [], np.zeros(len(candidate.at.axes))
+    laws = []
+    for trial, knots in enumerate(found.knots_s):
+        time = np.arange(bench.length(trial)) / bench.rate_hz(trial)
+        law = bench.values(trial, candidate) @ table
+        laws.append(np.stack([np.interp(knots, time, x) for x in law.T], axis=1))
+    weights = [1.0 / np.maximum(se, 1e-300) ** 2 for se in found.se]
+    total = np.sum([w.sum(axis=0) for w in weights], axis=0)
+    offset = np.sum(
+        [(w * (e - x)).sum(axis=0) for w, e, x in zip(weights, found.errors, laws, strict=True)], axis=0
+    )
+    offset = offset / total
+    for trial, (knots, error, se, law) in enumerate(
+        zip(found.knots_s, found.errors, found.se, laws, strict=True)
+    ):
+        time = np.arange(bench.length(trial)) / bench.rate_hz(trial)
+        signal = np.interp(knots, time, bench.signal(trial, candidate.term.of))
+        out.append(
+            {
+                "time_s": knots.tolist(),
+                "signal": signal.tolist(),
+                "error": (error - offset).T.tolist(),
+                "se": se.T.tolist(),
+                "law": law.T.tolist(),
+            }
+        )
+    return out
+
+
+def places_to_dict(located: Sequence[Located], most: int) -> list[dict[str, Any]]:
+    """The likeliest places: name, robot, joint, and by how many nats an error there is likelier than nothing."""
+    return [
+        {"place": one.place.name, "robot": one.place.robot, "joint": one.place.joint, "nats": float(one.nats)}
+        for one in located[:most]
+    ]
