@@ -17,13 +17,14 @@ from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
 
 
-def proposals(rig: Rig, base: Hypothesis, *, events: bool = True) -> list[Hypothesis]:
+def proposals(rig: Rig, base: Hypothesis, *, events: bool = True, narrow: bool = True) -> list[Hypothesis]:
     """Hypotheses with one cause more, the likeliest first; the added one is the last of its ``free``.
 
     Args:
         rig: for columns of other shapes.
         base: what is there already.
         events: whether to look for what acts for a while, too.
+        narrow: whether to look with kinds that scatter held within their tolerance, too.
     """
     fit = base.fit
     ranked = [_in_best_shape(rig, fit, item) for item in _with_kinds_held(base)]
@@ -34,7 +35,8 @@ def proposals(rig: Rig, base: Hypothesis, *, events: bool = True) -> list[Hypoth
         near = item.score > ranked[0].score - rules.CLOSE_NATS
         found.append(sharpened(rig, base, item, near=near))
     likely: dict[tuple[object, ...], Hypothesis] = {}
-    for new in sorted([*found, *_with_kinds_narrow(rig, base)], key=lambda new: -new.score):
+    found += _with_kinds_narrow(rig, base) if narrow else []
+    for new in sorted(found, key=lambda new: -new.score):
         last = new.causes[-1]
         which = (last.key, last.transient)
         if which not in likely and new.possible(rig, new.free[-1]) and not imitated(rig, base, last):

@@ -115,7 +115,7 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
                 break
             candidate = best.problem.candidates[index]
             # Its own shape may be another beside what was found since.
-            others = proposals(rig, less, events=candidate.transient is None)
+            others = proposals(rig, less, events=candidate.transient is None, narrow=False)
             last = [h.causes[-1] for h in others]
             rivals[index] = [
                 Rival(other, best.score - h.score)
