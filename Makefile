@@ -9,7 +9,7 @@ unexport PYTHONDONTWRITEBYTECODE
 BIN := .venv/bin
 MARK := .venv/.installed
 
-.PHONY: paper test lint style benchmark clean
+.PHONY: paper test lint style benchmark docs clean
 
 paper: $(MARK)
 	$(BIN)/mocobot paper --jobs $(JOBS) --out out/paper --force
@@ -31,6 +31,14 @@ style: $(MARK)
 benchmark: $(MARK)
 	$(BIN)/python benchmarks/speed/trial.py
 	$(BIN)/python benchmarks/speed/paper.py
+
+# Pages in out/site, opened from the disk; a warning ends it.
+docs: .venv/.docs
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
+
+.venv/.docs: $(MARK)
+	$(BIN)/python -m pip install --quiet --no-compile --constraint constraints.txt --editable '.[docs]'
+	touch .venv/.docs
 
 # Compiled when imported: pip would compile 11,000 modules, and most are never used.
 $(MARK): pyproject.toml constraints.txt

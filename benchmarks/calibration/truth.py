@@ -44,7 +44,7 @@ class Truth:
         R = Rotation.from_rotvec(rotvecs, degrees=True).as_matrix()
         p = np.array([grasp["p_1i_m"] for grasp in told["grasps"]])
         units = np.array([_unit(one) for one in told["as_built"]])
-        for effect in told["effects"]:
+        for effect in (one for one in told["effects"] if one["cause"] == "base_tilt"):
             units[effect["robot"] - 1, AT["tilt"]] = [
                 effect["parameters"][k] for k in ("roll_rad", "pitch_rad")
             ]

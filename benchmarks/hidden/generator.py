@@ -7,17 +7,18 @@ from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from estimator.recording.model import Recording
-from hidden.background import draw_background
-from hidden.draw import Ground, draw_effect
+from hidden.draw import Tabled
 from hidden.logger import Logger
 from hidden.of_log import limits_of
 from hidden.schedule import Schedule
 from hidden.sealed import Sealed
+from mocobot.campaign.background import draw_background
+from mocobot.campaign.draw import draw_effect
+from mocobot.campaign.ground import Ground, gimbal_axes
 from mocobot_sim.effects import Effect, apply_effects, effect_to_dict
-from mocobot_sim.scene.scene import TeamScene, build_team
+from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trajectories import Trajectory
 from mocobot_sim.trial.trial import run_trial
@@ -86,10 +87,10 @@ def generate(request: HiddenSet) -> tuple[list[Recording], Sealed]:
     payload = request.payload or str(request.rng("payload").choice(list(PAYLOADS)))
     team = build_team(payload)
     trajectories = request.schedule.trajectories(team, request.rng("trajectories"))
-    ground = Ground.of(team, trajectories)
+    ground = Ground.of(team, trajectories, Tabled())
     if request.logger and request.causes:
         clean = replace(request, kind="clean", causes=())
-        ground = replace(ground, limits=limits_of(_recorded(clean, payload, trajectories, [])))
+        ground = replace(ground, limits=Tabled(limits_of(_recorded(clean, payload, trajectories, []))))
     hidden, background = _effects(request, ground)
     recordings = _recorded(request, payload, trajectories, [*hidden, *background])
     truth = {
@@ -132,15 +133,3 @@ def _effects(request: HiddenSet, ground: Ground) -> tuple[list[Effect], list[Eff
 
 def _place(effect: Effect) -> Sequence[Any]:
     return effect.cause, *(getattr(effect, name) for name in effect.place_names())
-
-
-def gimbal_axes(team: TeamScene) -> list[list[list[float]]]:
-    """Axes of the gimbal joints 1, 2, 3 (z, y, x) at home in {1}, one per row, for every robot."""
-    out = []
-    for theta, X in zip(team.theta_home, team.X_1i, strict=True):
-        flange = X.rotation * Rotation.from_euler("ZYX", theta).inv()  # {b} turned into {1}
-        after_z = flange * Rotation.from_euler("Z", theta[0])
-        after_y = after_z * Rotation.from_euler("Y", theta[1])
-        axes = [flange.apply([0, 0, 1]), after_z.apply([0, 1, 0]), after_y.apply([1, 0, 0])]
-        out.append(np.array(axes).tolist())
-    return out

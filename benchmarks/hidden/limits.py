@@ -6,9 +6,6 @@ pendulum is 0.2 m long unless said otherwise. ``python benchmarks/hidden_effects
 
 import numpy as np
 
-GAIN = 38.0
-PUSH_S = 1.0
-
 LIMITS: dict[str, dict[str, float]] = {
     "phi_zero": {"zero_rad": 6.6e-4},
     "theta_zero": {"zero_rad": 6.2e-4},

@@ -15,9 +15,9 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances, read_tolerances
 from estimator.estimate.payload import estimate_payload
-from hidden.gains import sizes_of
 from hidden.generator import PAYLOADS, HiddenSet, generate
-from hidden.limits import GAIN, PENDULUM_LENGTHS_M, PUSH_S
+from hidden.limits import PENDULUM_LENGTHS_M
+from mocobot.campaign.limits import GAIN, PUSH_S, sizes_of
 
 
 def measure_limits(jobs: int) -> tuple[dict[str, dict[str, float]], dict[float, float]]:

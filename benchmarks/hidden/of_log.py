@@ -8,14 +8,12 @@ import numpy as np
 
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate, Transient
-from discrepancy.team.causes import CAUSES
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances, read_tolerances
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
-from hidden.gains import sizes_of
-from hidden.limits import GAIN, LIMITS, PUSH_S
+from hidden.limits import LIMITS
+from mocobot.campaign.limits import GAIN, pushes, sizes_of
 
 Place = tuple[str, int | None, int | None, int | None]
 """Cause, robot, joint and trial (from 1), where it has them."""
@@ -24,7 +22,7 @@ Place = tuple[str, int | None, int | None, int | None]
 def limits_of(recordings: Sequence[Recording]) -> dict[Place, float]:
     """Detection limits over those of ``hidden.limits``, by place: the median over parameters and a trial's instants."""
     rig = TeamRig.of(recordings, estimate_payload(recordings), read_tolerances(None))
-    candidates = [*rig.candidates(), *pushes(rig)]
+    candidates = [*rig.candidates(), *pushes(rig, default_tolerances()["push"])]
     problem = Problem.of(rig.rows(candidates), candidates)
     found: dict[Place, list[float]] = {}
     for candidate, values in zip(candidates, sizes_of(Fit.of(problem), GAIN), strict=True):
@@ -35,14 +33,3 @@ def limits_of(recordings: Sequence[Recording]) -> dict[Place, float]:
         ]
         found.setdefault((candidate.cause, candidate.robot, candidate.joint, trial), []).extend(ratios)
     return {place: float(np.median(ratios)) for place, ratios in found.items()}
-
-
-def pushes(rig: TeamRig) -> list[Candidate]:
-    """A push of a second every five seconds of all trials."""
-    tolerance = default_tolerances()["push"]
-    spans = [(t, linear.reduction.time) for t, linear in enumerate(rig.linear)]
-    return [
-        CAUSES["push"].event(tolerance, Transient(trial, float(start), PUSH_S))
-        for trial, time in spans
-        for start in np.arange(time[0] + 1.0, time[-1] - PUSH_S, 5.0)
-    ]

@@ -8,7 +8,6 @@ import numpy as np
 
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.trajectories import (
-    SETTLE_S,
     Trajectory,
     random_vias,
     sphere_motion,
@@ -49,12 +48,3 @@ SHORT = (
     Schedule(randoms=1, vias=20, periodic_s=None, hold_s=4.5),
 )
 """Two trials: as much as a first log may have."""
-
-
-def moving_intervals(trajectories: list[Trajectory]) -> list[tuple[int, float, float]]:
-    """Trial number (from 1), begin and end of the motion [s] of every trial that moves all the time."""
-    return [
-        (number, SETTLE_S, trajectory.duration_s - SETTLE_S)
-        for number, trajectory in enumerate(trajectories, start=1)
-        if trajectory.trial != "static"
-    ]

@@ -11,12 +11,10 @@ from numpy.typing import NDArray
 
 from discrepancy.team.causes import CAUSES
 from hidden.limits import LIMITS
+from mocobot.campaign.ground import one_axis
 from mocobot_sim.scene.models import omnid_design
 
 Array = NDArray[np.float64]
-
-PARALLEL = np.cos(np.deg2rad(10.0))
-"""Gimbal axes nearer than this at home are one axis: which robot's rubs cannot be decided."""
 
 Item = Mapping[str, Any]
 
@@ -94,9 +92,7 @@ def _family(item: Item) -> str:
 
 def _same_place(item: Item, effect: Item, truth: Item) -> bool:
     if item["cause"] == effect["cause"] == "gimbal_friction":
-        axes = np.array(truth["gimbal_axes_1"])
-        a, b = (axes[x["robot"] - 1, x["joint"] - 1] for x in (item, effect))
-        return bool(abs(a @ b) > PARALLEL)
+        return one_axis(truth["gimbal_axes_1"], item, effect)
     if effect["cause"] == "push":
         p, q = item["parameters"], effect["parameters"]
         overlap = min(p["start_s"] + p["duration_s"], q["start_s"] + q["duration_s"]) - max(

@@ -8,10 +8,10 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
 
 from discrepancy.team.causes import CAUSES
 from hidden.score import Score, score
+from mocobot.campaign.shares import interval
 
 Result = Mapping[str, Any]
 
@@ -72,13 +72,6 @@ def _alarms(parts: Mapping[str, Sequence[Result]]) -> str:
         rows.append(["converted logs", len(runs), alarms, f"{100 * low:.0f} .. {100 * high:.0f} %", what, ""])
     header = ["sets", "number", "something named", "95 % interval", "what", "other verdicts than consistent"]
     return _markdown("False alarms", header, rows)
-
-
-def interval(hits: int, of: int) -> tuple[float, float]:
-    """Exact 95 % interval of a share (Clopper-Pearson)."""
-    low = beta.ppf(0.025, hits, of - hits + 1) if hits else 0.0
-    high = beta.ppf(0.975, hits + 1, of - hits) if hits < of else 1.0
-    return float(low), float(high)
 
 
 def _singles(title: str, runs: Sequence[Result]) -> str:

@@ -2,34 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import hypot
-from typing import ClassVar, Literal, get_args
+from typing import Literal, get_args
 
 import numpy as np
 
 from discrepancy.team.tolerances import default_tolerances
-from hidden.background import draw_background
 from hidden.limits import LIMITS
+from mocobot.campaign.background import SPREAD_IN_UNCALIBRATED, cheaper, draw_background
 from mocobot_sim.effects import EFFECTS, Effect
-from mocobot_sim.effects import gimbal_friction as listed
 from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.trial.sensors import sensor_preset
 
 Background = Literal["x1", "x3", "x10", "uncalibrated"]
 BACKGROUNDS: tuple[Background, ...] = get_args(Background)
 TIMES: dict[Background, float] = {"x1": 1.0, "x3": 3.0, "x10": 10.0}
-SPREAD_IN_UNCALIBRATED = ("phi_zero", "theta_zero", "link_length", "sea_scale", "sea_bias")
-"""Causes of which an uncalibrated team has so much everywhere that no single one stands out."""
 SIGMAS = 6.2
 """Tolerances at a detection limit, however precise the data: sqrt(38)."""
-
-
-@dataclass(frozen=True)
-class GimbalFriction(listed.GimbalFriction):
-    """The same with a single row, which lets stiction fade within ten seconds: nine gimbals then cost a third less."""
-
-    rows: ClassVar[int] = 1
 
 
 def units_of(background: Background, robots: int, rng: np.random.Generator) -> tuple[AsBuilt, ...]:
@@ -41,10 +30,7 @@ def units_of(background: Background, robots: int, rng: np.random.Generator) -> t
 
 def tolerated(background: Background, robots: int, rng: np.random.Generator) -> list[Effect]:
     """What is a little off everywhere besides; an uncalibrated team's other parts are within their tolerances."""
-    effects = [
-        GimbalFriction(**vars(effect)) if isinstance(effect, listed.GimbalFriction) else effect
-        for effect in draw_background(robots, rng, TIMES.get(background, 1.0))
-    ]
+    effects = cheaper(draw_background(robots, rng, TIMES.get(background, 1.0)))
     if background != "uncalibrated":
         return effects
     return [effect for effect in effects if effect.cause not in SPREAD_IN_UNCALIBRATED]

@@ -7,11 +7,13 @@ import sys
 import time
 import traceback
 from collections.abc import Callable, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from mocobot_sim.errors import TrialError
 from sealed import store
+from sealed.law_score import score_law
 from sealed.sets import SealedSet
 from sealed.verdict import engine, verdict_on
 
@@ -55,6 +57,8 @@ def _diagnose(request: SealedSet, out: Path, path: Path, *, closed_loop: bool, k
         result["error"] = traceback.format_exc()
         said = result["error"].splitlines()[-1]
     result["truth"] = store.truth_of(request, out)  # opened after the verdict
+    if request.kind == "unlisted" and not result["error"]:
+        result["law_score"] = asdict(score_law(result, store.recordings_of(request, out)))
     store.append(path, result)
     if not keep:
         store.forget(request, out)

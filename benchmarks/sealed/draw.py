@@ -7,10 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from discrepancy.team.causes import CAUSES
-from hidden.draw import UNDECIDABLE, draw_effect
-from hidden.draw import Ground as HiddenGround
+from hidden.draw import ground_of
+from mocobot.campaign.background import SPREAD_IN_UNCALIBRATED
+from mocobot.campaign.draw import UNDECIDABLE, draw_effect
 from mocobot_sim.effects import EFFECTS, Effect
-from sealed.backgrounds import SPREAD_IN_UNCALIBRATED, Background, limit_over_nominal
+from sealed.backgrounds import Background, limit_over_nominal
 from sealed.forms.base import Form
 from sealed.forms.pushes import HalfSinePush, RampPush, in_every_trial
 from sealed.ground import Ground
@@ -66,7 +67,7 @@ def draw(
         return list(in_every_trial(kind, factor * LIMITS[kind.cause][background], ground, rng))
     if name in EFFECTS:
         factor *= limit_over_nominal(name, background)
-        return [draw_effect(name, factor, HiddenGround(ground.robots, ground.p_1c, ground.moving), rng)]
+        return [draw_effect(name, factor, ground_of(ground.robots, ground.p_1c, ground.moving), rng)]
     form = FORMS[name]
     return [form.drawn(factor * LIMITS[name][background], ground, _place(form, ground, rng), rng)]
 

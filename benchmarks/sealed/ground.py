@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from hidden.schedule import moving_intervals
+from mocobot.campaign.ground import moving_intervals
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import TeamIndex
 from mocobot_sim.trial.assemble import assemble_at_home
@@ -37,5 +37,5 @@ class Ground:
         """Of a team and the commands of its trials."""
         model = scene.compile()
         torque = assemble_at_home(scene, model, mujoco.MjData(model), TeamIndex.of(model))
-        moving = moving_intervals(list(trajectories))
+        moving = moving_intervals(trajectories)
         return cls(scene.robots, GroundTruth.of(scene).p_1c, moving, torque)

@@ -2,8 +2,8 @@
 
 A trial is simulated with and without the form, and read by ideal sensors. The difference of the whitened rows is held
 against grasps, payload, bases and every cause of the catalogue within its tolerance. At the limit of a listed cause
-chi-square falls by 38 (``hidden.limits``) when its answer is freed from its tolerance; at that of an unlisted one, 38
-are left that no healthy team explains. Both grow with the square of the size.
+chi-square falls by 38 (``mocobot.campaign.limits``) when its answer is freed from its tolerance; at that of an unlisted
+one, 38 are left that no healthy team explains. Both grow with the square of the size.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from discrepancy.team.linear.start import exact_residual
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances, read_tolerances
 from estimator.estimate.payload import estimate_payload
-from hidden.limits import GAIN
 from hidden.schedule import Schedule
+from mocobot.campaign.limits import GAIN
 from mocobot_sim.effects import Effect, apply_effects
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import measure, sensor_preset

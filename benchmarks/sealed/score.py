@@ -6,49 +6,14 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from discrepancy.team.causes import CAUSES
-from hidden.score import PARALLEL
-from sealed.forms.base import Form
-from sealed.registry import FORMS
+from mocobot.campaign.score import Score, family_of, match
+
+__all__ = ["HEALTHY", "Score", "Scored", "family_of", "score"]
 
 Item = Mapping[str, Any]
 HEALTHY = ("consistent", "miscalibrated")
 """Verdicts that name no fault."""
-
-
-@dataclass(frozen=True)
-class Score:
-    """How well one hidden effect was found.
-
-    Attributes:
-        effect: as the truth has it.
-        factor: its size over the detection limit of its background.
-        listed: whether the diagnosis' catalogue has the answer.
-        named: cause that the verdict names for it, or None.
-        family, member: whether family and cause are right.
-        ambiguous: the wrong member, but the right one, at its place, is among those called ambiguous.
-        place: whether the place is right, too.
-        error: of the parameters that the truth knows, estimate minus truth over truth, the largest; None without any.
-        deviations: estimate minus truth over the standard error of each.
-    """
-
-    effect: Item
-    factor: float
-    listed: bool
-    named: str | None
-    family: bool
-    member: bool
-    ambiguous: bool
-    place: bool
-    error: float | None
-    deviations: tuple[float, ...]
-
-    @property
-    def right(self) -> bool:
-        """Cause and place."""
-        return self.place and (self.member or self.ambiguous)
 
 
 @dataclass(frozen=True)
@@ -59,7 +24,7 @@ class Scored:
         result: what was scored.
         scores: one for every hidden effect.
         extras: what was named besides.
-        stated: probability and rightness of everything that was named with a probability.
+        stated: probability and rightness of everything that was named with a probability, laws left out.
     """
 
     result: Item
@@ -73,127 +38,38 @@ class Scored:
         return self.result["verdict"]["verdict"]
 
     @property
+    def laws(self) -> tuple[Item, ...]:
+        """Laws that were stated."""
+        return tuple(cause for cause in self.result["verdict"]["causes"] if cause["cause"] == "law")
+
+    @property
     def whole(self) -> bool:
         """Whether everything hidden was named right, or left unexplained if nobody lists it, and nothing else was."""
-        if self.extras:
+        if self.extras or (self.laws and all(score.listed for score in self.scores)):
             return False
         if not self.scores:
             return self.verdict in HEALTHY
         listed = [score for score in self.scores if score.listed]
         return all(score.right for score in listed) and (
-            len(listed) == len(self.scores) or self.verdict in ("unexplained", "partly_explained")
+            len(listed) == len(self.scores)
+            or self.verdict in ("unexplained", "partly_explained")
+            or bool(self.laws)
         )
 
 
 def score(result: Item) -> Scored:
     """Score one result that ended without an error."""
-    truth, left = result["truth"], list(result["verdict"]["causes"])
+    truth = result["truth"]
     excluded = set(result["set"]["names"]) if result["set"]["kind"] == "left-out" else set()
-    factors = _factors(result["set"], truth["effects"])
-    scores, matched = [], []
-    for effect, factor in zip(truth["effects"], factors, strict=True):
-        listed = effect["answer"]["cause"] in CAUSES and effect["answer"]["cause"] not in excluded
-        item = _match(left, effect, truth, alone=len(truth["effects"]) == 1) if listed else None
-        if item is not None:
-            left.remove(item)
-            matched.append(item)
-        one = _score(item, effect, factor, truth, listed=listed)
-        scores.append(one)
-    stated = [(item, one.right) for item, one in zip(matched, [s for s in scores if s.named], strict=True)]
-    stated += [(item, False) for item in left]
-    return Scored(
-        result,
-        tuple(scores),
-        tuple(left),
-        tuple((float(i["probability"]), right) for i, right in stated if i.get("probability") is not None),
-    )
+    causes = [cause for cause in result["verdict"]["causes"] if cause["cause"] != "law"]
+    found = match(
+        causes, truth, _factors(result["set"], truth["effects"]),
+        lambda cause: cause in CAUSES and cause not in excluded,
+    )  # fmt: skip
+    return Scored(result, found.scores, found.extras, found.stated)
 
 
 def _factors(request: Item, effects: Sequence[Item]) -> list[float]:
     if len(request["factors"]) == len(effects):
         return list(request["factors"])
     return [request["factors"][0]] * len(effects)  # pushes: one factor for all
-
-
-def _match(found: Sequence[Item], effect: Item, truth: Item, *, alone: bool) -> Item | None:
-    """The named cause that comes nearest to a hidden one: place, then member, then family, then any."""
-
-    def rank(item: Item) -> tuple[bool, bool, bool]:
-        member = item["cause"] == effect["answer"]["cause"]
-        return member and _same_place(item, effect, truth), member, item["family"] == family_of(effect)
-
-    if not found:
-        return None
-    best = max(found, key=rank)
-    return best if any(rank(best)) or alone else None  # among several hidden ones a stranger belongs to none
-
-
-def family_of(effect: Item) -> str | None:
-    """Family of the answer; None if the catalogue does not have it."""
-    cause = CAUSES.get(effect["answer"]["cause"])
-    return None if cause is None else cause.family
-
-
-def _score(item: Item | None, effect: Item, factor: float, truth: Item, *, listed: bool) -> Score:
-    if item is None:
-        return Score(effect, factor, listed, None, False, False, False, False, None, ())
-    answer = effect["answer"]
-    member = item["cause"] == answer["cause"]
-    ambiguous = not member and any(
-        rival["cause"] == answer["cause"] and _here(rival) == _here(answer)
-        for rival in item.get("alternatives", ())
-        if rival.get("ambiguous")
-    )
-    place = ambiguous or (member and _same_place(item, effect, truth))
-    error, deviations = _errors(item, effect) if member and place else (None, ())
-    family = item["family"] == family_of(effect)
-    return Score(effect, factor, listed, item["cause"], family, member, ambiguous, place, error, deviations)
-
-
-def _here(item: Item) -> tuple[int | None, int | None]:
-    return item.get("robot"), item.get("joint")
-
-
-def _same_place(item: Item, effect: Item, truth: Item) -> bool:
-    answer = effect["answer"]
-    if item["cause"] == answer["cause"] == "gimbal_friction":  # parallel axes cannot be told apart
-        axes = np.array(truth["gimbal_axes_1"])
-        a, b = (axes[x["robot"] - 1, x["joint"] - 1] for x in (item, answer))
-        return bool(abs(a @ b) > PARALLEL)
-    if answer["cause"] == "push":
-        p, q = {name: entry["value"] for name, entry in item["parameters"].items()}, effect["parameters"]
-        both = min(p["start_s"] + p["duration_s"], q["start_s"] + q["duration_s"])
-        return p["trial"] == q["trial"] and both > max(p["start_s"], q["start_s"])
-    return _here(item) == _here(answer)
-
-
-def _errors(item: Item, effect: Item) -> tuple[float | None, tuple[float, ...]]:
-    """Where a push acts along its line, and how long the interval is, cannot be told."""
-    known, named = effect["answer"]["known"], item["parameters"]
-    skipped = ("point", "start", "duration", "trial") if effect["answer"]["cause"] == "push" else ("trial",)
-    names = [name for name in named if name in known and not name.startswith(skipped)]
-    if not names:
-        return None, ()
-    away = np.array([named[name]["value"] - known[name] for name in names])
-    size = np.array([known[name] for name in names])
-    se = [named[name]["se"] for name in names]
-    deviations = tuple(float(d / s) for d, s in zip(away, se, strict=True) if s)
-    units = np.abs(size) > 0.1 * np.abs(size).max() if len(names) > 1 and _alike(names) else size != 0
-    error = float(np.max(np.abs(away[units] / size[units]))) if units.any() else None
-    return error, deviations
-
-
-def _alike(names: Sequence[str]) -> bool:
-    """Whether parameters have one unit, so that small ones do not count beside large ones."""
-    return len({name.rsplit("_", 1)[-1] for name in names}) == 1
-
-
-def form_of(effect: Item) -> str:
-    """Name under which an effect is counted."""
-    return effect["cause"]
-
-
-def is_other_form(effect: Item) -> bool:
-    """Whether it has another form than the catalogue's."""
-    form: type[Form] | None = FORMS.get(effect["cause"])
-    return form is not None and form.answer is not None

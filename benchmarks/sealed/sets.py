@@ -9,8 +9,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from estimator.recording.model import Recording
-from hidden.generator import PAYLOADS, gimbal_axes
+from hidden.generator import PAYLOADS
 from hidden.schedule import Schedule
+from mocobot.campaign.ground import gimbal_axes
 from mocobot_sim.effects import Effect, apply_effects, effect_to_dict
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.trial.sensors import measure, sensor_preset

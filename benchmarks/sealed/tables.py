@@ -7,13 +7,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
 
+from mocobot.campaign.shares import interval, reliability
 from sealed.backgrounds import BACKGROUNDS
 from sealed.score import HEALTHY, Score, Scored, family_of, score
 
 SIZES = ((0.0, 3.0, "2 to 3"), (3.0, 6.0, "3 to 6"), (6.0, np.inf, "6 and more"))
-BINS = ((0.0, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 0.99), (0.99, 1.0 + 1e-12))
 
 
 def tables(results: Iterable[Mapping[str, Any]]) -> str:
@@ -29,20 +28,13 @@ def tables(results: Iterable[Mapping[str, Any]]) -> str:
         out += [_by_size(title, sets), _by_name(title, sets)]
     out.append(_several([one for kind in ("pairs", "triples", "pushes") for one in by_kind.get(kind, [])]))
     nobody = [one for one in scored if one.scores and not any(s.listed for s in one.scores)]
-    out += [_nobodys("Not in the catalogue", nobody), _reliability(scored), _cost(scored)]
+    out += [_nobodys("Not in the catalogue", nobody), _laws(scored), _reliability(scored), _cost(scored)]
     if failed := [result for result in results if result["error"]]:
         lines = Counter(result["error"].splitlines()[-1] for result in failed)
         out.append(
             "\n".join([f"{len(failed)} ended in an error:", *(f"- {n} x {e}" for e, n in lines.items())])
         )
     return "\n\n".join(table for table in out if table)
-
-
-def interval(hits: int, of: int) -> tuple[float, float]:
-    """Exact 95 % interval of a share (Clopper and Pearson)."""
-    low = beta.ppf(0.025, hits, of - hits + 1) if hits else 0.0
-    high = beta.ppf(0.975, hits + 1, of - hits) if hits < of else 1.0
-    return float(low), float(high)
 
 
 def _share(hits: int, of: int) -> str:
@@ -159,6 +151,36 @@ def _nobodys(title: str, sets: Sequence[Scored]) -> str:
     return _markdown(title, header, rows)
 
 
+def _laws(scored: Sequence[Scored]) -> str:
+    """Laws stated of unlisted effects, and of sets that have none."""
+    rows = []
+    own = [one.result["law_score"] for one in scored if "law_score" in one.result]
+    if own:
+        stated = [score for score in own if score["stated"]]
+        sizes = [score["amplitude"] for score in own if score["amplitude"] is not None]
+        held = [score["held_out"] for score in stated if score["held_out"] is not None]
+        counts = [
+            _share(sum(bool(s[name]) for s in own), len(own))
+            for name in ("stated", "place", "variable", "formula")
+        ]
+        size = f"{100 * np.median(sizes):.1f}, {100 * max(sizes):.0f}" if sizes else "-"
+        rows.append(
+            [len(own), *counts, size, f"{100 * np.median(held):.0f}, {100 * min(held):.0f}" if held else "-"]
+        )
+    header = [
+        "unlisted effects", "a law stated", "place", "and signal", "and formula", "size off, median, most [%]",
+        "gain held out over in sample, median, least [%]",
+    ]  # fmt: skip
+    text = [_markdown("Laws", header, rows)] if rows else []
+    others = [one for one in scored if "law_score" not in one.result]
+    if others:
+        false = sum(bool(one.laws) for one in others)
+        text.append(
+            f"A law stated where nothing unlisted was hidden: {_share(false, len(others))} of {len(others)}."
+        )
+    return "\n\n".join(text)
+
+
 def _fate(own: Sequence[Scored]) -> list[Any]:
     none = inside = outside = sure = 0
     for one in own:
@@ -177,19 +199,15 @@ def _reliability(scored: Sequence[Scored]) -> str:
     stated = [pair for one in scored for pair in one.stated]
     if not stated:
         return ""
-    rows = []
-    for low, high in BINS:
-        own = [pair for pair in stated if low <= pair[0] < high]
-        if own:
-            right, mean = sum(ok for _, ok in own), float(np.mean([p for p, _ in own]))
-            share = interval(right, len(own))
-            inside = "yes" if share[0] <= mean <= share[1] else "no"
-            label = f"{100 * low:.0f} to {100 * min(high, 1.0):.0f} %"
-            rows.append([label, len(own), f"{100 * mean:.1f} %", _share(right, len(own)), inside])
-    brier = float(np.mean([(p - ok) ** 2 for p, ok in stated]))
-    rows.append(
-        ["**all**", len(stated), "", _share(sum(ok for _, ok in stated), len(stated)), f"Brier {brier:.4f}"]
-    )
+    found, rows = reliability(stated), []
+    for one in found["bins"]:
+        right, mean = one["right"], one["mean"]
+        low, high = right["interval"]
+        label = f"{100 * one['low']:.0f} to {100 * one['high']:.0f} %"
+        inside = "yes" if low <= mean <= high else "no"
+        rows.append([label, right["of"], f"{100 * mean:.1f} %", _share(right["hits"], right["of"]), inside])
+    all_right = _share(found["right"], found["number"])
+    rows.append(["**all**", found["number"], "", all_right, f"Brier {found['brier']:.4f}"])
     header = ["stated", "causes", "mean of it", "right", "within the band"]
     return _markdown("Stated probabilities", header, rows)
 

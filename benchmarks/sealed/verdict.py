@@ -11,6 +11,7 @@ from typing import Any
 
 import discrepancy
 import mocobot
+from sealed.law_score import stated_series
 
 
 def verdict_on(
@@ -18,7 +19,8 @@ def verdict_on(
 ) -> dict[str, Any]:
     """What the diagnosis says, through its public face, with the CPU time and the peak memory of this process."""
     before = _cpu_s()
-    values = mocobot.diagnose(trials, exclude=excluded, closed_loop=closed_loop).to_dict()
+    diagnosis = mocobot.diagnose(trials, exclude=excluded, closed_loop=closed_loop)
+    values = diagnosis.to_dict() | {"law_series": stated_series(diagnosis)}
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     left = {"evidence", "undecidable", "detection_limits", "provenance"}
     return {key: value for key, value in values.items() if key not in left} | {

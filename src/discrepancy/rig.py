@@ -14,6 +14,8 @@ import numpy as np
 from discrepancy import rules
 from estimator.arrays import Array
 
+Numbers = dict[str, float]
+
 
 @dataclass(frozen=True)
 class Parameter:
@@ -170,12 +172,7 @@ class Channel:
 
 
 class Rig(ABC):
-    """A machine and its simulation, seen by the diagnosis.
-
-    What a machine may lack (unknowns of every trial, transients, shapes) has defaults that say so.
-    """
-
-    # Recordings.
+    """A machine and its simulation, seen by the diagnosis; what a machine may lack has defaults that say so."""
 
     @property
     @abstractmethod
@@ -195,8 +192,6 @@ class Rig(ABC):
     def quantities(self, trial: int) -> dict[str, Array]:
         """What a misfit may depend on, per row of a trial, shape (n,); one of them is ``speed``."""
 
-    # Rows: the whitened residual, and what moves it.
-
     @property
     def local_unknowns(self) -> int:
         """Number of unknowns that every trial has of its own."""
@@ -214,12 +209,11 @@ class Rig(ABC):
     def residual(
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
     ) -> list[Array]:
-        """Exact whitened residual of every trial.
+        """Exact whitened residual of every trial, with the unknowns moved and causes taken out or modelled.
 
         Args:
-            shared: displacement of the shared unknowns.
-            local: of every trial's own unknowns.
-            active: causes with the values of their parameters, to be taken out of the data or added to the model.
+            shared, local: displacements of the shared unknowns, and of every trial's own.
+            active: causes with the values of their parameters.
         """
 
     def directions(self, trial: int) -> dict[str, Array]:
@@ -249,10 +243,7 @@ class Rig(ABC):
         return []
 
     def imitators(self, candidate: Candidate) -> Iterable[list[Array]]:
-        """Whitened columns of what a candidate must tell more than to be believed, one array per trial each.
-
-        Such as errors of single sensors that last as long as a transient.
-        """
+        """Whitened columns, one array per trial each, of what a candidate must tell more than to be believed."""
         return []
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
@@ -273,20 +264,23 @@ class Rig(ABC):
 
     @property
     def bench(self) -> Any:
-        """What the search for laws needs (``discrepancy.laws.bench.Bench``); None where a rig has no such."""
+        """What the search for laws needs (``laws.bench.Bench``); None where a rig has no such."""
         return None
-
-    # The simulator.
 
     def can_resimulate(self) -> str | None:
         """Why the recordings cannot be resimulated, or None."""
         return None
 
+    def carried(self, candidate: Candidate) -> bool:
+        """Whether a simulation has to have a healthy candidate as it is found, as nothing is linear at the design."""
+        return False
+
     @abstractmethod
     def simulation(
-        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
-    ) -> Callable[[], dict[str, Array] | None]:
-        """What resimulates one trial's commands, in any process.
+        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]],
+        healthy: Sequence[tuple[Candidate, Array]] = (),
+    ) -> Callable[[], dict[str, Array] | None]:  # fmt: skip
+        """What resimulates one trial's commands, in any process; ``healthy`` parts are off by so much (``carried``).
 
         It returns recorded minus simulated response by channel, or None where that cannot be simulated.
         """
@@ -298,7 +292,7 @@ class Rig(ABC):
     @abstractmethod
     def effect_parameters(
         self, candidate: Candidate, values: Array, covariance: Array
-    ) -> tuple[dict[str, float], dict[str, float]]:
+    ) -> tuple[Numbers, Numbers]:
         """Parameters of the simulator's effect, and their standard errors."""
 
     @abstractmethod

@@ -1,6 +1,7 @@
 """Files and folders that appear whole or not at all: written beside their place, then renamed into it."""
 
 import contextlib
+import errno
 import hashlib
 import json
 import os
@@ -13,6 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from estimator.errors import InputError
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)
+"""What a disk says that takes no more."""
 
 
 @contextmanager
@@ -39,7 +43,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 def whole_folder(path: Path) -> Iterator[Path]:
     """A temporary folder that takes the place of ``path`` (with all it held) when the block ends without an error.
 
-    Missing folders above it are made.
+    Missing folders above it are made. What cannot be written inside is told by its place in ``path``.
 
     Raises:
         InputError: it cannot be created or put in place.
@@ -56,6 +60,14 @@ def whole_folder(path: Path) -> Iterator[Path]:
                 if real.exists():
                     real.rename(old)
                 temporary.rename(real)
+        except InputError as error:
+            if str(temporary) not in str(error):
+                raise
+            raise InputError(str(error).replace(str(temporary), str(path))) from error
+        except OSError as error:  # of libraries that write pictures
+            if error.errno not in FULL:
+                raise
+            raise InputError(f"{path}: cannot be written ({error.strerror})") from error
         finally:
             if old.exists() and not real.exists():
                 with contextlib.suppress(OSError):

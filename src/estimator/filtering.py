@@ -97,6 +97,7 @@ def _samples(x: ArrayLike) -> Array:
     return x
 
 
+@cache
 def _difference_weights(at: int) -> Array:
     """Weights of the first derivative at node ``at`` of the nodes 0..6, exact for polynomials of degree 6."""
     nodes = np.arange(2 * _HALF_WIDTH + 1) - at

@@ -9,6 +9,7 @@ from typing import Any, NoReturn
 
 from estimator.errors import InputError
 from mocobot import options
+from mocobot.config import with_config
 from mocobot.parsing import parse
 from mocobot.strict import NotGood
 from mocobot_sim.errors import TrialError
@@ -25,6 +26,7 @@ COMMANDS = {
     "inspect": options.Inspect,
     "report": options.Report,
     "compare": options.Compare,
+    "campaign": options.Campaign,
     "simulate": options.Simulate,
     "effects": options.Effects,
 }
@@ -37,7 +39,7 @@ NOT_GOOD, REFUSED, INTERRUPTED, CLOSED = 1, 2, 130, 141
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Entry point: ends the process with a code of the README's, unless all is well.
+    """Entry point: ends the process with a code of docs/commands, unless all is well.
 
     0 done; 1 done, and with ``--strict`` the answer is not good; 2 refused after one sentence on standard error;
     130 interrupted; 141 standard output was closed before everything was printed.
@@ -85,7 +87,12 @@ def _run(arguments: Sequence[str]) -> None:
     if "--version" in arguments:
         print(f"mocobot {_version()}")
         return
-    options = parse(COMMANDS, arguments)
+    try:
+        options = parse(COMMANDS, with_config(COMMANDS, arguments))
+    except OSError as error:
+        if error.filename is None:  # a closed pipe
+            raise
+        raise InputError(f"{error.filename}: cannot be written ({error.strerror})") from error  # a completion
     name = next(name for name, kind in COMMANDS.items() if isinstance(options, kind))
     if name not in UNCHECKED:
         import_module(f"mocobot.checks.{name}").check(options)

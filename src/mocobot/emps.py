@@ -10,6 +10,7 @@ from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.staircase import Step, format_staircase
 from discrepancy.emps.staircase import staircase as stairs
+from discrepancy.engine.diagnose import When
 from estimator.errors import InputError
 from mocobot.api.diagnosis import Diagnosis
 from mocobot.api.public import public
@@ -23,6 +24,7 @@ def diagnose(
     tolerances: Path | str | None = None,
     exclude: Iterable[str] = (),
     closed_loop: bool = True,
+    laws: When = "auto",
     jobs: int = 1,
     say: Callable[[str], object] = lambda _: None,
     simulated: Callable[[int], object] | None = None,
@@ -31,7 +33,7 @@ def diagnose(
 
     Args:
         recording: MAT file; it is cut into blocks that validate each other.
-        tolerances, exclude, closed_loop, jobs, say, simulated: as of ``mocobot.diagnose``.
+        tolerances, exclude, closed_loop, laws, jobs, say, simulated: as of ``mocobot.diagnose``.
 
     Raises:
         InputError: recording, tolerances or causes that cannot be used.
@@ -39,7 +41,7 @@ def diagnose(
     known = read_tolerances(Path(tolerances) if tolerances is not None else None, default_tolerances())
     found = diagnose_emps(
         read_emps(Path(recording)), known, tuple(exclude),
-        closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated,
+        closed_loop=closed_loop, laws=laws, jobs=jobs, say=say, simulated=simulated,
     )  # fmt: skip
     return public(Diagnosis, found)
 

@@ -21,7 +21,7 @@ DESCRIPTION = (
     "Simulate mobile cobots that carry an unknown payload together, estimate it, and find out what the simulation "
     "gets wrong. Exit codes: 0 done; 1 done, and with --strict the answer is not good; 2 refused, with one sentence "
     "that says why; 130 interrupted; 141 nobody reads the output any more. --version "
-    "prints the version."
+    "prints the version; COMMAND --config FILE.toml takes more options from a file's table [COMMAND]."
 )
 
 

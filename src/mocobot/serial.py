@@ -8,16 +8,16 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from discrepancy import rules
 from discrepancy.causes.tolerances_file import read_tolerances
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.diagnosis import diagnose_serial
 from discrepancy.serial.mechanics.nominal import inverse_torque
 from discrepancy.serial.model import SerialModel, load_model
 from estimator.errors import InputError
-from estimator.files import write_json
 from mocobot.api.diagnosis import Diagnosis
+from mocobot.api.look import Look
 from mocobot.api.public import public
-from mocobot_inspect.findings import Finding
 from mocobot_inspect.joints import inspection
 from mocobot_inspect.joints.findings import joint_findings
 from mocobot_inspect.joints.json import joint_inspection_dict
@@ -106,41 +106,15 @@ def map_of(model: SerialModel, log: Path, given: Path | str | None) -> JointMap:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class JointInspection(inspection.JointInspection):
+class JointInspection(Look, inspection.JointInspection):
     """Stamps, columns, signs, order, units and delays of a joint log, judged by the robot's model: printable.
 
-    The attributes are those of ``mocobot_inspect.joints.inspection.JointInspection``.
+    The attributes are those of ``mocobot_inspect.joints.inspection.JointInspection``, the JSON's keys those of
+    ``mocobot_inspect.joints.json``.
     """
 
-    @property
-    def findings(self) -> list[Finding]:
-        """All that is wrong: ``topic`` and ``sentence`` each."""
-        return joint_findings(self)
-
-    @property
-    def ready_for(self) -> str:
-        """What the log can be used for, one line."""
-        return joint_ready_line(self)
-
-    def __str__(self) -> str:
-        """The text report."""
-        return format_joint_inspection(self)
-
-    def __repr__(self) -> str:
-        """One line."""
-        return f"<JointInspection of {self.name}: {self.ready_for}>"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Strict JSON with units in the keys; see ``mocobot_inspect.joints.json`` for the keys."""
-        return joint_inspection_dict(self)
-
-    def write(self, path: Path | str) -> None:
-        """Write it as JSON.
-
-        Raises:
-            InputError: the file cannot be written.
-        """
-        write_json(Path(path), self.to_dict())
+    _findings, _ready_line = joint_findings, joint_ready_line
+    _text, _dict = format_joint_inspection, joint_inspection_dict
 
 
 def inspect(
@@ -183,6 +157,7 @@ def diagnose(
     reference: GivenLogs = (),
     tolerances: Path | str | None = None,
     exclude: Iterable[str] = (),
+    odds: float = rules.PRIOR_ODDS,
     jobs: int = 1,
     say: Callable[[str], object] = lambda _: None,
 ) -> Diagnosis:
@@ -195,11 +170,12 @@ def diagnose(
         reference: logs of the same robot while it was well: what is wrong with the model there, too, is no news.
         tolerances: TOML file: how far a robot may be off without that being news.
         exclude: causes not to consider.
+        odds: of any cause being there before the data are seen, at all its places together.
         jobs: parallel processes.
         say: takes the name of the stage that begins.
 
     Raises:
-        InputError: model, logs, map, tolerances or causes that cannot be used.
+        InputError: model, logs, map, tolerances, causes or odds that cannot be used.
     """
     robot = _model(model)
     return public(
@@ -210,6 +186,7 @@ def diagnose(
             read_logs(reference, robot, map=map),
             serial_tolerances(Path(tolerances) if tolerances is not None else None),
             tuple(exclude),
+            odds=odds,
             jobs=jobs,
             say=say,
         ),
@@ -219,11 +196,11 @@ def diagnose(
 def diagnosed(
     model: SerialModel, logs: list[JointLog], reference: list[JointLog],
     tolerances: Mapping[str, Mapping[str, float]] | None, exclude: tuple[str, ...],
-    *, jobs: int, say: Callable[[str], object],
+    *, odds: float, jobs: int, say: Callable[[str], object],
 ) -> Any:  # fmt: skip
     """``diagnose_serial``, with the reference where there is one."""
     more: dict[str, Any] = {"reference": reference} if reference else {}
-    return diagnose_serial(model, logs, tolerances, exclude, jobs=jobs, say=say, **more)
+    return diagnose_serial(model, logs, tolerances, exclude, odds=odds, jobs=jobs, say=say, **more)
 
 
 def serial_tolerances(path: Path | None) -> dict[str, dict[str, float]] | None:

@@ -22,6 +22,7 @@ from estimator.estimate.result import VERSION as ESTIMATE_VERSION
 from estimator.estimate.result import PayloadEstimate
 from estimator.files import system_errors
 from estimator.strict import Fields, is_number, read_json
+from mocobot_report.campaign.words import FORMAT as CAMPAIGN
 from mocobot_report.sought import SOUGHT, check_folder
 from mocobot_sim.paper.tables import paper_tables, summary_table
 from mocobot_view.facts.fact_files import read_estimate
@@ -89,6 +90,15 @@ class Diagnosed:
 
 
 @dataclass(frozen=True)
+class Campaign:
+    """What ``mocobot campaign --out`` wrote: its summary (``mocobot_report.campaign.words``)."""
+
+    path: Path
+    values: Json
+    provenance: Json | None
+
+
+@dataclass(frozen=True)
 class Contents:
     """Everything found in a folder, and the files that it was read from."""
 
@@ -97,6 +107,7 @@ class Contents:
     estimates: tuple[Estimated, ...]
     diagnosis: Diagnosed | None
     calibrations: tuple[Calibrated, ...]
+    campaign: Campaign | None
     files: tuple[Path, ...]
 
 
@@ -109,7 +120,7 @@ def read_folder(folder: Path) -> Contents:
     check_folder(folder)
     with system_errors(folder, "read"):
         jsons = sorted(path for path in folder.glob("*.json") if path.is_file())
-    paper = diagnosis = None
+    paper = diagnosis = campaign = None
     estimates, calibrations, files = [], [], []
     for path in jsons:
         if path.name == "paper.json":
@@ -123,19 +134,22 @@ def read_folder(folder: Path) -> Contents:
             elif values.get("format") == ESTIMATE:
                 estimates.append(_estimate(path, values))
                 files.append(path)
+            elif values.get("format") == CAMPAIGN:
+                campaign = Campaign(path, values, _provenance(folder / "provenance.json"))
+                files += [path, *(p for p in [folder / "provenance.json"] if p.is_file())]
             elif values.get("format") == CALIBRATION:
                 made = values.get("provenance")
                 found = calibration_from_dict(values, str(path))
                 calibrations.append(Calibrated(path, found, made if isinstance(made, dict) else None))
                 files.append(path)
-    if paper is None and diagnosis is None and not estimates and not calibrations:
+    if not (paper or diagnosis or campaign or estimates or calibrations):
         raise InputError(f"{folder}: holds no result of mocobot; a report is made of {SOUGHT}")
     if paper is not None:
         files += [p for p in (folder / "trials.json", folder / "provenance.json") if p.is_file()]
         files += [folder / "estimates" / f"{p}_{preset}.json" for p, preset in paper.estimates]
     if diagnosis is not None and diagnosis.traces:
         files.append(folder / RESIDUALS)
-    return Contents(folder, paper, tuple(estimates), diagnosis, tuple(calibrations), tuple(files))
+    return Contents(folder, paper, tuple(estimates), diagnosis, tuple(calibrations), campaign, tuple(files))
 
 
 def _paper(folder: Path) -> Paper:

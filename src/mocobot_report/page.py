@@ -9,10 +9,20 @@ from estimator.files import check_target, whole_file
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import el, to_bytes
 from mocobot_report.calibration import part as calibration_part
+from mocobot_report.campaign import part as campaign_part
 from mocobot_report.diagnosis import part as diagnosis_part
 from mocobot_report.document import document
 from mocobot_report.estimate import part as estimate_part
-from mocobot_report.folder import Calibrated, Contents, Diagnosed, Estimated, Paper, complete, read_folder
+from mocobot_report.folder import (
+    Calibrated,
+    Campaign,
+    Contents,
+    Diagnosed,
+    Estimated,
+    Paper,
+    complete,
+    read_folder,
+)
 from mocobot_report.glossary import glossary, link_terms
 from mocobot_report.paper import part as paper_part
 from mocobot_report.provenance_part import provenance_part
@@ -25,7 +35,7 @@ def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: Non
     """Write the report of a result folder.
 
     Args:
-        folder: what ``mocobot paper``, ``estimate``, ``calibrate`` or ``diagnose`` wrote.
+        folder: what ``mocobot paper``, ``estimate``, ``calibrate``, ``diagnose`` or ``campaign`` wrote.
         out: file to write; ``report.html`` in the folder if None. An existing file is replaced.
         say: takes the name of every stage that begins.
 
@@ -99,7 +109,7 @@ class _Result:
     """One result: its file, what was read, the module that makes nodes of it, its id, and how headings call it."""
 
     path: Path
-    found: Paper | Estimated | Calibrated | Diagnosed
+    found: Paper | Estimated | Calibrated | Diagnosed | Campaign
     part: ModuleType
     identity: str
     name: str
@@ -127,4 +137,7 @@ def _results(contents: Contents) -> list[_Result]:
         out.append(
             _Result(path, diagnosis, diagnosis_part, "diagnosis", "The diagnosis in detail", "the diagnosis")
         )
+    if (campaign := contents.campaign) is not None:
+        name = "The campaign in detail"
+        out.append(_Result(campaign.path, campaign, campaign_part, "campaign", name, "the campaign"))
     return out

@@ -8,7 +8,7 @@ from estimator.files import system_errors
 NAME, SUFFIX = "report.html", ".html"
 SOUGHT = (
     "paper.json of `mocobot paper --out`, diagnosis.json of `mocobot diagnose --out`, calibration.json of "
-    "`mocobot calibrate --out`, or JSON files of `mocobot estimate --out`"
+    "`mocobot calibrate --out`, campaign.json of `mocobot campaign --out`, or JSON files of `mocobot estimate --out`"
 )
 
 

@@ -75,6 +75,14 @@ def test_recordings_that_do_not_belong_together(
         assert word in message
 
 
+@pytest.mark.parametrize("odds", ["0", "-1", "1e4"])
+def test_odds_that_are_none_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], odds: str
+) -> None:
+    message = refused(capsys, tmp_path / "none.parquet", "--odds", odds)
+    assert f"odds is {float(odds):g}; it must be greater than 0 and at most 1000" in message
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import re
 import shutil
 from pathlib import Path
 
 import pytest
 
 from estimator.errors import InputError
-from estimator.files import check_target, make_folder, whole_file, whole_folder
+from estimator.files import check_target, make_folder, whole_file, whole_folder, write_text
 from mocobot.files.targets import check_folder
 
 
@@ -131,3 +132,29 @@ def test_a_folder_that_cannot_be_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="file: cannot be made a folder"):
         make_folder(tmp_path / "file")
     assert make_folder(tmp_path / "a" / "b").is_dir()
+
+
+def test_a_file_that_cannot_be_written_is_named_by_its_place(tmp_path: Path) -> None:
+    """Nobody knows the name of the folder that stands in for it until all is there."""
+
+    def write() -> None:
+        with whole_folder(tmp_path / "out") as folder:
+            (folder / "a.txt").mkdir()
+            write_text(folder / "a.txt", "words")
+
+    with pytest.raises(InputError, match=re.escape(f"{tmp_path / 'out'}/a.txt: cannot be written")):
+        write()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is always full")
+def test_a_full_disk_is_one_sentence_whoever_writes(tmp_path: Path) -> None:
+    """Libraries that draw pictures raise errors of the system."""
+
+    def write() -> None:
+        with whole_folder(tmp_path / "out"), open("/dev/full", "w") as full:
+            full.write("words")
+
+    with pytest.raises(InputError, match=r"out: cannot be written \(No space left on device\)"):
+        write()
+    assert list(tmp_path.iterdir()) == []

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from command import refused, run
 from mocobot.cli import COMMANDS, UNCHECKED
 from mocobot.options.simulation import Kind
 
@@ -28,6 +29,7 @@ REFUSED = {
     "report": "report none",
     "compare": "compare none.json none.json",
     "simulate": "simulate --payload z --out rec.parquet",
+    "campaign": "campaign --payload z --out blind",
 }
 """A mistake of every command that refuses something at once."""
 
@@ -93,3 +95,11 @@ def test_machine_code_goes_to_the_users_cache(tmp_path: Path, home: bool) -> Non
     assert done.returncode == 0, done.stderr
     kept = done.stdout.strip()
     assert kept.startswith(str(cache)) if home else kept == "nowhere"
+
+
+def test_a_completion_is_written_where_it_can_be(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    code, _, _ = run(capsys, "--tyro-write-completion", "bash", tmp_path / "mocobot")
+    assert code == 0
+    assert "campaign" in (tmp_path / "mocobot").read_text()
+    said = refused(capsys, "--tyro-write-completion", "bash", tmp_path / "none" / "mocobot")
+    assert "cannot be written" in said

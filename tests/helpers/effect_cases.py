@@ -1,12 +1,13 @@
 """One plausible effect of every cause, and the same at zero size."""
 
 from pathlib import Path
+from typing import Any
 
 from mocobot_sim.effects import EFFECTS, Effect, apply_effects, make_effect
 from mocobot_sim.scene.scene import TeamScene, build_team
 from payload_mjcf import ONE
 
-SIZES: dict[str, dict[str, float]] = {
+SIZES: dict[str, dict[str, Any]] = {
     "phi_zero": {"zero_rad": 1e-3},
     "theta_zero": {"zero_rad": 1e-3},
     "link_length": {"proximal_m": 5e-4, "rod_m": 1e-3, "base_radius_m": 1e-3},
@@ -38,6 +39,10 @@ SIZES: dict[str, dict[str, float]] = {
     "slosh": {
         "mass_kg": 0.3, "length_m": 0.1, "damping_ratio": 0.05, "point_x_m": 0.0, "point_y_m": 0.0, "point_z_m": 0.1,
     },
+    "law": {
+        "target": "tau_1_2", "function": "linear", "of": "tau_1_3", "amplitude": 0.05, "number": 0.0, "second": 0.0,
+        "phase_rad": 0.0, "times": "",
+    },
 }  # fmt: skip
 # What makes an effect nothing; places and shapes stay.
 SIZE_NAMES = {
@@ -45,6 +50,7 @@ SIZE_NAMES = {
     "payload_tether": ("stiffness_N_per_m",),
     "push": ("force_x_N", "force_y_N", "force_z_N"),
     "slosh": ("mass_kg",),
+    "law": ("amplitude",),
 }
 
 

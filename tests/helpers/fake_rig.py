@@ -124,7 +124,7 @@ class FakeRig(Rig):
     def can_resimulate(self):
         return None if self.loop else "it is made up"
 
-    def simulation(self, trial, shared, local, active):
+    def simulation(self, trial, shared, local, active, healthy=()):
         names = tuple(sorted(c.cause for c, _ in active))
         self.calls.append((trial, names, [v for _, v in active]))
         chi2 = self.loop(names, trial)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from hidden.draw import REACH_M
+from mocobot.campaign.draw import REACH_M
+from mocobot_sim.effects.spring import add_site, tie
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from sealed.forms.base import Form, Place, direction, near, vector
@@ -16,18 +17,6 @@ from sealed.ground import Ground
 
 TRAVEL_M = (0.01, 0.05)
 """How far a cable is stretched at home: the payload moves by as much, so it goes slack at times."""
-
-
-def _hang(
-    scene: TeamScene, name: str, site: Any, anchor_W: np.ndarray, stiffness: float, length: float
-) -> TeamScene:
-    fixed = scene.root.worldbody.add("site", name=name, pos=anchor_W.tolist(), group=4, size=[0.006])
-    tendon = scene.root.tendon.add(
-        "spatial", name=name, stiffness=stiffness, springlength=[0.0, length], width=0.002
-    )
-    tendon.add("site", site=site)
-    tendon.add("site", site=fixed)
-    return scene
 
 
 @dataclass(frozen=True)
@@ -48,24 +37,19 @@ class PayloadCable(Form):
     anchor_z_m: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
         point, distance = near(ground.p_1c, REACH_M, rng), rng.uniform(0.5, 1.5)
-        return cls(
-            stiffness_N_per_m=size,
-            length_m=float(distance - rng.uniform(*TRAVEL_M)),
-            **vector("point", "m", point),
-            **vector("anchor", "m", point + distance * direction(rng)),
-        )
+        length = float(distance - rng.uniform(*TRAVEL_M))
+        anchor = point + distance * direction(rng)
+        return {"length_m": length} | vector("point", "m", point) | vector("anchor", "m", anchor)
 
     def _edit(self, scene: TeamScene) -> TeamScene:
-        point = [self.point_x_m, self.point_y_m, self.point_z_m]
-        site = scene.root.find("body", "omnid1/payload/payload").add(
-            "site", name="cable", pos=point, group=4, size=[0.006]
-        )
+        site = add_site(scene.root.find("body", "omnid1/payload/payload"), "cable", self.xyz("point"))
         rest = scene.X_Wb[0].apply(scene.wrist_home_b[0])  # origin of {1} at home
         R_W1 = (scene.X_Wb[0].rotation * _home_turn(scene)).as_matrix()
-        anchor = rest + R_W1 @ [self.anchor_x_m, self.anchor_y_m, self.anchor_z_m]
-        return _hang(scene, "payload_cable", site, anchor, self.stiffness_N_per_m, self.length_m)
+        anchor = rest + R_W1 @ self.xyz("anchor")
+        tie(scene, "payload_cable", site, anchor, self.stiffness_N_per_m, self.length_m)
+        return scene
 
 
 def _home_turn(scene: TeamScene) -> Rotation:
@@ -87,19 +71,14 @@ class RobotCable(Form):
     anchor_z_m: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
         distance, home = rng.uniform(0.5, 1.5), np.array([0.0, 0.0, omnid_design().home_height_m])
-        return cls(
-            **place,
-            stiffness_N_per_m=size,
-            length_m=float(distance - rng.uniform(*TRAVEL_M)),
-            **vector("anchor", "m", home + distance * direction(rng)),
-        )
+        length = float(distance - rng.uniform(*TRAVEL_M))
+        return {"length_m": length} | vector("anchor", "m", home + distance * direction(rng))
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         platform = scene.root.find("body", f"omnid{self.robot}/platform")
-        site = platform.add("site", name="cable", pos=[0.0, 0.0, 0.0], group=4, size=[0.006])
-        anchor = scene.X_Wb[self.robot - 1].apply([self.anchor_x_m, self.anchor_y_m, self.anchor_z_m])
-        return _hang(
-            scene, f"cable{self.robot}", site, np.asarray(anchor), self.stiffness_N_per_m, self.length_m
-        )
+        site = add_site(platform, "cable", [0.0, 0.0, 0.0])
+        anchor = scene.X_Wb[self.robot - 1].apply(self.xyz("anchor"))
+        tie(scene, f"cable{self.robot}", site, anchor, self.stiffness_N_per_m, self.length_m)
+        return scene

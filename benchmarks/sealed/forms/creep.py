@@ -30,9 +30,8 @@ class LateCreep(Form):
     start_s: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        heading, start = float(rng.uniform(-np.pi, np.pi)), float(rng.uniform(10.0, 25.0))
-        return cls(**place, speed_mps=size, heading_rad=heading, start_s=start)
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        return {"heading_rad": float(rng.uniform(-np.pi, np.pi)), "start_s": float(rng.uniform(10.0, 25.0))}
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         precise(scene, TOLERANCE)

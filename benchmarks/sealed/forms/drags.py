@@ -19,18 +19,15 @@ class TurningDrag(Form):
     """Force -c v at the centre of mass, and moment -c r^2 omega."""
 
     answer = "drag"
-    size = "coefficient_Ns_per_m"
+    size, size_is_known = "coefficient_Ns_per_m", True
     on_payload = True
     ranges: ClassVar = {"coefficient_Ns_per_m": (0.0, 1e3), "reach_m": (0.0, 10.0)}
     coefficient_Ns_per_m: float
     reach_m: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(coefficient_Ns_per_m=size, reach_m=float(rng.uniform(0.2, 0.6)))
-
-    def known(self) -> dict[str, float]:
-        return {"coefficient_Ns_per_m": self.coefficient_Ns_per_m}
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        return {"reach_m": float(rng.uniform(0.2, 0.6))}
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
         c, turn = self.coefficient_Ns_per_m, self.coefficient_Ns_per_m * self.reach_m**2
@@ -49,8 +46,8 @@ class QuadraticDrag(Form):
     reach_m: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(coefficient_Ns2_per_m2=size, reach_m=float(rng.uniform(0.1, 0.4)))
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        return {"reach_m": float(rng.uniform(0.1, 0.4))}
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
         c, turn = self.coefficient_Ns2_per_m2, self.coefficient_Ns2_per_m2 * self.reach_m**3

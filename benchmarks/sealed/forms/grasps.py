@@ -43,18 +43,15 @@ class SlowBaseCompliance(Form):
     """A base on springs beside dampers (Kelvin and Voigt): it follows its load in tens of milliseconds."""
 
     answer = "base_compliance"
-    size = "compliance_m_per_N"
+    size, size_is_known = "compliance_m_per_N", True
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-2), "relaxation_s": (0.02, 10.0)}
     robot: int
     compliance_m_per_N: float
     relaxation_s: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(**place, compliance_m_per_N=size, relaxation_s=float(rng.uniform(0.03, 0.15)))
-
-    def known(self) -> dict[str, float]:
-        return {"compliance_m_per_N": self.compliance_m_per_N}
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        return {"relaxation_s": float(rng.uniform(0.03, 0.15))}
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         precise(scene)
@@ -67,7 +64,7 @@ class SlowGrasp(Form):
     """A grasp on springs beside dampers."""
 
     answer = "grasp_flex"
-    size = "compliance_m_per_N"
+    size, size_is_known = "compliance_m_per_N", True
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-3), "relaxation_s": (0.02, 10.0)}
     on_payload = True
     robot: int
@@ -75,11 +72,8 @@ class SlowGrasp(Form):
     relaxation_s: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(**place, compliance_m_per_N=size, relaxation_s=float(rng.uniform(0.03, 0.15)))
-
-    def known(self) -> dict[str, float]:
-        return {"compliance_m_per_N": self.compliance_m_per_N}
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        return {"relaxation_s": float(rng.uniform(0.03, 0.15))}
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         precise(scene)
@@ -96,7 +90,7 @@ class TurningGrasp(Form):
     """
 
     answer = "grasp_flex"
-    size = "compliance_m_per_N"
+    size, size_is_known = "compliance_m_per_N", True
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-3), "reach_m": (0.0, 10.0), "offset_m": (-1.0, 1.0)}
     on_payload = True
     robot: int
@@ -107,12 +101,9 @@ class TurningGrasp(Form):
     """From the gimbal's centre to where it turns, along z of {i}."""
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
         reach, offset = rng.uniform(0.04, 0.1), rng.choice([-1.0, 1.0]) * rng.uniform(0.03, 0.08)
-        return cls(**place, compliance_m_per_N=size, reach_m=float(reach), offset_m=float(offset))
-
-    def known(self) -> dict[str, float]:
-        return {"compliance_m_per_N": self.compliance_m_per_N}
+        return {"reach_m": float(reach), "offset_m": float(offset)}
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         precise(scene)
@@ -144,7 +135,7 @@ class SoftPlay(Form):
     """A loose grasp, damped while it travels, with a contact behind the gap that gives way."""
 
     answer = "grasp_play"
-    size = "play_m"
+    size, size_is_known = "play_m", True
     ranges: ClassVar = {
         "play_m": (0.0, 5e-3),
         "contact_m_per_N": (1e-9, 1e-4),
@@ -157,16 +148,11 @@ class SoftPlay(Form):
     damping_Ns_per_m: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(
-            **place,
-            play_m=size,
-            contact_m_per_N=float(rng.uniform(0.5e-7, 3e-7)),
-            damping_Ns_per_m=float(rng.choice([0.0, rng.uniform(1.0, CONTACT_DAMPING_NS_PER_M)])),
-        )
-
-    def known(self) -> dict[str, float]:
-        return {"play_m": self.play_m}
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        return {
+            "contact_m_per_N": float(rng.uniform(0.5e-7, 3e-7)),
+            "damping_Ns_per_m": float(rng.choice([0.0, rng.uniform(1.0, CONTACT_DAMPING_NS_PER_M)])),
+        }
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         precise(scene)

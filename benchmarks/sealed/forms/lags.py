@@ -35,18 +35,15 @@ class SecondOrderTorqueLag(Form):
     """All torque sensors of a robot: second order, late by ``time_constant_s``."""
 
     answer = "torque_lag"
-    size = "time_constant_s"
+    size, size_is_known = "time_constant_s", True
     ranges: ClassVar = {"time_constant_s": (1e-5, 1.0), "damping_ratio": (0.1, 5.0)}
     robot: int
     time_constant_s: float
     damping_ratio: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(**place, time_constant_s=size, damping_ratio=float(rng.uniform(0.6, 1.2)))
-
-    def known(self) -> dict[str, float]:
-        return {"time_constant_s": self.time_constant_s}
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        return {"damping_ratio": float(rng.uniform(0.6, 1.2))}
 
     def readers(self, trial_number: int | None) -> Sequence[Reader]:
         return [_late(self.robot, (1, 2, 3), self.time_constant_s, self.damping_ratio)]
@@ -57,7 +54,7 @@ class SingleTorqueLag(Form):
     """One torque sensor alone: first order (no damping ratio is then of use) or second."""
 
     answer = "sensor_lag"
-    size = "time_constant_s"
+    size, size_is_known = "time_constant_s", True
     ranges: ClassVar = {"time_constant_s": (1e-5, 1.0), "damping_ratio": (0.1, 50.0)}
     robot: int
     joint: int
@@ -65,14 +62,9 @@ class SingleTorqueLag(Form):
     damping_ratio: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
         # A damping ratio of 5 is a lag of first order but for a hundredth.
-        return cls(
-            **place, time_constant_s=size, damping_ratio=float(rng.choice([5.0, rng.uniform(0.6, 1.2)]))
-        )
-
-    def known(self) -> dict[str, float]:
-        return {"time_constant_s": self.time_constant_s}
+        return {"damping_ratio": float(rng.choice([5.0, rng.uniform(0.6, 1.2)]))}
 
     def readers(self, trial_number: int | None) -> Sequence[Reader]:
         return [_late(self.robot, (self.joint,), self.time_constant_s, self.damping_ratio)]

@@ -18,14 +18,10 @@ class MassDrift(Form):
     """It loses (or gains) mass all the time, from everywhere alike: sand that runs out, water that runs in."""
 
     answer = "payload_mass"
-    size = "rate_kgps"
+    size, either_sign = "rate_kgps", True
     on_payload = True
     ranges: ClassVar = {"rate_kgps": (-0.1, 0.1)}
     rate_kgps: float
-
-    @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(rate_kgps=float(rng.choice([-1.0, 1.0]) * size))
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
         return [_Mass(lambda time: self.rate_kgps * time)]

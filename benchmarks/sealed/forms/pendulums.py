@@ -9,8 +9,8 @@ import numpy as np
 
 from estimator.arrays import Array
 from estimator.estimate.principal import inertia_parameters
-from hidden.draw import REACH_M
 from hidden.limits import pendulum_limit_kg
+from mocobot.campaign.draw import REACH_M
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from sealed.forms.base import Form, Place, near, vector
@@ -22,7 +22,7 @@ class DoublePendulum(Form):
     """A mass on a string, and another on a string below it: two modes in each direction."""
 
     answer = "slosh"
-    size = "mass_kg"
+    size, size_is_known = "mass_kg", True
     on_payload = True
     ranges: ClassVar = {
         "mass_kg": (0.0, 100.0), "length_m": (0.01, 10.0), "lower_share": (0.0, 0.45), "lower_length_m": (0.01, 10.0),
@@ -49,24 +49,20 @@ class DoublePendulum(Form):
             **vector("point", "m", near(ground.p_1c, REACH_M, rng)),
         )
 
-    def known(self) -> dict[str, float]:
-        return {"mass_kg": self.mass_kg}
-
     def carried(self) -> Array:
         """The mass at its pivot."""
-        at = np.array([self.point_x_m, self.point_y_m, self.point_z_m])
+        at = self.xyz("point")
         about_1 = inertia_parameters(at @ at * np.eye(3) - np.outer(at, at))
         return self.mass_kg * np.concatenate([[1.0], at, about_1])
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         lower = self.lower_share * self.mass_kg
-        point = [self.point_x_m, self.point_y_m, self.point_z_m]
         parent = scene.root.find("body", "omnid1/payload/payload")
-        upper = self._swinging(parent, "upper", point, self.mass_kg - lower, self.length_m)
-        self._swinging(upper, "lower", [0.0, 0.0, -self.length_m], lower, self.lower_length_m)
+        upper = self._swinging(parent, "upper", self.xyz("point"), self.mass_kg - lower, self.length_m)
+        self._swinging(upper, "lower", np.array([0.0, 0.0, -self.length_m]), lower, self.lower_length_m)
         return scene
 
-    def _swinging(self, parent, name: str, pos: list[float], mass: float, length: float):
+    def _swinging(self, parent, name: str, pos: np.ndarray, mass: float, length: float):
         body = parent.add("body", name=name, pos=pos)
         inertia = mass * length**2
         damping = 2.0 * self.damping_ratio * np.sqrt(omnid_design().gravity_mps2 / length) * inertia
@@ -81,7 +77,7 @@ class UnequalPendulum(Form):
     """A tank that is longer than wide: it swings at one frequency along it and at another across."""
 
     answer = "slosh"
-    size = "mass_kg"
+    size, size_is_known = "mass_kg", True
     on_payload = True
     ranges: ClassVar = {
         "mass_kg": (0.0, 100.0), "length_m": (0.01, 10.0), "ratio": (0.1, 1.0), "damping_ratio": (0.0, 10.0),
@@ -108,14 +104,11 @@ class UnequalPendulum(Form):
             **vector("point", "m", near(ground.p_1c, REACH_M, rng)),
         )
 
-    def known(self) -> dict[str, float]:
-        return {"mass_kg": self.mass_kg}
-
     def _edit(self, scene: TeamScene) -> TeamScene:
         half, short = 0.5 * self.heading_rad, self.ratio * self.length_m
         gravity = omnid_design().gravity_mps2
         body = scene.root.find("body", "omnid1/payload/payload").add(
-            "body", name="tank", pos=[self.point_x_m, self.point_y_m, self.point_z_m],
+            "body", name="tank", pos=self.xyz("point"),
             quat=[np.cos(half), 0.0, 0.0, np.sin(half)],
         )  # fmt: skip
         # About x it swings from the body's origin, about y from a point further down.

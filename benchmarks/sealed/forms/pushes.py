@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from hidden.draw import REACH_M
+from mocobot.campaign.draw import REACH_M
 from mocobot_sim.trial.actors import Actor
 from sealed.forms.base import Form, Place, direction, near, vector
 from sealed.forms.parts import PointForce
@@ -59,22 +60,21 @@ class _ShapedPush(Form):
             **vector("point", "m", near(ground.p_1c, REACH_M, rng)),
         )
 
+    @abstractmethod
     def shape(self, share: float) -> float:
         """Force over its peak, at a share of the duration."""
-        raise NotImplementedError
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
         if trial_number not in (None, self.trial):
             return []
-        peak = self.peak_N * np.array([self.along_x_m, self.along_y_m, self.along_z_m])
+        peak = self.peak_N * self.xyz("along")
         none = np.zeros(3)
 
         def force(time: float) -> np.ndarray:
             share = (time - self.start_s) / self.duration_s
             return peak * self.shape(share) if 0.0 <= share <= 1.0 else none
 
-        point = np.array([self.point_x_m, self.point_y_m, self.point_z_m])
-        return [PointForce(force, point)]
+        return [PointForce(force, self.xyz("point"))]
 
 
 @dataclass(frozen=True)

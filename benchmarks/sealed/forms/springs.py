@@ -32,14 +32,12 @@ class BoucWenSpring(Form):
     exponent: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(
-            **place,
-            force_Nm=size,
-            yield_rad=float(rng.uniform(3e-4, 3e-3)),
-            beta=float(rng.uniform(0.5, 0.8)),
-            exponent=float(rng.uniform(1.0, 2.0)),
-        )
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        return {
+            "yield_rad": float(rng.uniform(3e-4, 3e-3)),
+            "beta": float(rng.uniform(0.5, 0.8)),
+            "exponent": float(rng.uniform(1.0, 2.0)),
+        }
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
         law = BoucWen(self.force_Nm, self.yield_rad, self.beta, self.exponent)

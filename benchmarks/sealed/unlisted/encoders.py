@@ -3,51 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from mocobot_sim.trial.actors import Reader
-from mocobot_sim.trial.readings import Misreading, RobotReadings
-from sealed.forms.base import Form, Place
+from mocobot_sim.trial.readings import RobotReadings
+from sealed.forms.base import Place
 from sealed.ground import Ground
-from sealed.laws.hysteresis import Play
+from sealed.unlisted.misread import Gap, MisreadNow
 
 
 @dataclass(frozen=True)
-class _AngleReading(Form):
-    """One angle reading is off."""
-
-    angle: ClassVar[str]
-    robot: int
-    joint: int
-
-    def _law(self, variables: list[str], formula: str, amplitude: float, unit: str) -> dict[str, Any]:
-        place = {"robot": self.robot, "joint": self.joint}
-        return {
-            "place": place, "of": f"{self.angle} reading", "variables": variables, "formula": formula,
-            "amplitude": amplitude, "unit": unit,
-        }  # fmt: skip
-
-    def error(self, readings: RobotReadings, seen: np.ndarray, angle: float, time: float) -> float:
-        """Reading minus truth [rad]."""
-        raise NotImplementedError
-
-    def readers(self, trial_number: int | None) -> Sequence[Reader]:
-        phi = self.angle == "phi"
-
-        def change(readings: RobotReadings, seen: np.ndarray, time: float) -> None:
-            angle = (readings.phi if phi else readings.theta)(seen, self.joint)
-            add = readings.add_phi if phi else readings.add_theta
-            add(seen, self.joint, self.error(readings, seen, angle, time))
-
-        return [Misreading(self.robot, change)]
-
-
-@dataclass(frozen=True)
-class _Eccentric(_AngleReading):
+class _Eccentric(MisreadNow):
     size = "amplitude_rad"
     ranges: ClassVar = {"amplitude_rad": (0.0, 0.5)}
     amplitude_rad: float
@@ -55,23 +23,23 @@ class _Eccentric(_AngleReading):
     times: ClassVar[int]
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(**place, amplitude_rad=size, phase_rad=float(rng.uniform(-np.pi, np.pi)))
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        return {"phase_rad": float(rng.uniform(-np.pi, np.pi))}
 
     def law(self) -> dict[str, Any]:
         times = "" if self.times == 1 else f"{self.times} "
-        formula = f"a sin({times}{self.angle} + {self.phase_rad:.3g})"
-        return self._law([f"own {self.angle}, from home"], formula, self.amplitude_rad, "rad")
+        formula = f"a sin({times}{self.channel} + {self.phase_rad:.3g})"
+        return self._law([f"own {self.channel}, from home"], formula, "rad")
 
-    def error(self, readings: RobotReadings, seen: np.ndarray, angle: float, time: float) -> float:
-        return self.amplitude_rad * math.sin(self.times * angle + self.phase_rad)
+    def error(self, readings: RobotReadings, seen: np.ndarray, value: float, time: float) -> float:
+        return self.amplitude_rad * math.sin(self.times * value + self.phase_rad)
 
 
 @dataclass(frozen=True)
 class EccentricPhi(_Eccentric):
     """A driven joint's encoder disc sits off its axis."""
 
-    angle = "phi"
+    channel = "phi"
     times = 1
 
 
@@ -79,7 +47,7 @@ class EccentricPhi(_Eccentric):
 class EccentricTheta(_Eccentric):
     """A gimbal encoder's disc sits off its axis."""
 
-    angle = "theta"
+    channel = "theta"
     times = 1
 
 
@@ -87,71 +55,47 @@ class EccentricTheta(_Eccentric):
 class CyclicPhi(_Eccentric):
     """An error that comes again with every pole of a magnetic encoder."""
 
-    angle = "phi"
+    channel = "phi"
     times = 16
 
 
 @dataclass(frozen=True)
-class EncoderBacklash(_AngleReading):
+class EncoderBacklash(Gap):
     """A driven joint's encoder sits behind a gear with play."""
 
-    angle = "phi"
+    channel = "phi"
     size = "half_width_rad"
     ranges: ClassVar = {"half_width_rad": (0.0, 0.1)}
     half_width_rad: float
 
-    @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(**place, half_width_rad=size)
-
-    def law(self) -> dict[str, Any]:
-        return self._law(["own phi, its history"], "play of half width a", self.half_width_rad, "rad")
-
-    def readers(self, trial_number: int | None) -> Sequence[Reader]:
-        play = Play(self.half_width_rad)
-
-        def change(readings: RobotReadings, seen: np.ndarray, time: float) -> None:
-            phi = readings.phi(seen, self.joint)
-            readings.add_phi(seen, self.joint, play.step(phi) - phi)
-
-        return [Misreading(self.robot, change)]
-
 
 @dataclass(frozen=True)
-class SoftEncoderMount(_AngleReading):
+class SoftEncoderMount(MisreadNow):
     """A driven joint's encoder gives way to the joint's torque."""
 
-    angle = "phi"
-    size = "rad_per_Nm"
+    channel = "phi"
+    size, either_sign = "rad_per_Nm", True
     ranges: ClassVar = {"rad_per_Nm": (-0.1, 0.1)}
     rad_per_Nm: float
 
-    @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(**place, rad_per_Nm=float(rng.choice([-1.0, 1.0]) * size))
-
     def law(self) -> dict[str, Any]:
-        return self._law(["own tau"], "a tau", self.rad_per_Nm, "rad/(N m)")
+        return self._law(["own tau"], "a tau", "rad/(N m)")
 
-    def error(self, readings: RobotReadings, seen: np.ndarray, angle: float, time: float) -> float:
+    def error(self, readings: RobotReadings, seen: np.ndarray, value: float, time: float) -> float:
         return self.rad_per_Nm * readings.tau(seen, self.joint)
 
 
 @dataclass(frozen=True)
-class SlippingZero(_AngleReading):
+class SlippingZero(MisreadNow):
     """A gimbal encoder's zero slips steadily, in every trial anew."""
 
-    angle = "theta"
-    size = "rate_radps"
+    channel = "theta"
+    size, either_sign = "rate_radps", True
     ranges: ClassVar = {"rate_radps": (-0.1, 0.1)}
     rate_radps: float
 
-    @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(**place, rate_radps=float(rng.choice([-1.0, 1.0]) * size))
-
     def law(self) -> dict[str, Any]:
-        return self._law(["t"], "a t", self.rate_radps, "rad/s")
+        return self._law(["t"], "a t", "rad/s")
 
-    def error(self, readings: RobotReadings, seen: np.ndarray, angle: float, time: float) -> float:
+    def error(self, readings: RobotReadings, seen: np.ndarray, value: float, time: float) -> float:
         return self.rate_radps * time

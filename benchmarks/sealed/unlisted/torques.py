@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -23,17 +24,13 @@ class _Torque(Form):
     robot: int
     joint: int
 
-    def _law(self, variables: list[str], formula: str, amplitude: float, unit: str) -> dict[str, Any]:
+    def _law(self, variable: str, formula: str, unit: str) -> dict[str, Any]:
         where = "torque in driven joint" if self.kind == "driven" else "torque in gimbal axis"
-        place = {"robot": self.robot, "joint": self.joint}
-        return {
-            "place": place, "of": where, "variables": variables, "formula": formula, "amplitude": amplitude,
-            "unit": unit,
-        }  # fmt: skip
+        return self.told(where, [variable], formula, unit)
 
+    @abstractmethod
     def torque(self, angle: float, rate: float, time: float) -> float:
         """On the link [N m]."""
-        raise NotImplementedError
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
         return [JointTorque(self.kind, self.robot, self.joint, lambda q, v, t, dt: self.torque(q, v, t))]
@@ -51,13 +48,12 @@ class Cogging(_Torque):
     phase_rad: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        times, phase = float(rng.integers(8, 25)), float(rng.uniform(-np.pi, np.pi))
-        return cls(**place, amplitude_Nm=size, times=times, phase_rad=phase)
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        return {"times": float(rng.integers(8, 25)), "phase_rad": float(rng.uniform(-np.pi, np.pi))}
 
     def law(self) -> dict[str, Any]:
         formula = f"a sin({self.times:.0f} phi + {self.phase_rad:.3g})"
-        return self._law(["own phi, from home"], formula, self.amplitude_Nm, "N m")
+        return self._law("own phi, from home", formula, "N m")
 
     def torque(self, angle: float, rate: float, time: float) -> float:
         return self.amplitude_Nm * math.sin(self.times * angle + self.phase_rad)
@@ -72,12 +68,8 @@ class CubicSpring(_Torque):
     ranges: ClassVar = {"cubic_Nm_per_rad3": (0.0, 1e5)}
     cubic_Nm_per_rad3: float
 
-    @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(**place, cubic_Nm_per_rad3=size)
-
     def law(self) -> dict[str, Any]:
-        return self._law(["own theta"], "-a theta^3", self.cubic_Nm_per_rad3, "N m/rad^3")
+        return self._law("own theta", "-a theta^3", "N m/rad^3")
 
     def torque(self, angle: float, rate: float, time: float) -> float:
         return -self.cubic_Nm_per_rad3 * angle**3
@@ -94,12 +86,11 @@ class CableSpring(_Torque):
     rest_rad: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(**place, stiffness_Nm_per_rad=size, rest_rad=float(rng.uniform(-0.1, 0.1)))
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        return {"rest_rad": float(rng.uniform(-0.1, 0.1))}
 
     def law(self) -> dict[str, Any]:
-        formula = f"-a (theta - {self.rest_rad:.3g})"
-        return self._law(["own theta"], formula, self.stiffness_Nm_per_rad, "N m/rad")
+        return self._law("own theta", f"-a (theta - {self.rest_rad:.3g})", "N m/rad")
 
     def torque(self, angle: float, rate: float, time: float) -> float:
         return -self.stiffness_Nm_per_rad * (angle - self.rest_rad)
@@ -114,12 +105,8 @@ class DoorCloser(_Torque):
     ranges: ClassVar = {"damping_Nms_per_rad": (0.0, 100.0)}
     damping_Nms_per_rad: float
 
-    @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(**place, damping_Nms_per_rad=size)
-
     def law(self) -> dict[str, Any]:
-        return self._law(["own phi rate"], "-a max(phi_dot, 0)", self.damping_Nms_per_rad, "N m s/rad")
+        return self._law("own phi rate", "-a max(phi_dot, 0)", "N m s/rad")
 
     def torque(self, angle: float, rate: float, time: float) -> float:
         return -self.damping_Nms_per_rad * max(rate, 0.0)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from hidden.draw import REACH_M
+from mocobot.campaign.draw import REACH_M
 from mocobot_sim.effects.base_creep import ARMATURE_KG, DAMPING_NS_PER_M, TOLERANCE
 from mocobot_sim.effects.slides import add_slides
 from mocobot_sim.effects.solver import precise
@@ -32,26 +33,22 @@ class _Force(Form):
     point_y_m: float
     point_z_m: float
 
-    @staticmethod
-    def where(ground: Ground, rng: np.random.Generator) -> dict[str, float]:
-        """Direction and point at random."""
+    @classmethod
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
         return vector("along", "m", direction(rng)) | vector("point", "m", near(ground.p_1c, REACH_M, rng))
 
-    def _law(self, variables: list[str], formula: str, amplitude: float, unit: str) -> dict[str, Any]:
-        along = [self.along_x_m, self.along_y_m, self.along_z_m]
-        return {
-            "place": {}, "of": "force on the payload, in the world", "along": along, "variables": variables,
-            "formula": formula, "amplitude": amplitude, "unit": unit,
-        }  # fmt: skip
+    def _law(self, formula: str, unit: str) -> dict[str, Any]:
+        return self.told(
+            "force on the payload, in the world", ["t"], formula, unit, self.xyz("along").tolist()
+        )
 
+    @abstractmethod
     def force(self, time: float) -> float:
         """Along its direction [N]."""
-        raise NotImplementedError
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
-        along = np.array([self.along_x_m, self.along_y_m, self.along_z_m])
-        point = np.array([self.point_x_m, self.point_y_m, self.point_z_m])
-        return [PointForce(lambda time: along * self.force(time), point)]
+        along = self.xyz("along")
+        return [PointForce(lambda time: along * self.force(time), self.xyz("point"))]
 
 
 @dataclass(frozen=True)
@@ -62,12 +59,8 @@ class GrowingPush(_Force):
     ranges: ClassVar = {"rate_Nps": (0.0, 10.0)}
     rate_Nps: float = 0.0
 
-    @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(**cls.where(ground, rng), rate_Nps=size)
-
     def law(self) -> dict[str, Any]:
-        return self._law(["t"], "a t", self.rate_Nps, "N/s")
+        return self._law("a t", "N/s")
 
     def force(self, time: float) -> float:
         return self.rate_Nps * time
@@ -83,11 +76,12 @@ class Shaker(_Force):
     frequency_hz: float = 1.0
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(**cls.where(ground, rng), amplitude_N=size, frequency_hz=float(rng.uniform(0.9, 3.5)))
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        where = super().others(ground, place, rng)
+        return where | {"frequency_hz": float(rng.uniform(0.9, 3.5))}
 
     def law(self) -> dict[str, Any]:
-        return self._law(["t"], f"a sin(2 pi {self.frequency_hz:.4g} Hz t)", self.amplitude_N, "N")
+        return self._law(f"a sin(2 pi {self.frequency_hz:.4g} Hz t)", "N")
 
     def force(self, time: float) -> float:
         return self.amplitude_N * math.sin(2.0 * np.pi * self.frequency_hz * time)
@@ -106,18 +100,15 @@ class Gyroscope(Form):
     along_z_m: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(spin_kgm2ps=size, **vector("along", "m", direction(rng)))
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        return vector("along", "m", direction(rng))
 
     def law(self) -> dict[str, Any]:
-        along = [self.along_x_m, self.along_y_m, self.along_z_m]
-        return {
-            "place": {}, "of": "moment on the payload", "along": along, "variables": ["payload's angular velocity"],
-            "formula": "-omega x h", "amplitude": self.spin_kgm2ps, "unit": "kg m^2/s",
-        }  # fmt: skip
+        turned, along = ["payload's angular velocity"], self.xyz("along").tolist()
+        return self.told("moment on the payload", turned, "-omega x h", "kg m^2/s", along)
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
-        spin = self.spin_kgm2ps * np.array([self.along_x_m, self.along_y_m, self.along_z_m])
+        spin = self.spin_kgm2ps * self.xyz("along")
         # The payload turns by some degrees only, so its axes are the world's but for that.
         return [PayloadWrench(lambda t, p, v, w: (np.zeros(3), -np.cross(w, spin)))]
 
@@ -137,25 +128,22 @@ class ShiftingLoad(Form):
     point_z_m: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(
-            mass_kg=size,
-            frequency_hz=float(rng.uniform(0.8, 1.6)),
-            heading_rad=float(rng.uniform(-np.pi, np.pi)),
-            **vector("point", "m", near(ground.p_1c, REACH_M, rng)),
-        )
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        frequency, heading = float(rng.uniform(0.8, 1.6)), float(rng.uniform(-np.pi, np.pi))
+        point = vector("point", "m", near(ground.p_1c, REACH_M, rng))
+        return {"frequency_hz": frequency, "heading_rad": heading} | point
 
     def law(self) -> dict[str, Any]:
-        return {
-            "place": {}, "of": "force and moment on the payload", "variables": ["payload's tilt and acceleration"],
-            "along": [float(np.cos(self.heading_rad)), math.sin(self.heading_rad), 0.0],
-            "formula": f"mass that slides on a spring of {self.frequency_hz:.3g} Hz, damping ratio 0.7",
-            "amplitude": self.mass_kg, "unit": "kg",
-        }  # fmt: skip
+        felt, along = (
+            ["payload's tilt and acceleration"],
+            [math.cos(self.heading_rad), math.sin(self.heading_rad), 0.0],
+        )
+        formula = f"mass that slides on a spring of {self.frequency_hz:.3g} Hz, damping ratio 0.7"
+        return self.told("force and moment on the payload", felt, formula, "kg", along)
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         payload = scene.root.find("body", "omnid1/payload/payload")
-        body = payload.add("body", name="load", pos=[self.point_x_m, self.point_y_m, self.point_z_m])
+        body = payload.add("body", name="load", pos=self.xyz("point"))
         omega = 2.0 * np.pi * self.frequency_hz
         body.add(
             "joint", name="load", type="slide", axis=[np.cos(self.heading_rad), np.sin(self.heading_rad), 0.0],
@@ -176,17 +164,15 @@ class SinkingBase(Form):
     time_s: float
 
     @classmethod
-    def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
-        return cls(**place, depth_m=size, time_s=float(rng.uniform(6.0, 20.0)))
+    def others(cls, ground: Ground, place: Place, rng: np.random.Generator) -> dict[str, float]:
+        return {"time_s": float(rng.uniform(6.0, 20.0))}
 
     def law(self) -> dict[str, Any]:
-        return {
-            "place": {"robot": self.robot}, "of": "displacement of the base, down", "variables": ["t"],
-            "formula": f"a (1 - exp(-t / {self.time_s:.3g} s))", "amplitude": self.depth_m, "unit": "m",
-        }  # fmt: skip
+        return self.told(
+            "displacement of the base, down", ["t"], f"a (1 - exp(-t / {self.time_s:.3g} s))", "m"
+        )
 
     def _edit(self, scene: TeamScene) -> TeamScene:
-
         precise(scene, TOLERANCE)
         chassis = scene.root.find("body", f"omnid{self.robot}/chassis")
         add_slides(chassis, "sink", "z", armature=ARMATURE_KG, damping=DAMPING_NS_PER_M, stiffness=1.0)
@@ -203,7 +189,6 @@ class _Sinks:
         self._sinking = sinking
 
     def start(self, stage: Stage) -> None:
-
         sinking = self._sinking
         self._data, self._dt = stage.data, 1.0 / stage.rate_hz
         self._dof = int(stage.model.joint(f"omnid{sinking.robot}/sink_z").dofadr[0])

@@ -5,6 +5,9 @@ from typing import ClassVar
 
 from discrepancy.causes.base import Cause
 from discrepancy.causes.numbers import Numbers
+from discrepancy.laws.candidate import LawCandidate
+from discrepancy.laws.guess import experiment
+from discrepancy.laws.words import sentence
 from discrepancy.rig import Candidate
 
 
@@ -21,12 +24,16 @@ class Words:
 
     def describe(self, candidate: Candidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
         """What a cause does at its place, one sentence with its numbers; standard errors may be NaN."""
+        if isinstance(candidate, LawCandidate):
+            return sentence(candidate, values, se)
         cause = self.causes[candidate.cause]
         return f"{cause.place(candidate)}: {cause.sentence(Numbers(values, se))}."
 
-    def separate(self, cause: str) -> str:
+    def separate(self, candidate: Candidate) -> str:
         """Which experiment would tell a cause from its look-alikes, one sentence, or nothing."""
-        return self.causes[cause].separate
+        if isinstance(candidate, LawCandidate):
+            return experiment(candidate.at.name)
+        return self.causes[candidate.cause].separate
 
     def unit(self, name: str) -> str:
         """Unit of a closed-loop channel, or of a quantity that a misfit may depend on."""

@@ -14,7 +14,7 @@ from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.traces import traces
 from discrepancy.emps.words import EmpsWords
 from discrepancy.engine.block_errors import with_block_errors
-from discrepancy.engine.diagnose import Diagnosis, diagnose
+from discrepancy.engine.diagnose import Diagnosis, When, diagnose
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.block_errors import block_covariance, part_of
 from discrepancy.least_squares.fit import Fit
@@ -27,6 +27,8 @@ def diagnose_emps(
     excluded: Sequence[str] = (),
     *,
     closed_loop: bool = True,
+    laws: When = "auto",
+    odds: float = rules.PRIOR_ODDS,
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
     simulated: Callable[[int], object] | None = None,
@@ -37,13 +39,15 @@ def diagnose_emps(
         log: the recording.
         tolerances: standard deviations by cause and parameter; None for the defaults.
         excluded: causes left out of the catalogue.
-        closed_loop, jobs, say, simulated: as of ``diagnose``.
+        closed_loop, laws, odds, jobs, say, simulated: as of ``diagnose``.
 
     Raises:
         InputError: the recording cannot be used, or a cause to be excluded does not exist.
     """
     rig = EmpsRig.of(log, tolerances, excluded)
-    found = diagnose_axis(rig, closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated)
+    found = diagnose_axis(
+        rig, closed_loop=closed_loop, laws=laws, odds=odds, jobs=jobs, say=say, simulated=simulated
+    )
     return Diagnosed(rig, found, EmpsWords(), partial(traces, rig, found.explanation))
 
 
@@ -51,6 +55,8 @@ def diagnose_axis(
     rig: EmpsRig,
     *,
     closed_loop: bool = True,
+    laws: When = "auto",
+    odds: float = rules.PRIOR_ODDS,
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
     simulated: Callable[[int], object] | None = None,
@@ -59,9 +65,11 @@ def diagnose_axis(
 
     Args:
         rig: the recording.
-        closed_loop, jobs, say, simulated: as of ``diagnose``.
+        closed_loop, laws, odds, jobs, say, simulated: as of ``diagnose``.
     """
-    found = diagnose(rig, closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated)
+    found = diagnose(
+        rig, closed_loop=closed_loop, laws=laws, odds=odds, jobs=jobs, say=say, simulated=simulated
+    )
     explanation = with_block_errors(found.explanation, block_rows(rig))
     notes = (*rig.log.notes, *found.notes, _noise(rig), *_loop(rig, found.explanation))
     return replace(found, explanation=explanation, notes=notes)

@@ -203,8 +203,9 @@ class EmpsRig(Rig):
         return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
 
     def simulation(
-        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
-    ) -> Callable[[], dict[str, Array] | None]:
+        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]],
+        healthy: Sequence[tuple[Candidate, Array]] = (),
+    ) -> Callable[[], dict[str, Array] | None]:  # fmt: skip
         """What resimulates one block's reference, with causes in the axis.
 
         It returns recorded minus simulated ``position`` [m] and ``voltage`` [V], shape (Q,) each.

@@ -133,13 +133,14 @@ def confirm(
 
 def _decided(rig: Rig, found: Found, alternatives: Sequence[Alternative]) -> float:
     """The probability of a cause once the closed loop has spoken: a rival that does worse there is no look-alike."""
-    gaps = [
-        other.evidence_gap
-        if other.ambiguous or other.chi2_per_n is None
-        else max(other.evidence_gap, rules.AMBIGUOUS_NATS)
-        for other in alternatives
-    ]
-    return probability([*gaps, found.over_nothing], found.share_left, rig.law_share(found.candidate))
+    gaps = [*map(decided_gap, alternatives), found.over_nothing]
+    return probability(gaps, found.share_left, rig.law_share(found.candidate))
+
+
+def decided_gap(other: Alternative) -> float:
+    """By how much a rival is less likely once the closed loop has spoken [nats]."""
+    open_ = other.ambiguous or other.chi2_per_n is None
+    return other.evidence_gap if open_ else max(other.evidence_gap, rules.AMBIGUOUS_NATS)
 
 
 def _exchanged(rig: Rig, explanation: Explanation, problem: Problem, winner: _Swap) -> Explanation:
@@ -179,9 +180,13 @@ def _swaps(rig: Rig, explanation: Explanation) -> tuple[Problem, list[_Swap]]:
     for found in explanation.found:
         for rival, gap in found.rivals:
             index = problem.index_of(rival)
-            if index is None or index in free or gap > rules.AMBIGUOUS_NATS or rival.transient:
+            if index in free or gap > rules.AMBIGUOUS_NATS or rival.transient:
                 continue
-            problem = problem.with_columns(index, rival, rig.columns(rival))
+            if index is None:  # a law: those are not listed beforehand
+                index = len(problem.candidates)
+                problem = problem.extended(rival, rig.columns(rival))
+            else:
+                problem = problem.with_columns(index, rival, rig.columns(rival))
             swapped = tuple(index if i == found.index else i for i in free)
             swaps.append(_Swap(found, rival, index, gap, swapped))
     return problem, swaps

@@ -2,14 +2,20 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from discrepancy import rules
 from discrepancy.engine.confirm import Alternative, confirm, not_simulated
 from discrepancy.engine.explanation import Explanation, Found, explain
 from discrepancy.engine.gain import Gain, responses
 from discrepancy.engine.verdict import Verdict, verdict_of
+from discrepancy.inference.odds import check_odds
 from discrepancy.inference.search import search
+from discrepancy.laws.search import with_laws
+from discrepancy.laws.where import Located
 from discrepancy.rig import Rig
+
+When = Literal["auto", "always", "never"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +30,7 @@ class Diagnosis:
         gain: closed-loop responses without and with the causes, or None.
         not_simulated: why there is no closed-loop comparison, or None.
         notes: sentences about what the data could not decide or validate.
+        located: where something unlisted was looked for, the likeliest place first; empty where nothing unlisted is.
     """
 
     rig: Rig
@@ -33,6 +40,7 @@ class Diagnosis:
     gain: Gain | None
     not_simulated: str | None
     notes: tuple[str, ...]
+    located: tuple[Located, ...] = ()
 
     @property
     def causes(self) -> tuple[Found, ...]:
@@ -45,6 +53,8 @@ def diagnose(
     *,
     closed_loop: bool = True,
     most: int = rules.MOST_CAUSES,
+    laws: When = "auto",
+    odds: float = rules.PRIOR_ODDS,
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
     simulated: Callable[[int], object] | None = None,
@@ -55,13 +65,28 @@ def diagnose(
         rig: recordings and causes.
         closed_loop: whether to resimulate the recorded commands.
         most: largest number of causes.
+        laws: whether to look for laws that the catalogue lacks: where something unlisted is left, always, or never.
+        odds: of any cause being there before the data are seen, at all its places together.
         jobs: parallel processes of the simulations.
         say: called with what is being done.
         simulated: called with 1 for every simulated trial.
+
+    Raises:
+        InputError: the odds are none.
     """
-    searched = search(rig, most, progress=say)
-    rig, explanation = searched.rig, explain(searched)
+    searched = search(rig, most, progress=say, odds=check_odds(odds))
+    explanation = explain(searched)
+    located: tuple[Located, ...] = ()
+    if laws == "always" or (laws == "auto" and not explanation.clean):
+        lawful = with_laws(searched, most, say, always=laws == "always")
+        searched, located = lawful.searched, lawful.places
+        explanation = explain(searched)
+    rig = searched.rig
     notes: list[str] = []
+    if odds != rules.PRIOR_ODDS:
+        notes.append(
+            f"Every cause was taken to be there with odds of {odds:g} beforehand; otherwise it is {rules.PRIOR_ODDS:g}."
+        )
     why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"
     alternatives = tuple(not_simulated(found) for found in explanation.found)
     gain, contradicted = None, False
@@ -85,4 +110,4 @@ def diagnose(
         )
     if len(rig.trials) == 1:
         notes.append("One trial only: nothing could be validated on data that was not used for the fit.")
-    return Diagnosis(rig, verdict, explanation, alternatives, gain, why_not, tuple(notes))
+    return Diagnosis(rig, verdict, explanation, alternatives, gain, why_not, tuple(notes), located)

@@ -9,8 +9,11 @@ from scipy.stats import t as student
 
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Rig
+from discrepancy.rig import Candidate, Rig
 from estimator.arrays import Array
+
+Active = list[tuple[Candidate, Array]]
+"""Candidates and the values of their parameters."""
 
 
 @dataclass(frozen=True)
@@ -86,8 +89,8 @@ def responses(
             # A push says nothing about other trials; its own trial has to tell it.
             if any(problem.candidates[i].transient for i in free):
                 others = list(trials)
-            fit = Fit.of(problem, free, others, background=False)
-            tasks.append((t, -fit.shared, -fit.local(t)[: rig.local_unknowns], fit.active))
+            fit, healthy = fit_to_simulate(rig, problem, free, others)
+            tasks.append((t, -fit.shared, -fit.local(t)[: rig.local_unknowns], fit.active, healthy))
     run = Parallel(n_jobs=jobs, return_as="generator")
     done = []
     for errors, task in zip(run(delayed(rig.simulation(*task))() for task in tasks), tasks, strict=True):
@@ -96,6 +99,28 @@ def responses(
             progress(1)
     count = len(trials)
     return [tuple(done[k * count : (k + 1) * count]) for k in range(len(hypotheses))]
+
+
+def fit_to_simulate(
+    rig: Rig, problem: Problem, free: Sequence[int], trials: Sequence[int] | None = None
+) -> tuple[Fit, Active]:
+    """Unknowns and causes as a simulation takes them, and how far off healthy parts are in it.
+
+    Those are as designed; but where a rig had to be linearised elsewhere, as they are found there beside the causes.
+    """
+    carried = [
+        i for i, candidate in enumerate(problem.candidates) if i not in free and rig.carried(candidate)
+    ]
+    if not carried:
+        return Fit.of(problem, free, trials, background=False), []
+    found = Fit.of(problem, free, trials)
+    parts = {i: found.part(i)[0] for i in carried}
+    left = [
+        raw[..., -1] - np.sum([raw[..., problem.spans[i]] @ part for i, part in parts.items()], axis=0)
+        for raw in problem.raw
+    ]
+    fit = Fit.of(problem.with_residual(left), free, trials, background=False)
+    return fit, [(problem.candidates[i], part * problem.candidates[i].units) for i, part in parts.items()]
 
 
 def _response(errors: Mapping[str, Array], scales: Mapping[str, tuple[Array, Array]]) -> Response:

@@ -39,7 +39,7 @@ class _Parts:
     """The columns that are in a hypothesis.
 
     Attributes:
-        grams: Gram matrices of every cell that has numbers, shape (K, used + 1, used + 1), the residual last.
+        grams: Gram matrices of every cell that has numbers, the residual last, shape (K, (used + 1)^2).
         sizes: numbers in every cell, shape (K,).
         group: of every used column: -1 for shared unknowns, else the number of its spread.
         least, most: spread that a group has at least and at most, shape (groups,).
@@ -120,20 +120,23 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
         own.append(True)
     used = np.flatnonzero(group > -2)
     both = np.append(used, count)
-    grams = [
-        g[c.sizes > 0][:, both][:, :, both] for g, c in zip(problem.cell_grams, problem.cells, strict=True)
-    ]
     sizes = [c.sizes[c.sizes > 0] for c in problem.cells]
+    grams = np.empty((sum(map(len, sizes)), len(both), len(both)))
+    pairs = zip(problem.cell_grams, problem.cells, strict=True)
+    filled = (gram[cell] for gram, c in pairs for cell in np.flatnonzero(c.sizes))
+    for one, gram in zip(grams, filled, strict=True):
+        np.take(gram[both], both, axis=1, out=one, mode="clip")
     parts = _Parts(
-        np.concatenate(grams), np.concatenate(sizes).astype(float), group[used], np.array(least), np.array(most),
-        np.array(weight), np.array(own, dtype=bool),
+        grams.reshape(len(grams), -1), np.concatenate(sizes).astype(float), group[used], np.array(least),
+        np.array(most), np.array(weight), np.array(own, dtype=bool),
     )  # fmt: skip
     return names, parts
 
 
 def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Array]:
     """Log evidence with its priors at given powers and spreads, and the next ones."""
-    gram = np.tensordot(1.0 / power, parts.grams, 1)
+    count = len(parts.group) + 1
+    gram = ((1.0 / power) @ parts.grams).reshape(count, count)
     H, b, c = gram[:-1, :-1], gram[:-1, -1], gram[-1, -1]
     shared = parts.group < 0
     with np.errstate(divide="ignore"):
@@ -156,8 +159,10 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
     evidence -= 0.5 * float(parts.weight @ (2.0 * np.log(spread) + spread**-2.0 - 1.0))
     # Next powers: what is left over the numbers that are not spent on unknowns.
     x = np.append(-solution, 1.0)
-    left = np.einsum("i,kij,j->k", x, parts.grams, x, optimize=True)
-    spent = np.einsum("kij,ij->k", parts.grams[:, :-1, :-1], covariance, optimize=True) / power
+    both = np.zeros((2, count, count))
+    both[0], both[1, :-1, :-1] = np.outer(x, x), covariance
+    left, spent = (parts.grams @ both.reshape(2, -1).T).T
+    spent = spent / power
     power_next = (left + rules.POWER_NUMBERS) / (np.maximum(parts.sizes - spent, 1.0) + rules.POWER_NUMBERS)
     # Next spreads: squares over the numbers that the data determine.
     squares = np.bincount(parts.group[~shared], solution[~shared] ** 2, minlength=len(spread))

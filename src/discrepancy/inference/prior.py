@@ -21,4 +21,4 @@ def log_prior_odds(problem: Problem, candidate: Candidate) -> float:
         places = sum(
             other.cause == candidate.cause and other.transient is None for other in problem.candidates
         )
-    return float(np.log(rules.PRIOR_ODDS / max(places, 1) / rules.SLAB_OCTAVES))
+    return float(np.log(problem.odds / max(places, 1) / rules.SLAB_OCTAVES))

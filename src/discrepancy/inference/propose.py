@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,8 +17,21 @@ from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
 
 
-def proposals(rig: Rig, base: Hypothesis, *, events: bool = True, narrow: bool = True) -> list[Hypothesis]:
-    """Hypotheses with one cause more, the likeliest first; the added one is the last of its ``free``.
+@dataclass(frozen=True, eq=False)
+class Proposed:
+    """Hypotheses with one cause more.
+
+    Attributes:
+        best: the likeliest; the added cause is the last of its ``free``. None where none is possible.
+        scores: what is added, in its shape, and how likely that is [nats], the likeliest first.
+    """
+
+    best: Hypothesis | None
+    scores: tuple[tuple[Candidate, float], ...]
+
+
+def proposals(rig: Rig, base: Hypothesis, *, events: bool = True, narrow: bool = True) -> Proposed:
+    """Hypotheses with one cause more.
 
     Args:
         rig: for columns of other shapes.
@@ -30,18 +43,28 @@ def proposals(rig: Rig, base: Hypothesis, *, events: bool = True, narrow: bool =
     ranked = [_in_best_shape(rig, fit, item) for item in _with_kinds_held(base)]
     ranked += _events(rig, fit) if events else []
     ranked.sort(key=lambda item: -item.score)
-    found = []
-    for item in _chosen(ranked, rules.LEADERS):
-        near = item.score > ranked[0].score - rules.CLOSE_NATS
-        found.append(sharpened(rig, base, item, near=near))
-    likely: dict[tuple[object, ...], Hypothesis] = {}
-    found += _with_kinds_narrow(rig, base) if narrow else []
-    for new in sorted(found, key=lambda new: -new.score):
+    best: Hypothesis | None = None  # each has its own columns: all together would be gigabytes
+    scores: dict[tuple[object, ...], tuple[Candidate, float]] = {}
+    for new in _hypotheses(rig, base, ranked, narrow=narrow):
         last = new.causes[-1]
         which = (last.key, last.transient)
-        if which not in likely and new.possible(rig, new.free[-1]) and not imitated(rig, base, last):
-            likely[which] = new
-    return list(likely.values())
+        if which in scores and scores[which][1] >= new.score:
+            continue
+        if new.possible(rig, new.free[-1]) and not imitated(rig, base, last):
+            scores[which] = last, new.score
+            if best is None or new.score > best.score:
+                best = new
+    return Proposed(best, tuple(sorted(scores.values(), key=lambda one: -one[1])))
+
+
+def _hypotheses(
+    rig: Rig, base: Hypothesis, ranked: Sequence[Scanned], *, narrow: bool
+) -> Iterator[Hypothesis]:
+    """One after the other, each with one cause more in its best shape."""
+    for item in _chosen(ranked, rules.LEADERS):
+        yield sharpened(rig, base, item, near=item.score > ranked[0].score - rules.CLOSE_NATS)
+    if narrow:
+        yield from _with_kinds_narrow(rig, base)
 
 
 def _with_kinds_held(base: Hypothesis) -> list[Scanned]:
@@ -180,6 +203,7 @@ def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hy
     # Its size is found with them, and is theirs.
     first = start.with_unknowns(shaped.key, unknowns, max(size, shaped.parameters[0].tolerance))
     size = abs(float(Hypothesis.of(first, new.free, base.allowed).fit.part(index)[0][0] * shaped.units[0]))
+    del first  # for the sake of memory
     opened = start.with_unknowns(shaped.key, unknowns, max(size, shaped.parameters[0].tolerance))
     other = Hypothesis.of(opened, new.free, base.allowed)
     if other.score <= new.score:

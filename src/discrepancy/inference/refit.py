@@ -8,9 +8,7 @@ from discrepancy.rig import Rig
 from estimator.errors import InputError
 
 
-def exact(
-    rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis, rounds: int = rules.REFIT_ROUNDS
-) -> Hypothesis:
+def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
     """The hypothesis with exact residuals: Gauss-Newton on causes and unknowns until the values have settled.
 
     Unknowns are moved as far as the causes move them. What they share with tolerances stays linear on both sides: moved
@@ -20,12 +18,11 @@ def exact(
         rig: the rig.
         hypothesis: what is there.
         nothing: the hypothesis that nothing is.
-        rounds: largest number of steps.
     """
     own, trials = rig.local_unknowns, hypothesis.problem.trials
     start = [nothing.fit.local(t)[:own] for t in trials]
     linear, last = hypothesis, np.inf
-    for _ in range(rounds):
+    for _ in range(rules.REFIT_ROUNDS):
         fit = hypothesis.fit
         shared = fit.shared - nothing.fit.shared
         local = [fit.local(t)[:own] - there for t, there in zip(trials, start, strict=True)]

@@ -31,11 +31,11 @@ class Scanned:
     columns: tuple[Array, ...] | None = None
 
 
-def scan(fit: Fit, barred: Sequence[tuple[object, ...]] = ()) -> list[Scanned]:
+def scan(fit: Fit) -> list[Scanned]:
     """Every candidate of the problem that is not free, the best first."""
     found = []
     for index, candidate in enumerate(fit.problem.candidates):
-        if index in fit.free or candidate.key in barred:
+        if index in fit.free:
             continue
         found.append(Scanned(index, candidate, score_of(fit, index)))
     return sorted(found, key=lambda item: -item.score)

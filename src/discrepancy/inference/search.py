@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from discrepancy import rules
 from discrepancy.inference.hypothesis import Hypothesis
@@ -46,7 +46,10 @@ class Searched:
 
 
 def search(
-    rig: Rig, most: int = rules.MOST_CAUSES, progress: Callable[[str], object] | None = None
+    rig: Rig,
+    most: int = rules.MOST_CAUSES,
+    progress: Callable[[str], object] | None = None,
+    odds: float = rules.PRIOR_ODDS,
 ) -> Searched:
     """Find what is most probably there.
 
@@ -54,9 +57,11 @@ def search(
         rig: the rig.
         most: largest number of causes.
         progress: called with what is being done.
+        odds: of any cause being there before the data are seen.
     """
     say = progress or (lambda what: None)
     rig, nothing = _based(rig, say)
+    nothing = replace(nothing, learnt=replace(nothing.learnt, problem=replace(nothing.problem, odds=odds)))
     say("scan")
     return continued(Searched(rig, nothing, nothing, ()), most, say)
 
@@ -67,7 +72,7 @@ def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Se
     rivals = dict(zip(best.free, map(list, searched.rivals), strict=True))
     doubtful = 0
     while len(best.free) < most and doubtful < rules.DOUBTFUL:
-        added = next(iter(proposals(rig, best)), None)
+        added = proposals(rig, best).best
         if added is None or added.score - best.score < rules.NAMED_NATS:
             break
         say(f"refit {added.causes[-1].label}")
@@ -93,7 +98,9 @@ def _based(rig: Rig, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
         if moved is None:
             break
         say("linearise")
-        rig, nothing = moved, _nothing(moved, say)
+        rig = moved
+        del nothing, moved  # for the sake of memory
+        nothing = _nothing(rig, say)
     return rig, nothing
 
 
@@ -116,18 +123,19 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
             candidate = best.problem.candidates[index]
             # Its own shape may be another beside what was found since.
             others = proposals(rig, less, events=candidate.transient is None, narrow=False)
-            last = [h.causes[-1] for h in others]
             rivals[index] = [
-                Rival(other, best.score - h.score)
-                for other, h in zip(last, others, strict=True)
+                Rival(other, best.score - score)
+                for other, score in others.scores
                 if other.key != candidate.key
             ]
             rivals[index].append(Rival(None, best.score - less.score))
-            if others and others[0].score > best.score + rules.EXCHANGED_NATS:
-                other = exact(rig, others[0], nothing)
+            if others.best is not None and others.best.score > best.score + rules.EXCHANGED_NATS:
+                other = exact(rig, others.best, nothing)
                 if other.score > best.score:
                     best, changed = other, True
                     break
         if not changed:
             break
+    for index in set(best.free) - set(rivals):  # exchanged in the last round
+        rivals[index] = [Rival(None, best.score - best.without(index).score)]
     return best, rivals

@@ -40,7 +40,7 @@ class Bench(Protocol):
         ...
 
     def at_rows(self, trial: int, errors: Array, *, rates: bool) -> Array:
-        """Errors as functions of time, shape (Q, k), at the rows: value, rate and acceleration, (n, 3, k) or (n, 1, k)."""
+        """Errors as functions of time, shape (Q, k), at the rows: value (rate, acceleration), shape (n, 1 or 3, k)."""
         ...
 
     def directions(self, trial: int, place: Place) -> Array:

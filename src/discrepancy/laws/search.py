@@ -10,7 +10,7 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.engine.held_out import held_out_gains
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.inference.propose import sharpened
+from discrepancy.inference.propose import Proposed, sharpened
 from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import unlisted_nats
 from discrepancy.inference.scan import Scanned
@@ -36,7 +36,7 @@ class Lawful:
 
 
 def with_laws(
-    searched: Searched, most: int, progress: Callable[[str], object] | None = None
+    searched: Searched, most: int, progress: Callable[[str], object] | None = None, *, always: bool = False
 ) -> Lawful:
     """Go on with a search until what is left is noise, or no law helps on trials that it was not fitted to.
 
@@ -44,35 +44,59 @@ def with_laws(
         searched: what the catalogue can do.
         most: largest number of causes, laws among them.
         progress: called with what is being done.
+        always: also where what is left is noise.
     """
     say = progress or (lambda what: None)
     bench: Bench | None = searched.rig.bench
     first: tuple[Located, ...] = ()
-    laws: dict[tuple[object, ...], list[Rival]] = {}
+    rivals: dict[tuple[object, ...], list[Rival]] = {}
     for _ in range(rules.LAW_MOST if bench is not None else 0):
-        best = searched.best
-        if len(best.free) >= most or unlisted_nats(best) < rules.UNLISTED_NATS:
+        left = always or unlisted_nats(searched.best) >= rules.UNLISTED_NATS
+        if len(searched.best.free) >= most or not left:
             break
         assert bench is not None
-        say("locate what nobody lists")
-        places = located(best.fit, bench, bench.places)
-        first = first or tuple(places)
-        proposed = _proposals(searched, bench, places, say)
-        if not proposed or proposed[0].score - best.score < rules.NAMED_NATS:
+        starts = [searched]
+        if searched.best.free and not rivals:
+            # Causes that were named may have stood for what nobody lists.
+            starts.append(Searched(searched.rig, searched.nothing, searched.nothing, ()))
+        found = []
+        for start in starts:
+            places = located_in(start, bench, say)
+            first = first or tuple(places)
+            step = _with_one(start, bench, places, say)
+            if step is not None:
+                found.append((continued(step[0], most, say), step[1]))
+        if not found:
             break
-        added = proposed[0]
-        say(f"refit {added.causes[-1].label}")
-        refitted = exact(searched.rig, added, searched.nothing)
-        if not helps(refitted, refitted.free[-1]):
+        best, more = max(found, key=lambda one: one[0].best.score)
+        if best.best.score < searched.best.score + rules.NAMED_NATS:
             break
-        law = refitted.causes[-1]
-        laws[law.key] = _rivals(bench, proposed)
-        now, rivals = settled(searched.rig, refitted, searched.nothing)
-        found = Searched(
-            searched.rig, searched.nothing, now, tuple(tuple(rivals.get(i, ())) for i in now.free)
-        )
-        searched = continued(found, most, say)
-    return Lawful(_with_rivals(searched, laws), first)
+        searched, rivals = best, rivals | more
+    return Lawful(_with_rivals(searched, rivals), first)
+
+
+def located_in(searched: Searched, bench: Bench, say: Callable[[str], object]) -> list[Located]:
+    """Every place with the error that it would have to have, the likeliest first."""
+    say("locate what nobody lists")
+    return located(searched.best.fit, bench, bench.places)
+
+
+def _with_one(
+    searched: Searched, bench: Bench, places: Sequence[Located], say: Callable[[str], object]
+) -> tuple[Searched, dict[tuple[object, ...], list[Rival]]] | None:
+    """The search with one law more, and that law's rivals among laws; None where no law pays and helps."""
+    proposed = _proposals(searched, bench, places, say)
+    added = proposed.best
+    if added is None or added.score - searched.best.score < rules.NAMED_NATS:
+        return None
+    say(f"refit {added.causes[-1].label}")
+    refitted = exact(searched.rig, added, searched.nothing)
+    if not helps(refitted, refitted.free[-1]):
+        return None
+    law = refitted.causes[-1]
+    now, rivals = settled(searched.rig, refitted, searched.nothing)
+    each = tuple(tuple(rivals.get(i, ())) for i in now.free)
+    return Searched(searched.rig, searched.nothing, now, each), {law.key: _rivals(bench, proposed)}
 
 
 def helps(hypothesis: Hypothesis, index: int) -> bool:
@@ -90,17 +114,21 @@ def helps(hypothesis: Hypothesis, index: int) -> bool:
 
 def _proposals(
     searched: Searched, bench: Bench, places: Sequence[Located], say: Callable[[str], object]
-) -> list[Hypothesis]:
-    """Hypotheses with one law more, each with the best numbers inside, the likeliest first."""
+) -> Proposed:
+    """Hypotheses with one law more, each with the best numbers inside."""
     base = searched.best
     say("try formulas")
     ranked = judged(base.fit, bench, [one.place for one in places[: rules.LAW_PLACES]])
-    out = []
-    for item in _leaders(ranked, base):
+    best, scores = None, []
+    leaders = _leaders(ranked, base)
+    for item in leaders:
         candidate = _candidate(item, bench)
         scanned = Scanned(None, candidate, item.nats, tuple(searched.rig.columns(candidate)))
-        out.append(sharpened(searched.rig, base, scanned, near=True))
-    return sorted(out, key=lambda new: -new.score)
+        new = sharpened(searched.rig, base, scanned, near=item.nats > rules.LAW_NEAR * leaders[0].nats)
+        scores.append((new.causes[-1], new.score))
+        if best is None or new.score > best.score:
+            best = new
+    return Proposed(best, tuple(sorted(scores, key=lambda one: -one[1])))
 
 
 def _leaders(ranked: Sequence[Judged], base: Hypothesis) -> list[Judged]:
@@ -127,23 +155,23 @@ def _candidate(item: Judged, bench: Bench) -> LawCandidate:
     own = {variable.name for variable in item.place.own} | {"time"}
     others = 1 if own.issuperset(item.term.variables) else len(bench.variables)
     unit = item.place.unit
-    return candidate_of(item.place, item.term, rules.LAW_SCALES[unit], len(bench.places) * rules.LAW_FORMS * others)
+    inside = 1 if item.term.function == "spline" else rules.LAW_INSIDE ** len(item.term.numbers)
+    among = len(bench.places) * rules.LAW_FORMS * others * inside
+    return candidate_of(item.place, item.term, rules.LAW_SCALES[unit], among)
 
 
-def _rivals(bench: Bench, proposed: Sequence[Hypothesis]) -> list[Rival]:
+def _rivals(bench: Bench, proposed: Proposed) -> list[Rival]:
     """What else could be there instead of the first, and the place that the rows cannot tell from it."""
-    best, *others = proposed
-    law = best.causes[-1]
+    (law, score), *others = proposed.scores
     out: dict[tuple[object, ...], Rival] = {}
     assert isinstance(law, LawCandidate)
     twin = bench.twin(law.at)
     if twin is not None:
         other = replace(law, at=twin, title=twin.title)
         out[other.key] = Rival(other, 0.0)
-    for one in others:
-        candidate = one.causes[-1]
+    for candidate, less in others:
         if candidate.key != law.key and candidate.key not in out:
-            out[candidate.key] = Rival(candidate, best.score - one.score)
+            out[candidate.key] = Rival(candidate, score - less)
     return list(out.values())
 
 

@@ -20,9 +20,6 @@ from discrepancy.laws.variable import Variable
 from discrepancy.least_squares.fit import Fit
 from estimator.arrays import Array
 
-CHUNK = 240
-"""Columns at a time: memory."""
-
 
 @dataclass(frozen=True)
 class Judged:
@@ -55,6 +52,10 @@ def judged(fit: Fit, bench: Bench, places: Sequence[Place]) -> list[Judged]:
         spread = lambda variable: np.concatenate([signal(t, variable) for t in trials])  # noqa: E731
         terms = terms_at(place, bench.variables, spread) + hums(peaks)
         out += _at_place(beside, bench, place, terms, signal, trials)
+    # A hum is too fast to be seen in the error of a place over time.
+    for place in bench.places if peaks else ():
+        if place not in places:
+            out += _at_place(beside, bench, place, hums(peaks), signal, trials)
     return sorted(out, key=lambda one: -one.nats)
 
 
@@ -72,7 +73,7 @@ def _at_place(
     out, at = [], 0
     while at < len(terms):
         chunk, errors, groups = [], [[] for _ in trials], []
-        while at < len(terms) and sum(groups) < CHUNK:
+        while at < len(terms) and sum(groups) < rules.LAW_CHUNK:
             term = terms[at]
             at += 1
             values = [term.values(lambda v, t=t: signal(t, v), bench.rate_hz(t)) for t in trials]
@@ -100,7 +101,9 @@ def _nats(information: Array, score: Array) -> float:
 
 def _peaks(fit: Fit, bench: Bench) -> list[float]:
     """Frequencies [Hz] at which most is left, of all trials and channels, over its surroundings."""
-    top = 0.5 * min(fit.problem.cells[t].moving / max(bench.row_times(t)[-1], 1.0) for t in fit.problem.trials)
+    top = 0.5 * min(
+        fit.problem.cells[t].moving / max(bench.row_times(t)[-1], 1.0) for t in fit.problem.trials
+    )
     grid = np.arange(rules.LAW_HUM_LEAST_HZ, max(top, 2.0 * rules.LAW_HUM_LEAST_HZ), rules.LAW_HUM_STEP_HZ)
     power = np.zeros(len(grid))
     for t in fit.problem.trials:

@@ -1,12 +1,13 @@
-"""Where something is wrong: at every place the error that explains most, as a function of time, and what it is worth."""
+"""Where something is wrong: at every place the error over time that explains most, and what it is worth."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from discrepancy import rules
 from discrepancy.laws.bench import Bench
@@ -14,9 +15,6 @@ from discrepancy.laws.place import Place
 from discrepancy.laws.told import Beside
 from discrepancy.least_squares.fit import Fit
 from estimator.arrays import Array
-
-SIZES = 4.0 ** np.arange(-3.0, 2.0)
-"""Of an error, over what would just be seen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,19 +70,23 @@ def _located(beside: Beside, fit: Fit, bench: Bench, place: Place) -> Located:
     edge = np.concatenate(edges, axis=1)
     total -= edge.T @ (fit.covariance @ edge)
     score = np.concatenate(scores)
-    # In units in which each value is known to a standard error of one by itself.
+    # In units of what one value alone is known to; as it comes, and smooth over longer times.
     scale = 1.0 / np.sqrt(np.maximum(np.diag(total), 1e-9 * max(float(np.diag(total).max()), 1e-300)))
-    typical = float(np.median(scale))
-    best, nats = SIZES[0], -np.inf
-    for size in SIZES:
-        value = _evidence(total, score, 10.0 * size * typical)[0]
-        if value > nats:
-            best, nats = size, value
-    nats, mean, covariance = _evidence(total, score, 10.0 * best * typical, full=True)
-    axes = len(place.axes)
-    parts = [mean[a:b].reshape(-1, axes) for a, b in zip(spans[:-1], spans[1:], strict=True)]
+    typical = 10.0 * float(np.median(scale))
+    axes, best, nats = len(place.axes), (rules.LAW_SIZES[0], np.eye(len(score), dtype=np.float64)), -np.inf
+    for coarser in rules.LAW_SMOOTH:
+        onto = np.array(block_diag(*(_onto(len(at), coarser, axes) for at in knots)), dtype=np.float64)
+        inner, told = onto.T @ total @ onto, onto.T @ score
+        for size in rules.LAW_SIZES:
+            value = _evidence(inner, told, size * typical)[0]
+            if value > nats:
+                best, nats = (size, onto), value
+    size, onto = best
+    nats, mean, covariance = _evidence(onto.T @ total @ onto, onto.T @ score, size * typical, full=True)
+    mean, covariance = onto @ mean, onto @ covariance @ onto.T
+    parts = [mean[a:b].reshape(-1, axes) for a, b in pairwise(spans)]
     se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    errors = [se[a:b].reshape(-1, axes) for a, b in zip(spans[:-1], spans[1:], strict=True)]
+    errors = [se[a:b].reshape(-1, axes) for a, b in pairwise(spans)]
     return Located(place, nats, tuple(parts), tuple(errors), tuple(knots))
 
 
@@ -100,6 +102,16 @@ def _evidence(
     nats = 0.5 * (float(score @ mean) - log_det)
     covariance = size**2 * cho_solve(factor, np.eye(k)) if full else np.zeros((0, 0))
     return nats, mean, covariance
+
+
+def _onto(knots: int, coarser: int, axes: int) -> Array:
+    """Values at knots from those at ``coarser`` times fewer, straight lines between, of every component."""
+    if coarser == 1:
+        return np.eye(knots * axes)
+    few = max(2, round((knots - 1) / coarser) + 1)
+    at = np.linspace(0.0, few - 1.0, knots)
+    lines = np.maximum(1.0 - np.abs(at[:, None] - np.arange(few)), 0.0)
+    return np.array(np.kron(lines, np.eye(axes)), dtype=np.float64)
 
 
 def _hats(samples: int, rate_hz: float, step_s: float) -> tuple[Array, Array]:

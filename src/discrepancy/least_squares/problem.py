@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.least_squares.cells import Cells
 from discrepancy.least_squares.gram import gram_of, orthonormal, project
 from discrepancy.least_squares.opened import Opened, through
@@ -39,6 +40,7 @@ class Problem:
         tolerant: which candidate columns have a tolerance and are no event, shape (all candidate columns,).
         spread: standard deviation of the candidates' parameters in units, shape (all candidate columns,).
         opened: what causes leave open in every trial, by cause.
+        odds: of any cause being there before the data are seen, at all its places together.
     """
 
     candidates: tuple[Candidate, ...]
@@ -54,6 +56,7 @@ class Problem:
     tolerant: NDArray[np.bool_]
     spread: Array
     opened: Mapping[Key, tuple[Opened, ...]] = field(default_factory=dict)
+    odds: float = rules.PRIOR_ODDS
 
     @classmethod
     def of(cls, trials: Sequence[Rows], candidates: Sequence[Candidate]) -> Problem:
@@ -168,13 +171,16 @@ class Problem:
         candidates = (*self.candidates[:index], candidate, *self.candidates[index + 1 :])
         return self._with(self.spans[index].start, [c * candidate.units for c in columns], candidates)
 
-    def _with(self, start: int, columns: Sequence[Array], candidates: tuple[Candidate, ...]) -> Problem:
-        raw, spectra, grams = [], [], []
+    def _with(
+        self, start: int, columns: Sequence[Array], candidates: tuple[Candidate, ...], room: int = 0
+    ) -> Problem:
+        """With other columns from ``start`` on, for which so many of them may be made first."""
+        raw, spectra, grams, place = [], [], [], [start] * room
         for t, new in enumerate(columns):
             at = slice(start, start + new.shape[2])
-            raw.append(self.raw[t].copy())
-            spectra.append(self.spectra[t].copy())
-            grams.append(self.cell_grams[t].copy())
+            raw.append(np.insert(self.raw[t], place, 0.0, axis=2))
+            spectra.append(np.insert(self.spectra[t], place, 0.0, axis=2))
+            grams.append(np.insert(np.insert(self.cell_grams[t], place, 0.0, axis=1), place, 0.0, axis=2))
             raw[t][..., at], spectra[t][..., at] = new, self.spectrum(t, new)
             edge = self.cells[t].grams(spectra[t], spectra[t][..., at])
             grams[t][:, :, at], grams[t][:, at] = edge, np.swapaxes(edge, 1, 2)
@@ -219,6 +225,7 @@ class Problem:
             self.candidates, self.raw, self.local, self.cells, self.power, self.shared, self.spans, self.tolerant,
             self.spread,
         )  # fmt: skip
+        again = replace(again, odds=self.odds)
         for key, own in self.opened.items():
             if key in keep:
                 again = again.with_unknowns(key, [one.columns for one in own], 1.0)
@@ -232,19 +239,16 @@ class Problem:
     def extended(self, candidate: Candidate, columns: Sequence[Array]) -> Problem:
         """The problem with one candidate more."""
         start, count = self.shared + len(self.tolerant), len(candidate.parameters)
-        place = [start] * count  # before the residual
-        wider = replace(
-            self,
-            raw=tuple(np.insert(x, place, 0.0, axis=2) for x in self.raw),
-            spectra=tuple(np.insert(x, place, 0.0, axis=2) for x in self.spectra),
-            cell_grams=tuple(
-                np.insert(np.insert(x, place, 0.0, axis=1), place, 0.0, axis=2) for x in self.cell_grams
-            ),
+        # Before the residual.
+        wider = self._with(
+            start, [c * candidate.units for c in columns], (*self.candidates, candidate), count
+        )
+        return replace(
+            wider,
             spans=(*self.spans, slice(start, start + count)),
             tolerant=np.append(self.tolerant, _tolerant(candidate)).astype(bool),
             spread=np.append(self.spread, np.ones(count)),
         )
-        return wider._with(start, [c * candidate.units for c in columns], (*self.candidates, candidate))
 
 
 def _tolerant(candidate: Candidate) -> list[bool]:

@@ -28,9 +28,12 @@ def evidence_list(explanation: Explanation) -> dict[str, Any]:
     ``needed`` (as many nats name it, by its prior odds).
     """
     problem, named = _with_shapes(explanation)
-    nothing = explanation.nothing
+    # What a healthy one would explain with what it leaves open is not to a cause's credit, as in the search.
+    credit = explanation.hypothesis.allowed
+    allowed = {at: credit[i] for at, i in zip(named, explanation.hypothesis.free, strict=True) if i in credit}
+    nothing = Hypothesis(explanation.nothing.learnt, allowed)
     if problem is not nothing.problem:
-        nothing = Hypothesis.of(problem, ())
+        nothing = Hypothesis.of(problem, (), allowed)
     return {
         "before": _strongest(nothing, named),
         "after": _strongest(explanation.hypothesis, {}) if explanation.found else None,

@@ -2,6 +2,7 @@
 
 format, version     "mocobot-diagnosis", 2
 recordings          names of the trials
+prior_odds          of any cause being there before the data are seen, at all its places together
 verdict             "consistent", "miscalibrated", "explained", "partly_explained" or "unexplained"
 causes              list, in the order of discovery, of
     cause, family, robot, joint    robot and joint from 1, or null
@@ -16,6 +17,8 @@ causes              list, in the order of discovery, of
                                    in the catalogue and looks like it; with ``probability`` and those of the
                                    alternatives they add up to 1
     folds                          gain of chi-square on every trial when fitted to the others
+    law                            of what no catalogue lists {place, unit, targets, function, of, times, numbers,
+                                   formula}: an error at ``targets`` that is a function of signals; else null
     shape                          numbers that change the cause's columns, such as a pendulum's length
     separate                       what would tell the cause from its look-alikes
     alternatives                   list of {cause, kind, name, family, robot, joint, place, probability,
@@ -62,10 +65,12 @@ from typing import Any
 import numpy as np
 
 from discrepancy.causes.words import Words
-from discrepancy.engine.confirm import Alternative
+from discrepancy.engine.confirm import Alternative, decided_gap
 from discrepancy.engine.diagnose import Diagnosis
 from discrepancy.engine.explanation import Found
 from discrepancy.engine.gain import Gain, Response
+from discrepancy.laws.candidate import LawCandidate
+from discrepancy.laws.report import law_to_dict
 from discrepancy.least_squares.fit import Fit
 from discrepancy.result.evidence_list import at_of, evidence_list, place_of
 from discrepancy.result.read import FORMAT, VERSION
@@ -106,6 +111,7 @@ def diagnosis_to_dict(
         "version": VERSION,
         "recordings": list(rig.trials),
         "verdict": diagnosis.verdict,
+        "prior_odds": explanation.problem.odds,
         "causes": [
             _cause(found, alternatives, rig, words)
             for found, alternatives in zip(diagnosis.causes, diagnosis.alternatives, strict=True)
@@ -133,7 +139,7 @@ def diagnosis_to_dict(
 
 
 def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: Words) -> dict[str, Any]:
-    candidate, instead = found.candidate, _Instead.of(found)
+    candidate, instead = found.candidate, _Instead.of(found, alternatives)
     values, se = rig.effect_parameters(candidate, found.values, found.covariance)
     return {
         **place_of(candidate),
@@ -148,7 +154,8 @@ def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: W
         "instead": {"nothing": instead.nothing, "unlisted": instead.unlisted},
         "folds": [float(gain) for gain in found.folds],
         "shape": plain(dict(candidate.shape)),
-        "separate": words.separate(candidate.cause),
+        "law": law_to_dict(candidate) if isinstance(candidate, LawCandidate) else None,
+        "separate": words.separate(candidate),
         "alternatives": [
             {
                 **place_of(rival.candidate),
@@ -156,7 +163,7 @@ def _cause(found: Found, alternatives: Sequence[Alternative], rig: Rig, words: W
                 "evidence_gap": float(rival.evidence_gap),
                 "chi2_per_n": _finite(rival.chi2_per_n),
                 "ambiguous": bool(rival.ambiguous),
-                "separate": words.separate(rival.candidate.cause),
+                "separate": words.separate(rival.candidate),
             }
             for rival, probability in zip(alternatives, instead.rivals, strict=True)
         ],
@@ -189,9 +196,9 @@ class _Instead:
     unlisted: float
 
     @classmethod
-    def of(cls, found: Found) -> "_Instead":
+    def of(cls, found: Found, alternatives: Sequence[Alternative]) -> "_Instead":
         """What ``engine.probability`` weighs against a cause: what is so many nats less likely, by so much less."""
-        gaps = np.array([*(gap for _, gap in found.rivals), found.over_nothing], dtype=float)
+        gaps = np.array([*map(decided_gap, alternatives), found.over_nothing], dtype=float)
         listed = found.probability * np.exp(-np.clip(gaps, -50.0, 700.0))
         rest = 1.0 - found.probability - float(listed.sum())
         return cls(tuple(map(float, listed[:-1])), float(listed[-1]), max(rest, 0.0))

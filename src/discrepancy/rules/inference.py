@@ -76,8 +76,13 @@ LEAST_POWER = 0.5
 """Of a cell over that of its whitening. Chosen: some noise of healthy robots is drawn larger than it is."""
 FLAT_SHARE = 1e-10
 """Information that shared unknowns have beforehand, over that of the data. Derived: as good as none."""
-PRIOR_ODDS = 0.05
-"""Of any cause of the catalogue being there, at all its places together. Chosen: one in a team, of twenty causes."""
+PRIOR_ODDS, MOST_ODDS = 0.05, 1000.0
+"""Of any cause of the catalogue being there, at all its places together, unless they are given (--odds), and the most
+that may be given. Chosen: one in a team, of twenty causes; beyond the most the data would not matter."""
+FALSE_ALARM_COST, WRONG_NAME_COST = 150.0, 1.0
+"""What naming a cause where there is none costs, and naming another than what is there, in units of one that is missed.
+Chosen: whoever is sent to a healthy robot stops believing; whoever is sent to the wrong place has lost as much as if
+nothing had been said."""
 SLAB_OCTAVES = 10.0
 """In which the size of a fault is equally likely. Chosen: from the tolerance to a thousand times that."""
 INTERVALS = 1000.0
@@ -89,7 +94,8 @@ HELD_FACTOR = 1.5
 WORST_EVENTS = 3
 """Intervals looked at closely. Chosen."""
 NAMED_NATS = 5.0
-"""Log odds from which a cause is named. Derived: a false alarm costs as much as 150 misses, ln 150."""
+"""Log odds from which a cause is named. Derived: ln of ``FALSE_ALARM_COST``; named, a cause costs that much times 1 - p,
+and silence 1 times p."""
 EXCHANGES = 4
 """Rounds in which causes are exchanged and taken away after one was added. Chosen."""
 EXCHANGED_NATS = 1.0
@@ -108,8 +114,9 @@ LISTED_ODDS = 4.0
 """That a cause is one of the catalogue rather than an unlisted one that looks like it. Chosen."""
 LAW_ERROR_SHARE = 0.02
 """By which the law of a cause puts its size off; part of every standard error. Chosen."""
-LEAST_PROBABILITY = 0.5
-"""From which a cause is named; below, it is a suspicion. Derived: it is then likelier than all else together."""
+LEAST_PROBABILITY = WRONG_NAME_COST / (1.0 + WRONG_NAME_COST)
+"""From which a cause is named, one half; below, it is a suspicion. Derived: named, it costs the share of wrong
+names; not named, that of right ones."""
 SCATTER_FACTOR = 3.0
 """Spread of a kind over its tolerance, from which a team is said to be off in it. Chosen."""
 CONTRADICTED = 0.5

@@ -19,6 +19,8 @@ LAW_SLOW_RAD_PER_S = 4e-3
 LAW_KNOTS_S, LAW_VECTOR_KNOTS_S = 0.3, 1.2
 """Between knots of an error as a function of time, of one component and of several. Chosen: 0.3 s holds what a joint's
 motion carries, up to 1.6 Hz."""
+LAW_SMOOTH = (1, 4, 16)
+"""Times as many seconds between knots, for errors that change slowly. Chosen."""
 LAW_HUM_STEP_HZ = 0.01
 """Between frequencies that are tried. Derived: a period in the hundred seconds of a few trials."""
 LAW_HUM_LEAST_HZ = 0.3
@@ -39,3 +41,11 @@ LAW_SCALES = {"rad": 1e-3, "N m": 0.1, "N": 1.0, "m": 1e-3, "kg": 0.1, "kg m": 0
 """Typical sizes of errors, by unit. Chosen: columns are expressed in them; the size itself is learnt."""
 LAW_FORMS = 60
 """Formulas of a place's own signals that are as likely as each other. Derived: about so many are tried."""
+LAW_INSIDE = 10
+"""Values of a number inside a function that are as likely as each other. Derived: about so many are tried."""
+LAW_SIZES = tuple(4.0**k for k in range(-3, 2))
+"""Of an error over ten times what one value alone is known to, of which the likeliest is taken. Chosen."""
+LAW_CHUNK = 240
+"""Columns that are judged at a time. Chosen: memory."""
+LAW_NEAR = 0.5
+"""Share of the likeliest formula's nats from which the numbers inside another are sharpened. Chosen: time."""

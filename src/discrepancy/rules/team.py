@@ -50,6 +50,8 @@ falls with it. Chosen: the trajectory need only be one that the stairs may have 
 PHASE_TRAVEL = 4.0
 """Steps of travel after which a rounding error is drawn anew. Chosen: independent from one rest to the next, and
 changes an encoder's speed by half at most."""
+DRAWS_AT_A_TIME = 8
+"""Of noise. Chosen: memory."""
 NOISE_DRAWS = 24
 """From which the rows' covariance is made. Chosen."""
 NOISE_SEED = 20250

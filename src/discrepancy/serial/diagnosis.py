@@ -9,6 +9,7 @@ import numpy as np
 from discrepancy.engine.diagnose import Diagnosis, diagnose
 from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.rules import serial as rules
+from discrepancy.rules.inference import PRIOR_ODDS
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.errors import with_errors
 from discrepancy.serial.model import SerialModel
@@ -27,6 +28,7 @@ def diagnose_serial(
     excluded: Sequence[str] = (),
     *,
     reference: Sequence[JointLog] = (),
+    odds: float = PRIOR_ODDS,
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
 ) -> Diagnosed:
@@ -39,26 +41,32 @@ def diagnose_serial(
         excluded: causes left out of the catalogue.
         reference: logs of the same robot while it was well: only what has changed since is news then, and tolerances
             do not count.
-        jobs, say: as of ``diagnose``.
+        odds, jobs, say: as of ``diagnose``.
 
     Raises:
         InputError: a log cannot be used, or a cause to be excluded does not exist.
     """
     rig = SerialRig.of(model, logs, tolerances, excluded, reference)
-    found = diagnose_rig(rig, jobs=jobs, say=say)
+    found = diagnose_rig(rig, odds=odds, jobs=jobs, say=say)
     judged = PairedRig(rig) if rig.common else rig
     return Diagnosed(judged, found, SerialWords(), partial(traces, rig, found.explanation))
 
 
-def diagnose_rig(rig: SerialRig, *, jobs: int = 1, say: Callable[[str], object] | None = None) -> Diagnosis:
+def diagnose_rig(
+    rig: SerialRig,
+    *,
+    odds: float = PRIOR_ODDS,
+    jobs: int = 1,
+    say: Callable[[str], object] | None = None,
+) -> Diagnosis:
     """The engine's diagnosis, with standard errors that allow for correlation, and notes on the logs.
 
     Args:
         rig: the logs.
-        jobs, say: as of ``diagnose``.
+        odds, jobs, say: as of ``diagnose``.
     """
     judged = PairedRig(rig) if rig.common else rig
-    found = diagnose(judged, most=rules.MOST_CAUSES, jobs=jobs, say=say)
+    found = diagnose(judged, most=rules.MOST_CAUSES, odds=odds, jobs=jobs, say=say)
     rows = max(2, round(rules.ERROR_BLOCK_S * rig.row_rate_hz(0)))
     explanation = with_errors(found.explanation, rows)
     notes = (*(note for part in rig.parts for note in part.signals.log.notes), *found.notes, *_notes(rig))

@@ -106,8 +106,9 @@ class PairedRig(Rig):
         return self.inner.undecidable()
 
     def simulation(
-        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
-    ) -> Callable[[], dict[str, Array] | None]:
+        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]],
+        healthy: Sequence[tuple[Candidate, Array]] = (),
+    ) -> Callable[[], dict[str, Array] | None]:  # fmt: skip
         return self.inner.simulation(trial, shared, local, active)
 
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:

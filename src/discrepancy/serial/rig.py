@@ -176,8 +176,9 @@ class SerialRig(SerialRows, Rig):
         return shapes.steps(candidate)
 
     def simulation(
-        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
-    ) -> Callable[[], dict[str, Array] | None]:
+        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]],
+        healthy: Sequence[tuple[Candidate, Array]] = (),
+    ) -> Callable[[], dict[str, Array] | None]:  # fmt: skip
         """What foretells one block's torques from its motion.
 
         It returns measured minus foretold torque by joint, low-passed as the rows are, shape (n,) each.

@@ -79,15 +79,15 @@ def effect_of(candidate: Candidate, values: Array, context: Context) -> Effect |
         return None
 
 
-def named_effect(candidate: Candidate, effect: Effect | None) -> Effect:
-    """The effect of a named cause.
+def named_effects(candidate: Candidate, effects: Sequence[Effect] | None) -> Sequence[Effect]:
+    """The effects of a named cause.
 
     Raises:
-        InputError: there is none.
+        InputError: there are none.
     """
-    if effect is None:
+    if effects is None:
         raise InputError(f"{candidate.label}: no effect has the values found; nothing to extend")
-    return effect
+    return effects
 
 
 def why_not(recording: Recording) -> str | None:

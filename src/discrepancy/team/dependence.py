@@ -22,10 +22,10 @@ def quantities_of(linear: TrialLinear) -> dict[str, Array]:
 
 def directions_of(linear: TrialLinear, white: Whitening) -> dict[str, Array]:
     """Unit directions in the whitened rows of every spring torque and angle, shape (n, C, 1) each."""
-    at = linear.reduction.sample
+    of_all = linear.J.dense()[:, linear.reduction.sample]
     out = {}
-    for robot in range(linear.robots):
-        whose, J = f"robot {robot + 1}'s", linear.J[robot][at]
+    for robot, J in enumerate(of_all):
+        whose = f"robot {robot + 1}'s"
         tau, phi, theta = (J[:, :, kind] for kind in (TAU, PHI, THETA))
         for k in range(3):
             out[f"{whose} torque channel {k + 1}"] = _unit(white.rows_only(tau[..., k]))

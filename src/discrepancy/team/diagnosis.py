@@ -5,7 +5,8 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from discrepancy.engine.diagnose import diagnose
+from discrepancy import rules
+from discrepancy.engine.diagnose import When, diagnose
 from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.team.checks import check_estimate, check_recordings
 from discrepancy.team.estimates import errors, estimates
@@ -23,6 +24,8 @@ def diagnose_team(
     excluded: Sequence[str] = (),
     *,
     closed_loop: bool = True,
+    laws: When = "auto",
+    odds: float = rules.PRIOR_ODDS,
     jobs: int = 1,
     say: Callable[[str], object] = lambda _: None,
     simulated: Callable[[int], object] | None = None,
@@ -34,6 +37,8 @@ def diagnose_team(
         tolerances: standard deviations by cause and parameter (``read_tolerances``); None for the defaults.
         excluded: causes left out of the catalogue.
         closed_loop: whether to run the recorded commands again.
+        laws: whether to look for laws that the catalogue lacks.
+        odds: of any cause being there before the data are seen, at all its places together.
         jobs: parallel processes.
         say: takes the name of the stage that begins.
         simulated: called with 1 for every simulated trial.
@@ -49,7 +54,9 @@ def diagnose_team(
     known = read_tolerances(None) if tolerances is None else tolerances
     say("linearise")
     rig = TeamRig.of(recordings, estimate, known, excluded, jobs)
-    found = diagnose(rig, closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated)
+    found = diagnose(
+        rig, closed_loop=closed_loop, laws=laws, odds=odds, jobs=jobs, say=say, simulated=simulated
+    )
     assert isinstance(found.rig, TeamRig)
     payload = estimates(found.rig, found.explanation)
     return Diagnosed(found.rig, found, TeamWords(), partial(traces, found.rig, found.explanation), payload)

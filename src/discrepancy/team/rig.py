@@ -3,38 +3,47 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from discrepancy.engine.explanation import Explanation
-from discrepancy.least_squares.fit import Fit
+from discrepancy.engine.gain import fit_to_simulate
+from discrepancy.laws.candidate import LawCandidate
+from discrepancy.laws.report import report
 from discrepancy.rig import Candidate
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.closed_loop import (
     effect_of,
     impossible,
-    named_effect,
+    named_effects,
     posture,
     resimulation_errors,
     scale_of_response,
     team_of,
     why_not,
 )
-from discrepancy.team.rows import TeamRows
+from discrepancy.team.laws.effects import effects_of
+from discrepancy.team.laws.rows import LawfulRows
+from discrepancy.team.linear.origin import origin_of, places_of
 from discrepancy.team.undecidable import statements
+from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
+from estimator.recording.model import Recording
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.extended.extended import write_extended
 
 
-class TeamRig(TeamRows):
+class TeamRig(LawfulRows):
     """Recordings of one payload, linearised around the best unknowns without any cause, and their simulator."""
 
     def effect_parameters(
         self, candidate: Candidate, values: Array, covariance: Array
     ) -> tuple[dict[str, float], dict[str, float]]:
+        if isinstance(candidate, LawCandidate):
+            return report(candidate, values, covariance)
         return CAUSES[candidate.cause].report(values, covariance, self._context(candidate))
 
     def _context(self, candidate: Candidate) -> Context:
@@ -42,31 +51,60 @@ class TeamRig(TeamRows):
         height, trial = self.linear[0].design.home_height_m, None if at is None else at.trial + 1
         return Context(pi[1:4] / pi[0], height, candidate.shape, trial)
 
-    def effect(self, candidate: Candidate, values: Array) -> Effect | None:
-        """The simulator's effect, or None where the values are none that it can have (a negative play)."""
-        return effect_of(candidate, values, self._context(candidate))
+    def effects(self, candidate: Candidate, values: Array) -> list[Effect] | None:
+        """The simulator's effects, or None where the values are none that they can have (a negative play).
+
+        Args:
+            candidate: a cause, which is one effect, or a law, which has one for each component of its place.
+            values: of its parameters, counted from the design.
+        """
+        if isinstance(candidate, LawCandidate):
+            return effects_of(candidate, values)
+        effect = effect_of(candidate, self.beyond(candidate, values), self._context(candidate))
+        return None if effect is None else [effect]
 
     def can_resimulate(self) -> str | None:
         return next(filter(None, map(why_not, self.recordings)), None)
 
+    def carried(self, candidate: Candidate) -> bool:
+        return origin_of(candidate, self.origin) is not None
+
+    def _robots(self, trial: int, healthy: Sequence[tuple[Candidate, Array]]) -> Recording:
+        """The recording of a trial with its robots off by as much as they are found beside the causes."""
+        recording = self.recordings[trial]
+        units = recording.metadata.units
+        if not healthy or units is None:
+            return recording
+        x = units.x.copy()
+        for candidate, values in healthy:
+            place = places_of(candidate)
+            if place is not None:
+                x[place] += self.beyond(candidate, values)
+        known = replace(recording.metadata, units=ArmUnit(units.design, x))
+        return replace(recording, metadata=known)
+
     def simulation(
-        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]]
-    ) -> Callable[[], dict[str, Array] | None]:
+        self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]],
+        healthy: Sequence[tuple[Candidate, Array]] = (),
+    ) -> Callable[[], dict[str, Array] | None]:  # fmt: skip
         """What resimulates one trial's commands, with the unknowns moved and causes in the simulation.
 
         It returns recorded minus simulated ``phi``, ``theta`` [rad] and ``tau`` [N m], shape (Q, N, 3), or None if
         that cannot be simulated. It carries the recording and numbers only, so that processes can take it.
         """
         linear = self.linear[trial]
-        effects = [self.effect(candidate, self.beyond(candidate, values)) for candidate, values in active]
-        if any(effect is None for effect in effects):
-            return impossible
+        effects: list[Effect] = []
+        for candidate, values in active:
+            own = self.effects(candidate, values)
+            if own is None:
+                return impossible
+            effects += own
         return partial(
             resimulation_errors,
-            self.recordings[trial],
+            self._robots(trial, healthy),
             linear.shared.moved(shared),
             linear.bases.moved(local),
-            [effect for effect in effects if effect is not None],
+            effects,
             trial + 1,
             linear.signals.keep,
         )
@@ -81,16 +119,13 @@ class TeamRig(TeamRows):
         Raises:
             InputError: the folder cannot be written, or a cause has values that no effect can have.
         """
-        effects = [
-            named_effect(
-                found.candidate, self.effect(found.candidate, self.beyond(found.candidate, found.values))
-            )
-            for found in explanation.found
-        ]
-        fit = Fit.of(explanation.problem, explanation.fit.free, background=False)
+        effects: list[Effect] = []
+        for found in explanation.found:
+            effects += named_effects(found.candidate, self.effects(found.candidate, found.values))
+        fit, healthy = fit_to_simulate(self, explanation.problem, explanation.fit.free)
         shared = self.linear[0].shared.moved(-fit.shared)
         bases = self.linear[0].bases.moved(-fit.local(0)[: self.local_unknowns])
-        scene = team_of(shared, bases, effects, *posture(self.recordings[0]))
+        scene = team_of(shared, bases, effects, *posture(self._robots(0, healthy)))
         causes = [found.candidate.label for found in explanation.found]
         write_extended(scene, effects, folder, {"recordings": list(self.trials), "causes": causes})
 

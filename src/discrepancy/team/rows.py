@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from typing import Any, Self
 
 import numpy as np
@@ -12,7 +11,6 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.laws.candidate import LawCandidate, law_steps, refined
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate, Channel, Rig, Rows
 from discrepancy.team.candidates import (
@@ -25,10 +23,10 @@ from discrepancy.team.candidates import (
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.imitators import wrong_torques
-from discrepancy.team.laws.bench import TeamBench
 from discrepancy.team.linear.elsewhere import HEALTHY, found_at, resting_of
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.origin import origin_of
+from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, start_shared
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.unit import ArmUnit
@@ -102,11 +100,6 @@ class TeamRows(Rig):
         linear, known = linearised_trials(recordings, shared, limits, jobs, sensed)
         return cls(tuple(recordings), known, linear, tolerances, excluded, origin, resting, jobs)
 
-    @cached_property
-    def bench(self) -> TeamBench:
-        """Places and signals for laws that no catalogue lists."""
-        return TeamBench(self.linear, self.whitening)
-
     @property
     def noise(self) -> Noise:
         """Resolution of the sensors."""
@@ -177,29 +170,34 @@ class TeamRows(Rig):
         linear = self.linear[trial]
         if not candidate.acts_in(trial):
             return np.zeros((*linear.residual.shape, len(candidate.parameters)))
-        if isinstance(candidate, LawCandidate):
-            return self.whitening[trial](self.bench.columns(trial, candidate))
-        cause = CAUSES[candidate.cause]
-        robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-        again = candidate.transient is None and len(cause.shapes) > 1 and candidate.shape in cause.shapes
+        cause = CAUSES.get(candidate.cause)
+        shapes = () if cause is None else cause.shapes
+        again = candidate.transient is None and len(shapes) > 1 and candidate.shape in shapes
         key = (trial, *candidate.key, *candidate.shape.items())
         if again and key in self.kept:
             return self.kept[key]
-        columns = self.whitening[trial](cause.columns(linear, robot, joint, candidate.shape))
+        columns = self.whitening[trial](self._unwhitened(trial, candidate))
         if again:
             self.kept[key] = columns
         return columns
 
+    def _unwhitened(self, trial: int, candidate: Candidate) -> Array:
+        """What one unit of each parameter adds to a trial's residual, shape (n, C, k)."""
+        robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
+        return CAUSES[candidate.cause].columns(self.linear[trial], robot, joint, candidate.shape)
+
+    def _undo(self, trial: int, candidate: Candidate, values: Array, signals: Signals) -> Signals | None:
+        """A trial's signals as they would be without a cause, or None where it is not an error of the signals."""
+        robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
+        cause, beyond = CAUSES[candidate.cause], self.beyond(candidate, values)
+        return cause.undo(signals, self.linear[trial], robot, joint, beyond, candidate.shape)
+
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         """Whether such values can be: no negative stiffness or friction, no mass that swings outside the payload."""
-        if isinstance(candidate, LawCandidate):
-            return True
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return CAUSES[candidate.cause].possible(values, se, candidate.shape)
 
     def unknowns(self, candidate: Candidate) -> list[Array]:
-        if isinstance(candidate, LawCandidate):
-            return super().unknowns(candidate)
         out = []
         robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
         for linear, white in zip(self.linear, self.whitening, strict=True):
@@ -251,18 +249,9 @@ class TeamRows(Rig):
             for candidate, values in active:
                 if not candidate.acts_in(t):
                     continue
-                if isinstance(candidate, LawCandidate):
-                    read = self.bench.reading_error(t, candidate, values)
-                    if read is None:
-                        modelled += self.bench.columns(t, candidate) @ values
-                    else:
-                        signals = signals.minus(**read)
-                    continue
-                cause, beyond = CAUSES[candidate.cause], self.beyond(candidate, values)
-                robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-                corrected = cause.undo(signals, linear, robot, joint, beyond, candidate.shape)
+                corrected = self._undo(t, candidate, values, signals)
                 if corrected is None:
-                    modelled += cause.columns(linear, robot, joint, candidate.shape) @ beyond
+                    modelled += self._unwhitened(t, candidate) @ self.beyond(candidate, values)
                 else:
                     signals = corrected
             residual = exact_residual(
@@ -276,8 +265,6 @@ class TeamRows(Rig):
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a transient with its interval moved."""
-        if isinstance(candidate, LawCandidate):
-            return refined(candidate, finer=finer)
         if candidate.transient:
             tolerance = self.tolerances.get(candidate.cause, {})
             return nearby_events(candidate.cause, candidate.transient, tolerance)
@@ -297,8 +284,6 @@ class TeamRows(Rig):
         return wrong_torques(self.linear, self.whitening, candidate)
 
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
-        if isinstance(candidate, LawCandidate):
-            return law_steps(candidate)
         return shape_steps(candidate)
 
     def quantities(self, trial: int) -> dict[str, Array]:

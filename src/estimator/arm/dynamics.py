@@ -13,6 +13,7 @@ from estimator.arm.design import Triple
 from estimator.arm.gimbal import angular_motion, rate_matrix, rotation
 from estimator.arm.numbers import Arm
 from estimator.arrays import Array
+from estimator.so3 import cross
 
 
 def arm_torque(
@@ -112,5 +113,5 @@ def _rotor_torque(theta: Array, theta_dot: Array, theta_ddot: Array, inertia: Tr
     """Joint torques E^T (I omega_dot + omega x I omega) of one balanced body fixed in {i}."""
     omega, omega_dot = angular_motion(theta, theta_dot, theta_ddot)
     principal = np.array(inertia)
-    moment = principal * omega_dot + np.cross(omega, principal * omega)
+    moment = principal * omega_dot + cross(omega, principal * omega)
     return np.einsum("...ij,...i->...j", rate_matrix(theta), moment)

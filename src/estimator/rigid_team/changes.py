@@ -1,9 +1,8 @@
 """What small changes of pose and motion do to loops and balance."""
 
-import numpy as np
-
 from estimator.arrays import Array
 from estimator.estimate.principal import inertia_matrix
+from estimator.so3 import cross
 
 
 def needed_wrench(
@@ -20,11 +19,11 @@ def needed_wrench(
     mass, mass_c, inertia = pi[0], pi[1:4], inertia_matrix(pi[4:])
     omega, v = motion[:, :3], motion[:, 3:]
     d_omega, d_alpha = twist[..., :3], twist_dot[..., :3]
-    accel = twist_dot[..., 3:] + np.cross(d_omega, v) + np.cross(omega, twist[..., 3:]) + gravity
-    force = mass * accel + np.cross(d_alpha, mass_c)
-    force += np.cross(d_omega, np.cross(omega, mass_c)) + np.cross(omega, np.cross(d_omega, mass_c))
-    moment = np.cross(mass_c, accel) + d_alpha @ inertia
-    return force, moment + np.cross(d_omega, omega @ inertia) + np.cross(omega, d_omega @ inertia)
+    accel = twist_dot[..., 3:] + cross(d_omega, v) + cross(omega, twist[..., 3:]) + gravity
+    force = mass * accel + cross(d_alpha, mass_c)
+    force += cross(d_omega, cross(omega, mass_c)) + cross(omega, cross(d_omega, mass_c))
+    moment = cross(mass_c, accel) + d_alpha @ inertia
+    return force, moment + cross(d_omega, omega @ inertia) + cross(omega, d_omega @ inertia)
 
 
 def vee(A: Array) -> Array:

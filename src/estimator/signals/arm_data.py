@@ -11,6 +11,7 @@ from estimator.arm.dynamics import wrench_on_payload
 from estimator.arm.gimbal import angular_motion, rotation
 from estimator.arm.numbers import Arm
 from estimator.arrays import Array
+from estimator.so3 import cross
 
 
 class ArmData(NamedTuple):
@@ -50,7 +51,7 @@ def arm_data(
     R_bi = rotation(theta[0])
     omega, omega_dot = angular_motion(theta[0], theta[1], theta[2])
     v = np.einsum("...ji,...j->...i", R_bi, h_dot)
-    v_dot = np.einsum("...ji,...j->...i", R_bi, h_ddot) - np.cross(omega, v)
+    v_dot = np.einsum("...ji,...j->...i", R_bi, h_ddot) - cross(omega, v)
     wrench = wrench_on_payload(phi, theta, tau, arm, legs, R_bi)
     return ArmData(
         R_bi,

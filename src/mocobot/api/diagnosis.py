@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from discrepancy.engine.diagnose import Verdict
+from discrepancy import rules
+from discrepancy.engine.diagnose import Verdict, When
 from discrepancy.result.diagnosed import Diagnosed, is_diagnosis
 from discrepancy.team.diagnosis import against_truth, diagnose_team
 from discrepancy.team.tolerances import read_tolerances
@@ -89,6 +90,8 @@ def diagnose(
     tolerances: Path | str | None = None,
     exclude: Iterable[str] = (),
     closed_loop: bool = True,
+    laws: When = "auto",
+    odds: float = rules.PRIOR_ODDS,
     jobs: int = 1,
     say: Callable[[str], object] = lambda _: None,
     simulated: Callable[[int], object] | None = None,
@@ -105,17 +108,20 @@ def diagnose(
         tolerances: TOML file: how far a healthy robot may be off (docs/diagnosis/guide.md); None for the defaults.
         exclude: causes not to consider.
         closed_loop: whether to run the recorded commands again, without and with what is found.
+        laws: whether to look for laws that the catalogue lacks: ``"auto"`` where something unlisted is left,
+            ``"always"``, or ``"never"``.
+        odds: of any cause being there before the data are seen, at all its places together.
         jobs: parallel processes.
         say: takes the name of the stage that begins.
         simulated: called with 1 for every trial that was simulated.
 
     Raises:
-        InputError: recordings, tolerances or causes that cannot be used, or a calibration of other robots.
+        InputError: recordings, tolerances, causes or odds that cannot be used, or a calibration of other robots.
     """
     known = read_tolerances(Path(tolerances) if tolerances is not None else None)
     found = diagnose_team(
         list(recordings_of(recordings, map, Robots(calibration))), known, tuple(exclude),
-        closed_loop=closed_loop, jobs=jobs, say=say, simulated=simulated,
+        closed_loop=closed_loop, laws=laws, odds=odds, jobs=jobs, say=say, simulated=simulated,
     )  # fmt: skip
     if truth is not None:
         found = against_truth(found, truth.to_dict())

@@ -3,14 +3,13 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from estimator.arm.design import OmnidDesign, load_design
-from estimator.files import write_json
 from mocobot.api.given import GivenCalibration, Robots
+from mocobot.api.look import Look
 from mocobot.api.public import public
 from mocobot_inspect import inspection
-from mocobot_inspect.findings import Finding, findings
+from mocobot_inspect.findings import findings
 from mocobot_inspect.json import inspection_dict
 from mocobot_inspect.text import format_inspection, ready_line
 from mocobot_logs.map.files import read_map
@@ -19,46 +18,19 @@ from mocobot_sim.scene.models import omnid_design
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Inspection(inspection.Inspection):
+class Inspection(Look, inspection.Inspection):
     """Stamps, channels, clocks, wiring and excitation of a log: printable, and a table in a notebook.
 
-    The attributes are those of ``mocobot_inspect.inspection.Inspection``.
+    The attributes are those of ``mocobot_inspect.inspection.Inspection``; ``mocobot_inspect.json`` has the JSON's keys.
     """
 
-    @property
-    def findings(self) -> list[Finding]:
-        """All that is wrong: ``topic`` and ``sentence`` each."""
-        return findings(self)
-
-    @property
-    def ready_for(self) -> str:
-        """What the log can be used for, one line."""
-        return ready_line(self)
-
-    def __str__(self) -> str:
-        """The text report."""
-        return format_inspection(self)
-
-    def __repr__(self) -> str:
-        """One line."""
-        return f"<Inspection of {self.name}: {self.ready_for}>"
+    _findings, _ready_line = findings, ready_line
+    _text, _dict = format_inspection, inspection_dict
 
     def _repr_html_(self) -> str:
         from mocobot.api.notebook import inspection_html
 
         return inspection_html(self.to_dict())
-
-    def to_dict(self) -> dict[str, Any]:
-        """Strict JSON with units in the keys; see ``mocobot_inspect.json`` for the keys."""
-        return inspection_dict(self)
-
-    def write(self, path: Path | str) -> None:
-        """Write it as JSON.
-
-        Raises:
-            InputError: the file cannot be written.
-        """
-        write_json(Path(path), self.to_dict())
 
 
 def inspect(

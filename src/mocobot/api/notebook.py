@@ -76,9 +76,10 @@ def diagnosis_html(values: Values) -> str:
     sentences = [tidy(cause["sentence"]) for cause in values["causes"]]
     if values["verdict"] == "miscalibrated":
         sentences = [tidy(text) for text in (*(entry["sentence"] for entry in values["scatter"]), REMEDY)]
-    elif not sentences and values["verdict"] != "consistent":
+    left = remains(values)
+    if not sentences and not left and values["verdict"] != "consistent":
         sentences = [tidy(residual["nominal"]["signature"]["sentence"])]
-    sentences += map(tidy, remains(values))
+    sentences += map(tidy, left)
     head = ["cause", "probability [%]", "parameter", "value ± standard error"]
     return _whole(
         named,

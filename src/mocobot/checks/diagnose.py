@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from discrepancy.inference.odds import check_odds
 from estimator.errors import InputError
 from mocobot.files.targets import (
     calibration_file,
@@ -24,6 +25,7 @@ def check(options: Diagnose) -> None:
         raise InputError("no recording given; name them before --exclude")
     if options.jobs < 1:
         raise InputError(f"jobs is {options.jobs}; it must be at least 1")
+    check_odds(options.odds)
     check_recordings(options.rec)
     if options.model is not None:
         _check_joints(options, options.model)

@@ -63,7 +63,8 @@ def run(options: Diagnose) -> None:
         with workers_of(options.scheduler), stages() as (say, simulated):
             found = rig.diagnose(
                 data, tolerances, options.exclude,
-                closed_loop=options.closed_loop, jobs=options.jobs, say=say, simulated=simulated,
+                closed_loop=options.closed_loop, laws=options.laws, odds=options.odds, jobs=options.jobs, say=say,
+                simulated=simulated,
             )  # fmt: skip
             if options.rig == "team" and (truth := _truth(options.rec)) is not None:
                 found = against_truth(found, truth)

@@ -41,7 +41,14 @@ def run(options: Diagnose, model: Path) -> None:
         made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
         with stages() as (say, _):
             found = serial.diagnosed(
-                robot, logs, reference, tolerances, options.exclude, jobs=options.jobs, say=say
+                robot,
+                logs,
+                reference,
+                tolerances,
+                options.exclude,
+                odds=options.odds,
+                jobs=options.jobs,
+                say=say,
             )
             if folder is not None:
                 say("write")

@@ -41,4 +41,10 @@ def _lines(name: str, width: int, *, whole: bool) -> str:
 
 
 def _rule(number: Allowed) -> str:
-    return number.range if number.default is None else f"{number.range}; {number.default:g} if not given"
+    return (
+        number.range if number.default is None else f"{number.range}; {_given(number.default)} if not given"
+    )
+
+
+def _given(default: float | str) -> str:
+    return (default or "none") if isinstance(default, str) else f"{default:g}"

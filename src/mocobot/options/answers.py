@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
+from discrepancy.rules.inference import PRIOR_ODDS
 from mocobot.options.common import Calibrated, Flag, Force, Model, Scheduler
 
 
@@ -91,6 +92,10 @@ class Diagnose:
     """Causes not to consider."""
     closed_loop: bool = True
     """Run the recorded commands again, without and with what is found."""
+    laws: Literal["auto", "always", "never"] = "auto"
+    """Look for laws that the catalogue lacks: where something unlisted is left, always, or never."""
+    odds: float = PRIOR_ODDS
+    """Odds of any cause being there before the data are seen; more where a fault is suspected."""
 
 
 @dataclass(frozen=True)

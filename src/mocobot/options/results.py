@@ -35,10 +35,12 @@ class Paper:
 
 @dataclass(frozen=True)
 class Report:
-    """Make one HTML page of what `paper`, `estimate`, `calibrate` or `diagnose` wrote: tables, plots, provenance."""
+    """Make one HTML page of a result folder (`paper`, `estimate`, `calibrate`, `diagnose`, `campaign`): tables, plots,
+    provenance."""
 
     dir: Annotated[tyro.conf.Positional[Path], tyro.conf.arg(metavar="DIR")]
-    """Folder of `mocobot paper`, `calibrate` or `diagnose --out`, or one with files of `mocobot estimate --out`."""
+    """Folder of `mocobot paper`, `calibrate`, `diagnose` or `campaign --out`, or one with files of `mocobot estimate
+    --out`."""
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.html")] = None
     """Page to write; DIR/report.html if not given."""
     force: Force = False

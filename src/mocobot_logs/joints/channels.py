@@ -21,7 +21,7 @@ from mocobot_logs.joints.quantities import (
     si_factor,
     units_of,
 )
-from mocobot_logs.map.parse import JOINT_FIELDS, table_of
+from mocobot_logs.map.parse import check_place, sign_of, table_of
 
 KEYS = (
     "topic", "joint", "field", "column", "unit", "sign", "offset", "bits", "counts_per_turn", "full_scale", "rated"
@@ -143,20 +143,8 @@ def _channel(
     fields = Fields(merged, ("unit",), where, KEYS)
     unit = fields.text("unit")
     parts = {key: _text(fields, key, place) for key in _PLACES}
-    if parts["column"] is None and (parts["topic"] is None or parts["field"] is None):
-        missing = (
-            "topic" if parts["field"] is not None else "field" if parts["topic"] is not None else "column"
-        )
-        raise InputError(
-            f"{where}: missing key {missing!r}; a channel has a topic and a field (bags) or a column (tables)"
-        )
-    if parts["joint"] is not None and parts["field"] not in JOINT_FIELDS:
-        raise InputError(
-            f"{where}: field is {parts['field']!r:.60}; with a joint it must be one of {', '.join(JOINT_FIELDS)}"
-        )
-    sign = merged.get("sign", 1)
-    if type(sign) is not int or sign not in (1, -1):
-        fields.refuse("sign", "1 or -1")
+    check_place(parts, where)
+    sign = sign_of(fields, merged)
     bits = merged.get("bits")
     if bits is not None and (type(bits) is not int or not 2 <= bits <= MOST_BITS):
         fields.refuse("bits", f"a whole number from 2 to {MOST_BITS}")

@@ -161,20 +161,8 @@ def _merged(*tables: Values) -> dict[str, Any]:
 def _channel(name: str, values: Values, where: str) -> ChannelMap:
     fields = Fields(values, ("unit",), where, _CHANNEL)
     parts = {key: _text(fields, key) for key in ("topic", "joint", "field", "column")}
-    if parts["column"] is None and (parts["topic"] is None or parts["field"] is None):
-        missing = (
-            "topic" if parts["field"] is not None else "field" if parts["topic"] is not None else "column"
-        )
-        raise InputError(
-            f"{where}: missing key {missing!r}; a channel has a topic and a field (bags) or a column (tables)"
-        )
-    if parts["joint"] is not None and parts["field"] not in JOINT_FIELDS:
-        raise InputError(
-            f"{where}: field is {parts['field']!r:.60}; with a joint it must be one of {', '.join(JOINT_FIELDS)}"
-        )
-    sign = values.get("sign", 1)
-    if type(sign) is not int or sign not in (1, -1):
-        fields.refuse("sign", "1 or -1")
+    check_place(parts, where)
+    sign = sign_of(fields, values)
     unit, per_turn = values["unit"], None
     if "counts_per_turn" in fields:
         if unit != COUNTS:
@@ -191,6 +179,37 @@ def _channel(name: str, values: Values, where: str) -> ChannelMap:
         offset=fields.number("offset") if "offset" in fields else 0.0,
         optional=optional,
     )
+
+
+def check_place(parts: Mapping[str, str | None], where: str) -> None:
+    """Check where a channel is: its ``topic``, ``joint``, ``field`` and ``column``.
+
+    Raises:
+        InputError: one is missing, or does not go with another.
+    """
+    if parts["column"] is None and (parts["topic"] is None or parts["field"] is None):
+        missing = (
+            "topic" if parts["field"] is not None else "field" if parts["topic"] is not None else "column"
+        )
+        raise InputError(
+            f"{where}: missing key {missing!r}; a channel has a topic and a field (bags) or a column (tables)"
+        )
+    if parts["joint"] is not None and parts["field"] not in JOINT_FIELDS:
+        raise InputError(
+            f"{where}: field is {parts['field']!r:.60}; with a joint it must be one of {', '.join(JOINT_FIELDS)}"
+        )
+
+
+def sign_of(fields: Fields, values: Values) -> int:
+    """Sign of a channel, 1 or -1.
+
+    Raises:
+        InputError: it is another.
+    """
+    sign = values.get("sign", 1)
+    if type(sign) is not int or sign not in (1, -1):
+        fields.refuse("sign", "1 or -1")
+    return sign
 
 
 def time_map(values: Values, where: str) -> TimeMap:

@@ -110,7 +110,7 @@ def _strongest_sections(book: Book, values: Values) -> list[Node]:
     said = (
         "By how much the recordings are likelier if a cause is there besides what is in the model, in nats, for the "
         "strongest candidates; what is there leaves a mark in its relatives, too. Rings: what it takes to be named. "
-        "Both plots have the same logarithmic scale."
+        + ("Both plots have the same logarithmic scale." if len(charts) > 1 else "The scale is logarithmic.")
     )
     return _section(book, "Evidence", said, charts)
 

@@ -75,18 +75,18 @@ def answer(diagnosed: Diagnosed) -> list[Node]:
     meaning = MEANING[values["verdict"]]
     if len(values["causes"]) == 1:
         meaning = meaning.replace("causes explain", "cause explains").replace("causes are", "cause is")
-    said = None
-    if values["causes"]:
-        said = bullets([tidy(cause["sentence"]) for cause in values["causes"]])
-    elif values["verdict"] == "miscalibrated":
-        said = bullets([tidy(text) for text in (*(e["sentence"] for e in values["scatter"]), REMEDY)])
-    elif values["verdict"] != "consistent":
-        said = tidy(values["residual"]["nominal"]["signature"]["sentence"])
+    said: list[Node | str] = []
     left = remains(values)
+    if values["causes"]:
+        said = [bullets([tidy(cause["sentence"]) for cause in values["causes"]])]
+    elif values["verdict"] == "miscalibrated":
+        said = [bullets([tidy(entry["sentence"]) for entry in values["scatter"]]), tidy(REMEDY)]
+    elif values["verdict"] != "consistent" and not left:
+        said = [tidy(values["residual"]["nominal"]["signature"]["sentence"])]
     kind = KINDS[values["verdict"]]
     # Green stands beside no figure that contradicts it.
     kind = "warn" if left and kind == "good" else kind
-    box = verdict(kind, VERDICTS[values["verdict"]], meaning, said, *map(tidy, left))
+    box = verdict(kind, VERDICTS[values["verdict"]], meaning, *said, *map(tidy, left))
     return [paragraph(lede, kind="lede"), box, tiles(_tiles(values))]
 
 

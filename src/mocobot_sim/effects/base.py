@@ -24,12 +24,14 @@ class Effect(ABC):
     Attributes:
         cause: name of the cause: that of the class, in lower case with underscores.
         ranges: allowed range (low, high) of the parameters that may not be any finite number, both ends included.
+        texts: parameters that are names, not numbers.
         repeats: whether one place takes several.
         on_payload: whether it needs a payload, or a grasp of one.
     """
 
     cause: ClassVar[str]
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
+    texts: ClassVar[tuple[str, ...]] = ()
     repeats: ClassVar[bool] = False
     on_payload: ClassVar[bool] = False
 
@@ -44,6 +46,10 @@ class Effect(ABC):
         """
         for entry in fields(self):
             value = getattr(self, entry.name)
+            if entry.name in self.texts:
+                if not isinstance(value, str):
+                    raise InputError(f"{self.cause}: {entry.name} is {value!r:.60}; it must be text")
+                continue
             if entry.name in (*PLACE, "trial"):
                 allowed = "1, 2 or 3" if entry.name == "joint" else "a whole number of at least 1"
                 good = type(value) is int and value >= 1 and (entry.name != "joint" or value <= JOINTS)

@@ -35,6 +35,7 @@ NAMES = (
     "push",
     "drag",
     "slosh",
+    "law",
 )
 """One file of this folder each; the class in ``sea_bias.py`` is ``SeaBias``."""
 
@@ -46,7 +47,7 @@ EFFECTS: dict[str, type[Effect]] = {
 
 
 def make_effect(
-    cause: str, parameters: Mapping[str, float], robot: int | None = None, joint: int | None = None
+    cause: str, parameters: Mapping[str, Any], robot: int | None = None, joint: int | None = None
 ) -> Effect:
     """Make an effect from its name, parameters and place.
 
@@ -75,7 +76,7 @@ def make_effect(
     return kind(**place, **values)
 
 
-def _check_keys(cause: str, parameters: Mapping[str, float], kind: type[Effect]) -> None:
+def _check_keys(cause: str, parameters: Mapping[str, Any], kind: type[Effect]) -> None:
     names = kind.parameter_names()
     required = [entry.name for entry in fields(kind) if entry.name in names and not _has_default(entry)]
     unknown = [name for name in parameters if name not in names]
@@ -86,7 +87,7 @@ def _check_keys(cause: str, parameters: Mapping[str, float], kind: type[Effect])
 
 
 def _has_default(entry: Any) -> bool:
-    return isinstance(entry.default, float)
+    return isinstance(entry.default, float | str)
 
 
 def effect_to_dict(effect: Applied) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from mocobot_sim.effects.base import Effect
+from mocobot_sim.effects.spring import add_site, tie
 from mocobot_sim.scene.scene import TeamScene
 
 
@@ -27,14 +28,8 @@ class PayloadTether(Effect):
     def _edit(self, scene: TeamScene) -> TeamScene:
         if not self.stiffness_N_per_m:
             return scene
-        at, root = scene.X_Wb[0].apply([self.anchor_x_m, self.anchor_y_m, self.anchor_z_m]), scene.root
+        at = scene.X_Wb[0].apply([self.anchor_x_m, self.anchor_y_m, self.anchor_z_m])
         point = [self.point_x_m, self.point_y_m, self.point_z_m]
-        name, payload = "payload_tether", root.find("body", "omnid1/payload/payload")
-        site = payload.add("site", name=name, pos=point, group=4, size=[0.006])
-        anchor = root.worldbody.add("site", name=name, pos=at, group=4, size=[0.006])
-        tendon = root.tendon.add(
-            "spatial", name=name, stiffness=self.stiffness_N_per_m, springlength=[0.0, 0.0], width=0.002
-        )
-        tendon.add("site", site=site)
-        tendon.add("site", site=anchor)
+        site = add_site(scene.root.find("body", "omnid1/payload/payload"), "payload_tether", point)
+        tie(scene, "payload_tether", site, at, self.stiffness_N_per_m)
         return scene

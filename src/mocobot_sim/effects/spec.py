@@ -43,7 +43,7 @@ class Allowed:
     short: str
     unit: str
     range: str
-    default: float | None
+    default: float | str | None
 
 
 def allowed(kind: type[Effect]) -> tuple[Allowed, ...]:
@@ -54,7 +54,7 @@ def allowed(kind: type[Effect]) -> tuple[Allowed, ...]:
             short=(parted := _without_unit(entry.name))[0],
             unit=parted[1],
             range=_range(kind, entry.name),
-            default=entry.default if isinstance(entry.default, float) else None,
+            default=entry.default if isinstance(entry.default, float | str) else None,
         )
         for entry in fields(kind)
     )
@@ -80,7 +80,7 @@ def parse_effect(text: str) -> Effect:
         raise InputError(f"effect {cause!r} does not exist; {hint}")
     known = allowed(EFFECTS[cause])
     names = {short: each for each in known for short in (each.short, each.name)}
-    values: dict[str, float] = {}
+    values: dict[str, float | str] = {}
     for part in rest.split(",") if colon else ():
         name, _, word = part.partition("=")
         if name not in names:
@@ -89,7 +89,7 @@ def parse_effect(text: str) -> Effect:
         number = names[name]
         if number.name in values:
             raise InputError(f"effect {text!r}: {name} is given twice")
-        values[number.name] = _value(text, number, word)
+        values[number.name] = word if number.name in EFFECTS[cause].texts else _value(text, number, word)
     missing = [each.short for each in known if each.default is None and each.name not in values]
     if missing or not set(values) - set(PLACE):
         rule = f"{' and '.join(missing)} must be given" if missing else "at least one parameter must be given"
@@ -97,7 +97,7 @@ def parse_effect(text: str) -> Effect:
     return _made(cause, values)
 
 
-def _made(cause: str, values: Mapping[str, float]) -> Effect:
+def _made(cause: str, values: Mapping[str, float | str]) -> Effect:
     place = {name: int(values[name]) for name in PLACE if name in values}
     return make_effect(cause, {name: v for name, v in values.items() if name not in PLACE}, **place)
 
@@ -119,6 +119,8 @@ def _range(kind: type[Effect], name: str) -> str:
         return f"1 to {JOINTS}"
     if name in (*PLACE, "trial"):
         return "1, 2, ..."
+    if name in kind.texts:
+        return "a name"
     if name not in kind.ranges:
         return "any number"
     low, high = kind.ranges[name]

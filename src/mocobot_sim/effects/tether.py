@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from mocobot_sim.effects.base import Effect
+from mocobot_sim.effects.spring import tie
 from mocobot_sim.scene.scene import TeamScene
 
 
@@ -27,11 +28,6 @@ class Tether(Effect):
         if not self.stiffness_N_per_m:
             return scene
         at = scene.X_Wb[self.robot - 1].apply([self.anchor_x_m, self.anchor_y_m, self.anchor_z_m])
-        name = f"tether{self.robot}"
-        anchor = scene.root.worldbody.add("site", name=name, pos=at, group=4, size=[0.006])
-        tendon = scene.root.tendon.add(
-            "spatial", name=name, stiffness=self.stiffness_N_per_m, springlength=[0.0, 0.0], width=0.002
-        )
-        tendon.add("site", site=scene.root.find("site", f"omnid1/payload/grasp{self.robot}"))
-        tendon.add("site", site=anchor)
+        grasp = scene.root.find("site", f"omnid1/payload/grasp{self.robot}")
+        tie(scene, f"tether{self.robot}", grasp, at, self.stiffness_N_per_m)
         return scene

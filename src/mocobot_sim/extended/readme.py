@@ -16,7 +16,7 @@ def readme(effects: Sequence[Mapping[str, Any]], robots: int) -> str:
         place = (
             ", ".join(f"{name} {effect[name]}" for name in ("robot", "joint") if name in effect) or "payload"
         )
-        numbers = ", ".join(f"`{name}` = {value:.6g}" for name, value in effect["parameters"].items())
+        numbers = ", ".join(f"`{name}` = {_shown(value)}" for name, value in effect["parameters"].items())
         rows.append(f"| `{effect['cause']}` | {place} | {numbers} |")
     table = "\n".join(["| cause | where | parameters |", "|---|---|---|", *rows]) if rows else "None."
     many = "1 Omnid" if robots == 1 else f"{robots} Omnids"
@@ -37,3 +37,7 @@ Simulate a trial with it:
 From Python: `mocobot_sim.extended.extended.load_extended(folder)`, then `mocobot_sim.trial.trial.run_trial` or
 `mocobot_sim.trial.resimulate.resimulate`.
 """
+
+
+def _shown(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.6g}"

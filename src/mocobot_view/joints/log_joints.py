@@ -12,9 +12,9 @@ from estimator.arrays import Array
 from mocobot_view import colours
 from mocobot_view.colours import Colour
 from mocobot_view.joints.joint_replay import JointReplay
-from mocobot_view.replay.blueprint import BACKGROUND
+from mocobot_view.replay.blueprint import BACKGROUND, playing
 from mocobot_view.replay.log_robots import log_shape
-from mocobot_view.replay.log_time import TIMELINE, send, send_poses
+from mocobot_view.replay.log_time import send, send_poses
 
 MEASURED, ASKED, COMMANDED = colours.of_robot(1), colours.of_robot(2), colours.COMMAND
 SHOWN = 4
@@ -74,15 +74,7 @@ def _series(replay: JointReplay, j: int) -> str:
 
 def _blueprint(replays: Sequence[JointReplay]) -> rrb.Blueprint:
     columns = [_column(replay) for replay in replays]
-    body = columns[0] if len(columns) == 1 else rrb.Horizontal(*columns)
-    return rrb.Blueprint(
-        body,
-        rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="playing", loop_mode="all"),
-        rrb.BlueprintPanel(state="collapsed"),
-        rrb.SelectionPanel(state="collapsed"),
-        auto_views=False,
-        auto_layout=False,
-    )
+    return playing(columns[0] if len(columns) == 1 else rrb.Horizontal(*columns))
 
 
 def _column(replay: JointReplay) -> rrb.Horizontal:

@@ -51,6 +51,11 @@ def blueprint(trials: Sequence[ReplayTrial], tab: str | None = None) -> rrb.Blue
         ]
         body = rrb.Horizontal(*columns) if len(columns) <= 3 else rrb.Grid(*columns)
     _share_range(body, max(float(trial.time[-1]) for trial in trials))
+    return playing(body)
+
+
+def playing(body: rrb.Container) -> rrb.Blueprint:
+    """A layout that plays from the start, its panels out of the way."""
     return rrb.Blueprint(
         body,
         rrb.TimePanel(timeline=TIMELINE, state="collapsed", play_state="playing", loop_mode="all"),

@@ -141,7 +141,7 @@ def test_offset_and_uneven_dry_friction_are_not_told_apart() -> None:
     assert "injected_force" not in named(diagnosis)
     (rival,) = (c for c, _ in item.rivals if c.cause in pair)
     assert {rival.cause, item.candidate.cause} == pair
-    assert "breaks loose" in EmpsWords().separate(rival.cause)
+    assert "breaks loose" in EmpsWords().separate(rival)
 
 
 # The command.

@@ -59,7 +59,7 @@ def test_mean_of_a_failed_trial_is_infinite():
 class ThreeChannels(FakeRig):
     """Errors of known size in two channels."""
 
-    def simulation(self, trial, shared, local, active):
+    def simulation(self, trial, shared, local, active, healthy=()):
         self.calls.append((trial, shared, local, [(c.cause, v) for c, v in active]))
         error = np.random.default_rng(trial).standard_normal((50, 2, 3)) * (1 + trial)
         return lambda: None if trial == 2 else {"phi": 0.01 * error, "tau": 5.0 * error}

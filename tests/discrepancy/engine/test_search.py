@@ -13,6 +13,7 @@ from discrepancy.inference.scan import score_of
 from discrepancy.inference.search import search
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
+from discrepancy.result.evidence_list import evidence_list
 from discrepancy.rig import Transient
 from discrepancy.rules import CLEAN_CHI2_PER_N
 from fake_rig import CATALOGUE, CHANNELS, NINE, RATE_HZ, ROWS, TWINS, FakeRig, cause, names
@@ -363,6 +364,10 @@ def test_what_a_cause_leaves_open_is_integrated_out():
     assert explanation.hypothesis.allowed[found.index] > 100.0
     healthy = Hypothesis.of(explanation.problem, ())
     assert explanation.hypothesis.score - healthy.score < found.over_nothing + 0.2
+    # Nor in the list of the strongest: but for the prior odds it has there what the search gave it.
+    first = evidence_list(explanation)["before"][0]
+    assert first["cause"] == "cause 2"
+    assert first["nats"] - first["needed"] + rules.NAMED_NATS == pytest.approx(found.over_nothing, rel=0.05)
 
 
 def test_what_is_left_open_at_rest_is_not_charged_where_it_tells_nothing():

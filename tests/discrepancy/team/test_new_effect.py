@@ -71,7 +71,7 @@ def test_two_files_are_all_that_an_effect_needs(registered, tmp_path):
     # Written, and read again: whoever takes the model away has the hose in it.
     rig.write_extended(diagnosis.explanation, tmp_path / "extended")
     (effect,) = load_extended(tmp_path / "extended").effects
-    assert effect == rig.effect(diagnosis.causes[0].candidate, diagnosis.causes[0].values)
+    assert [effect] == rig.effects(diagnosis.causes[0].candidate, diagnosis.causes[0].values)
     model = load_extended(tmp_path / "extended").compile()
     hose = model.tendon("hose3_2").id
     assert np.ravel(model.tendon_stiffness[hose])[0] == pytest.approx(effect.stiffness_Nm_per_rad)

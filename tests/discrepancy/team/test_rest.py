@@ -80,7 +80,7 @@ def test_draws_are_torques_at_rest_of_the_tolerances_size(one_rest, tolerances, 
 
 
 def test_rows_far_from_a_rest_know_nothing_of_it(one_rest):
-    rows = Resting(one_rest, JOINT)(np.random.default_rng(2))
+    rows = Resting(one_rest, JOINT)(np.random.default_rng(2))[0]
     away = np.min([np.abs(one_rest.reduction.time - t) for hold in HOLDS_S[:2] for t in hold], axis=0) > 1.0
     away &= ~still(one_rest.reduction.time, HOLDS_S[:2])
     assert away.sum() > 20
@@ -100,7 +100,7 @@ def test_same_seed_same_bits_and_no_tolerance_no_friction(one_rest):
 
 def test_friction_in_a_gimbal_is_a_moment_alone(one_rest):
     """It shows in the balance of moments, and neither in forces nor in poses."""
-    rows = Resting(one_rest, {"gimbal_friction": {"coulomb_Nm": LIMIT_NM}})(np.random.default_rng(1))
+    rows = Resting(one_rest, {"gimbal_friction": {"coulomb_Nm": LIMIT_NM}})(np.random.default_rng(1))[0]
     assert not rows[:, :15].any()
     assert 0.05 * LIMIT_NM < np.abs(rows[:, 15:]).max() < 10.0 * LIMIT_NM
 
@@ -131,7 +131,7 @@ def test_healthy_holds_leave_noise_alone():
 
     resting = Resting(trial, JOINT)
     noise = np.array([sensors() for _ in range(40)])
-    with_friction = noise + np.array([resting(rng) for _ in noise])
+    with_friction = noise + np.array([resting(rng)[0] for _ in noise])
     data = [sensors() + friction() for _ in range(8)]
 
     def left(draws):

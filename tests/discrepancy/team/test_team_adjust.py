@@ -76,7 +76,7 @@ def test_torques_are_moved_as_little_as_balances_the_wrenches(case, noise):
     t, rng = case.reduction.sample[40], np.random.default_rng(2)
     only = Noise(noise.step, noise.sigma * np.array([0.0, 0.0, 1.0])[:, None, None])
     linear = measured(case, only, rng)
-    J = np.concatenate([linear.J[i, t, -6:, 18:] for i in range(3)], axis=1)  # (6, 9)
+    J = np.concatenate([linear.J.dense()[i, t, -6:, 18:] for i in range(3)], axis=1)  # (6, 9)
     variance = rng.uniform(1.0, 2.0, 9)
     information = np.linalg.inv(J @ np.diag(variance) @ J.T)
     torque_noise = TorqueNoise((variance.reshape(3, 3), np.zeros((3, 3))), (information, np.zeros((6, 6))))

@@ -132,7 +132,7 @@ def test_jacobian_is_one_of_filtered_signals(case, linear):
                 ends.append(samples(s))
             expected = (ends[0] - ends[1]) / (2 * step)
             scale = max(np.abs(expected).max(), 1e-9)
-            np.testing.assert_allclose(linear.J[robot, at][:, :, k], expected, atol=2e-4 * scale)
+            np.testing.assert_allclose(linear.J.dense()[robot, at][:, :, k], expected, atol=2e-4 * scale)
 
 
 def test_signals_are_value_rate_and_acceleration(case, linear):

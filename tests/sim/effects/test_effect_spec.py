@@ -11,8 +11,8 @@ from estimator.errors import InputError
 from mocobot_sim.effects.catalogue import EFFECTS, make_effect
 from mocobot_sim.effects.spec import allowed, paragraphs, parse_effect
 
-RATIOS = {"scale", "damping_ratio"}
-"""Parameters without a unit."""
+RATIOS = {"scale", "damping_ratio", "amplitude", "number", "second"}
+"""Parameters without a unit; of a law they have that of what it acts on."""
 
 
 @pytest.mark.parametrize("cause", EFFECTS)
@@ -23,7 +23,7 @@ def test_every_effect_can_be_written(cause: str, short: bool) -> None:
     place = {each.name: 2 for each in numbers if each.name in ("robot", "joint")}
     made = make_effect(cause, SIZES[cause], **place)
     values = {each: getattr(made, each.name) for each in numbers}
-    words = [f"{each.short if short else each.name}={value!r}" for each, value in values.items()]
+    words = [f"{each.short if short else each.name}={value}" for each, value in values.items()]
     assert parse_effect(f"{cause}:{','.join(words)}") == made
 
 
@@ -38,8 +38,10 @@ def test_what_is_listed_is_what_the_class_takes(cause: str) -> None:
         if each.unit:
             assert each.name.startswith(f"{each.short}_")
         else:
-            assert each.name in {"robot", "joint", "trial"} | RATIOS, "a unit that nobody knows"
-    assert {n.name: n.range for n in numbers if n.range not in ("1, 2, ...", "1 to 3", "any number")} == {
+            known = {"robot", "joint", "trial"} | RATIOS | set(kind.texts)
+            assert each.name in known, "a unit that nobody knows"
+    words = ("1, 2, ...", "1 to 3", "any number", "a name")
+    assert {n.name: n.range for n in numbers if n.range not in words} == {
         name: f"{low:g} to {high:g}" for name, (low, high) in kind.ranges.items()
     }
 

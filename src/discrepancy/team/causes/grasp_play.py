@@ -32,11 +32,14 @@ class GraspPlay(Cause):
     def unknowns(self, trial, robot, joint, shape):
         between = np.abs(trial.data.wrench[:, robot, 3:]) < shape["force_N"]
         columns = []
-        for axis, unit in enumerate(np.eye(3)):
-            for place in free_while(between[:, axis], trial.signals.rate_hz, rules.PLAY_KNOTS_S):
-                column = _moved(trial, robot, place[:, None] * unit)
-                if column.any():  # not before the first row or after the last
-                    columns.append(column)
+        for axis in range(3):
+            along = (trial.bases.R[robot] @ trial.data.R_bi[:, robot])[..., axis, None]
+            places = free_while(between[:, axis], trial.signals.rate_hz, rules.PLAY_KNOTS_S)
+            for first in range(0, len(places), 16):  # not all at once, for the sake of memory
+                some = np.stack(places[first : first + 16], axis=-1)
+                moved = trial.of_pose(robot, None, along * some[:, None])
+                # Not before the first row or after the last.
+                columns += [column for column in np.moveaxis(moved, -1, 0) if column.any()]
         return columns
 
 

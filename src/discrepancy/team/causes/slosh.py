@@ -6,9 +6,10 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from discrepancy import rules
-from discrepancy.team.causes.base import Cause, stack
+from discrepancy.team.causes.base import Cause
 from estimator.arrays import Array
 from estimator.estimate.fusion import fuse
+from estimator.so3 import skew
 
 
 class Slosh(Cause):
@@ -41,24 +42,19 @@ class Slosh(Cause):
         motion = fuse(trial.data, trial.shared.grasps)
         com = trial.shared.pi[1:4] / trial.shared.pi[0]
         omega, alpha = motion.omega, motion.alpha
-
-        def reaction(a: Array) -> Array:
-            """Force on the payload, in {1}, of 1 kg that hangs from a point with acceleration a."""
-            R_b1 = trial.data.R_bi[:, 0]
-            across = np.einsum("qij,qj->qi", R_b1, a) * np.array([1.0, 1.0, 0.0])
-            swing = _swing(across, trial.signals.rate_hz, trial.data.gravity_mps2, shape)
-            return np.asarray(np.einsum("qji,qj->qi", R_b1, -swing), dtype=np.float64)
-
-        def relative(r: Array) -> Array:
-            return np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))
-
-        force = reaction(motion.acceleration + relative(com))
-        columns = [trial.of_wrench(force, _moment(com, force))]
-        for axis in np.eye(3):
-            # Moving the point by r moves the force, and changes what drives the pendulum.
-            more = reaction(relative(axis))
-            columns.append(trial.of_wrench(more, _moment(com, more) + _moment(axis, force)))
-        return stack(columns)
+        R_b1 = trial.data.R_bi[:, 0]
+        # Accelerations of the point, and by how much more it is accelerated the further it is along each axis of {1}.
+        points = np.concatenate([com[:, None], np.eye(3)], axis=1)
+        driven = (skew(alpha) + skew(omega) @ skew(omega)) @ points
+        driven[..., 0] += motion.acceleration
+        across = R_b1[:, :2] @ driven
+        # Force on the payload, in {1}, of 1 kg that hangs there.
+        swing = _swing(across, trial.signals.rate_hz, trial.data.gravity_mps2, shape)
+        force = -np.swapaxes(R_b1[:, :2], 1, 2) @ swing
+        # Moving the point by r moves the force, and changes what drives the pendulum.
+        moment = skew(com) @ force
+        moment[..., 1:] -= skew(force[..., 0])  # r x f = -f x r
+        return trial.of_wrench(force, moment)
 
     def finer(self, shape):
         longer = (0.85, 0.9, 0.95, 0.975, 0.9875, 1.0125, 1.025, 1.05, 1.1, 1.15)
@@ -85,12 +81,8 @@ class Slosh(Cause):
         }
 
 
-def _moment(r: Array, force: Array) -> Array:
-    return np.asarray(np.cross(r, force), dtype=np.float64)
-
-
 def _swing(a, rate_hz, gravity, shape):
-    """Relative acceleration of the swinging mass [m/s^2] from rest, a linear between samples, shape (Q, 3)."""
+    """Relative acceleration of the swinging mass [m/s^2] from rest, a linear between samples, shapes (Q, ...)."""
     w = np.sqrt(gravity / shape["length_m"])
     pendulum = [-1.0, 0.0, 0.0], [1.0, 2.0 * shape["damping_ratio"] * w, w**2]
     discrete = cast("tuple[Array, Array, float]", cont2discrete(pendulum, 1.0 / rate_hz, method="foh"))

@@ -25,11 +25,11 @@ def directions_at(linear: TrialLinear, place: Place) -> Array:
     robot, joint = (place.robot or 1) - 1, (place.joint or 1) - 1
     if place.name in ("phi reading", "theta reading"):
         slots = (PHI, PHI_DOT, PHI_DDOT) if place.name == "phi reading" else (THETA, THETA_DOT, THETA_DDOT)
-        J = linear.J[robot][at]
-        return np.stack([J[:, :, kind][:, :, joint] for kind in slots], axis=1)[:, None]
+        J = [linear.J.at(robot, kind, at)[..., joint] for kind in slots]
+        return np.stack(J, axis=1)[:, None]
     if place.name in ("tau reading", "driven torque"):
         sign = 1.0 if place.name == "tau reading" else -1.0  # a torque beside the spring is not read
-        return sign * linear.J[robot][at][:, :, TAU][:, None, None, :, joint]
+        return sign * linear.J.at(robot, TAU, at)[:, None, None, :, joint]
     if place.name == "gimbal torque":
         axes_T = np.swapaxes(rate_matrix(linear.s[at][:, robot, THETA]), -1, -2)
         unit = np.tile(np.eye(3)[joint][:, None], (len(at), 1, 1))
@@ -85,25 +85,29 @@ def _of_payload(linear: TrialLinear, name: str) -> list[Array]:
     if name == "force on payload":
         forces = [R[:, k] for k in range(3)]  # unit vector k of {b1}, in {1}
         return [
-            *(_wrench(linear, f, np.cross(com, f))[:, None] for f in forces),
+            *(_wrench(linear, f, _cross(com, f))[:, None] for f in forces),
             *(_wrench(linear, none, f)[:, None] for f in forces),
         ]
     if name == "payload mass":  # a point mass at the centre that is known of
-        needed = felt + np.cross(alpha, com) + np.cross(omega, np.cross(omega, com))
-        return [_wrench(linear, -needed, -np.cross(com, needed))[:, None]]
+        needed = felt + _cross(alpha, com) + _cross(omega, _cross(omega, com))
+        return [_wrench(linear, -needed, -_cross(com, needed))[:, None]]
     axes = [np.tile(axis, (len(at), 1)) for axis in np.eye(3)]
     if name == "payload centre":
         # d/dt^2 of R c m, and gravity's moment: value, rate and acceleration of the first moment in {1}.
         return [
             np.stack(
                 [
-                    _wrench(linear, -(np.cross(alpha, e) + np.cross(omega, np.cross(omega, e))), -np.cross(e, felt)),
-                    _wrench(linear, -2.0 * np.cross(omega, e), none),
-                    _wrench(linear, -e, -np.cross(com, e)),
+                    _wrench(linear, -(_cross(alpha, e) + _cross(omega, _cross(omega, e))), -_cross(e, felt)),
+                    _wrench(linear, -2.0 * _cross(omega, e), none),
+                    _wrench(linear, -e, -_cross(com, e)),
                 ],
                 axis=1,
             )
             for e in axes
         ]  # fmt: skip
     # Angular momentum fixed in the payload: its change is omega x h.
-    return [_wrench(linear, none, -np.cross(omega, e))[:, None] for e in axes]
+    return [_wrench(linear, none, -_cross(omega, e))[:, None] for e in axes]
+
+
+def _cross(a: Array, b: Array) -> Array:
+    return np.asarray(np.cross(a, b), dtype=np.float64)

@@ -18,7 +18,7 @@ def places_of(robots: int) -> list[Place]:
             driven = tuple(joint_variable(n, i, j) for n in ("phi", "phi_rate", "phi_acceleration", "tau"))
             gimbal = tuple(joint_variable(n, i, j) for n in ("theta", "theta_rate", "theta_acceleration"))
             out += [
-                _joint("tau reading", i, j, "tau", "N m", "reading of torque sensor {driven joint}", driven,
+                _joint("tau reading", i, j, "tau", "N m", "reading of the torque sensor of {driven joint}", driven,
                        twin="driven torque"),
                 _joint("phi reading", i, j, "phi", "rad", "reading of the angle of {driven joint}", driven),
                 _joint("theta reading", i, j, "theta", "rad", "reading of the angle of {gimbal axis}", gimbal),
@@ -34,7 +34,9 @@ def places_of(robots: int) -> list[Place]:
         )  # fmt: skip
     own = tuple(payload_variable(n, a) for n in ("payload_position", "payload_velocity") for a in XYZ)
     inner = tuple(
-        payload_variable(n, a) for n in ("payload_acceleration", "payload_rate", "payload_up") for a in XYZ
+        payload_variable(n, a)
+        for n in ("payload_felt", "payload_acceleration", "payload_rate", "payload_up")
+        for a in XYZ
     )
     out += [
         _payload("force on payload", (*(f"payload_force_{a}" for a in XYZ), *(f"payload_moment_{a}" for a in XYZ)),
@@ -57,7 +59,12 @@ def _joint(
 
 
 def _payload(
-    name: str, targets: tuple[str, ...], axes: tuple[str, ...], unit: str, title: str, own: tuple[Variable, ...]
+    name: str,
+    targets: tuple[str, ...],
+    axes: tuple[str, ...],
+    unit: str,
+    title: str,
+    own: tuple[Variable, ...],
 ) -> Place:
     return Place(name, None, None, targets, axes, unit, title, own)
 

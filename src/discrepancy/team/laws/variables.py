@@ -26,9 +26,12 @@ _PAYLOAD: dict[str, tuple[str, str, str, Kind]] = {
     "payload_position": ("position of the payload along {axis}", "p", "m", "position"),
     "payload_velocity": ("velocity of the payload along {axis}", "v", "m/s", "velocity"),
     "payload_acceleration": ("acceleration of the payload along {axis}", "a", "m/s^2", "acceleration"),
+    "payload_felt": (
+        "acceleration that the payload feels, less gravity, along its {axis}", "f", "m/s^2", "acceleration",
+    ),
     "payload_rate": ("turn rate of the payload about its {axis}", "omega", "rad/s", "rate"),
     "payload_up": ("tilt of the payload, component of up along its {axis}", "up", "1", "tilt"),
-}
+}  # fmt: skip
 
 
 def joint_variable(name: str, robot: int, joint: int) -> Variable:
@@ -63,6 +66,7 @@ def signals_of(linear: TrialLinear) -> dict[str, Array]:
         "payload_position": position,
         "payload_velocity": with_rates(position, signals.rate_hz)[1],
         "payload_acceleration": motion.acceleration,
+        "payload_felt": motion.acceleration + linear.data.gravity_mps2 * motion.up,
         "payload_rate": motion.omega,
         "payload_up": motion.up,
     }

@@ -1,20 +1,83 @@
 """Derivative of a trial's residual by every robot's signals."""
 
+from __future__ import annotations
+
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
-from estimator.arm.arms import Arms, arm_of
+from estimator.arm.arms import Arms, arm_of, levelled
 from estimator.arrays import Array
 from estimator.estimate.fusion import fuse, fusion_matrix
 from estimator.rigid_team.changes import needed_wrench, vee
-from estimator.rigid_team.residual import Bases, Shared, robot_data
-from estimator.rigid_team.slots import COUNT, STEPS
+from estimator.rigid_team.residual import Bases, Shared
+from estimator.rigid_team.slots import COUNT, PHI, STEPS, THETA
+from estimator.signals.arm_data import ArmData, arm_data
 from estimator.signals.grasp_data import GraspData
+from estimator.so3 import cross
 
 
-def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Arms) -> Array:
-    """Derivative of the residual by every robot's signals, shape (N, Q, C, 21).
+@dataclass(frozen=True, eq=False)
+class BySignals:
+    """Derivative of the residual's samples by every robot's signals, (Q, C, 21) each; kept at every so-many-th sample.
+
+    It varies as slowly as the motion: a straight line between its values is good to 1e-3.
+
+    Attributes:
+        knots: its values, shape (N, K, C, 21).
+        every: samples from one to the next.
+        samples: Q.
+    """
+
+    knots: Array
+    every: int
+    samples: int
+
+    @classmethod
+    def none(cls, robots: int, channels: int) -> BySignals:
+        """Where nobody asks for it."""
+        return cls(np.zeros((robots, 0, channels, COUNT)), 1, 0)
+
+    def __call__(self, robot: int, slots: slice, change: Array) -> Array:
+        """What changes of some of one robot's signals do, (Q, s) -> (Q, C); of several (Q, s, k) -> (Q, C, k).
+
+        A change that stays is of shape (s,).
+        """
+        J = self.knots[robot][..., slots]
+        after = np.concatenate([J[1:], J[-1:]])
+        if change.ndim == 1:
+            change = np.broadcast_to(change, (self.samples, len(change)))
+        several = change.shape[2:]
+        each = np.zeros((len(J) * self.every, change.shape[1], *several))
+        each[: self.samples] = change
+        each = np.moveaxis(each.reshape(len(J), self.every, change.shape[1], -1), 1, 3)  # (K, s, k, every)
+        weight = np.arange(self.every) / self.every
+        rows, parts = J.shape[1], each.shape[2]
+        out = J @ (each * (1.0 - weight)).reshape(len(J), -1, parts * self.every)
+        out += after @ (each * weight).reshape(len(J), -1, parts * self.every)
+        out = np.moveaxis(out.reshape(len(J), rows, parts, self.every), 3, 1)
+        return out.reshape(-1, rows, *several)[: self.samples]
+
+    def at(self, robot: int, slots: slice, samples: NDArray[np.intp]) -> Array:
+        """Of one robot at some samples, shape (k,) -> (k, C, s)."""
+        J = self.knots[robot][..., slots]
+        low, rest = np.divmod(samples, self.every)
+        after = J[np.minimum(low + 1, len(J) - 1)]
+        return J[low] + (after - J[low]) * (rest / self.every)[:, None, None]
+
+    def dense(self, slots: slice = slice(None)) -> Array:
+        """At every sample, shape (N, Q, C, s)."""
+        J = self.knots[..., slots]
+        low, rest = np.divmod(np.arange(self.samples), self.every)
+        out = J[:, low]
+        after = J[:, np.minimum(low + 1, J.shape[1] - 1)]
+        return out + (after - out) * (rest / self.every)[:, None, None]
+
+
+def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Arms) -> BySignals:
+    """Derivative of the residual by every robot's signals.
 
     Central differences through one robot's own formulas, then by hand through what is linear in the robots;
     evaluated at 25 Hz.
@@ -30,36 +93,54 @@ def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Ar
     J = np.zeros((N, Q, 6 * N, COUNT))
     for i in range(N):
         G = fusion_matrix(grasps)[:, 6 * i : 6 * i + 6]
-        R_1i, p_1i, arm = grasps.R_1i[i], grasps.p_1i[i], arm_of(arms, i)
-        for k in range(COUNT):
-            ends = []
-            for sign in (1.0, -1.0):
-                moved = s[:, i].copy()
-                moved[:, k] += sign * STEPS[k]
-                ends.append(robot_data(moved, arm))
-            dR, dh, dV, dV_dot, dF = (
-                (a - b) / (2.0 * STEPS[k]) for a, b in zip(ends[0], ends[1], strict=True)
-            )
-            turn = vee(dR @ np.swapaxes(data.R_bi[:, i], -1, -2))  # in {b_i}
-            for j in range(1, N):
-                at = 6 * (j - 1)
-                if i == 0:
-                    J[i, :, at : at + 3, k] = -turn
-                    J[i, :, at + 3 : at + 6, k] = -dh - dR @ grasps.p_1i[j]
-                elif i == j:
-                    J[i, :, at : at + 3, k] = turn @ bases.R[j].T
-                    J[i, :, at + 3 : at + 6, k] = dh @ bases.R[j].T
-            d_up = dR[:, 2] @ R_1i.T / N
-            d_up -= np.sum(d_up * motion.up, axis=1, keepdims=True) * motion.up
-            needed = needed_wrench(fused, dV @ G.T, dV_dot @ G.T, data.gravity_mps2 * d_up, shared.pi)
-            d_force, d_moment = dF[:, 3:] @ R_1i.T, dF[:, :3] @ R_1i.T
-            d_moment = d_moment + np.cross(p_1i, d_force)
-            J[i, :, -6:-3, k], J[i, :, -3:, k] = d_force - needed[0], d_moment - needed[1]
-    # It varies as slowly as the motion: a straight line between its values is good to 1e-3.
-    at = np.minimum(np.arange(samples) / every, Q - 1.0)
-    low = np.minimum(at.astype(int), max(Q - 2, 0))
-    weight = (at - low)[None, :, None, None]
-    return J[:, low] * (1.0 - weight) + J[:, np.minimum(low + 1, Q - 1)] * weight
+        R_1i, p_1i = grasps.R_1i[i], grasps.p_1i[i]
+        dR, dh, dV, dV_dot, dF = _changes(s[:, i], arm_of(arms, i))  # (21, Q, ...)
+        turn = vee(dR @ np.swapaxes(data.R_bi[:, i], -1, -2))  # in {b_i}
+        for j in range(1, N):
+            at = 6 * (j - 1)
+            if i == 0:
+                J[i, :, at : at + 3] = np.moveaxis(-turn, 0, -1)
+                J[i, :, at + 3 : at + 6] = np.moveaxis(-dh - dR @ grasps.p_1i[j], 0, -1)
+            elif i == j:
+                J[i, :, at : at + 3] = np.moveaxis(turn @ bases.R[j].T, 0, -1)
+                J[i, :, at + 3 : at + 6] = np.moveaxis(dh @ bases.R[j].T, 0, -1)
+        d_up = dR[..., 2, :] @ R_1i.T / N
+        d_up -= np.sum(d_up * motion.up, axis=-1, keepdims=True) * motion.up
+        needed = needed_wrench(fused, dV @ G.T, dV_dot @ G.T, data.gravity_mps2 * d_up, shared.pi)
+        d_force, d_moment = dF[..., 3:] @ R_1i.T, dF[..., :3] @ R_1i.T
+        d_moment = d_moment + cross(p_1i, d_force)
+        J[i, :, -6:-3] = np.moveaxis(d_force - needed[0], 0, -1)
+        J[i, :, -3:] = np.moveaxis(d_moment - needed[1], 0, -1)
+    return BySignals(J, every, samples)
+
+
+def _changes(s: Array, arm: Arms) -> ArmData:
+    """Derivative of one robot's data by its signals, (Q, 21) -> (21, Q, ...) each.
+
+    All of a kind at once; where angles stay, so do the legs and the orientation, which are not found again.
+    """
+    Q, kinds = len(s), COUNT // 3
+    at = list(np.moveaxis(s.reshape(Q, kinds, 3), 1, 0))
+    fields = [np.zeros((COUNT, Q, *size)) for size in ((3, 3), (3,), (6,), (6,), (6,))]
+    phi, theta = PHI.start // 3, THETA.start // 3
+    for some in ((phi,), (theta,), tuple(k for k in range(kinds) if k not in (phi, theta))):
+        slots = np.concatenate([np.arange(3 * k, 3 * k + 3) for k in some])
+        steps, ends = STEPS[slots], []
+        for sign in (1.0, -1.0):
+            moved = [
+                x if k in (phi, theta) else np.broadcast_to(x, (len(slots), Q, 3)) for k, x in enumerate(at)
+            ]
+            for n, k in enumerate(some):
+                change = np.zeros((len(slots), 1, 3))
+                change[3 * n : 3 * n + 3, 0] = sign * np.diag(STEPS[3 * k : 3 * k + 3])
+                moved[k] = at[k] + change
+            data = arm_data((moved[0], moved[1], moved[2]), (moved[3], moved[4], moved[5]), moved[6], arm)
+            R_bi, h = levelled(arm, data.R_bi, data.h)
+            ends.append(data._replace(R_bi=R_bi, h=h))
+        for field, ahead, behind in zip(fields, *ends, strict=True):
+            if ahead.ndim == field.ndim:
+                field[slots] = (ahead - behind) / (2.0 * steps.reshape(-1, *[1] * (field.ndim - 1)))
+    return ArmData(*fields)
 
 
 def _thinned(data: GraspData, rows: NDArray[np.intp]) -> GraspData:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +14,7 @@ from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.gimbal import rate_matrix
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
-from estimator.rigid_team.slots import THETA
+from estimator.rigid_team.slots import TAU, THETA
 
 Tolerances = Mapping[str, Mapping[str, float]]
 
@@ -40,27 +41,37 @@ class Resting:
         self._play_m = tolerances.get("grasp_play", {}).get("play_m", 0.0)
         self._rests = {moves: _numbered(trial.signals, moves, slow[moves]) for moves in self._limit_Nm}
 
-    def __call__(self, rng: np.random.Generator) -> Array:
-        """One draw, shape (n, C)."""
-        trial = self._trial
+    def __call__(self, rng: np.random.Generator, draws: int = 1) -> Array:
+        """Draws of it, shape (draws, n, C)."""
+        out = []
+        for first in range(0, draws, rules.DRAWS_AT_A_TIME):
+            some = [self._drawn(rng) for _ in range(min(rules.DRAWS_AT_A_TIME, draws - first))]
+            out.append(self._rows(*(np.stack(part, axis=-1) for part in zip(*some, strict=True))))
+        return np.concatenate(out)
+
+    def _drawn(self, rng: np.random.Generator) -> tuple[Array, Array, Array]:
+        """Torques of joints and of gimbals at rest [N m], and places in the plays [m], shape (Q, N, 3) each."""
         driven = self._torque("phi", rng) + self._torque("tau", rng)
-        rows = np.zeros((len(trial.reduction.time), trial.channels))
-        for i in range(trial.robots):
-            rows += trial.of_signals(i, tau=driven[:, i])
         gimbal = self._torque("theta", rng)
-        if np.any(gimbal):
-            moment = np.zeros((len(gimbal), 3))
-            for i in range(trial.robots):
-                axes_T = np.swapaxes(rate_matrix(trial.s[:, i, THETA]), -1, -2)
-                moment += (
-                    np.linalg.solve(axes_T, gimbal[:, i, :, None])[..., 0] @ trial.shared.grasps.R_1i[i].T
-                )
-            rows += trial.of_wrench(np.zeros_like(moment), moment)
-        if self._play_m:
-            for i in range(trial.robots):
-                offset = np.einsum("qij,qj->qi", trial.data.R_bi[:, i], self._between(i, rng))
-                rows += trial.of_pose(i, None, offset @ trial.bases.R[i].T)
-        return rows
+        places = [self._between(i, rng) for i in range(self._trial.robots if self._play_m else 0)]
+        return driven, gimbal, np.stack(places, axis=1) if places else np.zeros_like(driven)
+
+    def _rows(self, driven: Array, gimbal: Array, places: Array) -> Array:
+        """What draws (Q, N, 3, D) of them leave, shape (D, n, C)."""
+        trial, (samples, N, _, D) = self._trial, driven.shape
+        rows = trial.reduction(np.sum([trial.J(i, TAU, driven[:, i]) for i in range(N)], axis=0))
+        moment = self._moments @ gimbal.reshape(samples, 3 * N, D)
+        rows += trial.of_wrench(np.zeros_like(moment), moment)
+        for i in range(N if self._play_m else 0):
+            rows += trial.of_pose(i, None, trial.bases.R[i] @ trial.data.R_bi[:, i] @ places[:, i])
+        return np.moveaxis(rows, -1, 0)
+
+    @cached_property
+    def _moments(self) -> Array:
+        """Moment on the payload in {1} by all gimbal torques, shape (Q, 3, 3 N)."""
+        axes_T = np.swapaxes(rate_matrix(self._trial.s[..., THETA]), -1, -2)
+        by_robot = np.moveaxis(self._trial.shared.grasps.R_1i @ np.linalg.inv(axes_T), 1, 2)
+        return np.asarray(by_robot.reshape(len(by_robot), 3, -1), dtype=np.float64)
 
     def _between(self, robot: int, rng: np.random.Generator) -> Array:
         """Place in a grasp's play along the axes of {i} [m] while the force leaves it open, shape (Q, 3); else 0."""

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import cast
 
 import numpy as np
@@ -113,7 +114,7 @@ def what_noise_leaves(
     rng, resting = np.random.default_rng([rules.NOISE_SEED, k, 1]), Resting(trial, tolerances)
     moving = trial.reduction.moving
     torque_noise = TorqueNoise.of(draws, torques, moving)
-    draws = draws + np.array([resting(rng) for _ in draws])
+    draws = draws + resting(rng, len(draws))
     return Whitening.of(draws, moving, uneven=True), torque_noise
 
 
@@ -143,17 +144,12 @@ def gauss_newton(linear: Sequence[TrialLinear], whitening: Sequence[Whitening]) 
     ]
 
 
-def noise_rows(
-    trial: TrialLinear, noise: Noise, rng: np.random.Generator, draws: int = rules.NOISE_DRAWS
-) -> tuple[Array, Array]:
+def noise_rows(trial: TrialLinear, noise: Noise, rng: np.random.Generator) -> tuple[Array, Array]:
     """What the sensors' errors alone would leave: residuals (draws, n, C), and the torques' own (draws, n, N, 3)."""
     out, torques = [], []
-    for errors in noise.draws(trial.signals, rng, draws):
-        out.append(
-            sum(
-                trial.of_signals(i, errors.phi[:, i], errors.theta[:, i], errors.tau[:, i])
-                for i in range(trial.robots)
-            )
-        )
-        torques.append(trial.reduction(errors.tau))
-    return np.array(out), np.array(torques)
+    errors = noise.draws(trial.signals, rng, rules.NOISE_DRAWS)
+    while some := list(islice(errors, rules.DRAWS_AT_A_TIME)):  # not all at once, for the sake of memory
+        phi, theta, tau = (np.array([getattr(e, kind) for e in some]) for kind in ("phi", "theta", "tau"))
+        out.append(trial.of_all_signals(phi, theta, tau))
+        torques += [trial.reduction(x) for x in tau]
+    return np.concatenate(out), np.array(torques)

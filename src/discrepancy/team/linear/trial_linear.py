@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from discrepancy.team.linear.jacobian import by_signals
+from discrepancy.team.linear.jacobian import BySignals, by_signals
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals, with_rates
 from estimator.arm.arms import Arms, arm_of, design_of
@@ -38,7 +38,7 @@ class TrialLinear:
         arms: the robots as they are, or as designed.
         reduction: samples to rows.
         residual: shape (n, C) with C = 6 N channels.
-        J: derivative of the residual's samples by robot i's 21 signals, shape (N, Q, C, 21).
+        J: derivative of the residual's samples by every robot's 21 signals.
         by_shared: derivative by ``Shared.moved``, shape (n, C, 6 (N - 1) + 10).
         by_bases: derivative by ``Bases.moved``, shape (n, C, 4 (N - 1)).
     """
@@ -51,7 +51,7 @@ class TrialLinear:
     arms: Arms
     reduction: Reduction
     residual: Array
-    J: Array
+    J: BySignals
     by_shared: Array
     by_bases: Array
 
@@ -96,14 +96,28 @@ class TrialLinear:
             if error is None:
                 continue
             if error.ndim == 1:
-                total += self.J[robot, :, :, angle] @ error
+                total += self.J(robot, angle, error)
             else:
                 parts = with_rates(error, rate).transpose(1, 0, 2).reshape(samples, 9)
-                total += np.einsum("qcs,qs->qc", self.J[robot, :, :, with_its_rates(angle)], parts)
+                total += self.J(robot, with_its_rates(angle), parts)
         if tau is not None:
-            tau = np.broadcast_to(tau, (samples, 3))
-            total += np.einsum("qcs,qs->qc", self.J[robot, :, :, TAU], tau)
+            total += self.J(robot, TAU, tau)
         return self.reduction(total)
+
+    def of_all_signals(self, phi: Array, theta: Array, tau: Array) -> Array:
+        """What errors of all robots' readings add together, many at once, (D, Q, N, 3) each -> (D, n, C)."""
+        D, samples, N = phi.shape[:3]
+        angles = with_rates(np.stack([phi, theta], axis=3).transpose(1, 2, 3, 4, 0), self.signals.rate_hz)
+        # (3, Q, N, 2, 3, D) to slots, which are value, rate and acceleration of phi, then of theta, then tau
+        parts = np.concatenate(
+            [
+                np.moveaxis(angles, 0, 3).reshape(samples, N, 18, D),
+                np.moveaxis(tau, 0, -1),
+            ],
+            axis=2,
+        )
+        total = np.sum([self.J(i, slice(None), parts[:, i]) for i in range(N)], axis=0)
+        return np.moveaxis(self.reduction(total), -1, 0)
 
     def of_wrench(self, force: Array, moment: Array) -> Array:
         """What an outside wrench at the origin of {1} on the payload, in {1}, adds, shape (n, C).
@@ -111,11 +125,11 @@ class TrialLinear:
         The robots then have to exert less: they and the outside together move the payload.
 
         Args:
-            force, moment: [N], [N m], shape (Q, 3).
+            force, moment: [N], [N m], shape (Q, 3); of several wrenches (Q, 3, k), for (n, C, k).
         """
-        total = np.zeros((len(force), self.channels))
-        total[:, -6:-3], total[:, -3:] = -force, -moment
-        return self.reduction(total)
+        rows = self.reduction(-np.concatenate([force, moment], axis=1))
+        none = np.zeros((len(rows), self.channels - 6, *rows.shape[2:]))
+        return np.concatenate([none, rows], axis=1)
 
     def of_pose(self, robot: int, rotation: Array | None, displacement: Array | None) -> Array:
         """What a small motion of robot i's grasp frame as seen from {b1} adds, shape (n, C).
@@ -126,23 +140,25 @@ class TrialLinear:
         Args:
             robot: index of the robot, from 0.
             rotation: true minus assumed, rotation vector in {b1} [rad], shape (Q, 3) or None.
-            displacement: the same [m].
+            displacement: the same [m]; of several (Q, 3, k), for (n, C, k).
         """
-        samples = len(self.signals.time)
-        total = np.zeros((samples, self.channels))
+        several = () if displacement is None else displacement.shape[2:]
+        total = np.zeros((len(self.signals.time), self.channels, *several))
         for i in range(1, self.robots):
             sign = 1.0 if robot == 0 else -1.0 if robot == i else 0.0
             for at, x in ((6 * (i - 1), rotation), (6 * (i - 1) + 3, displacement)):
                 if x is not None:
                     total[:, at : at + 3] += sign * x
         if displacement is not None:
-            total[:, -6:] = self._of_wrong_motion(robot, -displacement @ self.bases.R[robot])
+            of_motion = self._of_wrong_motion(robot, -displacement.reshape(len(total), 3, -1))
+            total[:, -6:] = of_motion.reshape(len(total), 6, *several)
         return self.reduction(total)
 
-    def _of_wrong_motion(self, robot: int, wrist: Array) -> Array:
-        """Wrench balance, shape (Q, 6), of a wrist that does not move with the payload: by ``wrist`` [m], in {b_i}."""
+    def _of_wrong_motion(self, robot: int, moved: Array) -> Array:
+        """Wrench balance (Q, 6, k) of a wrist that moves apart from the payload, by (Q, 3, k) [m] in {b1}."""
+        wrist = self.bases.R[robot].T @ moved
         rates = np.concatenate(with_rates(wrist, self.signals.rate_hz)[1:], axis=1)
-        return np.asarray((self.by_wrist[robot] @ rates[..., None])[..., 0])
+        return np.asarray(self.by_wrist[robot] @ rates)
 
     @cached_property
     def by_clocks(self) -> Array:
@@ -195,30 +211,31 @@ def linearise(
     pose = pose_residual(signals.phi, signals.theta, shared, bases, arms)
     residual = reduction(np.concatenate([pose, force], axis=1))
 
-    def both(x: Array) -> Array:
-        moved = shared.moved(x)
-        pose = pose_error(data.R_bi, data.p_bi, moved, bases)
-        return np.concatenate([pose, balance(data, moved)[0]], axis=1)
-
     C, split = 6 * N, 6 * (N - 1)
     by_shared = np.zeros((Q, C, split + 10))
     by_shared[:, split:, split:] = -Y
     for k in range(split):
-        by_shared[:, :, k] = _slope(both, k, split + 10)
+        by_shared[:, split:, k] = _slope(lambda x: balance(data, shared.moved(x))[0], np.eye(split + 10)[k])
+    # A loop knows its own robot's grasp and base alone: all loops at once.
     by_bases = np.zeros((Q, C, 4 * (N - 1)))
-    for k in range(4 * (N - 1)):
-        by_bases[:, :split, k] = _slope(
-            lambda x: pose_error(data.R_bi, data.p_bi, shared, bases.moved(x)), k, 4 * (N - 1)
-        )
-    J = by_signals(s, data, shared, bases, arms) if full else np.zeros((N, 0, C, COUNT))
+    for k in range(6):
+        all_grasps = np.append(np.tile(np.eye(6)[k], N - 1), np.zeros(10))
+        slope = _slope(lambda x: pose_error(data.R_bi, data.p_bi, shared.moved(x), bases), all_grasps)
+        for i in range(N - 1):
+            by_shared[:, 6 * i : 6 * i + 6, 6 * i + k] = slope[:, 6 * i : 6 * i + 6]
+    for k in range(4):
+        all_bases = np.tile(np.eye(4)[k], N - 1)
+        slope = _slope(lambda x: pose_error(data.R_bi, data.p_bi, shared, bases.moved(x)), all_bases)
+        for i in range(N - 1):
+            by_bases[:, 6 * i : 6 * i + 6, 4 * i + k] = slope[:, 6 * i : 6 * i + 6]
+    J = by_signals(s, data, shared, bases, arms) if full else BySignals.none(N, C)
     columns = reduction(by_shared), reduction(by_bases)
     return TrialLinear(signals, s, data, shared, bases, arms, reduction, residual, J, *columns)
 
 
-def _slope(of: Callable[[Array], Array], k: int, count: int) -> Array:
-    """Central difference of a function of ``count`` unknowns by the k-th, at nought."""
-    step = 1e-5 * np.eye(count)[k]
-    return (of(step) - of(-step)) / 2e-5
+def _slope(of: Callable[[Array], Array], along: Array) -> Array:
+    """Central difference of a function of unknowns in one direction, at nought."""
+    return (of(1e-5 * along) - of(-1e-5 * along)) / 2e-5
 
 
 def filtered(signals: Signals) -> Array:

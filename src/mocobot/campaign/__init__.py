@@ -1,0 +1,1 @@
+"""Blind campaigns: hide effects in simulated teams, diagnose, and count what was found, missed and invented."""

@@ -1,0 +1,1 @@
+"""The part of the page on a blind campaign."""

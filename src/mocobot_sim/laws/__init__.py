@@ -1,0 +1,1 @@
+"""Formulas that act in a trial: what the effect ``law`` is made of."""
