@@ -30,6 +30,18 @@ class LawCandidate(Candidate):
         """Place and signal: another function of the same signal is another form of the same thing."""
         return f"{CAUSE}: {self.at.name} by {' '.join(self.term.variables)}", self.robot, self.joint
 
+    @property
+    def where_it_is(self) -> str:
+        """What is wrong, at its place, in words."""
+        return super().label
+
+    @property
+    def label(self) -> str:
+        """The same, and of what it is a function."""
+        signals = [v.words for v in (self.term.of, self.term.times) if v is not None]
+        by = "a constant" if self.term.function == "constant" else f"by {' and '.join(signals)}"
+        return f"{self.where_it_is}, {by}"
+
     def shaped(self, numbers: dict[str, float]) -> LawCandidate:
         """The same with other numbers inside the function."""
         return replace(self, term=replace(self.term, numbers=numbers), shape=numbers)

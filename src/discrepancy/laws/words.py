@@ -21,7 +21,7 @@ def sentence(candidate: LawCandidate, values: Mapping[str, float], se: Mapping[s
         values, se: of ``report.report``.
     """
     term, place = candidate.term, candidate.at
-    what = candidate.label
+    what = candidate.where_it_is
     lead = f"{what[:1].upper()}{what[1:]}"
     if _is_share(candidate):
         share = number(values["amplitude"], se.get("amplitude"), "%", 100.0)

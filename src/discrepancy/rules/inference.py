@@ -94,8 +94,8 @@ HELD_FACTOR = 1.5
 WORST_EVENTS = 3
 """Intervals looked at closely. Chosen."""
 NAMED_NATS = 5.0
-"""Log odds from which a cause is named. Derived: ln of ``FALSE_ALARM_COST``; named, a cause costs that much times 1 - p,
-and silence 1 times p."""
+"""Log odds from which a cause is named. Derived: ln of ``FALSE_ALARM_COST``: naming costs that much times 1 - p, and
+silence 1 times p."""
 EXCHANGES = 4
 """Rounds in which causes are exchanged and taken away after one was added. Chosen."""
 EXCHANGED_NATS = 1.0
