@@ -30,13 +30,14 @@ class Proposed:
     scores: tuple[tuple[Candidate, float], ...]
 
 
-def proposals(rig: Rig, base: Hypothesis, *, events: bool = True) -> Proposed:
+def proposals(rig: Rig, base: Hypothesis, *, events: bool = True, narrow: bool = True) -> Proposed:
     """Hypotheses with one cause more.
 
     Args:
         rig: for columns of other shapes.
         base: what is there already.
         events: whether to look for what acts for a while, too.
+        narrow: whether to look with kinds that scatter held within their tolerance, too.
     """
     fit = base.fit
     ranked = [_in_best_shape(rig, fit, item) for item in _with_kinds_held(base)]
@@ -44,7 +45,7 @@ def proposals(rig: Rig, base: Hypothesis, *, events: bool = True) -> Proposed:
     ranked.sort(key=lambda item: -item.score)
     best: Hypothesis | None = None  # each has its own columns: all together would be gigabytes
     scores: dict[tuple[object, ...], tuple[Candidate, float]] = {}
-    for new in _hypotheses(rig, base, ranked):
+    for new in _hypotheses(rig, base, ranked, narrow=narrow):
         last = new.causes[-1]
         which = (last.key, last.transient)
         if which in scores and scores[which][1] >= new.score:
@@ -56,11 +57,14 @@ def proposals(rig: Rig, base: Hypothesis, *, events: bool = True) -> Proposed:
     return Proposed(best, tuple(sorted(scores.values(), key=lambda one: -one[1])))
 
 
-def _hypotheses(rig: Rig, base: Hypothesis, ranked: Sequence[Scanned]) -> Iterator[Hypothesis]:
+def _hypotheses(
+    rig: Rig, base: Hypothesis, ranked: Sequence[Scanned], *, narrow: bool
+) -> Iterator[Hypothesis]:
     """One after the other, each with one cause more in its best shape."""
     for item in _chosen(ranked, rules.LEADERS):
         yield sharpened(rig, base, item, near=item.score > ranked[0].score - rules.CLOSE_NATS)
-    yield from _with_kinds_narrow(rig, base)
+    if narrow:
+        yield from _with_kinds_narrow(rig, base)
 
 
 def _with_kinds_held(base: Hypothesis) -> list[Scanned]:

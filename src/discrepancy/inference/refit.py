@@ -42,7 +42,10 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         new = Hypothesis.of(fit.problem.with_residual(back), hypothesis.free, hypothesis.allowed)
         if new.learnt.log_evidence < hypothesis.learnt.log_evidence - rules.DIVERGED_NATS:
             break  # it diverges: the linear answer is the better one
-        step = np.abs(new.fit.solution - fit.solution) / np.sqrt(np.diag(new.fit.covariance))
+        se = np.sqrt(np.diag(new.fit.covariance))
+        step = (
+            np.abs(new.fit.solution - fit.solution)[se > 0] / se[se > 0]
+        )  # what nothing tells stays where it is
         moved = float(step.max(initial=0.0))
         if moved > max(last, 1.0):
             return linear  # steps grow: columns take up whatever a value that runs away leaves

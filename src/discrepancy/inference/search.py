@@ -122,7 +122,7 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
                 break
             candidate = best.problem.candidates[index]
             # Its own shape may be another beside what was found since.
-            others = proposals(rig, less, events=candidate.transient is None)
+            others = proposals(rig, less, events=candidate.transient is None, narrow=False)
             rivals[index] = [
                 Rival(other, best.score - score)
                 for other, score in others.scores

@@ -38,11 +38,15 @@ TOP_BAND = (0.25, 0.45)
 """Where the position's is, over the sampling rate. Chosen: motion is least there, whose noise is differentiated."""
 FILTERED_BAND = (0.1, 0.2)
 """The same of a log that was low-passed when it was resampled. Derived: ``mocobot_logs`` keeps as much."""
-SPOILT_SHARE = 0.01
-"""Of a trace's square, that noise of the positions may be. Derived: a fit would be off by as much."""
+SPOILT_SHARE = 0.05
+"""Of a trace's square, that noise of the positions may be. Derived: a fit would be off by as much; a share
+of friction by load that is off by 5 % is better than none."""
 SPOILT_GAIN = 8.0
 """Of chi-square, that noise in a trace may have by meeting itself in the residual. Derived: a third of the 24 from
 which a single number is significant."""
+STILL_S, STILL_STEPS = 0.1, 0.3
+"""How long a position's reading must be the same, and within which share of its step (of a resampled log it ripples a
+little), to be without noise. Chosen: rounding is all the noise there is then."""
 STICKING_SHARE = 0.06
 """Of a joint's typical speed, by which its smoothed velocity is off where it turns round. Derived: sticking takes some
 10 ms there and a period of ``SMOOTH_HZ`` 17 ms, in which a joint that takes 0.3 s from one speed to the other would
@@ -60,6 +64,9 @@ LEAST_LEVEL = 1e-3
 
 SLOW_SHARES = (0.01, 0.003, 0.03, 0.1)
 """Of a joint's typical speed, below which the direction of friction fades; the first is the catalogue's. Chosen."""
+SLOW_ROUNDINGS = 2.0
+"""The same, at least, over what rounding of the positions makes of a velocity. Chosen: two standard deviations; a joint
+that creeps through the steps of a coarse encoder has no direction."""
 STRIBECK_SHARES = (0.05, 0.1, 0.2)
 """The same, over which low-speed friction may fade. Chosen: slower is how dry friction fades, faster is viscous."""
 EXPONENTS = (0.5, 0.3, 0.7)
@@ -71,6 +78,8 @@ LEAST_TRAVEL = 1e-3
 
 REST_KNOTS_S, SHORTEST_REST_S = 0.5, 0.1
 """Between knots of friction at rest, which follows the load, and rests for which it is left open. Chosen."""
+SERVO_KNOTS_S = 0.02
+"""The same, both, where torques follow from duties: no row tells anything at rest. Derived: rows are as far apart."""
 LEAST_REST_SHARE = 1e-6
 """Of a unit, that such a friction must leave in the rows. Chosen: rounding is less."""
 
@@ -97,6 +106,29 @@ DELAY_S = 5e-4
 """By which torques are late or early. Chosen: half a period of a drive's loop at 1 kHz."""
 MOST_SCALE = 0.5
 """From which a scale is none, but a wrong unit or gear. Chosen."""
+
+# Servos.
+
+LEAST_DRIVEN_SHARE = 0.1
+"""Of the square of what a drive was given, that the model's torque must account for. Chosen: of a joint that only rubs,
+nobody can tell what a volt is worth."""
+MOTOR_SHARE, MOVES_THROUGHOUT = 0.5, 0.98
+"""Cut-off of the fit of what a volt is worth, over the rows', and the share of its filter's window in which the joint
+moves. Chosen: noise of accelerations would make the torque look smaller than it is."""
+UNKNOWN_SCALE_SHARE = 0.1
+"""By which what a volt or an ampere is worth may be off once it was fitted. Chosen: as much as the masses."""
+MOVING_SHARE, LEAST_OFF_S = 0.3, 0.2
+"""Of a joint's typical speed, and for how long, it moves while its drive is off. Chosen: a fall takes so long."""
+LOOP_STRETCH_S = 1.0
+"""Stretches whose scatter gives a loop's standard errors. Chosen: longer than any loop remembers."""
+MOST_LOOP_SHARE = 0.1
+"""Of a duty's variance, that a loop's law may leave. Chosen: what leaves more is another kind of loop."""
+CUT_OFF_SHARE, LEAST_CUT_OFF, CUT_OFF_SAMPLES = 0.97, 0.003, 7
+"""Of the largest duty, up to which the law of a loop is fitted; the share of the time in which that law asks for more
+than the largest by as much, from which it is cut off; and samples left out around a large one. Chosen: resampling
+ripples for three samples on either side."""
+LATE_S = 1e-3
+"""Lag of a loop that is worth a word. Chosen: less is within the stamps of a bus."""
 
 # Shapes and searches.
 

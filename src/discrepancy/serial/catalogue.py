@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discrepancy.rules import serial as rules
 from discrepancy.serial.candidate import SerialCandidate
@@ -11,6 +12,7 @@ from discrepancy.serial.causes.base import Cause, Hints, last_link, partner
 from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rows.signals import Signals
+from discrepancy.serial.servo.motor import Motor, driven_by_voltage
 from estimator.arrays import Array
 
 Tolerances = Mapping[str, Mapping[str, float]]
@@ -30,7 +32,9 @@ def places(cause: Cause, tree: Tree, hints: Hints, *, change: bool = False) -> l
         # A body of several joints is moved by the last of them.
         moving = [j for j in joints if tree.joint_body[j] not in tree.joint_body[j + 1 :]]
         if cause.name == "payload":
-            return moving if change else [last_link(tree)]
+            # Where one joint moves a link its mass does not show: what does is a first moment and an inertia.
+            carried = [j for j in moving if tree.moved[:, tree.joint_body[j]].sum() > 1]
+            return [j for j in carried if change or j == last_link(tree)]
         return [j for j in moving if cause.name == "link_length" or tree.mass[tree.joint_body[j]] > 0]
     travelled = [j for j in joints if hints.travel[j] > rules.LEAST_TRAVEL and cause.shapes(hints, j)]
     if cause.part == "pair":
@@ -53,7 +57,10 @@ def candidates(
         if name in excluded or cause.transient:
             continue
         for at in places(cause, tree, hints, change=change):
-            out.append(cause.at(tree, names, at, cause.shapes(hints, at)[0], tolerances.get(name)))
+            given = tolerances.get(name)
+            if name == "torque_scale" and given is None and hints.unscaled[at]:
+                given = {"scale": rules.UNKNOWN_SCALE_SHARE}
+            out.append(cause.at(tree, names, at, cause.shapes(hints, at)[0], given))
     return out
 
 
@@ -62,8 +69,8 @@ def events() -> dict[str, dict[str, float]]:
     return {name: dict.fromkeys(cause.parameters, 0.0) for name, cause in CAUSES.items()}
 
 
-def hints_of(parts: Sequence[Signals], logs: Sequence[JointLog]) -> Hints:
-    """Hints from all logs of one robot."""
+def hints_of(parts: Sequence[Signals], logs: Sequence[JointLog], motors: Sequence[Motor] = ()) -> Hints:
+    """Hints from all logs of one robot, and from those of its drives that tell no torque."""
     typical = parts[0].typical
     load = np.sqrt(np.mean(np.concatenate([s.inverse for s in parts]) ** 2, axis=0))
     q = np.concatenate([s.q for s in parts])
@@ -74,11 +81,14 @@ def hints_of(parts: Sequence[Signals], logs: Sequence[JointLog]) -> Hints:
         turns.append([] if tree.slides[j] else [t for t in sorted(each) if _passes(t, typical[j], logs)])
     return Hints(
         typical,
+        np.max([s.slow for s in parts], axis=0),
         load,
         np.ptp(q, axis=0),
         0.5 * (q.max(axis=0) + q.min(axis=0)),
         turns,
         _couplings(tree, logs[0]),
+        driven_by_voltage(motors, q.shape[1]) & _moves_while_off(parts),
+        np.isin(np.arange(q.shape[1]), [motor.joint for motor in motors]),
     )
 
 
@@ -90,6 +100,16 @@ def _passes(turns: float, typical: float, logs: Sequence[JointLog]) -> bool:
     """Whether a ripple of so many periods a turn is slow enough for the rows; one a turn is a counterbalance."""
     cutoff = min(rules.CUTOFF_HZ, rules.CUTOFF_SHARE * min(log.rate_hz for log in logs))
     return turns > 1.0 and turns * typical / (2.0 * np.pi) < rules.MOST_RIPPLE_HZ * cutoff
+
+
+def _moves_while_off(parts: Sequence[Signals]) -> NDArray[np.bool_]:
+    """Which joints move while the drives are off, too, in some log, shape (J,)."""
+    out = np.zeros(parts[0].q.shape[1], dtype=bool)
+    for s in parts:
+        if s.enabled is not None and not s.enabled.all():
+            moves = np.abs(s.dq[~s.enabled]) > rules.MOVING_SHARE * s.typical
+            out |= moves.sum(axis=0) > rules.LEAST_OFF_S * s.rate_hz
+    return out
 
 
 def _couplings(tree: Tree, log: JointLog) -> Array:

@@ -16,6 +16,7 @@ from discrepancy.serial.model import SerialModel
 from discrepancy.serial.paired import PairedRig
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
+from discrepancy.serial.servo.loop import loop_laws, sentences
 from discrepancy.serial.traces import traces
 from discrepancy.serial.words import SerialWords
 
@@ -73,6 +74,9 @@ def diagnose_rig(
 
 
 def _notes(rig: SerialRig) -> Iterator[str]:
+    for motor in rig.motors:
+        yield motor.sentence(rig.model.joints[motor.joint])
+    yield from sentences(loop_laws([part.signals.log for part in rig.parts]), rig.model.joints)
     if rig.common:
         yield (
             "What is wrong with the model in the reference, too, is fitted to all logs together and is no news; what "

@@ -18,6 +18,7 @@ from discrepancy.serial.model import SerialModel
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rows.reduction import Reduction, blocks
 from discrepancy.serial.rows.signals import Nominal, Signals
+from discrepancy.serial.servo.motor import Motor
 from estimator.arrays import Array
 from estimator.errors import InputError
 
@@ -30,11 +31,13 @@ class Part:
         signals: smoothed.
         blocks: samples of every block.
         reduction: from samples to rows.
+        knots_s: between knots of every joint's friction at rest, shape (J,).
     """
 
     signals: Signals
     blocks: tuple[slice, ...]
     reduction: Reduction
+    knots_s: Array
 
     @property
     def names(self) -> list[str]:
@@ -45,13 +48,14 @@ class Part:
     def rests(self, block: int) -> list[Array]:
         """Rows (n, J) of friction that a joint may have while it rests, one unit each; it follows the load."""
         s = self.signals
-        slow = rules.SLOW_SHARES[0] * s.typical
+        slow = s.slow
         out = []
         here = np.zeros(len(s.time), dtype=bool)
         here[self.blocks[block]] = True
         for j in range(s.q.shape[1]):
             still = (np.abs(s.dq[:, j]) < slow[j]) & here
-            for column in free_while(still, s.rate_hz, rules.REST_KNOTS_S, rules.SHORTEST_REST_S):
+            shortest = min(rules.SHORTEST_REST_S, float(self.knots_s[j]))
+            for column in free_while(still, s.rate_hz, float(self.knots_s[j]), shortest):
                 wide = np.zeros_like(s.q)
                 wide[:, j] = column
                 rows = self.reduction(wide)[block]
@@ -60,8 +64,15 @@ class Part:
         return out
 
 
-def parts_of(model: SerialModel, logs: Sequence[JointLog]) -> tuple[tuple[Part, ...], NDArray[np.intp]]:
+def parts_of(
+    model: SerialModel, logs: Sequence[JointLog], motors: Sequence[Motor] = ()
+) -> tuple[tuple[Part, ...], NDArray[np.intp]]:
     """All logs, and the joints whose torques every one of them has, from 0.
+
+    Args:
+        model: the robot as described.
+        logs: with torques.
+        motors: drives whose torques follow from duties.
 
     Raises:
         InputError: a log is too short, or has no torques.
@@ -71,7 +82,9 @@ def parts_of(model: SerialModel, logs: Sequence[JointLog]) -> tuple[tuple[Part, 
     known = np.ones(len(model.joints), dtype=bool)
     for log in logs:
         if log.torque is None:
-            raise InputError(f"{log.name}: there are no torques, which the diagnosis needs")
+            raise InputError(
+                f"{log.name}: there are no torques, currents or duties, one of which the diagnosis needs"
+            )
         known &= np.isfinite(log.torque).any(axis=0)
     joints = np.flatnonzero(known)
     if not len(joints):
@@ -80,12 +93,15 @@ def parts_of(model: SerialModel, logs: Sequence[JointLog]) -> tuple[tuple[Part, 
     # One typical speed of a joint for all logs, or shapes would differ between them.
     square = [np.mean(s.dq**2, axis=0) for s in signals]
     typical = np.maximum(np.sqrt(np.mean(square, axis=0)), rules.LEAST_SPEED)
-    parts = [_part(replace(s, typical=typical), joints) for s in signals]
+    # While a servo sticks its duty goes with its error, which is no load: friction at rest is whatever it gives.
+    knots = np.full(len(model.joints), rules.REST_KNOTS_S)
+    knots[[motor.joint for motor in motors]] = rules.SERVO_KNOTS_S
+    parts = [_part(replace(s, typical=typical), joints, len(logs), knots) for s in signals]
     return tuple(parts), joints
 
 
-def _part(signals: Signals, joints: NDArray[np.intp]) -> Part:
-    cut = blocks(signals)
+def _part(signals: Signals, joints: NDArray[np.intp], logs: int, knots_s: Array) -> Part:
+    cut = blocks(signals, logs)
     reduction = Reduction.of(signals, cut, joints)
     keep = [k for k, rows in enumerate(reduction.samples) if len(rows) >= rules.LEAST_ROWS]
     if not keep:
@@ -97,4 +113,4 @@ def _part(signals: Signals, joints: NDArray[np.intp]) -> Part:
     if len(keep) < len(cut):
         cut = [cut[k] for k in keep]
         reduction = Reduction.of(signals, cut, joints)
-    return Part(signals, tuple(cut), reduction)
+    return Part(signals, tuple(cut), reduction, knots_s)

@@ -27,6 +27,7 @@ from discrepancy.serial.rows.common import combinations
 from discrepancy.serial.rows.remainder import Key
 from discrepancy.serial.rows.whiten import whiten
 from discrepancy.serial.serial_rows import SerialRows, place_of
+from discrepancy.serial.servo.motor import with_torques
 from discrepancy.serial.undecidable import general, look_alikes
 from estimator.arrays import Array
 from mocobot_sim.serial.effects import RobotEffect
@@ -57,8 +58,9 @@ class SerialRig(SerialRows, Rig):
             InputError: the logs cannot be used, or a cause to be excluded does not exist.
         """
         left_out = excluded_from(CAUSES, excluded)
-        parts, joints = parts_of(model, [*logs, *reference])
-        hints = catalogue.hints_of([part.signals for part in parts], logs)
+        every_log, motors = with_torques(model, [*logs, *reference])
+        parts, joints = parts_of(model, every_log, motors)
+        hints = catalogue.hints_of([part.signals for part in parts], logs, motors)
         given = catalogue.events() if reference else {} if tolerances is None else tolerances
         every = catalogue.candidates(parts[0].signals.tree, model.joints, hints, left_out, given)
         # What differs between the days must not look like noise, so each has its own.
@@ -79,6 +81,7 @@ class SerialRig(SerialRows, Rig):
             spoilt,
             len(whitening),
             (),
+            motors,
         )
         if not reference:
             return rig
@@ -155,8 +158,11 @@ class SerialRig(SerialRows, Rig):
         return LAW_SHARE if candidate.transient else rules.SERIAL_LAW_SHARE
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
-        """Pushes at the intervals where the torques are worst."""
-        if "push" in self.excluded:
+        """Pushes at the intervals where the torques are worst; none where torques are only what duties should give.
+
+        A servo's gear leaves more than its readings' noise at every reversal, which looks like a push each time.
+        """
+        if "push" in self.excluded or self.motors:
             return []
         times = [self.row_times(t) for t in range(self.changed)]
         return shapes.pushes(self.nominal.tree, self.model.joints, times, remaining[: self.changed])

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Candidate
+from discrepancy.rules import serial as rules
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.base import Cause, Hints
@@ -19,6 +20,7 @@ from discrepancy.serial.logs import Part
 from discrepancy.serial.model import SerialModel
 from discrepancy.serial.rows.remainder import Key
 from discrepancy.serial.rows.signals import Nominal
+from discrepancy.serial.servo.motor import Motor
 from estimator.arrays import Array
 
 
@@ -38,6 +40,7 @@ class SerialRows:
         spoilt: cause and place of what noise of the positions hides.
         changed: blocks in which causes act; those of a reference come after them.
         common: what may be wrong with the model in all logs, where there is a reference: rows (n, C, s) per block.
+        motors: drives that tell no torque, and what they give by what they were given.
     """
 
     model: SerialModel
@@ -51,6 +54,7 @@ class SerialRows:
     spoilt: frozenset[Key]
     changed: int
     common: tuple[Array, ...]
+    motors: tuple[Motor, ...] = ()
     _seen: dict[Any, list[Array]] = field(default_factory=dict, repr=False)
 
     @property
@@ -79,7 +83,7 @@ class SerialRows:
         key = (candidate.key, tuple(sorted(candidate.shape.items())))
         if key not in self._seen:
             done = [part.reduction(cause.columns(part.signals, at, candidate.shape)) for part in self.parts]
-            rows = [block[:, self.joints] for blocks in done for block in blocks]
+            rows = _seen_only([block[:, self.joints] for blocks in done for block in blocks], candidate.units)
             rows = [block * (t < self.changed and candidate.acts_in(t)) for t, block in enumerate(rows)]
             if candidate.transient:
                 return rows
@@ -125,6 +129,12 @@ class SerialRows:
         if shared is not None and shared.size:
             out = [r + columns @ shared for r, columns in zip(out, self.common, strict=True)]
         return out
+
+
+def _seen_only(rows: list[Array], units: Array) -> list[Array]:
+    """Columns with nought in place of those that are rounding beside the others, such as a push along the axis."""
+    size = units * np.sqrt(np.sum([np.sum(block**2, axis=(0, 1)) for block in rows], axis=0))
+    return [block * (size > rules.REDUNDANT * size.max(initial=0.0)) for block in rows]
 
 
 def place_of(candidate: Candidate) -> int:

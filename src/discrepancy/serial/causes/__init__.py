@@ -11,6 +11,7 @@ NAMES = (
     "stribeck",
     "sublinear_friction",
     "load_friction",
+    "back_emf",
     "coupled_drive",
     "armature",
     "torque_offset",

@@ -16,5 +16,8 @@ class Armature(Cause):
         more = n.either("armature_kgm2", "more", "less")
         return f"the rotor adds {n('armature_kgm2', 'kg m^2')} {more} than modelled"
 
+    def possible(self, tree, at, values, se):
+        return bool(tree.armature[at] + values[0] > -2.0 * se[0])
+
     def columns(self, signals, at, shape):
         return at_joint(signals, at, signals.ddq[:, at])

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discrepancy.causes import base
 from discrepancy.causes.base import Shape
@@ -33,19 +34,25 @@ class Hints:
 
     Attributes:
         typical: speed while it moves [rad/s or m/s].
+        slow: speed below which the direction of friction fades [rad/s or m/s].
         load: typical torque of the nominal model without friction [N m or N].
         travel, middle: range of positions, and its middle [rad or m].
         turns: periods of a ripple in one unit of joint position that are tried, per joint.
         couplings: how many times a joint's motor turns when the joint before it turns once, in units of its own
             joint's turns, if the map says so; else NaN.
+        unscaled: whether what a joint's drive gives per volt or ampere was fitted.
+        switched: whether a joint's drive is given a voltage, and the joint moves while it is off, too.
     """
 
     typical: Array
+    slow: Array
     load: Array
     travel: Array
     middle: Array
     turns: Sequence[Sequence[float]]
     couplings: Array
+    switched: NDArray[np.bool_]
+    unscaled: NDArray[np.bool_]
 
 
 class Cause(base.Cause):
@@ -170,5 +177,6 @@ def direction(signals: Signals, at: int, slow: float) -> Array:
 
 
 def slow_shapes(hints: Hints, at: int, shares: Sequence[float]) -> list[Shape]:
-    """Speeds over which the direction of friction fades, as shares of the joint's typical one."""
-    return [{"slow_per_s": share * float(hints.typical[at])} for share in shares]
+    """Speeds over which the direction of friction fades, as shares of the joint's typical one, if they can be told."""
+    told = (max(share * float(hints.typical[at]), float(hints.slow[at])) for share in shares)
+    return [{"slow_per_s": speed} for speed in dict.fromkeys(told)]

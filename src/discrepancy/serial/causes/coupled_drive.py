@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause, partner
 
 
@@ -30,7 +29,7 @@ class CoupledDrive(Cause):
         both = np.zeros(signals.q.shape[1])
         both[at], both[before] = 1.0, shape["ratio"]
         v, a = signals.dq @ both, signals.ddq @ both
-        slow = rules.SLOW_SHARES[0] * (np.abs(both) @ signals.typical)
+        slow = float(np.abs(both) @ signals.slow)
         motor = np.column_stack([np.clip(v / slow, -1.0, 1.0), v, a])
         return motor[:, None, :] * both[:, None]
 

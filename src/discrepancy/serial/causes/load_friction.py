@@ -2,7 +2,6 @@
 
 import numpy as np
 
-from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause, at_joint, direction
 
 
@@ -26,7 +25,7 @@ class LoadFriction(Cause):
         )
 
     def columns(self, signals, at, shape):
-        slow = rules.SLOW_SHARES[0] * signals.typical[at]
+        slow = float(signals.slow[at])
         load = np.abs(signals.inverse[:, at] - signals.nominal.armature[at] * signals.ddq[:, at])
         return at_joint(signals, at, direction(signals, at, slow) * (load - shape["load_Nm"]))
 

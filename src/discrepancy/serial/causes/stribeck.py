@@ -24,7 +24,7 @@ class Stribeck(Cause):
         )
 
     def columns(self, signals, at, shape):
-        slow = rules.SLOW_SHARES[0] * signals.typical[at]
+        slow = float(signals.slow[at])
         fade = np.exp(-np.abs(signals.dq[:, at]) / shape["fade_per_s"])
         return at_joint(signals, at, direction(signals, at, slow) * fade)
 

@@ -28,7 +28,7 @@ class SublinearFriction(Cause):
         )
 
     def columns(self, signals, at, shape):
-        slow = rules.SLOW_SHARES[0] * signals.typical[at]
+        slow = float(signals.slow[at])
         u, e = np.abs(signals.dq[:, at]) / shape["typical_per_s"], shape["exponent"]
         constant, slope = line_of_power(e)
         return at_joint(signals, at, direction(signals, at, slow) * (u**e - constant - slope * u))

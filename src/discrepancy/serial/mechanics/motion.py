@@ -5,7 +5,7 @@ Featherstone, "Rigid Body Dynamics Algorithms" (2008), section 5.3, written at t
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -24,6 +24,7 @@ class Motion:
         omega, alpha: angular velocity and acceleration, shape (B, Q, 3).
         acceleration: of the origins, less gravity's, shape (B, Q, 3) [m/s^2].
         axis, anchor: of every joint, shape (J, Q, 3).
+        regressors: of bodies, as far as they were asked for (``regressor.body_regressor``).
     """
 
     tree: Tree
@@ -34,6 +35,7 @@ class Motion:
     acceleration: Array
     axis: Array
     anchor: Array
+    regressors: dict[int, Array] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, tree: Tree, q: Array, dq: Array, ddq: Array) -> Motion:

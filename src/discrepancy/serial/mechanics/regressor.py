@@ -20,7 +20,13 @@ def inertial_parameters(mass: float, com: Array, inertia: Array) -> Array:
 
 
 def body_regressor(motion: Motion, body: int) -> Array:
-    """Joint torques per unit of each of a body's ten numbers, shape (Q, J, 10)."""
+    """Joint torques per unit of each of a body's ten numbers, shape (Q, J, 10); kept with the motion."""
+    if body not in motion.regressors:
+        motion.regressors[body] = _body_regressor(motion, body)
+    return motion.regressors[body]
+
+
+def _body_regressor(motion: Motion, body: int) -> Array:
     tree = motion.tree
     R, a = motion.rotation[body], motion.acceleration[body]
     w, al = motion.omega[body], motion.alpha[body]

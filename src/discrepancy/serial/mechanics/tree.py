@@ -27,6 +27,7 @@ class Tree:
         com: centres of mass in the frames of their bodies, shape (B, 3) [m].
         inertia: about the centres of mass, along the bodies' frames, shape (B, 3, 3) [kg m^2].
         gravity: in the frame of the world, shape (3,) [m/s^2].
+        armature: inertia of the rotors as the joints feel it, shape (J,).
     """
 
     parent: NDArray[np.intp]
@@ -41,6 +42,7 @@ class Tree:
     com: Array
     inertia: Array
     gravity: Array
+    armature: Array
 
     @classmethod
     def of(cls, model: Any) -> Tree:
@@ -59,6 +61,7 @@ class Tree:
             com=np.array(model.body_ipos),
             inertia=own @ (model.body_inertia[:, :, None] * own.swapaxes(1, 2)),
             gravity=np.array(model.opt.gravity),
+            armature=np.array(model.dof_armature),
         )
 
     @property

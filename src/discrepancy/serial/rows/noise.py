@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
 from scipy.signal import welch
 
 from discrepancy.least_squares.whitening import Whitening
@@ -49,6 +51,7 @@ class SensorNoise:
         rounding = log.position_step**2 / 12.0 / (rate / 2.0)
         angle_density = np.maximum(_density(log.q, rate, top[0] * rate, top[1] * rate), rounding)
         white = np.sqrt(rate / 2.0) * rng.standard_normal((2, *log.q.shape))
+        white[1] *= _changing(log)
         smooth = [
             low_pass(np.sqrt(density) * x, rate, smoothing_hz(rate))
             for density, x in zip((torque_density, angle_density), white, strict=True)
@@ -68,6 +71,13 @@ class SensorNoise:
     def of_angles(self, signals: Signals, reduction: Reduction) -> list[Array]:
         """What the positions' noise makes of the rows of every block, through the nominal model, shape (n, J)."""
         return reduction(signals.inverse - self.added(signals).inverse)
+
+
+def _changing(log: JointLog) -> NDArray[np.bool_]:
+    """Where the readings of positions change, shape (Q, J): one that stands still, by its step, has no noise at all."""
+    size = max(3, 2 * round(rules.STILL_S * log.rate_hz / 2.0) + 1)
+    spread = maximum_filter1d(log.q, size, axis=0) - minimum_filter1d(log.q, size, axis=0)
+    return spread > rules.STILL_STEPS * log.position_step
 
 
 def draws_of(rows: Sequence[Array], moving: Sequence[Array]) -> Array:

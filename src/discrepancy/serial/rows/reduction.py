@@ -73,10 +73,17 @@ def _kernel(rate_hz: float, cutoff: float) -> Array:
     return np.asarray(kernel / kernel.sum())
 
 
-def blocks(signals: Signals) -> list[slice]:
-    """Samples of every block of a log: some seconds each, three at least, without the ends that smoothing spoils."""
+def blocks(signals: Signals, logs: int = 1) -> list[slice]:
+    """Samples of every block of a log: some seconds each, without the ends that smoothing spoils.
+
+    Args:
+        signals: of the log.
+        logs: how many there are; all together have three blocks at least.
+    """
     edge = math.ceil(rules.EDGE_PERIODS / smoothing_hz(signals.log.rate_hz) * signals.rate_hz)
     first, last = edge, len(signals.time) - edge
-    count = max(rules.FEWEST_BLOCKS, round((last - first) / signals.rate_hz / rules.BLOCK_S))
+    count = max(
+        math.ceil(rules.FEWEST_BLOCKS / logs), round((last - first) / signals.rate_hz / rules.BLOCK_S)
+    )
     cuts = np.linspace(first, last, count + 1).astype(int)
     return [slice(int(a), int(b)) for a, b in itertools.pairwise(cuts)]

@@ -54,6 +54,7 @@ class Signals:
         usable: samples and joints whose torque and motion are what they seem, shape (W, J).
         inverse: torques that the nominal model asks for without friction, shape (W, J).
         typical: speed of every joint while it moves, over all logs (root mean square), shape (J,).
+        enabled: whether the drives are on, shape (W,); None where the log does not say.
     """
 
     log: JointLog
@@ -67,6 +68,7 @@ class Signals:
     usable: NDArray[np.bool_]
     inverse: Array
     typical: Array
+    enabled: NDArray[np.bool_] | None = None
 
     @classmethod
     def of(
@@ -91,8 +93,9 @@ class Signals:
         inverse = inverse_torque(q, dq, ddq)
         typical = np.maximum(np.sqrt(np.mean(dq**2, axis=0)), rules.LEAST_SPEED)
         return cls(
-            log, nominal, rate / step, log.time[here], q, dq, ddq, torque, known[here], inverse, typical
-        )
+            log, nominal, rate / step, log.time[here], q, dq, ddq, torque, known[here], inverse, typical,
+            None if log.enabled is None else log.enabled[here],
+        )  # fmt: skip
 
     @property
     def tree(self) -> Tree:
@@ -107,8 +110,16 @@ class Signals:
     @property
     def residual(self) -> Array:
         """Measured torque minus what the nominal model asks for, its friction included, shape (W, J)."""
-        dry = self.nominal.coulomb * self.direction(rules.SLOW_SHARES[0] * self.typical)
+        dry = self.nominal.coulomb * self.direction(self.slow)
         return self.torque - self.inverse - dry - self.nominal.viscous * self.dq
+
+    @property
+    def slow(self) -> Array:
+        """Speeds below which the direction of friction fades, shape (J,): slow, and told from the reading's steps."""
+        cutoff, rate = smoothing_hz(self.log.rate_hz), self.log.rate_hz
+        # Rounding as white noise of step^2 / 12, low-passed and differentiated.
+        rounding = self.log.position_step * 2.0 * np.pi * np.sqrt(cutoff**3 / (18.0 * rate))
+        return np.maximum(rules.SLOW_SHARES[0] * self.typical, rules.SLOW_ROUNDINGS * rounding)
 
     def direction(self, slow: Array) -> Array:
         """Direction of motion in [-1, 1], shape (W, J); it fades below the speeds ``slow``, shape (J,) or ()."""
