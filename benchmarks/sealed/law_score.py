@@ -194,7 +194,7 @@ def _alike(
     if len(found) != len(wanted):
         return math.inf, None
     found, wanted = (x - x.mean(axis=1, keepdims=True) for x in (found, wanted))
-    if np.sum(wanted**2) == 0.0:  # a constant, as of what spins
+    if np.linalg.norm(wanted) < 1e-9 * max(np.linalg.norm(x) for x in true):  # a constant, as of what spins
         found, wanted = (
             np.concatenate([np.array(x) for x in y], axis=1)
             for y in ([one["values"] for one in series], true)

@@ -27,7 +27,7 @@ def format_diagnosis(values: Values) -> str:
     """
     lines = list(_wrapped(_verdict(values), ""))
     for k, cause in enumerate(values["causes"], start=1):
-        lines += ["", f"[[Cause {k}: {name_of(cause)} ({cause['cause']})]]", *_cause(cause, further=k > 1)]
+        lines += ["", f"[[Cause {k}: {_heading(cause)} ({cause['cause']})]]", *_cause(cause, further=k > 1)]
     lines += [*_suspected(values), *_scatter(values), *gain_lines(values)]
     notes = list(values["notes"])
     if values["not_simulated"] and not values["causes"]:
@@ -75,6 +75,11 @@ def _verdict(values: Values) -> str:
     if causes:
         return f"{said}the catalogue's best explains little of it: {named} {also}"
     return f"{said}no cause of the catalogue explains it. {also}"
+
+
+def _heading(cause: Values) -> str:
+    """The cause at its place; of a law without its signals, which the sentence has."""
+    return name_of(cause).partition(", by ")[0] if cause.get("law") else name_of(cause)
 
 
 def _cause(cause: Values, *, further: bool) -> Iterable[str]:

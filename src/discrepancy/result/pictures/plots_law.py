@@ -15,7 +15,7 @@ Values = Mapping[str, Any]
 
 def law_figure(values: Values) -> Figure | None:
     """Every stated law that was located: over time in the first trial, and against its signal in all; None without."""
-    laws = [cause for cause in values["causes"] if cause["law"] and cause["law"]["traces"]]
+    laws = [cause for cause in values["causes"] if cause.get("law") and cause["law"]["traces"]]
     if not laws:
         return None
     figure = Figure(figsize=(12.0, 3.6 * len(laws) + 0.6), layout="constrained")
