@@ -11,12 +11,14 @@ from pathlib import Path
 
 import tyro
 
+from discrepancy.engine.diagnose import When
 from hidden.campaign import run_tasks
 from hidden.measure_limits import measure_limits
 from hidden.notes import failures
 from hidden.parts import Part, tasks
 from hidden.store import read_results
 from hidden.tables import tables
+from hidden.verdict import Loop
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,9 @@ class Options:
         jobs: processes.
         out: where recordings and results go.
         again: repeat sets that were not found right.
+        closed_loop: when to run the recorded commands again; ``undecided`` is where the rows leave two causes about
+            equally likely.
+        laws: when to look for laws that the catalogue lacks; ``auto`` is where something unlisted is left.
         tables: print the tables of all results instead.
         failures: print every set that was not found right instead.
         limits: measure the detection limits instead.
@@ -49,6 +54,8 @@ class Options:
     jobs: int = 2
     out: Path = Path("out/hidden")
     again: bool = False
+    closed_loop: Loop = "always"
+    laws: When = "auto"
     tables: bool = False
     failures: bool = False
     limits: bool = False
@@ -71,7 +78,14 @@ def main(options: Options) -> None:
             background=options.background,
             preset=options.preset,
         )
-        run_tasks(chosen, options.out, options.jobs, again=options.again)
+        run_tasks(
+            chosen,
+            options.out,
+            options.jobs,
+            again=options.again,
+            closed_loop=options.closed_loop,
+            laws=options.laws,
+        )
 
 
 if __name__ == "__main__":
