@@ -6,17 +6,20 @@ Finished sets are kept in the output folder and skipped when the command is give
 from __future__ import annotations
 
 import pprint
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import tyro
 
+from discrepancy.engine.diagnose import When
 from hidden.campaign import run_tasks
+from hidden.generator import TIMESTEP_S
 from hidden.measure_limits import measure_limits
 from hidden.notes import failures
 from hidden.parts import Part, tasks
 from hidden.store import read_results
 from hidden.tables import tables
+from hidden.verdict import Loop
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,11 @@ class Options:
         preset: sensors.
         jobs: processes.
         out: where recordings and results go.
+        timestep_s: of the simulation [s]; the closed loop must not share its own, 0.001.
         again: repeat sets that were not found right.
+        closed_loop: when to run the recorded commands again; ``undecided`` is where the rows leave two causes about
+            equally likely.
+        laws: when to look for laws that the catalogue lacks; ``auto`` is where something unlisted is left.
         tables: print the tables of all results instead.
         failures: print every set that was not found right instead.
         limits: measure the detection limits instead.
@@ -48,7 +55,10 @@ class Options:
     preset: str = "nominal"
     jobs: int = 2
     out: Path = Path("out/hidden")
+    timestep_s: float = TIMESTEP_S
     again: bool = False
+    closed_loop: Loop = "always"
+    laws: When = "auto"
     tables: bool = False
     failures: bool = False
     limits: bool = False
@@ -71,7 +81,17 @@ def main(options: Options) -> None:
             background=options.background,
             preset=options.preset,
         )
-        run_tasks(chosen, options.out, options.jobs, again=options.again)
+        chosen = [
+            replace(task, request=replace(task.request, timestep_s=options.timestep_s)) for task in chosen
+        ]
+        run_tasks(
+            chosen,
+            options.out,
+            options.jobs,
+            again=options.again,
+            closed_loop=options.closed_loop,
+            laws=options.laws,
+        )
 
 
 if __name__ == "__main__":

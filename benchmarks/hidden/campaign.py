@@ -12,14 +12,23 @@ from joblib import Parallel, delayed, parallel_config
 from tqdm import tqdm
 
 import discrepancy
+from discrepancy.engine.diagnose import When
 from hidden.parts import Task
 from hidden.score import score
 from hidden.store import append_result, read_results, recordings_of
-from hidden.verdict import verdict_on
+from hidden.verdict import Loop, verdict_on
 from mocobot_sim.errors import TrialError
 
 
-def run_tasks(tasks: Sequence[Task], folder: Path, jobs: int, *, again: bool = False) -> None:
+def run_tasks(
+    tasks: Sequence[Task],
+    folder: Path,
+    jobs: int,
+    *,
+    again: bool = False,
+    closed_loop: Loop = "always",
+    laws: When = "auto",
+) -> None:
     """Run what is not finished yet, and append each result as soon as it is there.
 
     Args:
@@ -27,6 +36,7 @@ def run_tasks(tasks: Sequence[Task], folder: Path, jobs: int, *, again: bool = F
         folder: recordings and results.
         jobs: processes.
         again: also repeat what was not found right.
+        closed_loop, laws: as in ``verdict_on``.
     """
     path = folder / "results.jsonl"
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -34,17 +44,17 @@ def run_tasks(tasks: Sequence[Task], folder: Path, jobs: int, *, again: bool = F
     todo = [task for task in tasks if (task.part, task.request.key) not in finished]
     with parallel_config("loky", inner_max_num_threads=1):
         run = Parallel(jobs, return_as="generator_unordered")
-        done: Any = run(delayed(run_task)(task, folder) for task in todo)
+        done: Any = run(delayed(run_task)(task, folder, closed_loop, laws) for task in todo)
         for result in tqdm(done, total=len(todo), unit="set", dynamic_ncols=True):
             append_result(path, result)
 
 
-def run_task(task: Task, folder: Path) -> dict[str, Any]:
+def run_task(task: Task, folder: Path, closed_loop: Loop = "always", laws: When = "auto") -> dict[str, Any]:
     """Simulate and diagnose one set; the truth is opened after the verdict."""
     result = {"part": task.part, "key": task.request.key, "engine": engine(), "error": None}
     try:
         recordings, sealed = recordings_of(task.request, folder / "sets")
-        verdict = verdict_on(recordings, task.excluded)
+        verdict = verdict_on(recordings, task.excluded, closed_loop, laws)
         return result | {"verdict": verdict, "truth": sealed.open(verdict)}
     except TrialError as error:
         return result | {"error": f"not simulated: {error}"}

@@ -17,6 +17,7 @@ from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import Recording
 from mocobot_logs.convert import Labels, convert
 from mocobot_logs.log import CHANNELS, REF, Level, Samples
+from mocobot_logs.resample.log import RATE_HZ as CONVERTED_HZ
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.trial.trial_log import TrialLog
 
@@ -65,6 +66,7 @@ class Logger:
         encoder_bits: resolution of every encoder, per turn; None for continuous.
         tau_noise_Nm: standard deviation of white torque noise before rounding [N m].
         tau_step_Nm: torque resolution [N m]; 0 for continuous.
+        converted_hz: sampling rate of the recording that ``mocobot convert`` is asked for.
     """
 
     rate_hz: float = 100.0
@@ -76,6 +78,7 @@ class Logger:
     encoder_bits: int | None = 16
     tau_noise_Nm: float = 0.01
     tau_step_Nm: float = 0.01
+    converted_hz: float = CONVERTED_HZ
 
     @classmethod
     def draw(cls, rng: np.random.Generator) -> Logger:
@@ -103,7 +106,9 @@ class Logger:
         """
         log = MadeLog(name, tuple(self._stream(trial, robot, rng) for robot in range(trial.robots)))
         labels = Labels(trial=trial.trial)
-        recording = convert(log, labels, omnid_design(), correct=bool(self.offset_s or self.drift)).recording
+        correct = bool(self.offset_s or self.drift)
+        converted = convert(log, labels, omnid_design(), rate_hz=self.converted_hz, correct=correct)
+        recording = converted.recording
         control = trial.gains.to_dict() | {"feed_forward_N": trial.feed_forward.tolist()}
         return replace(recording, metadata=replace(recording.metadata, control=control))
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any, Literal
 
 from discrepancy.engine.confirm import Alternative
-from discrepancy.engine.diagnose import Diagnosis, diagnose
+from discrepancy.engine.diagnose import Diagnosis, When, diagnose
 from discrepancy.engine.explanation import Found
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
@@ -18,7 +18,10 @@ Loop = Literal["always", "undecided", "never"]
 
 
 def verdict_on(
-    recordings: Sequence[Recording], excluded: Sequence[str] = (), closed_loop: Loop = "always"
+    recordings: Sequence[Recording],
+    excluded: Sequence[str] = (),
+    closed_loop: Loop = "always",
+    laws: When = "auto",
 ) -> dict[str, Any]:
     """What the diagnosis finds.
 
@@ -27,12 +30,13 @@ def verdict_on(
         excluded: causes left out of its catalogue.
         closed_loop: when to simulate the recorded commands again; ``undecided`` is where the rows leave two causes
             about equally likely, which saves time.
+        laws: whether to look for laws that the catalogue lacks; ``auto`` is where something unlisted is left.
     """
     start = time.perf_counter()
     rig = TeamRig.of(recordings, estimate_payload(recordings), read_tolerances(None), excluded)
-    diagnosis = diagnose(rig, closed_loop=closed_loop == "always")
+    diagnosis = diagnose(rig, closed_loop=closed_loop == "always", laws=laws)
     if closed_loop == "undecided" and _undecided(diagnosis):
-        diagnosis = diagnose(rig)
+        diagnosis = diagnose(rig, laws=laws)
     explanation = diagnosis.explanation
     return {
         "verdict": diagnosis.verdict,

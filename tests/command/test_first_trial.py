@@ -237,6 +237,7 @@ FILES = {
     "table.parquet": "table.parquet: missing column 'omnid1.phi1' for phi1 of robot 1 by map mocobot; the columns "
     "are a. No map was given (--map): `mocobot map table.parquet` drafts one",
     "log.h5": f"log.h5: {UNREAD}",
+    "lone.truth.json": "lone.truth.json: is a JSON file, not a recording of mocobot; recordings are .parquet files",
 }
 """Files that are neither recordings nor logs that can be read as they are."""
 

@@ -17,6 +17,8 @@ NOTHING_WRONG_HERE = ("consistent", "miscalibrated")
 """Verdicts with which no place stands out."""
 SAID = 0.001
 """Probabilities below are not told."""
+WHOLE = 0.005
+"""Shares from which whole percents are told."""
 
 
 def format_diagnosis(values: Values) -> str:
@@ -99,14 +101,17 @@ def _cause(cause: Values, *, further: bool) -> Iterable[str]:
         f"Probability {probability_words(cause['probability'])}{over}{_else(cause)}. {explained}."
     )
     alike = [rival for rival in cause["alternatives"] if rival["ambiguous"]]
-    ruled_out = [rival for rival in cause["alternatives"] if not rival["ambiguous"]]
+    ruled_out: dict[str, Values] = {}  # the likeliest of those that may act at several instants
+    for rival in cause["alternatives"]:
+        if not rival["ambiguous"]:
+            ruled_out.setdefault(name_of(rival), rival)
     if alike:
         names = ", ".join(f"{name_of(rival)} by {rival['evidence_gap']:.1f} nats" for rival in alike)
         yield from _wrapped(f"Cannot be told from: {names}.")
         advice = dict.fromkeys(text for rival in [cause, *alike] if (text := rival["separate"]))
         yield from _wrapped("To tell them apart: " + " ".join(advice)) if advice else ()
     if ruled_out:
-        yield from _wrapped("Fits worse: " + ", ".join(_rival(r) for r in ruled_out[:4]) + ".")
+        yield from _wrapped("Fits worse: " + ", ".join(map(_rival, list(ruled_out.values())[:4])) + ".")
     if not cause["alternatives"]:
         yield from _wrapped("No other cause comes near.")
 
@@ -195,7 +200,10 @@ def _range(words: str, unit: str, sizes: Sequence[float | None], shown: Mapping[
 
 
 def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %"
+    """``94 %``; a digit of what would round to none."""
+    if 0.0 < abs(share) < SAID / 100:
+        return "less than 0.001 %"
+    return f"{100 * share:.{'1g' if 0.0 < abs(share) < WHOLE else '0f'}} %"
 
 
 def probability_words(probability: float) -> str:

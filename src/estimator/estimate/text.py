@@ -20,7 +20,8 @@ def format_estimate(estimate: PayloadEstimate) -> str:
     """Readable report, values as ``value +- standard error (percent)``."""
     label = "" if estimate.payload is None else f" ({estimate.payload})"
     lines = [
-        f"[[Payload{label}]]  {estimate.robots} {'calibrated ' * (estimate.units is not None)}robots, "
+        f"[[Payload{label}]]  {estimate.robots} {'calibrated ' * (estimate.units is not None)}"
+        f"robot{'s' * (estimate.robots > 1)}, "
         f"{HOW.get(estimate.method, estimate.method)} estimate, "
         f"{len(estimate.recordings)} recording{'s' * (len(estimate.recordings) > 1)}"
     ]
@@ -45,7 +46,8 @@ def format_estimate(estimate: PayloadEstimate) -> str:
         if r.force_residual is not None:
             text += f", force left over {100 * r.force_residual:.2g} % of the weight"
         if wrong := beyond_noise(r.leftovers):
-            text += f", robots apart {max(one.ratio for one in wrong):.2g} times the noise"
+            apart = "robots apart" if estimate.robots > 1 else "forces and moments off by"
+            text += f", {apart} {max(one.ratio for one in wrong):.2g} times the noise"
         lines.append(text)
     lines += ["[[Excitation]]"]
     for step in estimate.steps:

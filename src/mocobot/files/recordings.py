@@ -28,6 +28,10 @@ def read(path: Path) -> Recording:
     try:
         return read_recording(path)
     except InputError:
+        if path.is_file() and path.suffix == ".json":
+            raise InputError(
+                f"{path}: is a JSON file, not a recording of mocobot; recordings are .parquet files"
+            ) from None
         if path.is_file() or path.is_dir():
             check_no_log(path)
         raise

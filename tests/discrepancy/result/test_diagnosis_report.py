@@ -154,6 +154,20 @@ def test_a_share_beyond_the_first_is_a_further_one() -> None:
     text = " ".join(format_diagnosis(values).split())
     assert text.count("Explains 99 % of") == 1
     assert "Explains a further 1 % of the misfit in sample" in text
+    for share, words in ((0.0, "0 %"), (0.00067, "0.07 %"), (-0.00067, "-0.07 %"), (1e-6, "less than 0.001 %")):
+        second["explained"]["in_sample"] = share
+        text = " ".join(format_diagnosis(values).split())
+        assert f"Explains a further {words} of the misfit in sample" in text
+
+
+def test_what_fits_worse_at_several_instants_is_named_once() -> None:
+    values = small_diagnosis()
+    push = values["causes"][0]["alternatives"][0] | {"name": "push", "ambiguous": False, "chi2_per_n": None}
+    gaps = (30.0, 40.0, 50.0)
+    values["causes"][0]["alternatives"] += [push | {"evidence_gap": gap} for gap in gaps]
+    values["causes"][0]["alternatives"].append(push | {"name": "drag", "evidence_gap": 60.0})
+    text = " ".join(format_diagnosis(values).split())
+    assert "Fits worse: push (30 nats worse), drag (60 nats worse)." in text
 
 
 @pytest.mark.parametrize("cause", sorted(CAUSES))

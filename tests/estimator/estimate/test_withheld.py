@@ -41,6 +41,8 @@ def test_one_of_three_robots_tells_no_mass(robot):
         "Mass, centre of mass and inertia are withheld: the forces of this robot"
     )
     assert estimate.flags[0] in format_estimate(estimate)
+    assert format_estimate(estimate).startswith("[[Payload]]  1 robot, ")
+    assert "robots apart" not in format_estimate(estimate)
     assert estimate_payload([part([robot])], withhold=False).mass is not None
 
 
