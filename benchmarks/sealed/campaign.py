@@ -57,7 +57,7 @@ def _diagnose(request: SealedSet, out: Path, path: Path, *, closed_loop: bool, k
         result["error"] = traceback.format_exc()
         said = result["error"].splitlines()[-1]
     result["truth"] = store.truth_of(request, out)  # opened after the verdict
-    if request.kind == "unlisted" and not result["error"]:
+    if request.kind in ("unlisted", "outside") and not result["error"]:
         result["law_score"] = asdict(score_law(result, store.recordings_of(request, out)))
     store.append(path, result)
     if not keep:

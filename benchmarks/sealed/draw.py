@@ -16,7 +16,7 @@ from sealed.forms.base import Form
 from sealed.forms.pushes import HalfSinePush, RampPush, in_every_trial
 from sealed.ground import Ground
 from sealed.limits import LIMITS
-from sealed.registry import FORMS, LISTED, UNLISTED
+from sealed.registry import FORMS, LISTED, OUTSIDE, UNLISTED
 
 SIZES = (2.0, 20.0)
 """Over the limit; drawn evenly in logarithm."""
@@ -82,3 +82,4 @@ def _place(form: type[Form], ground: Ground, rng: np.random.Generator) -> dict[s
 CATALOGUE = tuple(name for name in CAUSES if name in EFFECTS)
 OTHER = tuple(form.cause for form in LISTED)
 NOWHERE = tuple(form.cause for form in UNLISTED)
+BEYOND = tuple(form.cause for form in OUTSIDE)

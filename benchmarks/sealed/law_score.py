@@ -15,7 +15,8 @@ from estimator.recording.parquet import read_recording
 from mocobot.campaign.ground import one_axis
 from mocobot_sim.control.control import home_phi
 from mocobot_sim.scene.models import omnid_design
-from sealed.laws.hysteresis import Play
+from sealed.laws.hysteresis import BoucWen, Play
+from sealed.unlisted.outside import SCRATCH_RAD, SLACK_RAD, SOFT_NM, YIELD_NM
 
 Item = Mapping[str, Any]
 Series = list[np.ndarray]
@@ -119,6 +120,7 @@ FORMULAS: dict[str, tuple[str, ...]] = {
     "slipping_zero": ("linear",), "cogging": ("sine",), "cubic_spring": ("cube",), "cable_spring": ("linear",),
     "door_closer": ("above",), "growing_push": ("linear",), "shaker": ("hum",), "gyroscope": ("constant",),
     "shifting_load": ("second_order",), "sinking_base": ("warming",),
+    "scratched_disc": (), "soft_saturation": (), "loose_bridge": (), "fine_interpolation": (), "slack_hose": (),
 }  # fmt: skip
 """Functions of the dictionary that are the hidden formula."""
 PERIODS: dict[str, float] = {"eccentric_phi": 1.0, "eccentric_theta": 1.0, "cyclic_phi": 16.0}
@@ -173,6 +175,8 @@ VARIABLES: dict[str, tuple[set[str], ...]] = {
     "encoder_backlash": ({"phi"},), "soft_encoder_mount": ({"tau"},), "slipping_zero": ({"time"},),
     "cogging": ({"phi"},), "cubic_spring": ({"theta"},), "cable_spring": ({"theta"},), "door_closer": ({"phi_rate"},),
     "growing_push": ({"time"},), "shaker": ({"time"},), "gyroscope": ({"time"},), "sinking_base": ({"time"},),
+    "scratched_disc": ({"phi"},), "soft_saturation": ({"tau"},), "loose_bridge": ({"tau"},),
+    "fine_interpolation": ({"theta"},), "slack_hose": ({"theta"},),
 }  # fmt: skip
 
 
@@ -256,6 +260,11 @@ def _behind(x: np.ndarray, half_width: float) -> np.ndarray:
     return np.array([play.step(value) for value in x.tolist()]) - x
 
 
+def _bent(x: np.ndarray, amplitude: float) -> np.ndarray:
+    wen = BoucWen(amplitude, YIELD_NM, 0.5, 1.0)
+    return np.array([wen.step(step, 1.0) for step in np.diff(x, prepend=x[0]).tolist()])
+
+
 SHAPES: dict[str, Callable[[_Seen, Item], np.ndarray]] = {
     "cross_talk": lambda s, p: p["share"] * s.neighbour(p["neighbour"]),
     "warming_scale": lambda s, p: -p["scale"] * np.expm1(-s.t / p["time_s"]) * s.tau,
@@ -280,6 +289,13 @@ SHAPES: dict[str, Callable[[_Seen, Item], np.ndarray]] = {
         _vector(p, "along") * p["amplitude_N"] * np.sin(2.0 * np.pi * p["frequency_hz"] * s.t)
     ),
     "gyroscope": lambda s, p: _vector(p, "along") * p["spin_kgm2ps"] * np.ones(len(s.t)),
+    "scratched_disc": lambda s, p: p["depth_rad"] * np.exp(-(((s.phi - p["at_rad"]) / SCRATCH_RAD) ** 2)),
+    "soft_saturation": lambda s, p: -p["lost_share"] * (s.tau - SOFT_NM * np.tanh(s.tau / SOFT_NM)),
+    "loose_bridge": lambda s, p: _bent(s.tau, p["amplitude_Nm"]),
+    "fine_interpolation": lambda s, p: p["amplitude_rad"] * np.sin(64.0 * s.theta + p["phase_rad"]),
+    "slack_hose": lambda s, p: (
+        -p["square_Nm_per_rad2"] * np.copysign(np.maximum(np.abs(s.theta) - SLACK_RAD, 0.0) ** 2, s.theta)
+    ),
     "sinking_base": lambda s, p: (
         np.array([[0.0], [0.0], [1.0]]) * p["depth_m"] * np.expm1(-s.t / p["time_s"])
     ),

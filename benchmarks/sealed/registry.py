@@ -21,6 +21,7 @@ from sealed.unlisted.encoders import (
     SlippingZero,
     SoftEncoderMount,
 )
+from sealed.unlisted.outside import FineInterpolation, LooseBridge, ScratchedDisc, SlackHose, SoftSaturation
 from sealed.unlisted.readings import (
     AngleInTorque,
     CrossTalk,
@@ -83,4 +84,6 @@ UNLISTED: tuple[type[Form], ...] = (
     ShiftingLoad,
     SinkingBase,
 )
-FORMS: dict[str, type[Form]] = {form.cause: form for form in (*LISTED, *UNLISTED)}
+OUTSIDE: tuple[type[Form], ...] = (ScratchedDisc, SoftSaturation, LooseBridge, FineInterpolation, SlackHose)
+"""Unlisted ones whose formula the dictionary of laws does not have either."""
+FORMS: dict[str, type[Form]] = {form.cause: form for form in (*LISTED, *UNLISTED, *OUTSIDE)}

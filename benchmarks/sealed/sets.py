@@ -18,7 +18,7 @@ from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trial import run_trial
 from mocobot_sim.trial.truth import GroundTruth
 from sealed.backgrounds import BACKGROUNDS, Background, tolerated, units_of
-from sealed.draw import CATALOGUE, NOWHERE, OTHER, SIZES, draw, family, largest, possible
+from sealed.draw import BEYOND, CATALOGUE, NOWHERE, OTHER, SIZES, draw, family, largest, possible
 from sealed.forms.base import Form
 from sealed.ground import Ground
 
@@ -27,7 +27,16 @@ TIMESTEP_S = 1e-3
 SCHEDULE = Schedule(randoms=2, vias=22, periodic_s=35.0, hold_s=3.0)
 """146 s or a little more: two random trials, a periodic one, a static one."""
 Kind = Literal[
-    "clean", "single", "forms", "unlisted", "pairs", "triples", "pushes", "left-out", "unlisted-pairs"
+    "clean",
+    "single",
+    "forms",
+    "unlisted",
+    "pairs",
+    "triples",
+    "pushes",
+    "left-out",
+    "unlisted-pairs",
+    "outside",
 ]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 SHARES = (0.4, 0.25, 0.2, 0.15)
@@ -113,6 +122,7 @@ def _names(
     several = {"pairs": 2, "triples": 3, "unlisted-pairs": 2}.get(kind, 1)
     pools: dict[Kind, tuple[str, ...]] = {
         "single": CATALOGUE, "left-out": CATALOGUE, "forms": OTHER, "unlisted": NOWHERE, "unlisted-pairs": NOWHERE,
+        "outside": BEYOND,
     }  # fmt: skip
     found: list[str] = []
     while len(found) < several:
