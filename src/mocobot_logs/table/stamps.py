@@ -1,4 +1,4 @@
-"""Time of a table in whole nanoseconds: exact for whole numbers, decimal text and dates, rounded for floats."""
+"""Time of a table in whole nanoseconds: exact for whole numbers and dates, rounded for floats and decimal text."""
 
 from bisect import bisect_left
 
@@ -12,6 +12,8 @@ from mocobot_logs.log import Stamps
 
 LARGEST_NS = (1 << 63) - 1
 _DIGITS = {10**exponent: exponent for exponent in range(10)}
+_BELOW_NS = 6
+"""Decimals below the nanosecond that are looked at, to round: programs write 32439.999999999996 ms for 32.44 s."""
 
 Given = NDArray[np.bool_]
 
@@ -46,7 +48,7 @@ def from_numbers(values: NDArray, unit_ns: int | None, where: str, row: int = 0)
 
 
 def from_text(values: pa.Array, unit_ns: int | None, where: str, row: int = 0) -> tuple[Stamps, Given]:
-    """Stamps from decimal text, to the nanosecond: a float of the Unix time resolves 0.24 us only.
+    """Stamps from decimal text, to the nearest nanosecond: a float of the Unix time resolves 0.24 us only.
 
     Args:
         values: decimal numbers, null where there is none, shape (q,).
@@ -60,20 +62,30 @@ def from_text(values: pa.Array, unit_ns: int | None, where: str, row: int = 0) -
     Raises:
         InputError: a time is not a number, or is beyond 292 years, or there is no unit.
     """
-    exact = pa.decimal128(38, _DIGITS[_unit(unit_ns, where)])
+    digits = _DIGITS[_unit(unit_ns, where)]
+    exact = pa.decimal128(38, digits)
     try:
-        decimals = pc.cast(values, exact, safe=False)
+        cut = pc.cast(values, exact, safe=False)
     except pa.ArrowInvalid:
         # The first count of texts that do not cast ends with the one that is no number.
         bad = bisect_left(range(1, len(values)), True, key=lambda count: not _casts(values[:count], exact))
         text = values[bad].as_py()
         raise InputError(f"{where} is {text!r:.60} in row {row + bad}; a time must be a number") from None
+    _in_ns(cut, values, where, row)
+    finer = pc.cast(values, pa.decimal256(76, digits + _BELOW_NS), safe=False)
+    rounded = pc.cast(pc.call_function("round", [finer], pc.RoundOptions(digits)), exact)
+    ns = _in_ns(rounded, values, where, row)
+    given = ns.is_valid().to_numpy(zero_copy_only=False)
+    return pc.fill_null(ns, 0).cast(pa.int64()).to_numpy(zero_copy_only=False), given
+
+
+def _in_ns(decimals: pa.Array, values: pa.Array, where: str, row: int) -> pa.Array:
+    """Decimals with nanoseconds as their last digits as these; refused beyond 292 years."""
     ns = decimals.view(pa.decimal128(38, 0))  # the digits without the point are the nanoseconds
     size = pc.call_function("abs", [ns])
     beyond = pc.fill_null(pc.call_function("greater", [size, pa.scalar(LARGEST_NS)]), False)
     _refuse(values, beyond.to_numpy(zero_copy_only=False), where, row)
-    given = ns.is_valid().to_numpy(zero_copy_only=False)
-    return pc.fill_null(ns, 0).cast(pa.int64()).to_numpy(zero_copy_only=False), given
+    return ns
 
 
 def _unit(unit_ns: int | None, where: str) -> int:

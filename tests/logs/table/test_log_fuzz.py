@@ -7,7 +7,7 @@ import re
 import struct
 import zipfile
 from collections.abc import Callable
-from decimal import ROUND_DOWN, Decimal
+from decimal import ROUND_HALF_EVEN, Decimal
 from pathlib import Path
 from typing import Any
 
@@ -136,8 +136,8 @@ def test_any_array_in_an_archive(
     ),
     unit=st.sampled_from(list(TIME_UNITS)),
 )
-def test_decimal_time_is_cut_below_the_nanosecond(value: Decimal, unit: str) -> None:
-    expected = int((value * TIME_UNITS[unit]).to_integral_value(ROUND_DOWN))
+def test_decimal_time_is_rounded_to_the_nanosecond(value: Decimal, unit: str) -> None:
+    expected = int((value * TIME_UNITS[unit]).to_integral_value(ROUND_HALF_EVEN))
     text = pa.array([f"{value:f}", None])
     if abs(expected) >= 1 << 63:
         with pytest.raises(InputError, match="292 years"):

@@ -145,6 +145,7 @@ def test_time_is_exact_to_the_nanosecond(path: Path, lines: list[str], unit: str
         ("inf", ["column 'time' is 'inf' in row 7"]),
         ("", ["column 'time' has no time"]),
         ("9223372036.854775808", ["column 'time' is 9223372036.854775808 in row 7", "292 years"]),
+        ("9223372036.8547758079", ["in row 7", "292 years"]),
         ("-1e28", ["in row 7", "292 years"]),
         ("1e40", ["in row 7"]),
     ],
