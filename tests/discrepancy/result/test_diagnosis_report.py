@@ -154,7 +154,12 @@ def test_a_share_beyond_the_first_is_a_further_one() -> None:
     text = " ".join(format_diagnosis(values).split())
     assert text.count("Explains 99 % of") == 1
     assert "Explains a further 1 % of the misfit in sample" in text
-    for share, words in ((0.0, "0 %"), (0.00067, "0.07 %"), (-0.00067, "-0.07 %"), (1e-6, "less than 0.001 %")):
+    for share, words in (
+        (0.0, "0 %"),
+        (0.00067, "0.07 %"),
+        (-0.00067, "-0.07 %"),
+        (1e-6, "less than 0.001 %"),
+    ):
         second["explained"]["in_sample"] = share
         text = " ".join(format_diagnosis(values).split())
         assert f"Explains a further {words} of the misfit in sample" in text
