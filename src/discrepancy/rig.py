@@ -7,7 +7,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -174,6 +174,10 @@ class Channel:
 class Rig(ABC):
     """A machine and its simulation, seen by the diagnosis; what a machine may lack has defaults that say so."""
 
+    rigid: ClassVar[
+        tuple[str, ...]
+    ] = ()  # causes that are also looked for with kinds held that would bend their shape
+
     @property
     @abstractmethod
     def trials(self) -> Sequence[str]:
@@ -219,8 +223,6 @@ class Rig(ABC):
     def directions(self, trial: int) -> dict[str, Array]:
         """Orthonormal directions in the whitened channels of what single sources can do, shape (n, C, k)."""
         return {}
-
-    # Causes.
 
     @abstractmethod
     def candidates(self) -> list[Candidate]:

@@ -130,12 +130,12 @@ def _with_kinds_narrow(rig: Rig, base: Hypothesis) -> list[Hypothesis]:
     Kinds that scatter to explain a cause take its shape from it: a payload is then whatever masses leave of it.
     """
     wide = base.problem.spread > rules.HELD_FACTOR
-    if not wide.any():
+    if not wide.any() or not rig.rigid:
         return []
     narrow = replace(base.problem, spread=np.where(wide, 1.0, base.problem.spread))
     fit, found = Fit.of(narrow, base.free), []
     for index, candidate in enumerate(narrow.candidates):
-        if index not in base.free and not narrow.has_tolerance(index) and rig.steps(candidate):
+        if index not in base.free and candidate.cause in rig.rigid:
             item = _in_best_shape(rig, fit, Scanned(index, candidate, score_of(fit, index)))
             if item.score > rules.LOOKED_AT_NATS:
                 found.append(sharpened(rig, base, item, near=True, start=narrow))

@@ -65,7 +65,8 @@ def with_laws(
             first = first or tuple(places)
             step = _with_one(start, bench, places, say)
             if step is not None:
-                found.append((continued(step[0], most, say), step[1]))
+                enough = min(most, len(step[0].best.free) + rules.LAW_CAUSES)
+                found.append((continued(step[0], enough, say), step[1]))
         if not found:
             break
         best, more = max(found, key=lambda one: one[0].best.score)

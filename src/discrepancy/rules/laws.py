@@ -49,3 +49,5 @@ LAW_CHUNK = 240
 """Columns that are judged at a time. Chosen: memory."""
 LAW_NEAR = 0.5
 """Share of the likeliest formula's nats from which the numbers inside another are sharpened. Chosen: time."""
+LAW_CAUSES = 2
+"""Causes of the catalogue that are looked for at most after each law. Chosen: what was missed without it is little."""

@@ -171,6 +171,8 @@ class SerialRig(SerialRows, Rig):
         """The candidate with every other shape of its cause; a push with its interval moved."""
         return shapes.others(candidate, self.hints, finer=finer)
 
+    rigid = ("payload",)
+
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
         """For every number of its shape that the data determine: a little less, a little more, and the difference."""
         return shapes.steps(candidate)
