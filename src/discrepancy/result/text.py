@@ -17,8 +17,6 @@ NOTHING_WRONG_HERE = ("consistent", "miscalibrated")
 """Verdicts with which no place stands out."""
 SAID = 0.001
 """Probabilities below are not told."""
-WHOLE = 0.005
-"""Shares from which whole percents are told."""
 
 
 def format_diagnosis(values: Values) -> str:
@@ -203,7 +201,8 @@ def _percent(share: float) -> str:
     """``94 %``; a digit of what would round to none."""
     if 0.0 < abs(share) < SAID / 100:
         return "less than 0.001 %"
-    return f"{100 * share:.{'1g' if 0.0 < abs(share) < WHOLE else '0f'}} %"
+    whole = f"{100 * share:.0f} %"
+    return whole if share == 0.0 or whole not in ("0 %", "-0 %") else f"{100 * share:.1g} %"
 
 
 def probability_words(probability: float) -> str:
