@@ -174,9 +174,7 @@ class Channel:
 class Rig(ABC):
     """A machine and its simulation, seen by the diagnosis; what a machine may lack has defaults that say so."""
 
-    rigid: ClassVar[
-        tuple[str, ...]
-    ] = ()  # causes that are also looked for with kinds held that would bend their shape
+    rigid: ClassVar[tuple[str, ...]] = ()  # causes that are looked for with kinds held, too
 
     @property
     @abstractmethod
