@@ -23,7 +23,7 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     """
     assert set(values) - {"provenance"} == {
         "format", "version", "recordings", "verdict", "causes", "suspected", "scatter", "evidence", "gain",
-        "not_simulated", "undecidable", "detection_limits", "residual", "remains", "notes",
+        "not_simulated", "undecidable", "detection_limits", "residual", "remains", "notes", "places", "prior_odds",
     }  # fmt: skip
     assert (values["format"], values["version"]) == ("mocobot-diagnosis", 2)
     assert values["verdict"] in VERDICTS
@@ -32,9 +32,10 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     for cause in values["causes"]:
         assert set(cause) == PLACE | {
             "sentence", "parameters", "explained", "probability", "over_nothing", "share_left", "instead", "folds",
-            "shape", "separate", "alternatives",
+            "shape", "separate", "alternatives", "law",
         }  # fmt: skip
         _check_place(cause)
+        assert (cause["law"] is not None) == (cause["cause"] == "law")
         assert cause["parameters"]
         for parameter in cause["parameters"].values():
             assert set(parameter) == {"value", "se"}
@@ -61,6 +62,8 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
         assert set(entry) == PLACE | {"at", "sentence", "probability", "over_nothing"}
         _check_place(entry)
         assert entry["probability"] < 0.5
+    assert all(set(entry) == {"place", "robot", "joint", "nats"} for entry in values["places"])
+    assert 0.0 < values["prior_odds"]
     assert values["scatter"] or values["verdict"] != "miscalibrated"
     for entry in values["scatter"]:
         assert set(entry) == {

@@ -110,7 +110,7 @@ def test_long_gaps_cut_a_log(tmp_path) -> None:
 REFUSED = {
     "backwards": (
         lambda t: np.concatenate([t[:700], t[700:] - 0.5]),
-        "time runs back by 0.498000001 s in row 700",
+        "time runs back by 0.498 s in row 700",
     ),
     "slow": (lambda t: t * 100, "at 5 Hz; 20 to 20000 Hz are allowed (is the unit of time right?)"),
     "fast": (lambda t: t / 100, "at 50000 Hz; 20 to 20000 Hz are allowed (is the unit of time right?)"),
