@@ -63,7 +63,7 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
         _check_place(entry)
         assert entry["probability"] < 0.5
     assert all(set(entry) == {"place", "robot", "joint", "nats"} for entry in values["places"])
-    assert 0.0 < values["prior_odds"]
+    assert values["prior_odds"] > 0.0
     assert values["scatter"] or values["verdict"] != "miscalibrated"
     for entry in values["scatter"]:
         assert set(entry) == {
@@ -180,6 +180,7 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
         "folds": [3.0, 4.0],
         "shape": {},
         "separate": "A known weight separates them.",
+        "law": None,
         "alternatives": [
             {
                 **rival,
@@ -226,6 +227,8 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
             if "explained" not in verdict or verdict == "unexplained"
             else [{**rival, "at": None, "nats": 0.2, "needed": 10.5}],
         },
+        "places": [],
+        "prior_odds": 0.05,
         "suspected": [],
         "scatter": [scattered()] if verdict == "miscalibrated" else [],
         "gain": {
