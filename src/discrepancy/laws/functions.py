@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 from scipy.signal import lfilter, lfilter_zi
@@ -23,9 +22,8 @@ class Function:
         name: as in the JSON and in the simulator's effect ``law``.
         numbers: names of what is inside, in order.
         of: values at a rate [Hz]: signal (Q,), rate, numbers -> columns (Q, k), one amplitude each.
-        formula: in words and symbols; ``x`` is the signal, ``a`` the amplitude, names in braces the numbers.
+        formula: in words and symbols; ``a`` is the amplitude, in braces are the signal ``x`` and the numbers.
         fitted: which of the numbers the data determine, with the share by which to change them for slopes.
-        memory: whether it depends on what was before.
     """
 
     name: str
@@ -33,7 +31,6 @@ class Function:
     of: Callable[[Array, float, Numbers], Array]
     formula: str
     fitted: Mapping[str, float]
-    memory: bool = False
 
 
 def _plain(of: Callable[[Array], Array]) -> Callable[[Array, float, Numbers], Array]:
@@ -121,26 +118,26 @@ FUNCTIONS: dict[str, Function] = {
     function.name: function
     for function in (
         Function("constant", (), _plain(np.ones_like), "a", {}),
-        Function("linear", (), _plain(lambda x: x), "a x", {}),
-        Function("square", (), _plain(np.square), "a x^2", {}),
-        Function("cube", (), _plain(lambda x: x**3), "a x^3", {}),
-        Function("absolute", (), _plain(np.abs), "a |x|", {}),
-        Function("signed_square", (), _plain(lambda x: x * np.abs(x)), "a x |x|", {}),
-        Function("sign", ("slow",), _sign, "a sign(x)", {}),
-        Function("above", ("knee",), _above, "a max(x - {knee}, 0)", {}),
-        Function("below", ("knee",), _below, "a min(x - {knee}, 0)", {}),
-        Function("beyond", ("knee",), _beyond, "a x beyond +-{knee}", {}),
-        Function("sine", ("times",), _sine, "a sin({times} x + {phase})", {}),
-        Function("hum", ("frequency_hz",), _hum, "a sin(2 pi {frequency_hz} x + {phase})", {"frequency_hz": 2e-4}),
-        Function("warming", ("time_s",), _warming, "a (1 - exp(-x / {time_s}))", {"time_s": 0.02}),
-        Function("play", ("half_width",), _play, "play of x, half width {half_width}, amplitude a", {}, True),
-        Function("lag", ("time_s",), _lag, "a times how far x lags with {time_s}, over that", {"time_s": 0.05}, True),
+        Function("linear", (), _plain(lambda x: x), "a {x}", {}),
+        Function("square", (), _plain(np.square), "a {x}^2", {}),
+        Function("cube", (), _plain(lambda x: x**3), "a {x}^3", {}),
+        Function("absolute", (), _plain(np.abs), "a |{x}|", {}),
+        Function("signed_square", (), _plain(lambda x: x * np.abs(x)), "a {x} |{x}|", {}),
+        Function("sign", ("slow",), _sign, "a sign({x})", {}),
+        Function("above", ("knee",), _above, "a max({x} - {knee}, 0)", {}),
+        Function("below", ("knee",), _below, "a min({x} - {knee}, 0)", {}),
+        Function("beyond", ("knee",), _beyond, "a {x} beyond +-{knee}", {}),
+        Function("sine", ("times",), _sine, "a sin({times} {x} + {phase})", {}),
+        Function("hum", ("frequency_hz",), _hum, "a sin(2 pi {frequency_hz} {x} + {phase})", {"frequency_hz": 2e-4}),
+        Function("warming", ("time_s",), _warming, "a (1 - exp(-{x} / {time_s}))", {"time_s": 0.02}),
+        Function("play", ("half_width",), _play, "play of {x}, half width {half_width}, amplitude a", {}),
+        Function("lag", ("time_s",), _lag, "a times how far {x} lags with {time_s}, over that", {"time_s": 0.05}),
         Function(
             "second_order", ("frequency_hz", "damping"), _second_order,
-            "a times what follows x at {frequency_hz}, damping ratio {damping}",
-            {"frequency_hz": 0.02, "damping": 0.05}, True,
+            "a times what follows {x} at {frequency_hz}, damping ratio {damping}",
+            {"frequency_hz": 0.02, "damping": 0.05},
         ),
-        Function("spline", ("low", "step"), _spline, "a curve of x", {}),
+        Function("spline", ("low", "step"), _spline, "a curve of {x}", {}),
     )
 }  # fmt: skip
 """By name."""
@@ -149,8 +146,3 @@ FUNCTIONS: dict[str, Function] = {
 def knots_of(low: float, high: float) -> dict[str, float]:
     """Numbers of a spline over a range."""
     return {"low": low, "step": (high - low) / (rules.LAW_KNOTS - 1)}
-
-
-def between(values: Sequence[float]) -> list[float]:
-    """Middles of successive numbers."""
-    return [0.5 * (a + b) for a, b in pairwise(values)]

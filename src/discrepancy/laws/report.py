@@ -99,7 +99,6 @@ def law_to_dict(candidate: LawCandidate) -> dict[str, object]:
 def formula_of(candidate: LawCandidate) -> str:
     """The formula in symbols, its numbers put in, ``a`` for the amplitude."""
     term = candidate.term
-    shown = {name: f"{value:.4g}" for name, value in term.numbers.items()} | {"phase": "phase"}
-    text = term.law.formula.format(**shown).replace("x", "\0")
-    text = text.replace("e\0p", "exp").replace("ma\0", "max").replace("\0", term.of.symbol)
+    shown = {name: f"{value:.4g}" for name, value in term.numbers.items()}
+    text = term.law.formula.format(**shown, phase="phase", x=term.of.symbol)
     return text if term.times is None else f"{text} {term.times.symbol}"

@@ -173,7 +173,7 @@ def _rivals(bench: Bench, proposed: Proposed) -> list[Rival]:
     for candidate, less in others:
         if candidate.key != law.key and candidate.key not in out:
             out[candidate.key] = Rival(candidate, score - less)
-    return list(out.values())
+    return list(out.values())[: rules.LAW_RIVALS]
 
 
 def _with_rivals(searched: Searched, laws: dict[tuple[object, ...], list[Rival]]) -> Searched:

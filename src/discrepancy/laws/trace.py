@@ -47,14 +47,15 @@ def traces_of(
         zip(found.knots_s, found.errors, found.se, laws, strict=True)
     ):
         time = np.arange(bench.length(trial)) / bench.rate_hz(trial)
-        signal = np.interp(knots, time, bench.signal(trial, candidate.term.of))
+        signal, rows = np.interp(knots, time, bench.signal(trial, candidate.term.of)), bench.row_times(trial)
+        seen = (knots >= rows.min()) & (knots <= rows.max())  # of the rest nothing is known
         out.append(
             {
-                "time_s": knots.tolist(),
-                "signal": signal.tolist(),
-                "error": (error - offset).T.tolist(),
-                "se": se.T.tolist(),
-                "law": law.T.tolist(),
+                "time_s": knots[seen].tolist(),
+                "signal": signal[seen].tolist(),
+                "error": (error - offset)[seen].T.tolist(),
+                "se": se[seen].T.tolist(),
+                "law": law[seen].T.tolist(),
             }
         )
     return out

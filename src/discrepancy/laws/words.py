@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from discrepancy.causes.numbers import number
 from discrepancy.causes.units import SMALL, fitting
 from discrepancy.laws.candidate import LawCandidate
@@ -121,9 +119,3 @@ def _where(candidate: LawCandidate) -> str:
 
 def _words(variable: Variable) -> str:
     return "time" if variable.kind == "time" else f"{variable.words} [{variable.unit}]"
-
-
-def largest(values: Mapping[str, float]) -> float:
-    """The largest amplitude among a law's parameters."""
-    sizes = [abs(x) for name, x in values.items() if name.startswith(("amplitude", "at_knot"))]
-    return float(np.max(sizes))

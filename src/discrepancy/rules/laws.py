@@ -51,3 +51,5 @@ LAW_NEAR = 0.5
 """Share of the likeliest formula's nats from which the numbers inside another are sharpened. Chosen: time."""
 LAW_CAUSES = 2
 """Causes of the catalogue that are looked for at most after each law. Chosen: what was missed without it is little."""
+LAW_RIVALS = 6
+"""Other laws that are kept as rivals of one, the likeliest. Chosen: what comes after has no part in a probability."""

@@ -17,7 +17,6 @@ from mocobot_sim.effects import apply_effects
 from mocobot_sim.effects.law import Law
 from mocobot_sim.extended.extended import load_extended
 from mocobot_sim.scene.scene import build_team
-from mocobot_sim.trial.actors import Stage
 from mocobot_sim.trial.readings import Misreading, RobotReadings
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trajectories import random_vias, sphere_motion
@@ -36,9 +35,6 @@ class Neighbour(Misreading):
 
     def _mix(self, readings: RobotReadings, seen: np.ndarray, time: float) -> None:
         readings.set_tau(seen, 1, readings.tau(seen, 1) + SHARE * readings.tau(seen, 2))
-
-    def start(self, stage: Stage) -> None:
-        super().start(stage)
 
 
 @pytest.fixture(scope="module")

@@ -25,8 +25,10 @@ def tiny_set(seed: int) -> HiddenSet:
 generated = cache(generate)
 
 
-def blind(request: HiddenSet, excluded: tuple[str, ...] = ()) -> tuple[dict[str, Any], dict[str, Any]]:
+def blind(
+    request: HiddenSet, excluded: tuple[str, ...] = (), **options: Any
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """The verdict, and the truth that is opened after it."""
     recordings, sealed = generated(request)
-    verdict = verdict_on(recordings, excluded, "undecided")
+    verdict = verdict_on(recordings, excluded, "undecided", **options)
     return verdict, sealed.open(verdict)

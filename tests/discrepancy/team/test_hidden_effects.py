@@ -55,11 +55,21 @@ def test_nothing_is_named_where_nothing_is_hidden(kind):
 @pytest.mark.slow
 def test_without_the_true_cause_only_its_family_is_named():
     request = HIDDEN[1]
-    verdict, truth = blind(request, excluded=request.causes)
+    verdict, truth = blind(request, excluded=request.causes, laws="never")
     family = CAUSES[truth["effects"][0]["cause"]].family
     assert "sea_bias" not in [item["cause"] for item in verdict["found"]]
-    # What is not in the catalogue may be stated as a law.
-    assert all(item["family"] in (family, "unlisted") for item in verdict["found"][:1])
+    assert all(item["family"] == family for item in verdict["found"][:1])
+
+
+@pytest.mark.slow
+def test_without_the_true_cause_it_is_stated_as_a_law_at_its_place():
+    request = HIDDEN[1]
+    verdict, truth = blind(request, excluded=request.causes)
+    (item,), (effect,) = verdict["found"], truth["effects"]
+    assert (item["cause"], item["robot"], item["joint"]) == ("law", effect["robot"], effect["joint"])
+    assert abs(item["parameters"]["amplitude"]) == pytest.approx(
+        abs(effect["parameters"]["bias_Nm"]), rel=0.1
+    )
 
 
 def test_equal_requests_give_equal_bits():

@@ -54,12 +54,14 @@ def _moved(linear: TrialLinear, robot: int, axis: Array, base: Array | None) -> 
     Args:
         linear: the trial.
         robot: from 0.
-        axis: along which, shape (3,): of the robot's {b}, or of the payload.
-        base: axes of the robot's base in {b1}; None for an axis of the payload.
+        axis: along which, shape (3,): of the robot's {b}, or of its grasp frame {i}.
+        base: axes of the robot's base in {b1}; None for an axis of {i}.
     """
     at = linear.reduction.sample
     displacement = (
-        np.tile(base @ axis, (len(at), 1)) if base is not None else linear.data.R_bi[at][:, 0] @ axis
+        np.tile(base @ axis, (len(at), 1))
+        if base is not None
+        else linear.data.R_bi[at][:, 0] @ (linear.shared.grasps.R_1i[robot] @ axis)
     )
     out = np.zeros((len(at), 3, linear.channels))
     for i in range(1, linear.robots):
