@@ -120,7 +120,8 @@ class Candidate:
 
     def _at(self, part: str) -> str:
         if self.joint:
-            return f"{part.removeprefix('driven ')} {self.joint} of robot {self.robot}"
+            joint = f"{part.removeprefix('driven ')} {self.joint}"
+            return f"{joint} of robot {self.robot}" if self.robot else joint
         return f"robot {self.robot}" if part == "robot" else f"the {part} of robot {self.robot}"
 
     @property
@@ -175,6 +176,7 @@ class Rig(ABC):
     """A machine and its simulation, seen by the diagnosis; what a machine may lack has defaults that say so."""
 
     rigid: ClassVar[tuple[str, ...]] = ()  # causes that are looked for with kinds held, too
+    normal: ClassVar[bool] = False  # whether a simulation has what is normal as the other trials have it
 
     @property
     @abstractmethod
