@@ -57,9 +57,7 @@ def terms_at(place: Place, variables: Sequence[Variable], spread: Callable[[Vari
     return out
 
 
-def rubbing(
-    direction: Variable, own: Sequence[Variable], spread: Callable[[Variable], Array]
-) -> list[Term]:
+def rubbing(direction: Variable, own: Sequence[Variable], spread: Callable[[Variable], Array]) -> list[Term]:
     """Dry friction that changes with time, with where the joint stands, or with what it carries."""
     out = [Term(term.function, TIME, term.numbers, direction) for term in of_time()]
     for variable in own:
@@ -98,7 +96,9 @@ def of_own(variable: Variable, values: Array) -> list[Term]:
         out += [Term("beyond", variable, {"knee": knee}) for knee in sizes]
         out += [Term("lag", variable, {"time_s": time}) for time in rules.LAW_LAG_S]
     if variable.kind in ("angle", "travel"):
-        out += [Term("sine", variable, {"times": variable.wave * k}) for k in range(1, rules.LAW_MOST_TIMES + 1)]
+        out += [
+            Term("sine", variable, {"times": variable.wave * k}) for k in range(1, rules.LAW_MOST_TIMES + 1)
+        ]
     if variable.kind == "rate":
         out += [Term(side, variable, {"knee": 0.0}) for side in ("above", "below")]
         out.append(Term("sign", variable, {"slow": variable.slow}))

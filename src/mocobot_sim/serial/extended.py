@@ -14,7 +14,7 @@ from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.strict import Fields, read_json
 from mocobot_sim.serial.effects import LAWS, RobotEffect, resistances
-from mocobot_sim.serial.law import JointLaw
+from mocobot_sim.serial.law import ActingLaw, JointLaw
 from mocobot_sim.serial.mjcf import into_mjcf
 from mocobot_sim.serial.state import State
 
@@ -70,12 +70,18 @@ def _steps(effect: Effect) -> bool:
 
 def _entry(effect: Effect) -> dict[str, Any]:
     if isinstance(effect, JointLaw):
-        return {"cause": LAW, "joint": effect.joint, "partner": None, "parameters": {}, "law": effect.to_dict()}
+        return {
+            "cause": LAW,
+            "joint": effect.joint,
+            "partner": None,
+            "parameters": {},
+            "law": effect.to_dict(),
+        }
     own = {"cause": effect.cause, "joint": effect.joint, "partner": effect.partner}
     return own | {"parameters": dict(effect.parameters), "law": None}
 
 
-def load_effects(folder: Path) -> list[Effect]:
+def load_effects(folder: Path) -> list[RobotEffect | ActingLaw]:
     """The effects of an extended robot that its MJCF lacks, for ``step``.
 
     Laws may remember what was, such as a play: load them anew for every run.
@@ -96,15 +102,17 @@ def load_effects(folder: Path) -> list[Effect]:
     return [_effect(e, where) for e in entries if e.values["in"] == NUMBERS]
 
 
-def _effect(entry: Fields, where: str) -> Effect:
+def _effect(entry: Fields, where: str) -> RobotEffect | ActingLaw:
     values = entry.values
     if values["cause"] == LAW:
-        return JointLaw.of_dict(values["law"], where)
+        return ActingLaw(JointLaw.of_dict(values["law"], where))
     numbers = {k: float(v) for k, v in values["parameters"].items()}
     return RobotEffect(values["cause"], values["joint"], values["partner"], numbers)
 
 
-def step(model: mujoco.MjModel, data: mujoco.MjData, effects: Sequence[Effect], torque: Array) -> None:
+def step(
+    model: mujoco.MjModel, data: mujoco.MjData, effects: Sequence[RobotEffect | ActingLaw], torque: Array
+) -> None:
     """One step of a robot whose drives give some torques, with the effects that its MJCF lacks.
 
     Args:
@@ -121,8 +129,8 @@ def step(model: mujoco.MjModel, data: mujoco.MjData, effects: Sequence[Effect], 
     listed = [effect for effect in effects if isinstance(effect, RobotEffect)]
     taken = resistances(listed, data.qpos, data.qvel, load)
     state = State(data.time, model.opt.timestep, data.qpos, data.qvel, before, load, torque)
-    for law in (effect for effect in effects if isinstance(effect, JointLaw)):
-        taken[law.joint - 1] += law.torque(state)
+    for acting in (effect for effect in effects if isinstance(effect, ActingLaw)):
+        taken[acting.law.joint - 1] += acting.torque(state)
     data.qfrc_applied[:] = torque - taken
     mujoco.mj_step2(model, data)
 
@@ -158,5 +166,7 @@ One step with all of it, from torques at the joints:
 def _row(effect: Effect) -> str:
     entry = _entry(effect)
     numbers = entry["law"] or entry["parameters"]
-    each = (f"`{n}` = {v:.6g}" if isinstance(v, float) else f"`{n}` = {v}" for n, v in numbers.items() if v != "")
+    each = (
+        f"`{n}` = {v:.6g}" if isinstance(v, float) else f"`{n}` = {v}" for n, v in numbers.items() if v != ""
+    )
     return f"`{entry['cause']}` | {entry['joint'] or ''} | {', '.join(each)}"
