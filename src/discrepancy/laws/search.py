@@ -80,7 +80,7 @@ def with_laws(
 
 
 def _suffices(found: Hypothesis, named: Hypothesis) -> bool:
-    """Whether a law, with what it goes with, leaves noise and is likelier than the causes that were named without it."""
+    """Whether a law, with what it goes with, leaves noise and is likelier than what was named without it."""
     clean = unlisted_nats(found) < rules.UNLISTED_NATS
     return clean and found.score >= named.score + rules.NAMED_NATS
 
