@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterable
 
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate, law_steps, refined
-from discrepancy.laws.report import report
+from discrepancy.laws.said.numbers import report
 from discrepancy.rig import Candidate, Numbers, Rig
 from estimator.arrays import Array
 
@@ -26,6 +27,9 @@ class Lawful(Rig):
         if isinstance(candidate, LawCandidate):
             return [columns[..., :0] for columns in self.columns(candidate)]
         return super().unknowns(candidate)
+
+    def imitators(self, candidate: Candidate) -> Iterable[list[Array]]:
+        return [] if isinstance(candidate, LawCandidate) else super().imitators(candidate)
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         if isinstance(candidate, LawCandidate):

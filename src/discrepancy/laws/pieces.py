@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from discrepancy.laws.candidate import LawCandidate
-from discrepancy.laws.report import parts_of
+from discrepancy.laws.said.numbers import parts_of
 from estimator.arrays import Array
 
 
