@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 from estimator.errors import InputError
 from estimator.strict import Fields
@@ -73,12 +73,12 @@ class Formula:
         return asdict(self)
 
     @classmethod
-    def of_dict(cls, values: object, where: str) -> Self:
+    def of_dict(cls, values: Mapping[str, Any], where: str) -> Self:
         """From plain JSON values.
 
         Raises:
             InputError: they are no formula.
         """
         entry = Fields(values, (*TEXTS, *NUMBERS), where)
-        texts = {key: str(entry.values[key]) for key in TEXTS}
-        return cls(**texts, **{key: entry.number(key) for key in NUMBERS})
+        target, function, of, times = (str(entry.values[key]) for key in TEXTS)
+        return cls(target, function, of, *(entry.number(key) for key in NUMBERS), times)
