@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from discrepancy.serial.diagnosis import diagnose_rig
+from discrepancy.serial.laws.rig import LawfulSerialRig
 from discrepancy.serial.model import SerialModel, load_model
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
@@ -88,7 +89,7 @@ def named(rig: SerialRig, per_rad: float) -> tuple[Servo, list[str]]:
     """A servo with what a diagnosis names, and the names."""
     servo = Servo(rig.motors[0].torque_per_unit, per_rad)
     labels = []
-    for found in diagnose_rig(rig).causes:
+    for found in diagnose_rig(rig, laws="never").causes:
         values = dict(
             zip([p.name for p in found.candidate.parameters], map(float, found.values), strict=True)
         )
@@ -132,7 +133,7 @@ def main() -> None:
     for law in loop_laws(logs):
         print(f"gain {law.gain:g}: {law.per_rad / law.gain:.6f} +- {law.se / law.gain:.6f} of full duty per rad "
               f"and unit; leaves {law.left:.4f}; cut off at {law.limit:.3g}")  # fmt: skip
-    whole = SerialRig.of(model, logs)
+    whole = LawfulSerialRig.of(model, logs)
     began = time.process_time()
     found = diagnose_rig(whole)
     print(
@@ -153,7 +154,7 @@ def main() -> None:
     for gain in GAINS:
         others = [log for log in logs if log.drive.position_gain[0] != gain]
         laws = loop_laws(others)
-        rig = SerialRig.of(model, others)
+        rig = LawfulSerialRig.of(model, others)
         full, labels = named(rig, float(np.mean([law.per_rad / law.gain for law in laws])))
         bare = plain(rig, full)
         print(f"gain {gain} from the others: {', '.join(labels)}")
