@@ -47,7 +47,9 @@ def test_a_way_that_rubs_more_at_its_end(tmp_path: Path) -> None:
     assert law.candidate.term.variables == ("position", "direction")
     x = np.linspace(0.0, float(np.max(reference())), 50)
     term = law.candidate.term
-    values = term.law.of(x, 1000.0, term.numbers) @ law.values[: term.law.of(x, 1000.0, term.numbers).shape[1]]
+    values = (
+        term.law.of(x, 1000.0, term.numbers) @ law.values[: term.law.of(x, 1000.0, term.numbers).shape[1]]
+    )
     truth = SPOT_N * np.maximum(x - KNEE_M, 0.0)
     off = (values - values.mean()) - (truth - truth.mean())  # a constant is Coulomb friction
     assert np.std(off) < 0.15 * np.std(truth)

@@ -160,7 +160,9 @@ def test_places_and_signals(model: SerialModel) -> None:
     assert {"torque_1", "torque_3", "q_2", "direction_4", "load_1"} <= {v.name for v in bench.variables}
 
 
-STATE = State(3.0, 1e-3, np.array([0.1, 0.2]), np.array([0.0, -0.5]), np.zeros(2), np.zeros(2), np.array([4.0, 0.0]))
+STATE = State(
+    3.0, 1e-3, np.array([0.1, 0.2]), np.array([0.0, -0.5]), np.zeros(2), np.zeros(2), np.array([4.0, 0.0])
+)
 
 
 def test_laws_of_other_signals() -> None:
