@@ -12,6 +12,7 @@ from discrepancy.inference.best_shape import nearest_shape
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.imitation import imitated
 from discrepancy.inference.scan import Scanned, scan, score_of, score_with
+from discrepancy.inference.twins import alike
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
@@ -74,10 +75,17 @@ def _with_kinds_held(base: Hypothesis) -> list[Scanned]:
     for index, candidate in enumerate(problem.candidates):
         if index not in base.free and problem.has_tolerance(index):
             kinds.setdefault(candidate.cause, []).append(index)
-    for members in kinds.values():
-        if problem.spread[problem.columns_of(members[0])][0] > rules.HELD_FACTOR:
+    wide = {
+        kind
+        for kind, members in kinds.items()
+        if problem.spread[problem.columns_of(members[0])][0] > rules.HELD_FACTOR
+    }
+    twins = {kind: [other for other in wide - {kind} if alike(problem, kind, other)] for kind in kinds}
+    for kind, members in kinds.items():
+        if kind in wide or twins[kind]:
             spread = problem.spread.copy()
-            for index in members:
+            # What leaves the same trace would take the fault for a scatter of its own.
+            for index in (i for one in (kind, *twins[kind]) for i in kinds[one]):
                 spread[problem.columns_of(index)] = 1.0
             fit = Fit.of(replace(problem, spread=spread), base.free)
             for index in members:

@@ -97,7 +97,7 @@ def test_torques_are_moved_as_little_as_balances_the_wrenches(case):
 
 
 def test_holds_have_a_noise_of_their_own():
-    """What residuals tell of signals in motion and in holds is that of their own draws; nothing where there are none."""
+    """What residuals tell of signals in motion and in holds is that of their own draws; none where there are none."""
     rng = np.random.default_rng(3)
     rows = rng.standard_normal((400, 30, 12))
     errors = rng.standard_normal((400, 30, 2, 21))
