@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_solve, cholesky, get_lapack_funcs
 
 from discrepancy import rules
-from discrepancy.inference.twins import alike
+from discrepancy.inference.twins import twins
 from discrepancy.least_squares.problem import Problem
 from estimator.arrays import Array
 
@@ -71,12 +71,16 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
     power = np.concatenate([p[c.sizes > 0] for p, c in zip(problem.power, problem.cells, strict=True)])
     start = np.array([np.sqrt(np.mean(problem.spread[at] ** 2)) for at in names])
     evidence, power, spread = _climbed(parts, power, np.clip(start, parts.least, parts.most), rounds)
-    for a, b in _sharing(problem, parts, spread):
-        apart = np.array(spread)
-        apart[a], apart[b] = np.minimum(np.hypot(spread[a], spread[b]), parts.most[a]), parts.least[b]
-        other = _climbed(parts, power, apart, rounds)
-        if other[0] > evidence:
-            evidence, power, spread = other
+    # Two kinds that leave the same trace share a scatter, a saddle: one of them alone is likelier.
+    wide = [kind for kind, group in parts.kinds.items() if spread[group] > rules.HELD_FACTOR]
+    for pair in twins(problem, wide):
+        a, b = (parts.kinds[kind] for kind in pair)
+        for one, other in ((a, b), (b, a)):
+            apart = np.array(spread)
+            apart[one], apart[other] = min(np.sqrt(2.0) * spread[one], parts.most[one]), parts.least[other]
+            alone = _climbed(parts, power, apart, rounds)
+            if alone[0] > evidence:
+                evidence, power, spread = alone
     evidence -= problem.price
     found, at = [], 0
     for old, cells in zip(problem.power, problem.cells, strict=True):
@@ -88,18 +92,6 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
     for where, value in zip(names, spread, strict=True):
         spreads[where] = value
     return Learnt(problem.with_noise(found, spreads), tuple(free), evidence)
-
-
-def _sharing(problem: Problem, parts: _Parts, spread: Array) -> list[tuple[int, int]]:
-    """Pairs of kinds that leave the same trace and share a scatter evenly: a saddle, for one alone is likelier."""
-    wide = [kind for kind, group in parts.kinds.items() if spread[group] > rules.HELD_FACTOR]
-    pairs = [(a, b) for k, a in enumerate(wide) for b in wide[k + 1 :]]
-    return [
-        (parts.kinds[a], parts.kinds[b])
-        for a, b in pairs
-        if np.isclose(spread[parts.kinds[a]], spread[parts.kinds[b]], rtol=rules.SHARED_EVENLY)
-        and alike(problem, a, b)
-    ]
 
 
 def _climbed(parts: _Parts, power: Array, spread: Array, rounds: int) -> tuple[float, Array, Array]:
