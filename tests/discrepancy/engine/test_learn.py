@@ -220,10 +220,10 @@ def test_learning_starts_anywhere(rows):
 
 
 def with_twins(rng, values, rows=60):
-    """Two kinds of five places with the same columns, in other units, and a third that is apart."""
+    """Two kinds of five places with the same columns, and a third that is apart."""
     candidates = tuple(place(kind, joint) for kind in ("one", "other", "apart") for joint in range(1, 6))
     columns = [rng.standard_normal((rows, 2, 1)) for _ in range(10)]
-    causes = [*columns[:5], *(-1.2 * c for c in columns[:5]), *columns[5:]]
+    causes = [*columns[:5], *(-c for c in columns[:5]), *columns[5:]]
     x = rng.standard_normal((rows, 2)) + sum(c[..., 0] * v for c, v in zip(columns, values, strict=False))
     none = np.zeros((rows, 2, 0))
     return [Rows("a", x, none, none, causes, np.arange(rows) / 10.0)], candidates

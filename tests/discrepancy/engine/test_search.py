@@ -414,7 +414,7 @@ def test_linearising_again_ends():
 def test_a_fault_of_one_of_two_kinds_with_one_trace_is_seen_in_both():
     """Either could be it; while the one is looked at, the other may not take it for a scatter of its own."""
     catalogue = tuple(cause(kind, robot) for kind in ("lag", "late") for robot in (1, 2, 3))
-    rig = FakeRig({4: 14.0}, catalogue=catalogue, twins={k + 3: (k, 0.0) for k in range(3)})
+    rig = FakeRig({4: 200.0}, catalogue=catalogue, twins={k + 3: (k, 0.0) for k in range(3)})
     nothing = Hypothesis.of(Problem.of(rig.rows(catalogue), catalogue), ())
     wide = nothing.problem.spread[[0, 3]]
     assert min(wide) < 1.5 < 3.0 < max(wide)
