@@ -88,7 +88,7 @@ def linearised_trials(
     bases = [start_bases(*poses(s.phi[s.keep], s.theta[s.keep], arms), shared) for s in signals]
     run = Parallel(n_jobs=jobs, prefer="processes" if jobs > 1 else "threads")
     tasks = zip(signals, bases, reductions, strict=True)
-    each = run(delayed(linearise)(s, shared, b, arms, r, full=True) for s, b, r in tasks)
+    each = run(delayed(linearise)(s, shared, b, arms, r, full=sensed is None) for s, b, r in tasks)
     linear = tuple(cast("list[TrialLinear]", each))
     if sensed is None:
         left = run(delayed(what_noise_leaves)(t, noise, k, tolerances) for k, t in enumerate(linear))

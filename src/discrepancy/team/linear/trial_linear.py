@@ -208,39 +208,40 @@ def linearise(
 ) -> TrialLinear:
     """Linearise one trial; without ``full`` the robots' signals are left out (J is empty)."""
     s = filtered(signals)
-    Q, N = s.shape[:2]
     data = grasp_data(s, arms, signals.rate_hz)
-    force = balance(data, shared)[0]
     pose = pose_residual(signals.phi, signals.theta, shared, bases, arms)
-    residual = reduction(np.concatenate([pose, force], axis=1))
+    residual = reduction(np.concatenate([pose, balance(data, shared)[0]], axis=1))
+    columns = reduction(by_shared(data, shared, bases)), reduction(by_bases(data, shared, bases))
+    J = by_signals(s, data, shared, bases, arms) if full else BySignals.none(s.shape[1], 6 * s.shape[1])
+    return TrialLinear(signals, s, data, shared, bases, arms, reduction, residual, J, *columns)
 
-    C, split = 6 * N, 6 * (N - 1)
-    by_shared = np.zeros((Q, C, split + 10))
-    by_shared[:, split:] = payload_columns(data, shared)
+
+def by_shared(data: GraspData, shared: Shared, bases: Bases) -> Array:
+    """Derivative of the residual's samples by ``Shared.moved``, shape (Q, 6 N, 6 (N - 1) + 10)."""
+    N, split = data.robots, 6 * (data.robots - 1)
+    out = np.zeros((data.samples, 6 * N, split + 10))
+    out[:, split:, split:] = -balance(data, shared)[1]
+    for k in range(split):
+        out[:, split:, k] = _slope(lambda x: balance(data, shared.moved(x))[0], np.eye(split + 10)[k])
     # A loop knows its own robot's grasp and base alone: all loops at once.
-    by_bases = np.zeros((Q, C, 4 * (N - 1)))
     for k in range(6):
         all_grasps = np.append(np.tile(np.eye(6)[k], N - 1), np.zeros(10))
         slope = _slope(lambda x: pose_error(data.R_bi, data.p_bi, shared.moved(x), bases), all_grasps)
         for i in range(N - 1):
-            by_shared[:, 6 * i : 6 * i + 6, 6 * i + k] = slope[:, 6 * i : 6 * i + 6]
+            out[:, 6 * i : 6 * i + 6, 6 * i + k] = slope[:, 6 * i : 6 * i + 6]
+    return out
+
+
+def by_bases(data: GraspData, shared: Shared, bases: Bases) -> Array:
+    """The same by ``Bases.moved``, shape (Q, 6 N, 4 (N - 1))."""
+    N = data.robots
+    out = np.zeros((data.samples, 6 * N, 4 * (N - 1)))
     for k in range(4):
         all_bases = np.tile(np.eye(4)[k], N - 1)
         slope = _slope(lambda x: pose_error(data.R_bi, data.p_bi, shared, bases.moved(x)), all_bases)
         for i in range(N - 1):
-            by_bases[:, 6 * i : 6 * i + 6, 4 * i + k] = slope[:, 6 * i : 6 * i + 6]
-    J = by_signals(s, data, shared, bases, arms) if full else BySignals.none(N, C)
-    columns = reduction(by_shared), reduction(by_bases)
-    return TrialLinear(signals, s, data, shared, bases, arms, reduction, residual, J, *columns)
-
-
-def payload_columns(data: GraspData, shared: Shared) -> Array:
-    """Derivative of the wrench balance by ``Shared.moved``, shape (Q, 6, 6 (N - 1) + 10)."""
-    split = 6 * (data.robots - 1)
-    slopes = [
-        _slope(lambda x: balance(data, shared.moved(x))[0], along) for along in np.eye(split + 10)[:split]
-    ]
-    return np.concatenate([np.stack(slopes, axis=-1), -balance(data, shared)[1]], axis=-1)
+            out[:, 6 * i : 6 * i + 6, 4 * i + k] = slope[:, 6 * i : 6 * i + 6]
+    return out
 
 
 def _slope(of: Callable[[Array], Array], along: Array) -> Array:
