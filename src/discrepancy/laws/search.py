@@ -80,9 +80,12 @@ def with_laws(
 
 
 def _suffices(found: Hypothesis, named: Hypothesis) -> bool:
-    """Whether a law, with what it goes with, leaves noise and is likelier than what was named without it."""
-    clean = unlisted_nats(found) < rules.UNLISTED_NATS
-    return clean and found.score >= named.score + rules.NAMED_NATS
+    """Whether a law, with what it goes with, is likelier than what was named and leaves noise, or holds all of that."""
+    enough = (
+        unlisted_nats(found) < rules.UNLISTED_NATS
+        or {cause.key for cause in named.causes} <= {cause.key for cause in found.causes}
+    )  # fmt: skip
+    return enough and found.score >= named.score + rules.NAMED_NATS
 
 
 def located_in(searched: Searched, bench: Bench, say: Callable[[str], object]) -> list[Located]:

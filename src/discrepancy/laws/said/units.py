@@ -45,6 +45,8 @@ def amplitude(unit: str, candidate: LawCandidate) -> str:
         return {1: "", 2: f"1/{_grouped(of)}"}.get(power, f"1/{_grouped(of)}^{power - 1}")
     below = [f"{_grouped(of)}^{power}" if power > 1 else of] if power else []
     below += ["s^-1"] if term.function == "lag" else []
+    if term.times is not None and term.times.unit == unit:
+        return f"1/({' '.join(below)})" if below else ""
     below += [] if term.times is None else [term.times.unit]
     below = [one for one in below if one not in ("1", "")]
     if len(below) == 1:
