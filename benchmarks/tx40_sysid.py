@@ -83,7 +83,7 @@ def parameters(*, masses: bool) -> sysid.ParameterDict:
 def edited(params: sysid.ParameterDict, base: mujoco.MjSpec) -> mujoco.MjModel:
     """The model with the parameters in it."""
     spec = base.copy()
-    value = dict(zip(params, params.as_vector(), strict=True))
+    value = dict(zip(params.parameters, params.as_vector(), strict=True))
     put(spec, value)
     (tendon,) = spec.tendons
     tendon.armature, tendon.frictionloss = value["coupled_armature"], value["coupled_coulomb"]
@@ -134,7 +134,11 @@ def fitted(log: JointLog, *, masses: bool) -> tuple[dict[str, float], float, int
     )
     start = time.process_time()
     found, _ = sysid.optimize(params, residual, optimizer="scipy", verbose=False, x_scale="jac", max_iters=30)
-    return dict(zip(found, map(float, found.as_vector()), strict=True)), time.process_time() - start, calls
+    return (
+        dict(zip(found.parameters, map(float, found.as_vector()), strict=True)),
+        time.process_time() - start,
+        calls,
+    )
 
 
 def left(whole: SerialRig, log: JointLog, value: dict[str, float]) -> np.ndarray:

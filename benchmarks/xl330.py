@@ -134,20 +134,22 @@ def main() -> None:
         print(f"gain {law.gain:g}: {law.per_rad / law.gain:.6f} +- {law.se / law.gain:.6f} of full duty per rad "
               f"and unit; leaves {law.left:.4f}; cut off at {law.limit:.3g}")  # fmt: skip
     whole = LawfulSerialRig.of(model, logs)
-    began = time.process_time()
-    found = diagnose_rig(whole)
-    print(
-        f"all runs: {found.verdict}, {time.process_time() - began:.1f} s of CPU; "
-        f"{whole.motors[0].torque_per_unit:.4f} N m/V"
-    )
-    for item in found.causes:
-        values, se = whole.effect_parameters(item.candidate, item.values, item.covariance)
-        held = "" if item.held_out is None else f"; {100.0 * item.held_out:.1f} % held out"
+    for wanted in ("never", "auto"):
+        began = time.process_time()
+        found = diagnose_rig(whole, laws=wanted)
         print(
-            f"  {item.candidate.label}: "
-            + ", ".join(f"{n} {v:.4g} +- {se[n]:.2g}" for n, v in values.items())
-            + held
+            f"all runs, laws {wanted}: {found.verdict}, {time.process_time() - began:.1f} s of CPU; "
+            f"{whole.motors[0].torque_per_unit:.4f} N m/V"
         )
+        print(f"  foretold torques, share of the excess error removed: {found.gain and found.gain.removed()}")
+        for item in found.causes:
+            values, se = whole.effect_parameters(item.candidate, item.values, item.covariance)
+            held = "" if item.held_out is None else f"; {100.0 * item.held_out:.1f} % held out"
+            print(
+                f"  {item.candidate.label}: "
+                + ", ".join(f"{n} {v:.4g} +- {se[n]:.2g}" for n, v in values.items())
+                + held
+            )
     print(
         "\nPosition foretold from the commands, rms error over the motion's rms [%]: named, Coulomb and viscous alone"
     )
