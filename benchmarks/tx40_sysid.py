@@ -37,6 +37,8 @@ def servoed() -> mujoco.MjSpec:
     spec.option.timestep = 1.0 / RATE_HZ
     stiffness = (2.0 * np.pi * SERVO_HZ) ** 2 * INERTIA
     damping = 2.0 * 2.0 * np.pi * SERVO_HZ * INERTIA
+    for own in [*spec.actuators, *spec.sensors]:
+        spec.delete(own)
     names = [joint.name for joint in spec.joints]
     for joint in spec.joints:
         joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
