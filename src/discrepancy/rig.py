@@ -102,8 +102,7 @@ class Candidate:
     @property
     def place(self) -> str:
         """The place in words."""
-        words = [f"robot {self.robot}"] if self.robot else []
-        words += [f"joint {self.joint}"] if self.joint else []
+        words = [f"{p} {number}" for p, number in (("robot", self.robot), ("joint", self.joint)) if number]
         return ", ".join(words) or self.where
 
     @property
@@ -120,8 +119,7 @@ class Candidate:
 
     def _at(self, part: str) -> str:
         if self.joint:
-            joint = f"{part.removeprefix('driven ')} {self.joint}"
-            return f"{joint} of robot {self.robot}" if self.robot else joint
+            return f"{part.removeprefix('driven ')} {self.joint}{f' of robot {self.robot}' if self.robot else ''}"
         return f"robot {self.robot}" if part == "robot" else f"the {part} of robot {self.robot}"
 
     @property
