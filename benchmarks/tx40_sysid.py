@@ -29,6 +29,8 @@ RATE_HZ, SERVO_HZ, SMOOTH_HZ = 1000.0, 40.0, 60.0
 INERTIA = np.array([1.5, 1.5, 0.6, 0.15, 0.08, 0.03])
 """As the joints feel it, about: for the servo's gains [kg m^2]."""
 AXES = "xyz"
+LEAST = 0.05
+"""Lower bounds over start values: at 0 its differences are taken over steps too small to see, and it stays there."""
 
 
 def servoed() -> mujoco.MjSpec:
@@ -64,13 +66,13 @@ def parameters(*, masses: bool) -> sysid.ParameterDict:
     out = sysid.ParameterDict()
     for j in range(6):
         for name, start, most in (("armature", 0.05, 2.0), ("viscous", 0.5, 20.0), ("coulomb", 1.0, 20.0)):
-            out[f"{name}_{j}"] = sysid.Parameter(f"{name}_{j}", start, 0.0, most)
+            out[f"{name}_{j}"] = sysid.Parameter(f"{name}_{j}", start, LEAST * start, most)
     for name, start, most in (
         ("coupled_armature", 0.02, 1.0),
         ("coupled_viscous", 0.3, 10.0),
         ("coupled_coulomb", 0.5, 10.0),
     ):
-        out[name] = sysid.Parameter(name, start, 0.0, most)
+        out[name] = sysid.Parameter(name, start, LEAST * start, most)
     for body in servoed().bodies[2:] if masses else ():
         out[f"mass_{body.name}"] = sysid.Parameter(
             f"mass_{body.name}", body.mass, 0.5 * body.mass, 2.0 * body.mass
