@@ -22,6 +22,7 @@ from discrepancy.least_squares.problem import Problem
 from discrepancy.rules import serial as rules
 from discrepancy.serial.diagnosis import diagnose_rig
 from discrepancy.serial.errors import with_errors
+from discrepancy.serial.laws.rig import LawfulSerialRig
 from discrepancy.serial.model import SerialModel, load_model
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
@@ -82,7 +83,7 @@ def shown(error: np.ndarray, torque: np.ndarray) -> str:
 
 def frictions(model: SerialModel, log: JointLog, causes: list[Candidate]) -> dict[int, np.ndarray]:
     """Coulomb and viscous friction by joint, all given causes fitted together."""
-    rig = SerialRig.of(model, [log])
+    rig = LawfulSerialRig.of(model, [log])
     kept = {c.key: c for c in causes}
     every = [kept.get(c.key, c) for c in rig.candidates()]
     every += [c for c in causes if c.key not in {k.key for k in every}]
@@ -94,7 +95,7 @@ def main() -> None:
     """Print the tables."""
     model, log = read()
     start = time.process_time()
-    whole = SerialRig.of(model, [log])
+    whole = LawfulSerialRig.of(model, [log])
     found = diagnose_rig(whole)
     spent = time.process_time() - start
     explanation = with_errors(found.explanation, max(2, round(rules.ERROR_BLOCK_S * whole.row_rate_hz(0))))
@@ -127,7 +128,7 @@ def main() -> None:
         left = plain(whole, kinds, list(range(last)))
         print(f"  {title:<44}{shown(left, torque)}  ({time.process_time() - began:.2f} s)")
     began = time.process_time()
-    first = SerialRig.of(model, [crop(log, 0.0, 2.0 / 3.0)])
+    first = LawfulSerialRig.of(model, [crop(log, 0.0, 2.0 / 3.0)])
     named = diagnose_rig(first).explanation
     active = [(item.candidate, item.values) for item in named.found]
     left = whole.simulation(last, np.zeros(0), np.zeros(0), active)()

@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from discrepancy.serial.diagnosis import diagnose_rig
+from discrepancy.serial.laws.rig import LawfulSerialRig
 from discrepancy.serial.model import SerialModel, load_model
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
@@ -88,7 +89,7 @@ def named(rig: SerialRig, per_rad: float) -> tuple[Servo, list[str]]:
     """A servo with what a diagnosis names, and the names."""
     servo = Servo(rig.motors[0].torque_per_unit, per_rad)
     labels = []
-    for found in diagnose_rig(rig).causes:
+    for found in diagnose_rig(rig, laws="never").causes:
         values = dict(
             zip([p.name for p in found.candidate.parameters], map(float, found.values), strict=True)
         )
@@ -132,28 +133,30 @@ def main() -> None:
     for law in loop_laws(logs):
         print(f"gain {law.gain:g}: {law.per_rad / law.gain:.6f} +- {law.se / law.gain:.6f} of full duty per rad "
               f"and unit; leaves {law.left:.4f}; cut off at {law.limit:.3g}")  # fmt: skip
-    whole = SerialRig.of(model, logs)
-    began = time.process_time()
-    found = diagnose_rig(whole)
-    print(
-        f"all runs: {found.verdict}, {time.process_time() - began:.1f} s of CPU; "
-        f"{whole.motors[0].torque_per_unit:.4f} N m/V"
-    )
-    for item in found.causes:
-        values, se = whole.effect_parameters(item.candidate, item.values, item.covariance)
-        held = "" if item.held_out is None else f"; {100.0 * item.held_out:.1f} % held out"
+    whole = LawfulSerialRig.of(model, logs)
+    for wanted in ("never", "auto"):
+        began = time.process_time()
+        found = diagnose_rig(whole, laws=wanted)
         print(
-            f"  {item.candidate.label}: "
-            + ", ".join(f"{n} {v:.4g} +- {se[n]:.2g}" for n, v in values.items())
-            + held
+            f"all runs, laws {wanted}: {found.verdict}, {time.process_time() - began:.1f} s of CPU; "
+            f"{whole.motors[0].torque_per_unit:.4f} N m/V"
         )
+        print(f"  foretold torques, share of the excess error removed: {found.gain and found.gain.removed()}")
+        for item in found.causes:
+            values, se = whole.effect_parameters(item.candidate, item.values, item.covariance)
+            held = "" if item.held_out is None else f"; {100.0 * item.held_out:.1f} % held out"
+            print(
+                f"  {item.candidate.label}: "
+                + ", ".join(f"{n} {v:.4g} +- {se[n]:.2g}" for n, v in values.items())
+                + held
+            )
     print(
         "\nPosition foretold from the commands, rms error over the motion's rms [%]: named, Coulomb and viscous alone"
     )
     for gain in GAINS:
         others = [log for log in logs if log.drive.position_gain[0] != gain]
         laws = loop_laws(others)
-        rig = SerialRig.of(model, others)
+        rig = LawfulSerialRig.of(model, others)
         full, labels = named(rig, float(np.mean([law.per_rad / law.gain for law in laws])))
         bare = plain(rig, full)
         print(f"gain {gain} from the others: {', '.join(labels)}")

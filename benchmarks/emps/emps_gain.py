@@ -12,6 +12,7 @@ import numpy as np
 
 from discrepancy.emps.catalogue import candidate_of
 from discrepancy.emps.diagnosis import diagnose_axis
+from discrepancy.emps.laws.rig import LawfulEmpsRig
 from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.staircase import Active, errors, format_staircase, staircase
@@ -40,7 +41,7 @@ def given(rig: EmpsRig, values: dict[str, float]) -> Active:
 def main() -> None:
     """Print the staircase and the models beside it."""
     folder = needed_folder()
-    rig, other = (EmpsRig.of(read_emps(folder / name)) for name in (DATA, PULSES))
+    rig, other = (LawfulEmpsRig.of(read_emps(folder / name)) for name in (DATA, PULSES))
     there = diagnose_axis(other).explanation
     injected = [(f.candidate, f.values) for f in there.found if f.candidate.cause == "injected_voltage"]
     found = diagnose_axis(rig).explanation

@@ -116,7 +116,8 @@ class Candidate:
 
     def _at(self, part: str) -> str:
         if self.joint:
-            return f"{part.removeprefix('driven ')} {self.joint} of robot {self.robot}"
+            joint = f"{part.removeprefix('driven ')} {self.joint}"
+            return f"{joint} of robot {self.robot}" if self.robot else joint
         return f"robot {self.robot}" if part == "robot" else f"the {part} of robot {self.robot}"
 
     @property

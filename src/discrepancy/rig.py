@@ -61,6 +61,7 @@ class Rig(ABC):
     """A machine and its simulation, seen by the diagnosis; what a machine may lack has defaults that say so."""
 
     rigid: ClassVar[tuple[str, ...]] = ()  # causes that are looked for with kinds held, too
+    normal: ClassVar[bool] = False  # whether a simulation has what is normal as the other trials have it
 
     @property
     @abstractmethod

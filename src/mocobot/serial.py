@@ -10,6 +10,7 @@ from typing import Any
 
 from discrepancy import rules
 from discrepancy.causes.tolerances_file import read_tolerances
+from discrepancy.engine.diagnose import When
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.diagnosis import diagnose_serial
 from discrepancy.serial.mechanics.nominal import inverse_torque
@@ -157,6 +158,7 @@ def diagnose(
     reference: GivenLogs = (),
     tolerances: Path | str | None = None,
     exclude: Iterable[str] = (),
+    laws: When = "auto",
     odds: float = rules.PRIOR_ODDS,
     jobs: int = 1,
     say: Callable[[str], object] = lambda _: None,
@@ -170,6 +172,8 @@ def diagnose(
         reference: logs of the same robot while it was well: what is wrong with the model there, too, is no news.
         tolerances: TOML file: how far a robot may be off without that being news.
         exclude: causes not to consider.
+        laws: whether to look for laws that the catalogue lacks: ``"auto"`` where something unlisted is left,
+            ``"always"`` or ``"never"``; with a reference they are not looked for.
         odds: of any cause being there before the data are seen, at all its places together.
         jobs: parallel processes.
         say: takes the name of the stage that begins.
@@ -186,6 +190,7 @@ def diagnose(
             read_logs(reference, robot, map=map),
             serial_tolerances(Path(tolerances) if tolerances is not None else None),
             tuple(exclude),
+            laws=laws,
             odds=odds,
             jobs=jobs,
             say=say,
@@ -196,11 +201,11 @@ def diagnose(
 def diagnosed(
     model: SerialModel, logs: list[JointLog], reference: list[JointLog],
     tolerances: Mapping[str, Mapping[str, float]] | None, exclude: tuple[str, ...],
-    *, odds: float, jobs: int, say: Callable[[str], object],
+    *, laws: When, odds: float, jobs: int, say: Callable[[str], object],
 ) -> Any:  # fmt: skip
     """``diagnose_serial``, with the reference where there is one."""
     more: dict[str, Any] = {"reference": reference} if reference else {}
-    return diagnose_serial(model, logs, tolerances, exclude, odds=odds, jobs=jobs, say=say, **more)
+    return diagnose_serial(model, logs, tolerances, exclude, laws=laws, odds=odds, jobs=jobs, say=say, **more)
 
 
 def serial_tolerances(path: Path | None) -> dict[str, dict[str, float]] | None:

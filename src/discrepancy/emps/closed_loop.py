@@ -1,6 +1,7 @@
 """Resimulate a recording's reference, block by block from where each began."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,6 +10,8 @@ from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG, LIMIT_V, AxisLog
 from discrepancy.emps.recording.signals import Signals
+from discrepancy.laws.candidate import CAUSE, LawCandidate
+from discrepancy.laws.pieces import pieces_of
 from estimator.arrays import Array
 from mocobot_sim.emps.effects import AxisEffect, apply_effects
 from mocobot_sim.emps.loop import Start, run
@@ -21,15 +24,16 @@ def nominal_plant(log: AxisLog) -> Plant:
 
 
 def effects_of(active: Sequence[tuple[Candidate, Array]]) -> list[AxisEffect]:
-    """Causes as the simulator's effects: values and shape by name."""
-    return [
-        AxisEffect(
-            candidate.cause,
-            {p.name: float(v) for p, v in zip(candidate.parameters, values, strict=True)}
-            | {name: float(v) for name, v in candidate.shape.items()},
-        )
-        for candidate, values in active
-    ]
+    """Causes as the simulator's effects: values and shape by name; a law has one for every amplitude."""
+    out = []
+    for candidate, values in active:
+        if isinstance(candidate, LawCandidate):
+            out += [AxisEffect(CAUSE, asdict(piece)) for piece in pieces_of(candidate, values)]
+            continue
+        named = {p.name: float(v) for p, v in zip(candidate.parameters, values, strict=True)}
+        inside = {name: float(v) for name, v in candidate.shape.items()}
+        out.append(AxisEffect(candidate.cause, named | inside))
+    return out
 
 
 def plant_of(nominal: Plant, active: Sequence[tuple[Candidate, Array]]) -> Plant:

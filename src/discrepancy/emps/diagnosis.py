@@ -9,6 +9,7 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.causes.numbers import number
 from discrepancy.emps.catalogue import Tolerances
+from discrepancy.emps.laws.rig import LawfulEmpsRig
 from discrepancy.emps.recording.axis_log import AxisLog
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.emps.traces import traces
@@ -44,7 +45,7 @@ def diagnose_emps(
     Raises:
         InputError: the recording cannot be used, or a cause to be excluded does not exist.
     """
-    rig = EmpsRig.of(log, tolerances, excluded)
+    rig = LawfulEmpsRig.of(log, tolerances, excluded)
     found = diagnose_axis(
         rig, closed_loop=closed_loop, laws=laws, odds=odds, jobs=jobs, say=say, simulated=simulated
     )

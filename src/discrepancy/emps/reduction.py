@@ -49,3 +49,14 @@ class Reduction:
         flat = x.reshape(len(x), -1)
         smooth = oaconvolve(flat, self.kernel[:, None], mode="same", axes=0)
         return [smooth[rows].reshape(len(rows), *x.shape[1:]) for rows in self.samples]
+
+    def of_block(self, block: int, x: Array, start: int) -> Array:
+        """The rows of one block from its samples alone, shape (Q, k) -> (n, k).
+
+        Args:
+            block: which.
+            x: samples of the block.
+            start: the first of them.
+        """
+        smooth = oaconvolve(x, self.kernel[:, None], mode="same", axes=0)
+        return smooth[self.samples[block] - start]

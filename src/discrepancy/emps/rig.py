@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -189,7 +189,7 @@ class EmpsRig(Rig):
             out += [cause.event(self.tolerances[cause.name], when) for cause in causes for when in worst]
         return out
 
-    def imitators(self, candidate: Candidate) -> Iterator[list[Array]]:
+    def imitators(self, candidate: Candidate) -> Iterable[list[Array]]:
         """The candidate in shapes that what repeats with the motion may have."""
         shapes = CAUSES[candidate.cause].imitators(self.signals, self.hints, candidate.shape)
         return (self.columns(replace(candidate, shape=dict(shape))) for shape in shapes)

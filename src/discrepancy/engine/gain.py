@@ -108,7 +108,10 @@ def fit_to_simulate(
     """Unknowns and causes as a simulation takes them, and how far off healthy parts are in it.
 
     Those are as designed; but where a rig had to be linearised elsewhere, as they are found there beside the causes.
+    Where a simulation finds what is normal by itself, causes are what they are beside that.
     """
+    if rig.normal:
+        return Fit.of(problem, free, trials), []
     carried = [
         i for i, candidate in enumerate(problem.candidates) if i not in free and rig.carried(candidate)
     ]

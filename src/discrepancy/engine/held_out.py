@@ -20,9 +20,16 @@ def held_out_gains(problem: Problem, free: Sequence[int], index: int) -> list[fl
     for t in problem.trials:
         others = [k for k in problem.trials if k != t]
         # Not within its tolerance: the spread of what is there is its size.
-        without = Fit.of(problem, free, others, fixed=(index, nothing))
-        gains.append(without.held_out(t) - Fit.of(problem, [*free, index], others).held_out(t))
+        told = _told(problem, free, t)
+        without = Fit.of(problem, told, others, fixed=(index, nothing))
+        gains.append(without.held_out(t) - Fit.of(problem, [*told, index], others).held_out(t))
     return gains
+
+
+def _told(problem: Problem, free: Sequence[int], trial: int) -> list[int]:
+    """The causes without the events of a trial: of those the other trials tell nothing."""
+    candidates = problem.candidates
+    return [i for i in free if candidates[i].transient is None or not candidates[i].acts_in(trial)]
 
 
 def shares(problem: Problem, causes: Sequence[int]) -> list[tuple[float, float | None]]:
@@ -40,8 +47,10 @@ def shares(problem: Problem, causes: Sequence[int]) -> list[tuple[float, float |
     left, best = np.zeros(len(steps)), 0.0
     for t in trials:
         others = [k for k in trials if k != t]
-        left += [Fit.of(problem, step, others, background=False).held_out(t) for step in steps]
-        best += Fit.of(problem, causes, others).held_out(t)
+        left += [
+            Fit.of(problem, _told(problem, step, t), others, background=False).held_out(t) for step in steps
+        ]
+        best += Fit.of(problem, _told(problem, causes, t), others).held_out(t)
     # What acts in one trial only cannot be fitted to the others.
     lasting = [problem.candidates[index].transient is None for index in causes]
     return [

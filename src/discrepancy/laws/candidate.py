@@ -31,6 +31,14 @@ class LawCandidate(Candidate):
         return f"{CAUSE}: {self.at.name} by {' '.join(self.term.variables)}", self.robot, self.joint
 
     @property
+    def place(self) -> str:
+        """The place in words."""
+        return f"{super().place}{self.at.called}"
+
+    def _at(self, part: str) -> str:
+        return f"{super()._at(part)}{self.at.called}"
+
+    @property
     def where_it_is(self) -> str:
         """What is wrong, at its place, in words."""
         return super().label
@@ -63,8 +71,8 @@ def candidate_of(place: Place, term: Term, scale: float, among: int) -> LawCandi
     names = [f"{part}_{axis}".strip("_").replace(" ", "_") for part in parts for axis in place.axes]
     parameters = tuple(Parameter(name, 0.0, scale) for name in names)
     return LawCandidate(
-        CAUSE, FAMILY, place.robot, place.joint, parameters, dict(term.numbers), title=place.title, among=among,
-        at=place, term=term,
+        CAUSE, FAMILY, place.robot, place.joint, parameters, dict(term.numbers), where=place.where,
+        title=place.title, among=among, at=place, term=term,
     )  # fmt: skip
 
 

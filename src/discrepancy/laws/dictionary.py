@@ -17,12 +17,14 @@ from estimator.arrays import Array
 PLAIN: dict[Kind, tuple[str, ...]] = {
     "time": ("linear", "square"),
     "angle": ("linear", "square", "cube", "absolute"),
+    "travel": ("linear", "square", "cube", "absolute"),
     "rate": ("linear", "signed_square", "absolute"),
     "acceleration": ("linear",),
     "torque": ("linear", "square", "cube", "absolute"),
     "position": ("linear", "square"),
     "velocity": ("linear", "signed_square", "absolute"),
     "tilt": ("linear",),
+    "direction": (),
 }
 """Functions without a number inside, by kind of signal."""
 
@@ -45,10 +47,28 @@ def terms_at(place: Place, variables: Sequence[Variable], spread: Callable[[Vari
         out += [Term("linear", TIME, {}, torque)]
         for other in place.own:
             if other.kind == "rate":
-                out += [Term("sign", other, {"slow": rules.LAW_SLOW_RAD_PER_S}, torque)]
-            elif other.kind == "angle":
+                out += [Term("sign", other, {"slow": other.slow}, torque)]
+            elif other.kind in ("angle", "travel"):
                 out.append(Term("linear", other, {}, torque))
-    out += [Term("linear", v) for v in variables if v not in place.own and v.kind != "time"]
+    for direction in (v for v in place.own if v.kind == "direction"):
+        out += rubbing(direction, place.own, spread)
+    apart = {v.name for v in (*place.own, *place.without, TIME)}
+    out += [Term("linear", v) for v in variables if v.name not in apart]
+    return out
+
+
+def rubbing(direction: Variable, own: Sequence[Variable], spread: Callable[[Variable], Array]) -> list[Term]:
+    """Dry friction that changes with time, with where the joint stands, or with what it carries."""
+    out = [Term(term.function, TIME, term.numbers, direction) for term in of_time()]
+    for variable in own:
+        if variable.kind in ("angle", "travel"):
+            skip = ("play",)
+        elif variable.kind == "torque":
+            skip = ("play", "lag", "beyond")
+        else:
+            continue
+        each = (t for t in of_own(variable, spread(variable)) if t.function not in skip)
+        out += [Term(t.function, variable, t.numbers, direction) for t in each]
     return out
 
 
@@ -68,25 +88,27 @@ def of_own(variable: Variable, values: Array) -> list[Term]:
     out = [Term(name, variable) for name in PLAIN[variable.kind]]
     low, *inner, high = np.quantile(values, rules.LAW_QUANTILES).tolist()
     sigma = float(np.std(values))
-    if variable.kind in ("angle", "torque"):
+    if variable.kind in ("angle", "travel", "torque"):
         out += [Term(side, variable, {"knee": knee}) for knee in inner for side in ("above", "below")]
         out += [Term("play", variable, {"half_width": sigma * w}) for w in rules.LAW_PLAY_SHARES]
     if variable.kind == "torque":
         sizes = np.quantile(np.abs(values), rules.LAW_QUANTILES[1:-1]).tolist()
         out += [Term("beyond", variable, {"knee": knee}) for knee in sizes]
         out += [Term("lag", variable, {"time_s": time}) for time in rules.LAW_LAG_S]
-    if variable.kind == "angle":
-        out += [Term("sine", variable, {"times": float(k)}) for k in range(1, rules.LAW_MOST_TIMES + 1)]
+    if variable.kind in ("angle", "travel"):
+        out += [
+            Term("sine", variable, {"times": variable.wave * k}) for k in range(1, rules.LAW_MOST_TIMES + 1)
+        ]
     if variable.kind == "rate":
         out += [Term(side, variable, {"knee": 0.0}) for side in ("above", "below")]
-        out.append(Term("sign", variable, {"slow": rules.LAW_SLOW_RAD_PER_S}))
+        out.append(Term("sign", variable, {"slow": variable.slow}))
     if variable.kind in ("acceleration", "tilt"):
         out += [
             Term("second_order", variable, {"frequency_hz": f, "damping": zeta})
             for f in rules.LAW_RESONANCE_HZ
             for zeta in rules.LAW_DAMPING
         ]
-    if high > low:
+    if high > low and variable.kind != "direction":
         out.append(Term("spline", variable, knots_of(low, high)))
     return out
 
@@ -100,9 +122,11 @@ def nearby(term: Term, *, finer: bool) -> list[Term]:
     """The formula with other numbers inside; ``finer`` ones around its own."""
     step = 1.15 if finer else 1.6
     if term.function == "sine":
-        times = term.numbers["times"]
-        steps = (-2.0, -1.0, 1.0, 2.0) if not finer else ()
-        return [replace(term, numbers={"times": times + d}) for d in steps if times + d >= 1.0]
+        times, wave = term.numbers["times"], term.of.wave
+        # What comes again with a turn does so a whole number of times in it; along a way it need not.
+        steps = (-2.0, -1.0, 1.0, 2.0) if not finer else (-0.2, 0.2) if term.of.kind == "travel" else ()
+        moved = (times + d * wave for d in steps)
+        return [replace(term, numbers={"times": t}) for t in moved if t >= wave]
     if term.function == "hum":
         f, width = term.numbers["frequency_hz"], rules.LAW_HUM_STEP_HZ / (8.0 if finer else 2.0)
         return [replace(term, numbers={"frequency_hz": f + d}) for d in (-width, width) if f + d > 0]

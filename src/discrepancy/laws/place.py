@@ -20,6 +20,9 @@ class Place:
         title: in words, with the part in braces as in ``Candidate.title``.
         own: signals of the same joint or robot: those that it most likely depends on.
         offset: whether a constant has to go with every law, because no cause of the catalogue is one here.
+        without: signals that hold the error itself, such as the very torque that is read; it is no function of those.
+        where: the place in words, of what sits at no robot and no joint.
+        called: what the part is called besides its number, such as `` (elbow)``.
         units: of each component where they differ from ``unit``; empty where they do not.
         twin: name of a place whose rows are the same, minus these; only the response to the commands separates them.
     """
@@ -35,6 +38,9 @@ class Place:
     offset: bool = False
     units: tuple[str, ...] = ()
     twin: str | None = None
+    without: tuple[Variable, ...] = ()
+    where: str = "payload"
+    called: str = ""
 
     @property
     def key(self) -> tuple[str, int | None, int | None]:

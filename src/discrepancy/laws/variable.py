@@ -5,7 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Kind = Literal["time", "angle", "rate", "acceleration", "torque", "position", "velocity", "tilt"]
+from discrepancy import rules
+
+Kind = Literal[
+    "time", "angle", "travel", "rate", "acceleration", "torque", "direction", "position", "velocity", "tilt"
+]
 
 
 @dataclass(frozen=True)
@@ -18,6 +22,9 @@ class Variable:
         symbol: in a formula.
         unit: of its values.
         kind: decides which functions of it make sense.
+        slow: of a rate, below which its direction fades [``unit``].
+        wave: of an angle or a travel, by which the phase of its slowest sine grows [rad per ``unit``]: once a turn, or
+            once over the whole way.
     """
 
     name: str
@@ -25,6 +32,8 @@ class Variable:
     symbol: str
     unit: str
     kind: Kind
+    slow: float = rules.LAW_SLOW_RAD_PER_S
+    wave: float = 1.0
 
 
 TIME = Variable("time", "time", "t", "s", "time")

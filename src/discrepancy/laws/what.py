@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,7 +16,6 @@ from discrepancy.laws.dictionary import hums, terms_at
 from discrepancy.laws.place import Place
 from discrepancy.laws.term import Term
 from discrepancy.laws.told import Beside
-from discrepancy.laws.variable import Variable
 from discrepancy.least_squares.fit import Fit
 from estimator.arrays import Array
 
@@ -38,24 +37,16 @@ class Judged:
 def judged(fit: Fit, bench: Bench, places: Sequence[Place]) -> list[Judged]:
     """Every formula at every one of some places, the likeliest first."""
     beside = Beside(fit)
-    signals: dict[tuple[int, str], Array] = {}
-
-    def signal(trial: int, variable: Variable) -> Array:
-        key = trial, variable.name
-        if key not in signals:
-            signals[key] = bench.signal(trial, variable)
-        return signals[key]
-
     trials = fit.problem.trials
     out, peaks = [], _peaks(fit, bench)
     for place in places:
-        spread = lambda variable: np.concatenate([signal(t, variable) for t in trials])  # noqa: E731
+        spread = lambda variable: np.concatenate([bench.signal(t, variable) for t in trials])  # noqa: E731
         terms = terms_at(place, bench.variables, spread) + hums(peaks)
-        out += _at_place(beside, bench, place, terms, signal, trials)
+        out += _at_place(beside, bench, place, terms, trials)
     # A hum is too fast to be seen in the error of a place over time.
     for place in bench.places if peaks else ():
         if place not in places:
-            out += _at_place(beside, bench, place, hums(peaks), signal, trials)
+            out += _at_place(beside, bench, place, hums(peaks), trials)
     return sorted(out, key=lambda one: -one.nats)
 
 
@@ -64,30 +55,23 @@ def _at_place(
     bench: Bench,
     place: Place,
     terms: Sequence[Term],
-    signal: Callable[[int, Variable], Array],
     trials: Sequence[int],
 ) -> list[Judged]:
     directions = [bench.directions(t, place) for t in trials]
-    rates = directions[0].shape[2] == 3
-    offset = [np.ones((bench.length(t), 1)) for t in trials]
     out, at = [], 0
     while at < len(terms):
         chunk, errors, groups = [], [[] for _ in trials], []
         while at < len(terms) and sum(groups) < rules.LAW_CHUNK:
             term = terms[at]
             at += 1
-            values = [term.values(lambda v, t=t: signal(t, v), bench.rate_hz(t)) for t in trials]
-            if place.offset and term.function not in ("constant", "spline"):
-                values = [np.concatenate([v, o], axis=1) for v, o in zip(values, offset, strict=True)]
+            values = [bench.with_offset(place, term, bench.of_term(t, term)) for t in trials]
             groups.append(values[0].shape[1] * len(place.axes))
             chunk.append(term)
             for own, value in zip(errors, values, strict=True):
                 own.append(value)
         blocks = []
         for t, own in zip(trials, errors, strict=True):
-            moved = bench.at_rows(t, np.concatenate(own, axis=1), rates=rates)
-            columns = np.einsum("narc,nrk->ncka", directions[t], moved, optimize=True)
-            blocks.append(bench.white(t, columns.reshape(*columns.shape[:2], -1)))
+            blocks.append(bench.white(t, bench.moved(t, directions[t], np.concatenate(own, axis=1))))
         for term, (information, score) in zip(chunk, beside.each(blocks, groups), strict=True):
             out.append(Judged(place, term, _nats(information, score)))
     return out

@@ -52,10 +52,7 @@ def _located(beside: Beside, fit: Fit, bench: Bench, place: Place) -> Located:
     knots, information, edges, scores = [], [], [], []
     for trial in fit.problem.trials:
         at, hats = _hats(bench.length(trial), bench.rate_hz(trial), step)
-        directions = bench.directions(trial, place)
-        moved = bench.at_rows(trial, hats, rates=directions.shape[2] == 3)
-        columns = np.einsum("narc,nrk->ncka", directions, moved, optimize=True)
-        columns = columns.reshape(*columns.shape[:2], -1)
+        columns = bench.moved(trial, bench.directions(trial, place), hats)
         rows = beside.rows(trial, bench.white(trial, columns))
         edge, score = beside.edges(trial, rows)
         knots.append(at)

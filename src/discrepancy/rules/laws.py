@@ -37,7 +37,9 @@ LAW_HELD_OUT = 0.5
 """Least share of a law's gain in sample that it must also have on trials that were left out, to be stated. Chosen."""
 LAW_FOLDS = 0.5
 """Share of the trials that it must help, fitted to the others. Chosen: more than half."""
-LAW_SCALES = {"rad": 1e-3, "N m": 0.1, "N": 1.0, "m": 1e-3, "kg": 0.1, "kg m": 0.01, "kg m^2/s": 0.1}
+LAW_SCALES = {
+    "rad": 1e-3, "N m": 0.1, "N": 1.0, "m": 1e-3, "kg": 0.1, "kg m": 0.01, "kg m^2/s": 0.1, "V": 0.01
+}  # fmt: skip
 """Typical sizes of errors, by unit. Chosen: columns are expressed in them; the size itself is learnt."""
 LAW_FORMS = 60
 """Formulas of a place's own signals that are as likely as each other. Derived: about so many are tried."""

@@ -147,6 +147,9 @@ PUSH_S, SHORTEST_PUSH_S = (0.2, 0.4, 0.8, 1.6), 0.1
 """Durations searched, and what refining may leave. Chosen: octaves."""
 STEP_RAD, STEP_M = 1e-4, 1e-5
 """Of differences by joint positions and by lengths. Derived: squares of the step and rounding are both below 1e-6."""
+STEP_RATE, STEP_ACCELERATION = 1e-2, 1e-1
+"""Of differences by a joint's rate and by its acceleration, per second and per second squared. Derived: torques are
+quadratic in the one and linear in the other, so that any will do that rounding does not see."""
 ALIKE_SHARE, MOST_UNITS = 0.02, 30.0
 """Of a trace's square, that another cause may leave of it to be the same, and how many units of that it may take.
 Chosen: a seventh of the trace itself; what would take more is no imitation."""

@@ -29,7 +29,7 @@ class SerialCandidate(Candidate):
             return self.where
         if self.part == "pair":
             return f"joints {self.partner} and {self.joint}"
-        return f"{self.part} {self.joint}{self._name}"
+        return f"{self.part} {self.joint}{told_name(self.joint, self.called)}"
 
     @property
     def label(self) -> str:
@@ -41,11 +41,11 @@ class SerialCandidate(Candidate):
         """The cause in words, wherever it sits: ``Coulomb friction in a joint``."""
         return re.sub(r"\{(.*?)\}", lambda part: _some(part[1]), self.title) or self.cause.replace("_", " ")
 
-    @property
-    def _name(self) -> str:
-        # "joint 3 (joint_3)" says nothing.
-        told = re.fullmatch(rf"(joint|j|axis|link)?[ _-]?0*{self.joint}", self.called, re.IGNORECASE)
-        return "" if told or not self.called else f" ({self.called})"
+
+def told_name(joint: int, called: str) -> str:
+    """A joint's name behind its number, as `` (elbow)``; nothing where it says no more, as "joint_3" of joint 3."""
+    told = re.fullmatch(rf"(joint|j|axis|link)?[ _-]?0*{joint}", called, re.IGNORECASE)
+    return "" if told or not called else f" ({called})"
 
 
 def _some(part: str) -> str:

@@ -6,12 +6,13 @@ from functools import partial
 
 import numpy as np
 
-from discrepancy.engine.diagnose import Diagnosis, diagnose
+from discrepancy.engine.diagnose import Diagnosis, When, diagnose
 from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.rules import serial as rules
 from discrepancy.rules.inference import PRIOR_ODDS
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.errors import with_errors
+from discrepancy.serial.laws.rig import LawfulSerialRig
 from discrepancy.serial.model import SerialModel
 from discrepancy.serial.paired import PairedRig
 from discrepancy.serial.recording.joint_log import JointLog
@@ -28,6 +29,7 @@ def diagnose_serial(
     excluded: Sequence[str] = (),
     *,
     reference: Sequence[JointLog] = (),
+    laws: When = "auto",
     odds: float = PRIOR_ODDS,
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
@@ -40,14 +42,14 @@ def diagnose_serial(
         tolerances: standard deviations by cause and parameter that are no news; None for the defaults.
         excluded: causes left out of the catalogue.
         reference: logs of the same robot while it was well: only what has changed since is news then, and tolerances
-            do not count.
-        odds, jobs, say: as of ``diagnose``.
+            do not count, and laws that no catalogue lists are not looked for.
+        laws, odds, jobs, say: as of ``diagnose``.
 
     Raises:
         InputError: a log cannot be used, or a cause to be excluded does not exist.
     """
-    rig = SerialRig.of(model, logs, tolerances, excluded, reference)
-    found = diagnose_rig(rig, odds=odds, jobs=jobs, say=say)
+    rig = LawfulSerialRig.of(model, logs, tolerances, excluded, reference)
+    found = diagnose_rig(rig, laws=laws, odds=odds, jobs=jobs, say=say)
     judged = PairedRig(rig) if rig.common else rig
     return Diagnosed(judged, found, SerialWords(), partial(traces, rig, found.explanation))
 
@@ -55,6 +57,7 @@ def diagnose_serial(
 def diagnose_rig(
     rig: SerialRig,
     *,
+    laws: When = "auto",
     odds: float = PRIOR_ODDS,
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
@@ -63,10 +66,10 @@ def diagnose_rig(
 
     Args:
         rig: the logs.
-        odds, jobs, say: as of ``diagnose``.
+        laws, odds, jobs, say: as of ``diagnose``.
     """
     judged = PairedRig(rig) if rig.common else rig
-    found = diagnose(judged, most=rules.MOST_CAUSES, odds=odds, jobs=jobs, say=say)
+    found = diagnose(judged, most=rules.MOST_CAUSES, laws=laws, odds=odds, jobs=jobs, say=say)
     rows = max(2, round(rules.ERROR_BLOCK_S * rig.row_rate_hz(0)))
     explanation = with_errors(found.explanation, rows)
     notes = (*(note for part in rig.parts for note in part.signals.log.notes), *found.notes, *_notes(rig))

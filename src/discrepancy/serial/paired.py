@@ -30,6 +30,7 @@ class PairedRig(Rig):
 
     inner: SerialRig
     rigid = SerialRig.rigid
+    normal = SerialRig.normal
 
     def blocks_of(self, trial: int) -> list[int]:
         """Which blocks are one trial, the log's own first; with fewer blocks of the reference some serve twice."""

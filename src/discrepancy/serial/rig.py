@@ -12,7 +12,7 @@ import numpy as np
 
 from discrepancy.candidate import Candidate
 from discrepancy.causes.excluded import excluded_from
-from discrepancy.engine.explanation import Explanation
+from discrepancy.engine.explanation import Explanation, Found
 from discrepancy.rig import Channel, Rig, Rows
 from discrepancy.rules import LAW_SHARE
 from discrepancy.rules import serial as rules
@@ -32,7 +32,7 @@ from discrepancy.serial.servo.motor import with_torques
 from discrepancy.serial.undecidable import general, look_alikes
 from estimator.arrays import Array
 from mocobot_sim.serial.effects import RobotEffect
-from mocobot_sim.serial.extended import write_extended
+from mocobot_sim.serial.extended import Effect, write_extended
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,12 +103,12 @@ class SerialRig(SerialRows, Rig):
         ]
 
     def row_rate_hz(self, trial: int) -> float:
-        part, _ = self._where[trial]
+        part, _ = self.block_of[trial]
         return part.signals.rate_hz / part.reduction.step
 
     def quantities(self, trial: int) -> dict[str, Array]:
         """Speed over every joint's typical one, and per joint position, per row of a block, shape (n,) each."""
-        part, k = self._where[trial]
+        part, k = self.block_of[trial]
         at, s = part.reduction.samples[k], part.signals
         share = s.dq[at] / s.typical
         out = {"speed": np.sqrt(np.mean(share**2, axis=1))}
@@ -173,6 +173,7 @@ class SerialRig(SerialRows, Rig):
         return shapes.others(candidate, self.hints, finer=finer)
 
     rigid = ("payload",)
+    normal = True
 
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
         """For every number of its shape that the data determine: a little less, a little more, and the difference."""
@@ -210,7 +211,7 @@ class SerialRig(SerialRows, Rig):
 
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
         """Noise of the rows, and the torque's own size."""
-        part, k = self._where[trial]
+        part, k = self.block_of[trial]
         torque = part.reduction(part.signals.torque)[k][:, self.joints]
         noise = np.sqrt(np.mean(self.sigma(trial) ** 2, axis=0))
         return {
@@ -240,14 +241,16 @@ class SerialRig(SerialRows, Rig):
         Raises:
             InputError: the folder cannot be written, or MuJoCo refuses the model.
         """
-        effects = []
-        for found in explanation.found:
-            candidate = found.candidate
-            values, _ = self.effect_parameters(candidate, found.values, found.covariance)
-            more = {"gyration_m": rules.PAYLOAD_GYRATION_M} if candidate.cause == "payload" else {}
-            before = candidate.partner if isinstance(candidate, SerialCandidate) else None
-            effects.append(RobotEffect(candidate.cause, candidate.joint, before, values | more))
+        effects = [effect for found in explanation.found for effect in self.effects(found)]
         write_extended(load_spec(self.model.path), effects, folder, self.trials)
+
+    def effects(self, found: Found) -> Sequence[Effect]:
+        """A named cause as the simulator's effects."""
+        candidate = found.candidate
+        values, _ = self.effect_parameters(candidate, found.values, found.covariance)
+        more = {"gyration_m": rules.PAYLOAD_GYRATION_M} if candidate.cause == "payload" else {}
+        before = candidate.partner if isinstance(candidate, SerialCandidate) else None
+        return [RobotEffect(candidate.cause, candidate.joint, before, values | more)]
 
     def undecidable(self) -> list[dict[str, Any]]:
         """What such logs cannot decide, and what these cannot."""

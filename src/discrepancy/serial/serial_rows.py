@@ -68,13 +68,13 @@ class SerialRows:
         return self.parts[0].signals.nominal
 
     @cached_property
-    def _where(self) -> list[tuple[Part, int]]:
+    def block_of(self) -> list[tuple[Part, int]]:
         """Log and number in it of every block."""
         return [(part, k) for part in self.parts for k in range(len(part.blocks))]
 
     def row_times(self, trial: int) -> Array:
         """Time of every row of a block on its log's clock [s], shape (n,)."""
-        part, k = self._where[trial]
+        part, k = self.block_of[trial]
         return part.signals.time[part.reduction.samples[k]]
 
     def physical(self, candidate: Candidate) -> list[Array]:
@@ -98,12 +98,12 @@ class SerialRows:
         """Whitened columns of what may be wrong in all logs, shape (n, C, s); none without a reference."""
         if self.common:
             return self.whitening[trial](self.common[trial])
-        part, k = self._where[trial]
+        part, k = self.block_of[trial]
         return np.zeros((len(part.reduction.samples[k]), len(self.joints), 0))
 
     def local_columns(self, trial: int) -> Array:
         """Whitened columns of the friction that joints may have while they rest, shape (n, C, l)."""
-        part, k = self._where[trial]
+        part, k = self.block_of[trial]
         rests = [rest[:, self.joints] for rest in part.rests(k)]
         none = np.zeros((len(part.reduction.samples[k]), len(self.joints), 0))
         return self.whitening[trial](np.stack(rests, axis=2)) if rests else none

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from discrepancy.candidate import Candidate
 from discrepancy.causes.numbers import Numbers
 from discrepancy.causes.words import Words
+from discrepancy.laws.candidate import LawCandidate
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.base import parameter_name
@@ -41,6 +42,8 @@ class SerialWords(Words):
 
     def describe(self, candidate: Candidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
         """What a cause does at its place, one sentence with its numbers; standard errors may be NaN."""
+        if isinstance(candidate, LawCandidate):
+            return super().describe(candidate, values, se)
         slide = isinstance(candidate, SerialCandidate) and candidate.slide
         numbers = SlideNumbers(values, se) if slide else Numbers(values, se)
         cause = CAUSES[candidate.cause]

@@ -12,7 +12,6 @@ from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation
 from discrepancy.engine.gain import fit_to_simulate
 from discrepancy.laws.candidate import LawCandidate
-from discrepancy.laws.said.numbers import report
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.closed_loop import (
@@ -43,7 +42,7 @@ class TeamRig(LawfulRows):
         self, candidate: Candidate, values: Array, covariance: Array
     ) -> tuple[dict[str, float], dict[str, float]]:
         if isinstance(candidate, LawCandidate):
-            return report(candidate, values, covariance)
+            return super().effect_parameters(candidate, values, covariance)
         return CAUSES[candidate.cause].report(values, covariance, self._context(candidate))
 
     def _context(self, candidate: Candidate) -> Context:

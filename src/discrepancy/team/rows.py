@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
@@ -280,7 +280,7 @@ class TeamRows(Rig):
         reductions = [linear.reduction for linear in self.linear]
         return worst_events(reductions, remaining, self.tolerances, self.excluded)
 
-    def imitators(self, candidate: Candidate) -> list[list[Array]]:
+    def imitators(self, candidate: Candidate) -> Iterable[list[Array]]:
         """One joint's torque wrong by a constant for as long as a push lasts, every joint in turn."""
         return wrong_torques(self.linear, self.whitening, candidate)
 

@@ -46,6 +46,7 @@ def run(options: Diagnose, model: Path) -> None:
                 reference,
                 tolerances,
                 options.exclude,
+                laws=options.laws,
                 odds=options.odds,
                 jobs=options.jobs,
                 say=say,

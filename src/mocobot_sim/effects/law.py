@@ -7,7 +7,7 @@ from functools import partial
 from estimator.errors import InputError
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.laws import signals, targets
-from mocobot_sim.laws.functions import FUNCTIONS, NEEDS, POSITIVE, WIDE, Inside, Step
+from mocobot_sim.laws.functions import FUNCTIONS, Inside, Step, check_numbers
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.actors import Actor, Reader
 
@@ -49,11 +49,7 @@ class Law(Effect):
         self._named("function", self.function, self.function in FUNCTIONS, ", ".join(FUNCTIONS))
         self._named("of", self.of, signals.is_signal(self.of), signals.WORDS)
         self._named("times", self.times, not self.times or signals.is_signal(self.times), signals.WORDS)
-        if self.function in POSITIVE and self.number <= 0.0:
-            what = NEEDS[self.function].replace(",", " and must be")
-            raise InputError(f"law: number is {self.number!r}; of {self.function} it is {what}")
-        if self.function in WIDE and self.second <= 0.0:
-            raise InputError(f"law: second is {self.second!r}; with {self.function} it must be above 0")
+        check_numbers(self.function, self.number, self.second)
 
     def _named(self, field: str, value: str, known: bool, words: str) -> None:
         if not known:

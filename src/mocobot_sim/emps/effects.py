@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from mocobot_sim.emps.law import AxisLaw
 from mocobot_sim.emps.plant import ForcePush, Plant, PulseTrain, Ripple
 
 
@@ -13,11 +14,11 @@ class AxisEffect:
 
     Attributes:
         cause: a key of ``CHANGES``.
-        parameters: by name, units in the names.
+        parameters: by name, units in the names; a law has names among them.
     """
 
     cause: str
-    parameters: Mapping[str, float]
+    parameters: Mapping[str, Any]
 
     def changes(self, plant: Plant) -> dict[str, Any]:
         """The plant's numbers that it changes, as they are then."""
@@ -69,5 +70,6 @@ CHANGES: dict[str, Callable[..., dict[str, Any]]] = {
         "force_pulses": (*plant.force_pulses, PulseTrain(**times, size=resisting_N))
     },
     "push": lambda plant, force_N, **times: {"pushes": (*plant.pushes, ForcePush(**times, force_N=force_N))},
+    "law": lambda plant, **formula: {"laws": (*plant.laws, AxisLaw(**formula))},
 }  # fmt: skip
 """Changed numbers of the plant from plant and parameters, for every cause of the diagnosis' catalogue."""

@@ -9,10 +9,11 @@ from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.strict import Fields, read_json
 from mocobot_sim.emps.effects import AxisEffect, apply_effects
+from mocobot_sim.emps.law import AxisLaw
 from mocobot_sim.emps.mjcf import LACKS, axis_spec
 from mocobot_sim.emps.plant import ForcePush, Plant, PulseTrain, Ripple
 
-FORMAT, VERSION = "mocobot-extended-axis", 1
+FORMAT, VERSION = "mocobot-extended-axis", 2
 SCENE, NUMBERS, README = "axis.xml", "plant.json", "README.md"
 NESTED = {"ripples": Ripple, "voltage_pulses": PulseTrain, "force_pulses": PulseTrain, "pushes": ForcePush}
 
@@ -61,6 +62,8 @@ def load_plant(folder: Path) -> Plant:
         file.refuse("format", f"{FORMAT!r}, with version {VERSION}")
     plant = file.within("plant", [entry.name for entry in fields(Plant)])
     values: dict[str, Any] = {name: _items(plant, name, kind) for name, kind in NESTED.items()}
+    laws = plant.list("laws")
+    values["laws"] = tuple(AxisLaw.of_dict(item, f"{plant.where}: laws") for item in laws)
     values |= {name: tuple(plant.array(name, (2,)).tolist()) for name in ("coulomb_N", "viscous_Ns_per_m")}
     values |= {name: plant.number(name) for name in plant.required if name not in values}
     return Plant(**values)
@@ -74,7 +77,7 @@ def _items(plant: Fields, name: str, kind: type) -> tuple[Any, ...]:
 
 def _readme(plant: Plant, effects: Sequence[AxisEffect]) -> str:
     rows = [
-        f"| `{e.cause}` | {', '.join(f'`{n}` = {v:.6g}' for n, v in e.parameters.items())} | "
+        f"| `{e.cause}` | {', '.join(_number(n, v) for n, v in e.parameters.items() if v != '')} | "
         f"{'`plant.json`' if LACKS.issuperset(e.changes(plant)) else '`axis.xml`'} |"
         for e in effects
     ]
@@ -96,3 +99,7 @@ With the digital loop and all causes:
     from mocobot_sim.emps.loop import Start, run
     position, voltage = run(load_plant("."), time, reference, Start(x0, v0, velocities, voltages))
 """
+
+
+def _number(name: str, value: float | str) -> str:
+    return f"`{name}` = {value}" if isinstance(value, str) else f"`{name}` = {value:.6g}"

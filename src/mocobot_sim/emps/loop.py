@@ -2,6 +2,7 @@
 
 # mujoco's compiled modules come without types.
 # pyright: reportAttributeAccessIssue=false
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import mujoco
@@ -61,7 +62,8 @@ def run(plant: Plant, time: Array, reference: Array, start: Start) -> tuple[Arra
     data.qpos[:] = start.position_m
     data.qvel[:] = start.velocity_mps
     acting = _acting(plant.delay_s, plant.period_s, steps)
-    extra = _extra(plant, time)
+    extra = _extra(plant, time, reference, plant.period_s / steps)
+    added = _laws(plant, "voltage", plant.period_s)
     pulses = sum((p.size * p.on(time) for p in plant.voltage_pulses), np.zeros(len(time)))
     lag = plant.velocity_lag_s / plant.period_s
     voltages, velocities = _history(start, acting.shape[1], lag)
@@ -76,6 +78,8 @@ def run(plant: Plant, time: Array, reference: Array, start: Start) -> tuple[Arra
         velocities.append(v)
         seen = (1.0 - share) * velocities[-1 - low] + share * velocities[-2 - low] if lag else v
         volts = kv * (kp * (float(reference[k]) - x) - seen) + pulses[k]
+        if added:
+            volts += added(_State(float(time[k]), x, v, float(data.qacc[axis]), float(reference[k])))
         volts = min(max(volts, -limit), limit)
         voltages.append(volts)
         positions[k], given[k] = x, volts
@@ -83,7 +87,8 @@ def run(plant: Plant, time: Array, reference: Array, start: Start) -> tuple[Arra
         for weights in acting:
             data.ctrl[drive] = float(np.dot(weights, recent)) if len(recent) > 1 else volts
             if extra is not None:
-                data.qfrc_applied[moved] = extra(k, float(data.qpos[moved]), float(data.qvel[moved]))
+                own = (float(state[moved]) for state in (data.qpos, data.qvel, data.qacc))
+                data.qfrc_applied[moved] = extra(k, *own)
             mujoco.mj_step(model, data)
     return positions, given
 
@@ -111,9 +116,48 @@ def _history(start: Start, voltages: int, lag: float) -> tuple[list[float], list
     return reaching_back(start.voltages, 0.0), reaching_back(start.velocities_mps, start.velocity_mps)
 
 
-def _extra(plant: Plant, time: Array):
-    """Force that MJCF lacks, from sample, position and velocity; None where there is none."""
-    if not (plant.ripples or plant.stribeck_N or plant.force_pulses or plant.pushes):
+@dataclass(frozen=True)
+class _State:
+    """What laws at the axis are functions of.
+
+    Attributes:
+        time: on the clock of the reference [s].
+        position, velocity, acceleration: of the carriage.
+        reference: that is asked for [m].
+    """
+
+    time: float
+    position: float
+    velocity: float
+    acceleration: float
+    reference: float
+
+    @property
+    def direction(self) -> float:
+        """Of motion, in [-1, 1]."""
+        return min(max(self.velocity / STRIBECK_MPS, -1.0), 1.0)
+
+    @property
+    def error(self) -> float:
+        """Reference minus position [m]."""
+        return self.reference - self.position
+
+
+def _laws(plant: Plant, target: str, period_s: float) -> Callable[[_State], float] | None:
+    """What laws add to a target at every step of a period; None where there are none."""
+    running = [law.running(period_s) for law in plant.laws if law.target == target]
+    if not running:
+        return None
+    return lambda state: sum(value(lambda name: float(getattr(state, name))) for value in running)
+
+
+def _extra(plant: Plant, time: Array, reference: Array, step_s: float):
+    """Force that MJCF lacks, from sample, position, velocity and acceleration; None where there is none.
+
+    To be asked once a step: laws may remember what was.
+    """
+    laws = _laws(plant, "force", step_s)
+    if not (plant.ripples or plant.stribeck_N or plant.force_pulses or plant.pushes or laws):
         return None
     given = np.zeros(len(time))
     for train in plant.force_pulses:
@@ -121,7 +165,7 @@ def _extra(plant: Plant, time: Array):
     for push in plant.pushes:
         given += push.force_N * ((time >= push.start_s) & (time < push.start_s + push.duration_s))
 
-    def force(k: int, x: float, v: float) -> float:
+    def force(k: int, x: float, v: float, a: float) -> float:
         total = given[k]
         for ripple in plant.ripples:
             angle = 2.0 * np.pi * x / ripple.wavelength_m
@@ -129,6 +173,8 @@ def _extra(plant: Plant, time: Array):
         if plant.stribeck_N:
             direction = min(max(v / STRIBECK_MPS, -1.0), 1.0)
             total -= plant.stribeck_N * direction * np.exp(-abs(v) / plant.stribeck_mps)
+        if laws is not None:
+            total -= laws(_State(float(time[k]), x, v, a, float(reference[k])))
         return float(total)
 
     return force

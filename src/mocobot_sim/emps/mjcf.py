@@ -15,7 +15,8 @@ LARGE_N = 1e9
 CARRIAGE_SHARE = 0.5
 """Share of the moving mass behind a play: assumed."""
 LACKS = frozenset({
-    "stribeck_N", "stribeck_mps", "ripples", "delay_s", "velocity_lag_s", "voltage_pulses", "force_pulses", "pushes"
+    "stribeck_N", "stribeck_mps", "ripples", "delay_s", "velocity_lag_s", "voltage_pulses", "force_pulses", "pushes",
+    "laws",
 })  # fmt: skip
 """Numbers of a plant that MJCF has no words for; ``loop.py`` adds them."""
 

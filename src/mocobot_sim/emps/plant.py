@@ -5,6 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mocobot_sim.emps.law import AxisLaw
+
 SLACK_S = 1e-6
 """Samples and edges are on a grid: what is a rounding error before an edge is on it."""
 
@@ -63,6 +65,7 @@ class Plant:
         voltage_pulses: added to the loop's voltage; size in V.
         force_pulses: resisting forward motion; size in N.
         pushes: outside forces that push forward.
+        laws: formulas that nobody has listed: forces against forward motion, and voltages.
     """
 
     mass_kg: float
@@ -83,3 +86,4 @@ class Plant:
     voltage_pulses: tuple[PulseTrain, ...] = ()
     force_pulses: tuple[PulseTrain, ...] = ()
     pushes: tuple[ForcePush, ...] = ()
+    laws: tuple[AxisLaw, ...] = ()

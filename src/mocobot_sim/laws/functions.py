@@ -6,6 +6,8 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from estimator.errors import InputError
+
 Step = Callable[[float], float]
 """The next value of the function from the next value of the signal."""
 
@@ -102,3 +104,16 @@ POSITIVE = ("sign", "warming", "play", "lag", "second_order")
 """Functions whose ``number`` must be above 0."""
 WIDE = ("hat", "first_hat", "last_hat", "second_order")
 """Functions whose ``second``, a width or a damping ratio, must be above 0."""
+
+
+def check_numbers(function: str, number: float, second: float) -> None:
+    """Refuse numbers that a function cannot have inside.
+
+    Raises:
+        InputError: one of them is not above 0 that must be.
+    """
+    if function in POSITIVE and number <= 0.0:
+        what = NEEDS[function].replace(",", " and must be")
+        raise InputError(f"law: number is {number!r}; of {function} it is {what}")
+    if function in WIDE and second <= 0.0:
+        raise InputError(f"law: second is {second!r}; with {function} it must be above 0")

@@ -9,9 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from estimator.arrays import Array
-
-CREEP = 1e-3
-"""Speed over which dry friction changes its direction here [rad/s or m/s]: slow beside what joints do."""
+from mocobot_sim.serial.state import direction
 
 
 @dataclass(frozen=True)
@@ -65,16 +63,12 @@ def resistances(effects: list[RobotEffect], q: Array, v: Array, load: Array) -> 
     return out
 
 
-def _sign(v: float) -> float:
-    return math.tanh(v / CREEP)
-
-
 def _friction(e: RobotEffect, q: float, v: float, load: float) -> float:
-    return e.number("coulomb") * _sign(v) + e.number("viscous") * v
+    return e.number("coulomb") * direction(v) + e.number("viscous") * v
 
 
 def _asymmetric_coulomb(e: RobotEffect, q: float, v: float, load: float) -> float:
-    return e.number("asymmetry") * abs(_sign(v))
+    return e.number("asymmetry") * abs(direction(v))
 
 
 def _asymmetric_viscous(e: RobotEffect, q: float, v: float, load: float) -> float:
@@ -82,7 +76,7 @@ def _asymmetric_viscous(e: RobotEffect, q: float, v: float, load: float) -> floa
 
 
 def _stribeck(e: RobotEffect, q: float, v: float, load: float) -> float:
-    return e.number("excess") * _sign(v) * math.exp(-abs(v) / e.number("fade"))
+    return e.number("excess") * direction(v) * math.exp(-abs(v) / e.number("fade"))
 
 
 def _sublinear(e: RobotEffect, q: float, v: float, load: float) -> float:
@@ -90,11 +84,11 @@ def _sublinear(e: RobotEffect, q: float, v: float, load: float) -> float:
     # a = 2^(n+1)/(n+1) and b = 2^(n+2)/(n+2), that line is 2 a - 3 b / 2 + (3 b / 2 - 3 a / 2) u.
     n, u = e.number("exponent"), abs(v) / e.number("typical")
     a, b = 2.0 ** (n + 1.0) / (n + 1.0), 2.0 ** (n + 2.0) / (n + 2.0)
-    return e.number("bend") * _sign(v) * (u**n - (2.0 * a - 1.5 * b) - (1.5 * b - 1.5 * a) * u)
+    return e.number("bend") * direction(v) * (u**n - (2.0 * a - 1.5 * b) - (1.5 * b - 1.5 * a) * u)
 
 
 def _load_friction(e: RobotEffect, q: float, v: float, load: float) -> float:
-    return e.number("share") * _sign(v) * (abs(load) - e.number("load"))
+    return e.number("share") * direction(v) * (abs(load) - e.number("load"))
 
 
 def _ripple(e: RobotEffect, q: float, v: float, load: float) -> float:

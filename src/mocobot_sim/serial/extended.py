@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -13,15 +14,19 @@ from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.strict import Fields, read_json
 from mocobot_sim.serial.effects import LAWS, RobotEffect, resistances
+from mocobot_sim.serial.law import ActingLaw, JointLaw
 from mocobot_sim.serial.mjcf import into_mjcf
+from mocobot_sim.serial.state import State
 
-FORMAT, VERSION = "mocobot-extended-robot", 1
+FORMAT, VERSION = "mocobot-extended-robot", 2
 SCENE, NUMBERS, README = "robot.xml", "effects.json", "README.md"
-KEYS = ("cause", "joint", "partner", "parameters", "in")
+KEYS = ("cause", "joint", "partner", "parameters", "law", "in")
+LAW = "law"
+Effect = RobotEffect | JointLaw
 
 
 def write_extended(
-    spec: mujoco.MjSpec, effects: Sequence[RobotEffect], folder: Path, recordings: Sequence[str]
+    spec: mujoco.MjSpec, effects: Sequence[Effect], folder: Path, recordings: Sequence[str]
 ) -> None:
     """Write ``robot.xml``, ``effects.json`` and a README into a new folder.
 
@@ -35,7 +40,7 @@ def write_extended(
         InputError: the folder cannot be written, or an effect makes a model that MuJoCo refuses.
     """
     try:
-        inside = [into_mjcf(spec, effect) for effect in effects]
+        inside = [isinstance(e, RobotEffect) and into_mjcf(spec, e) for e in effects]
         spec.compile()
         text = spec.to_xml()
     except (ValueError, RuntimeError) as error:
@@ -43,24 +48,14 @@ def write_extended(
             f"MuJoCo refuses the model with the causes in it ({' '.join(str(error).split())})"
         ) from error
     places = [
-        SCENE if said else NUMBERS if e.cause in LAWS else "none"
-        for e, said in zip(effects, inside, strict=True)
+        SCENE if said else NUMBERS if _steps(e) else "none" for e, said in zip(effects, inside, strict=True)
     ]
     try:
         folder.mkdir()
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
     write_text(folder / SCENE, text)
-    causes = [
-        {
-            "cause": e.cause,
-            "joint": e.joint,
-            "partner": e.partner,
-            "parameters": dict(e.parameters),
-            "in": place,
-        }
-        for e, place in zip(effects, places, strict=True)
-    ]
+    causes = [_entry(e) | {"in": place} for e, place in zip(effects, places, strict=True)]
     write_json(
         folder / NUMBERS,
         {"format": FORMAT, "version": VERSION, "causes": causes, "recordings": list(recordings)},
@@ -68,8 +63,28 @@ def write_extended(
     write_text(folder / README, _readme(effects, places))
 
 
-def load_effects(folder: Path) -> list[RobotEffect]:
+def _steps(effect: Effect) -> bool:
+    """Whether ``step`` simulates an effect: errors of the log it does not."""
+    return effect.acts if isinstance(effect, JointLaw) else effect.cause in LAWS
+
+
+def _entry(effect: Effect) -> dict[str, Any]:
+    if isinstance(effect, JointLaw):
+        return {
+            "cause": LAW,
+            "joint": effect.joint,
+            "partner": None,
+            "parameters": {},
+            "law": effect.to_dict(),
+        }
+    own = {"cause": effect.cause, "joint": effect.joint, "partner": effect.partner}
+    return own | {"parameters": dict(effect.parameters), "law": None}
+
+
+def load_effects(folder: Path) -> list[RobotEffect | ActingLaw]:
     """The effects of an extended robot that its MJCF lacks, for ``step``.
+
+    Laws may remember what was, such as a play: load them anew for every run.
 
     Raises:
         InputError: ``effects.json`` cannot be read or is something else.
@@ -82,20 +97,22 @@ def load_effects(folder: Path) -> list[RobotEffect]:
     )
     if (file.values["format"], file.values["version"]) != (FORMAT, VERSION):
         file.refuse("format", f"{FORMAT!r}, with version {VERSION}")
-    entries = [Fields(item, KEYS, f"{path}: causes") for item in file.list("causes")]
-    return [
-        RobotEffect(
-            e.values["cause"],
-            e.values["joint"],
-            e.values["partner"],
-            {k: float(v) for k, v in e.values["parameters"].items()},
-        )
-        for e in entries
-        if e.values["in"] == NUMBERS
-    ]
+    where = f"{path}: causes"
+    entries = [Fields(item, KEYS, where) for item in file.list("causes")]
+    return [_effect(e, where) for e in entries if e.values["in"] == NUMBERS]
 
 
-def step(model: mujoco.MjModel, data: mujoco.MjData, effects: Sequence[RobotEffect], torque: Array) -> None:
+def _effect(entry: Fields, where: str) -> RobotEffect | ActingLaw:
+    values = entry.values
+    if values["cause"] == LAW:
+        return ActingLaw(JointLaw.of_dict(values["law"], where))
+    numbers = {k: float(v) for k, v in values["parameters"].items()}
+    return RobotEffect(values["cause"], values["joint"], values["partner"], numbers)
+
+
+def step(
+    model: mujoco.MjModel, data: mujoco.MjData, effects: Sequence[RobotEffect | ActingLaw], torque: Array
+) -> None:
     """One step of a robot whose drives give some torques, with the effects that its MJCF lacks.
 
     Args:
@@ -103,17 +120,24 @@ def step(model: mujoco.MjModel, data: mujoco.MjData, effects: Sequence[RobotEffe
         effects: of ``load_effects``.
         torque: at the joints, shape (J,).
     """
+    before = np.array(data.qacc)
     mujoco.mj_step1(model, data)
-    load = np.array(data.qfrc_bias) - np.array(data.qfrc_passive)
-    data.qfrc_applied[:] = torque - resistances(list(effects), data.qpos, data.qvel, load)
+    # What the gears pass on: gravity, springs and the bodies' inertia, but nothing that rubs, and no rotors.
+    inertia = np.zeros(model.nv)
+    mujoco.mj_mulM(model, data, inertia, before)
+    load = inertia - model.dof_armature * before + data.qfrc_bias - data.qfrc_spring
+    listed = [effect for effect in effects if isinstance(effect, RobotEffect)]
+    taken = resistances(listed, data.qpos, data.qvel, load)
+    state = State(data.time, model.opt.timestep, data.qpos, data.qvel, before, load, torque)
+    for acting in (effect for effect in effects if isinstance(effect, ActingLaw)):
+        taken[acting.law.joint - 1] += acting.torque(state)
+    data.qfrc_applied[:] = torque - taken
     mujoco.mj_step2(model, data)
 
 
-def _readme(effects: Sequence[RobotEffect], places: Sequence[str]) -> str:
+def _readme(effects: Sequence[Effect], places: Sequence[str]) -> str:
     rows = [
-        f"| `{e.cause}` | {'' if e.joint is None else e.joint} | "
-        f"{', '.join(f'`{n}` = {v:.6g}' for n, v in e.parameters.items())} | "
-        f"{'not simulated' if place == 'none' else f'`{place}`'} |"
+        f"| {_row(e)} | {'not simulated' if place == 'none' else f'`{place}`'} |"
         for e, place in zip(effects, places, strict=True)
     ]
     table = (
@@ -137,3 +161,12 @@ One step with all of it, from torques at the joints:
     data, effects = mujoco.MjData(model), load_effects(".")
     step(model, data, effects, torque)
 """
+
+
+def _row(effect: Effect) -> str:
+    entry = _entry(effect)
+    numbers = entry["law"] or entry["parameters"]
+    each = (
+        f"`{n}` = {v:.6g}" if isinstance(v, float) else f"`{n}` = {v}" for n, v in numbers.items() if v != ""
+    )
+    return f"`{entry['cause']}` | {entry['joint'] or ''} | {', '.join(each)}"

@@ -28,8 +28,9 @@ def sentence(candidate: LawCandidate, values: Mapping[str, float], se: Mapping[s
     elif term.function == "spline":
         sizes = [x for name, x in values.items() if name.startswith("at_knot")]
         unit, scale = fitting(place.unit, max(map(abs, sizes)))
+        rubs = "" if term.times is None else f" times the {_words(term.times)}"
         said = (
-            f"{lead} is off by a curve of the {_words(term.of)}, from {scale * min(sizes):.3g} to "
+            f"{lead} is off by a curve of the {_words(term.of)}{rubs}, from {scale * min(sizes):.3g} to "
             f"{scale * max(sizes):.3g} {unit}"
         )
     else:
@@ -100,4 +101,6 @@ def _where(candidate: LawCandidate) -> str:
 
 
 def _words(variable: Variable) -> str:
-    return "time" if variable.kind == "time" else f"{variable.words} [{variable.unit}]"
+    if variable.kind in ("time", "direction"):
+        return variable.words
+    return f"{variable.words} [{variable.unit}]"

@@ -57,6 +57,11 @@ class Reduction:
         ends = np.cumsum([len(s) for s in self.samples])[:-1]
         return [part.reshape(len(part), *x.shape[1:]) for part in np.split(rows, ends)]
 
+    def of_block(self, block: int, samples: slice) -> csr_array:
+        """The map from the samples of one block, which are all that its rows see, to its rows."""
+        starts = np.cumsum([0, *(len(s) for s in self.samples)])
+        return self.filter[starts[block] : starts[block + 1], samples]
+
 
 def cutoff_hz(rate_hz: float) -> float:
     """Cut-off of the rows of a log of some rate."""

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.place import Place
 from discrepancy.laws.variable import Variable
@@ -19,7 +20,7 @@ from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 
 
-class TeamBench:
+class TeamBench(Bench):
     """Places, signals and rows of a team; see ``discrepancy.laws.bench.Bench``.
 
     Args:
@@ -55,27 +56,14 @@ class TeamBench:
         parts = with_rates(errors, linear.signals.rate_hz)
         return np.stack([linear.reduction(part) for part in parts], axis=1)
 
-    def values(self, trial: int, candidate: LawCandidate) -> Array:
-        """What one unit of each amplitude is, as a function of time, shape (Q, k)."""
-        term = candidate.term
-        values = term.values(lambda variable: self.signal(trial, variable), self.rate_hz(trial))
-        if candidate.at.offset and term.function not in ("constant", "spline"):
-            values = np.concatenate([values, np.ones((len(values), 1))], axis=1)
-        return values
-
     def columns(self, trial: int, candidate: LawCandidate) -> Array:
         """What a law adds to the residual, one column an amplitude, components side by side, shape (n, C, k)."""
-        linear, place = self._linear[trial], candidate.at
-        values = self.values(trial, candidate)
-        if place.name in READINGS and place.robot and place.joint:
-            kind, joint = READINGS[place.name], place.joint - 1
-            return np.stack(
-                [linear.of_signals(place.robot - 1, **{kind: one_joint(x, joint)}) for x in values.T], axis=2
-            )
-        directions = self.directions(trial, place)
-        moved = self.at_rows(trial, values, rates=directions.shape[2] == 3)
-        columns = np.einsum("narc,nrk->ncka", directions, moved, optimize=True)
-        return np.asarray(columns.reshape(*columns.shape[:2], -1))
+        place = candidate.at
+        if place.name not in READINGS or not place.robot or not place.joint:
+            return super().columns(trial, candidate)
+        linear, values = self._linear[trial], self.values(trial, candidate)
+        kind, joint, robot = READINGS[place.name], place.joint - 1, place.robot - 1
+        return np.stack([linear.of_signals(robot, **{kind: one_joint(x, joint)}) for x in values.T], axis=2)
 
     def reading_error(
         self, trial: int, candidate: LawCandidate, amplitudes: Array

@@ -5,14 +5,15 @@ from __future__ import annotations
 from functools import cached_property
 
 from discrepancy.candidate import Candidate
-from discrepancy.laws.candidate import LawCandidate, law_steps, refined
+from discrepancy.laws.candidate import LawCandidate
+from discrepancy.laws.lawful import Lawful
 from discrepancy.team.laws.bench import TeamBench
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.rows import TeamRows
 from estimator.arrays import Array
 
 
-class LawfulRows(TeamRows):
+class LawfulRows(Lawful, TeamRows):
     """Rows of a team whose candidates may be laws."""
 
     @property
@@ -34,19 +35,3 @@ class LawfulRows(TeamRows):
             error = self.bench.reading_error(trial, candidate, values)
             return None if error is None else signals.minus(**error)
         return super()._undo(trial, candidate, values, signals)
-
-    def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
-        return isinstance(candidate, LawCandidate) or super().possible(candidate, values, covariance)
-
-    def unknowns(self, candidate: Candidate) -> list[Array]:
-        if isinstance(candidate, LawCandidate):
-            return [columns[..., :0] for columns in self.columns(candidate)]
-        return super().unknowns(candidate)
-
-    def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
-        if isinstance(candidate, LawCandidate):
-            return refined(candidate, finer=finer)
-        return super().refinements(candidate, finer=finer)
-
-    def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
-        return law_steps(candidate) if isinstance(candidate, LawCandidate) else super().steps(candidate)

@@ -1,0 +1,1 @@
+"""Laws at the axis."""

@@ -1,0 +1,1 @@
+"""Laws at the joints of a serial robot."""
