@@ -5,10 +5,11 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Iterable
 
+from discrepancy.candidate import Candidate
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate, law_steps, refined
 from discrepancy.laws.said.numbers import report
-from discrepancy.rig import Candidate, Numbers, Rig
+from discrepancy.rig import Numbers, Rig
 from estimator.arrays import Array
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
+from discrepancy.candidate import Candidate
 from discrepancy.emps.laws.bench import AxisBench
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.lawful import Lawful
-from discrepancy.rig import Candidate
 from estimator.arrays import Array
 
 

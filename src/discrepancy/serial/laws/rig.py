@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from functools import cached_property
 
+from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Found
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.lawful import Lawful
 from discrepancy.laws.pieces import pieces_of
-from discrepancy.rig import Candidate
 from discrepancy.serial.laws.bench import SerialBench
 from discrepancy.serial.rig import SerialRig
 from estimator.arrays import Array

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from functools import cached_property
 
+from discrepancy.candidate import Candidate
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.lawful import Lawful
-from discrepancy.rig import Candidate
 from discrepancy.team.laws.bench import TeamBench
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.rows import TeamRows
