@@ -285,6 +285,11 @@ class Rig(ABC):
         It returns recorded minus simulated response by channel, or None where that cannot be simulated.
         """
 
+    @property
+    def resimulated(self) -> Sequence[int]:
+        """Trials of which the commands can be simulated again, from where they begin."""
+        return range(len(self.trials))
+
     @abstractmethod
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
         """Standard deviation of the noise and of the motion, by channel; shapes broadcast with the response."""

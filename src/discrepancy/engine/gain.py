@@ -33,7 +33,7 @@ class Response:
 
 @dataclass(frozen=True)
 class Gain:
-    """Responses of every trial without and with the causes, each simulated with what the other trials say.
+    """Responses of every trial that can be simulated without and with the causes, each simulated with what the other trials say.
 
     Attributes:
         before, after: one per trial; None where the simulation failed.
@@ -84,7 +84,7 @@ def responses(
     trials = problem.trials
     tasks = []
     for free in hypotheses:
-        for t in trials:
+        for t in rig.resimulated:
             others = [k for k in trials if k != t] or [t]
             # A push says nothing about other trials; its own trial has to tell it.
             if any(problem.candidates[i].transient for i in free):
@@ -97,7 +97,7 @@ def responses(
         done.append(None if errors is None else _response(errors, rig.response_scale(task[0])))
         if progress:
             progress(1)
-    count = len(trials)
+    count = len(rig.resimulated)
     return [tuple(done[k * count : (k + 1) * count]) for k in range(len(hypotheses))]
 
 
