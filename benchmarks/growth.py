@@ -27,7 +27,7 @@ import tyro
 import mocobot
 from discrepancy.team.causes import CAUSES
 
-MASS_KG, APART_M, VIA_S = 4.0, 1.1, 1.72
+MASS_KG, APART_M, VIA_S = 4.0, 1.1, 1.31
 """Of the ring for each robot, along its rim from one to the next, and of one random via and the way there."""
 FRICTION = {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.02}
 MINUTES, ROBOTS, KINDS = (1, 5, 15, 60), (1, 3, 6, 10), (1, 6, 12, 23)
@@ -83,8 +83,8 @@ def points() -> Iterator[Point]:
 
 
 def ring_mjcf(robots: int) -> str:
-    """A thin ring with its grasps evenly around it, {1} at the first; a mass that hangs below the grasp of one robot."""
-    radius, height = (robots * APART_M / (2.0 * np.pi), 0.06) if robots > 1 else (0.0, -0.1)
+    """A thin ring with its grasps evenly around it, {1} at the first; of one or two robots it hangs."""
+    radius, height = (robots * APART_M / (2.0 * np.pi), 0.06) if robots > 2 else (0.35 * (robots - 1), -0.1)
     angles = 2.0 * np.pi * np.arange(robots) / robots
     sites = "\n".join(
         f'<site name="grasp{i + 1}" pos="{radius * (np.cos(a) - 1.0)} {radius * np.sin(a)} 0" euler="0 0 {a}"/>'
@@ -97,7 +97,8 @@ def ring_mjcf(robots: int) -> str:
   <worldbody>
     <body name="payload">
       <inertial pos="{-radius} 0 {height}" mass="{mass}" diaginertia="{across} {across} {2.0 * across}"/>
-      <geom name="rim" type="cylinder" size="{max(radius, 0.2)} 0.02" pos="{-radius} 0 {height}" mass="0" contype="0" conaffinity="0"/>
+      <geom name="rim" type="cylinder" mass="0" contype="0" conaffinity="0"
+            size="{max(radius, 0.2)} 0.02" pos="{-radius} 0 {height}"/>
       {sites}
     </body>
   </worldbody>
@@ -167,7 +168,10 @@ def key_of(result: dict[str, Any]) -> Point:
 
 def table(results: Sequence[dict[str, Any]]) -> str:
     """All of it."""
-    lines = ["| command | robots | minutes | kinds of causes | CPU [s] | memory [MB] |", "|---|---|---|---|---|---|"]
+    lines = [
+        "| command | robots | minutes | kinds of causes | CPU [s] | memory [MB] |",
+        "|---|---|---|---|---|---|",
+    ]
     for r in sorted(results, key=lambda r: (r["command"], r["kinds"], r["robots"], r["minutes"])):
         ended = "" if r["code"] == 0 else f" (ended with {r['code']})"
         lines.append(

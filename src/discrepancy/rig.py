@@ -200,8 +200,8 @@ class Rig(ABC):
         return 0
 
     @abstractmethod
-    def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
-        """Whitened rows of every trial at the nominal unknowns."""
+    def rows(self, candidates: Sequence[Candidate]) -> Iterable[Rows]:
+        """Whitened rows of every trial at the nominal unknowns; they may come one at a time."""
 
     @abstractmethod
     def columns(self, candidate: Candidate) -> list[Array]:

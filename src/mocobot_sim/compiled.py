@@ -35,6 +35,6 @@ def entry(function: Callable[..., Any]) -> Callable[..., Any]:
         return compiled(function)
 
     def called(*given: Any) -> Any:
-        return function(*[memoryview(one) if isinstance(one, np.ndarray) else one for one in given])
+        return function(*[one.data if isinstance(one, np.ndarray) else one for one in given])
 
     return called

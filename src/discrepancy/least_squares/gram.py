@@ -7,7 +7,8 @@ from estimator.arrays import Array
 
 def gram_of(a: Array, b: Array) -> Array:
     """a^T b over rows and channels, shapes (n, C, k), (n, C, l) -> (k, l)."""
-    return a.reshape(-1, a.shape[2]).T @ b.reshape(-1, b.shape[2])
+    count = a.shape[0] * a.shape[1]
+    return a.reshape(count, a.shape[2]).T @ b.reshape(count, b.shape[2])
 
 
 def orthonormal(columns: Array) -> Array:

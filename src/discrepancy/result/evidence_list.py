@@ -55,7 +55,7 @@ def _with_shapes(explanation: Explanation) -> tuple[Problem, dict[int, Problem]]
     best, problem, at = explanation.hypothesis, explanation.nothing.problem, []
     for index in best.free:
         candidate, span = best.problem.candidates[index], best.problem.spans[index]
-        columns = [x[..., span] / candidate.units for x in best.problem.raw]
+        columns = [best.problem.raw_columns(t, span) / candidate.units for t in best.problem.trials]
         known = problem.index_of(candidate)
         at.append(len(problem.candidates) if known is None else known)
         if known is None:

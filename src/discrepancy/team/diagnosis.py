@@ -59,9 +59,9 @@ def diagnose_team(
         rig, closed_loop=closed_loop, laws=laws, odds=odds, jobs=jobs, say=say, simulated=simulated
     )
     assert isinstance(found.rig, TeamRig)
+    payload, own = estimates(found.rig, found.explanation), partial(traces, found.rig, found.explanation)
     found = replace(found, notes=(*found.notes, *said(recordings)))
-    payload = estimates(found.rig, found.explanation)
-    return Diagnosed(found.rig, found, TeamWords(), partial(traces, found.rig, found.explanation), payload)
+    return Diagnosed(found.rig, found, TeamWords(), own, payload)
 
 
 def against_truth(found: Diagnosed, truth: Mapping[str, Any]) -> Diagnosed:

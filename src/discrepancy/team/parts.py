@@ -1,12 +1,13 @@
-"""Long recordings in parts, each with bases of its own: time and memory then grow as the recording does, and not faster.
+"""Long recordings in parts, each with bases of its own: time and memory then grow as the recording does, not faster.
 
 What causes leave open, such as friction at every rest, is a number of unknowns that grows with the trial, and to take
-them out of its rows costs their square. What is minutes apart has nothing to do with each other but through the unknowns
-of all trials, so parts lose nothing; and they can be held out of a fit, which a single trial cannot.
+them out of its rows costs their square. What is minutes apart has nothing to do with each other but through the
+unknowns of all trials, so parts lose nothing; and they can be held out of a fit, which a single trial cannot.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -49,7 +50,7 @@ def _parts(recording: Recording) -> list[Recording]:
     if len(edges) == 2:
         return [recording]
     out = []
-    for k, (start, stop) in enumerate(zip(edges, edges[1:], strict=False)):
+    for k, (start, stop) in enumerate(pairwise(edges)):
         at = slice(max(0, start - trim), stop + trim)
         ref = None if recording.ref is None else recording.ref[at]
         time = np.array(recording.time[at])

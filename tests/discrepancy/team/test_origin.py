@@ -100,7 +100,7 @@ def test_exact_residual_is_counted_from_there_too(case, name):
     origin = ArmUnit(DESIGN, 0.1 * SIZES * rng.standard_normal((3, COUNT)))
     rig = team(case, origin)
     candidate = next(c for c in CANDIDATES if c.cause == name and c.robot == 3)
-    rows, (columns,) = rig.rows([])[0].residual, rig.columns(candidate)
+    rows, (columns,) = next(iter(rig.rows([]))).residual, rig.columns(candidate)
     for other in rig.candidates():
         if origin_of(other, origin) is not None and other.key != candidate.key:
             rows = rows + rig.columns(other)[0] @ origin_of(other, origin)

@@ -53,9 +53,9 @@ def with_adjusted_torques(linear: TrialLinear, noise: TorqueNoise) -> TrialLinea
     residual = balance(linear.data, linear.shared)[0]
     held = np.zeros(len(residual), dtype=bool)
     held[linear.reduction.operator[linear.reduction.moving :].indices] = True
-    s, by_torque = linear.s.copy(), linear.J.dense(TAU)
+    s, by_torque = linear.s.copy(), linear.J.dense(TAU)[:, :, -6:]
     for rows, variance, information in zip((~held, held), noise.variance, noise.information, strict=True):
         weighed = residual[rows] @ information
-        moved = np.einsum("iqcs,qc->qis", by_torque[:, rows, -6:], weighed, optimize=True)
+        moved = np.einsum("iqcs,qc->qis", by_torque[:, rows], weighed, optimize=True)
         s[rows, :, TAU] -= variance * moved
     return replace(linear, s=s)
