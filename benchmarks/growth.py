@@ -30,7 +30,8 @@ from discrepancy.team.causes import CAUSES
 MASS_KG, APART_M, VIA_S = 4.0, 1.1, 1.31
 """Of the ring for each robot, along its rim from one to the next, and of one random via and the way there."""
 FRICTION = {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.02}
-MINUTES, ROBOTS, KINDS = (1, 5, 15, 60), (1, 3, 6, 10), (1, 6, 12, 23)
+MINUTES, ROBOTS, KINDS = (1, 5, 15, 60), (2, 3, 6, 10), (1, 6, 12, 23)
+"""A diagnosis needs two robots."""
 ALL = len(CAUSES)
 
 
@@ -74,11 +75,14 @@ class Options:
 
 def points() -> Iterator[Point]:
     """What there is to measure, small things first."""
-    yield from (Point(command, 3, m) for m in MINUTES for command in ("estimate", "diagnose"))
     yield from (Point(command, n, 1) for n in ROBOTS for command in ("estimate", "diagnose"))
     yield from (Point("diagnose", 3, 1, kinds) for kinds in KINDS)
+    yield from (Point(command, 3, m) for m in MINUTES for command in ("estimate", "diagnose"))
+    yield Point("estimate", 1, 1)
     yield Point("simulated", 3, 1)
-    yield from (Point(command, 10, 10) for command in ("estimate", "diagnose", "simulated"))
+    yield Point("diagnose", 10, 10)
+    yield Point("estimate", 10, 10)
+    yield Point("simulated", 10, 10)
     yield Point("simulated", 3, 60)
 
 
@@ -137,7 +141,9 @@ def measure(point: Point, path: Path, most_s: float) -> dict[str, Any]:
         [sys.executable, "-m", "mocobot", *words(point, path)],
         env=os.environ | {"OPENBLAS_NUM_THREADS": "1"}, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
     )  # fmt: skip
+    largest = 0
     while True:
+        largest = max(largest, memory_kB(process.pid))
         pid, status, used = os.wait4(process.pid, os.WNOHANG)
         if pid:
             break
@@ -149,10 +155,19 @@ def measure(point: Point, path: Path, most_s: float) -> dict[str, Any]:
     return asdict(point) | {
         "cpu_s": round(used.ru_utime + used.ru_stime, 2),
         "clock_s": round(time.perf_counter() - begin, 2),
-        "memory_MB": round(used.ru_maxrss / 1024),
+        "memory_MB": round(largest / 1024),
         "code": os.waitstatus_to_exitcode(status),
         "said": said[:120].split("\n")[0],
     }
+
+
+def memory_kB(pid: int) -> int:
+    """Largest resident memory of a process so far; what its resource usage says includes that of its parent."""
+    try:
+        lines = Path(f"/proc/{pid}/status").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        return 0
+    return next((int(line.split()[1]) for line in lines if line.startswith("VmHWM:")), 0)
 
 
 def read(path: Path) -> list[dict[str, Any]]:

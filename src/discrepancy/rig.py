@@ -211,12 +211,7 @@ class Rig(ABC):
     def residual(
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
     ) -> list[Array]:
-        """Exact whitened residual of every trial, with the unknowns moved and causes taken out or modelled.
-
-        Args:
-            shared, local: displacements of the shared unknowns, and of every trial's own.
-            active: causes with the values of their parameters.
-        """
+        """Exact whitened residual of every trial, with shared and own unknowns moved and causes taken out or modelled."""
 
     def directions(self, trial: int) -> dict[str, Array]:
         """Orthonormal directions in the whitened channels of what single sources can do, shape (n, C, k)."""

@@ -206,9 +206,7 @@ class Problem:
 
     def with_residual(self, residuals: Sequence[Array]) -> Problem:
         """The same columns with another residual, shape (n, C) per trial."""
-        return self._with(
-            len(self.tolerant) + self.shared, [r[..., None] for r in residuals], self.candidates
-        )
+        return self._with(self.width - 1, [r[..., None] for r in residuals], self.candidates)
 
     def with_columns(self, index: int, candidate: Candidate, columns: Sequence[Array]) -> Problem:
         """One candidate replaced by another of as many parameters."""

@@ -82,7 +82,7 @@ def test_values_are_counted_from_where_the_robots_were_believed_to_be(case):
     origin = ArmUnit(DESIGN, 0.1 * SIZES * rng.standard_normal((3, COUNT)))
     here, there = team(case), team(case, origin)
     candidates = there.candidates()
-    plain, moved = here.rows(candidates)[0], there.rows(candidates)[0]
+    plain, moved = (next(iter(rig.rows(candidates))) for rig in (here, there))
     back = moved.residual.copy()
     for candidate, columns in zip(candidates, moved.causes, strict=True):
         value = origin_of(candidate, origin)
