@@ -110,35 +110,37 @@ def ring_mjcf(robots: int) -> str:
 """
 
 
-def recording(robots: int, minutes: int, out: Path) -> Path:
-    """A simulated recording, made once."""
-    path = out / f"{robots}-robots-{minutes}-min.parquet"
-    if not path.is_file():
-        payload = out / f"ring-{robots}.xml"
-        payload.write_text(ring_mjcf(robots), encoding="utf-8")
-        friction = mocobot.make_effect("joint_friction", FRICTION, robot=min(2, robots), joint=1)
-        vias = round(60.0 * minutes / VIA_S)
-        trial = mocobot.simulate(payload, "random", vias=vias, seed=1, effects=[friction])
-        mocobot.write_recording(trial, path)
-    return path
+def recordings(robots: int, minutes: int, out: Path) -> list[Path]:
+    """Simulated recordings of half an hour at most that last so long together; made once."""
+    count = -(-minutes // 30)
+    paths = [out / f"{robots}-robots-{minutes}-min-{k + 1}.parquet" for k in range(count)]
+    payload = out / f"ring-{robots}.xml"
+    payload.write_text(ring_mjcf(robots), encoding="utf-8")
+    friction = mocobot.make_effect("joint_friction", FRICTION, robot=min(2, robots), joint=1)
+    vias = round(60.0 * minutes / count / VIA_S)
+    for k, path in enumerate(paths):
+        if not path.is_file():
+            trial = mocobot.simulate(payload, "random", vias=vias, seed=1, number=k, effects=[friction])
+            mocobot.write_recording(trial, path)
+    return paths
 
 
-def words(point: Point, path: Path) -> list[str]:
+def words(point: Point, paths: Sequence[Path]) -> list[str]:
     """The command line."""
     if point.command == "estimate":
-        return ["estimate", str(path)]
+        return ["estimate", *map(str, paths)]
     others = [name for name in CAUSES if name != "joint_friction"]
     excluded = others[point.kinds - 1 :]
-    out = ["diagnose", str(path), "--jobs", "1"]
+    out = ["diagnose", *map(str, paths), "--jobs", "1"]
     out += [] if point.command == "simulated" else ["--no-closed-loop"]
     return [*out, "--exclude", *excluded] if excluded else out
 
 
-def measure(point: Point, path: Path, most_s: float) -> dict[str, Any]:
+def measure(point: Point, paths: Sequence[Path], most_s: float) -> dict[str, Any]:
     """CPU [s], clock [s] and largest memory [MB] of one command, and whether it ended well."""
     begin = time.perf_counter()
     process = subprocess.Popen(
-        [sys.executable, "-m", "mocobot", *words(point, path)],
+        [sys.executable, "-m", "mocobot", *words(point, paths)],
         env=os.environ | {"OPENBLAS_NUM_THREADS": "1"}, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
     )  # fmt: skip
     largest = 0
@@ -244,7 +246,7 @@ def main(options: Options) -> None:
     for point in dict.fromkeys(points()):
         if point in done or point.minutes > options.most_minutes:
             continue
-        result = measure(point, recording(point.robots, point.minutes, options.out), options.most_s)
+        result = measure(point, recordings(point.robots, point.minutes, options.out), options.most_s)
         with file.open("a", encoding="utf-8") as lines:
             lines.write(json.dumps(result) + "\n")
         print(json.dumps(result), flush=True)

@@ -211,7 +211,7 @@ class Rig(ABC):
     def residual(
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
     ) -> list[Array]:
-        """Exact whitened residual of every trial, with shared and own unknowns moved and causes taken out or modelled."""
+        """Exact whitened residual of every trial, with shared and own unknowns moved, causes taken out or modelled."""
 
     def directions(self, trial: int) -> dict[str, Array]:
         """Orthonormal directions in the whitened channels of what single sources can do, shape (n, C, k)."""

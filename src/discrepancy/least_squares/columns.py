@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import numpy as np
 
 from discrepancy.least_squares.cells import Cells
-from discrepancy.least_squares.gram import gram_of, project
+from discrepancy.least_squares.gram import added_up, gram_of, project
 from estimator.arrays import Array
 
 
@@ -51,7 +52,8 @@ class Columns:
 
     def single(self) -> Columns:
         """The same in single precision."""
-        return Columns(tuple(piece.astype(np.float32, copy=False) for piece in self.pieces), self.inside)
+        pieces = [cast(Array, piece.astype(np.float32, copy=False)) for piece in self.pieces]
+        return Columns(tuple(pieces), self.inside)
 
     def take(self, span: slice) -> Array:
         """Some successive columns, shape (n, C, k)."""
@@ -70,7 +72,7 @@ class Columns:
         """The columns added up, each by its number in x, shape (columns,) or (columns, k) -> (n, C) or (n, C, k)."""
         out, at = np.zeros((*self.pieces[0].shape[:2], *x.shape[1:])), 0
         for piece in self.pieces:
-            out += piece @ x[at : at + piece.shape[2]]
+            out += added_up(piece, x[at : at + piece.shape[2]])
             at += piece.shape[2]
         return out
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discrepancy.least_squares.gram import gram_of
+from discrepancy.least_squares.gram import added_up, gram_of
 from estimator.arrays import Array
 
 
@@ -64,7 +64,7 @@ class Opened:
         """Rows that are white with these unknowns integrated out, shape (n, C, l) -> the same."""
         if not len(self.shrink) or not x.size:
             return x
-        return np.asarray(x - self.basis @ self.along(x))
+        return np.asarray(x - added_up(self.basis, self.along(x)))
 
 
 def through(opened: Sequence[Opened], x: Array) -> Array:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from discrepancy import rules
 from discrepancy.least_squares.cells import Cells
 from discrepancy.least_squares.columns import Columns, held
-from discrepancy.least_squares.gram import gram_of, orthonormal, project
+from discrepancy.least_squares.gram import added_up, gram_of, orthonormal, project
 from discrepancy.least_squares.opened import Opened, through
 from discrepancy.rig import Candidate, Rows
 from estimator.arrays import Array
@@ -73,7 +73,8 @@ class Problem:
             parts = [trial.shared, *(a * u for a, u in zip(trial.causes, units, strict=True))]
             raw = np.concatenate([*parts, trial.residual[..., None]], axis=2)
             shared = trial.shared.shape[2]
-            cells.append(Cells.of(*trial.residual.shape, trial.moving, trial.groups))
+            rows, channels = trial.residual.shape
+            cells.append(Cells.of(rows, channels, trial.moving, trial.groups))
             local.append(trial.local)
             explicable.append(orthonormal(trial.local))
             columns.append(Columns.of(raw, explicable[-1], cells[-1]))
@@ -109,7 +110,7 @@ class Problem:
         """Some columns without what the trial's own unknowns and those of causes can explain, in the transform."""
         x = self.columns[trial].take(span)
         for one, shares in self._open(trial):
-            x = x - one.basis @ shares[:, span]
+            x = x - added_up(one.basis, shares[:, span])
         return x
 
     def _open(self, trial: int) -> list[tuple[Opened, Array]]:
@@ -227,7 +228,7 @@ class Problem:
             (left,) = new.pieces
             for key, own in self.opened.items():
                 along = own[t].along(left)
-                left, old = left - own[t].basis @ along, self.shares[key][t]
+                left, old = left - added_up(own[t].basis, along), self.shares[key][t]
                 shares[key].append(np.concatenate([old[:, :start], along, old[:, stop:]], axis=1))
             grams.append(np.insert(np.insert(self.cell_grams[t], place, 0.0, axis=1), place, 0.0, axis=2))
             edge = self._grams(t, left)
@@ -240,10 +241,7 @@ class Problem:
         )  # fmt: skip
 
     def with_unknowns(self, key: Key, unknowns: Sequence[Array], size: float) -> Problem:
-        """The problem with what a cause (``key``) leaves open in every trial.
-
-        Its columns are ``unknowns``, shape (n, C, k) per trial, ``size`` is the standard deviation of their values.
-        """
+        """The problem with what a cause leaves open: columns (n, C, k) per trial, values that scatter by ``size``."""
         if key in self.opened or not any(u.shape[2] for u in unknowns):
             return self
         own = [Opened.of(u, size, self.spectrum(t, u)) for t, u in enumerate(unknowns)]
