@@ -13,7 +13,7 @@ from typing import Any
 
 from mocobot_sim.errors import TrialError
 from sealed import store
-from sealed.law_score import score_law
+from sealed.law_score import score_laws
 from sealed.sets import SealedSet
 from sealed.verdict import engine, verdict_on
 
@@ -57,8 +57,9 @@ def _diagnose(request: SealedSet, out: Path, path: Path, *, closed_loop: bool, k
         result["error"] = traceback.format_exc()
         said = result["error"].splitlines()[-1]
     result["truth"] = store.truth_of(request, out)  # opened after the verdict
-    if request.kind in ("unlisted", "outside") and not result["error"]:
-        result["law_score"] = asdict(score_law(result, store.recordings_of(request, out)))
+    if request.kind in ("unlisted", "outside", "unlisted-pairs") and not result["error"]:
+        scores = score_laws(result, store.recordings_of(request, out))
+        result["law_scores"] = [asdict(one) for one in scores]
     store.append(path, result)
     if not keep:
         store.forget(request, out)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
 from mocobot.campaign.ground import one_axis
+from sealed.grounded import of_the_background
 from sealed.law_truth import instants, true_series
 
 Item = Mapping[str, Any]
@@ -31,7 +32,8 @@ class LawScore:
         place, variable, formula: whether these are right; ``formula`` also of a curve that is like it.
         amplitude: error of its size, as a share; None without a right place.
         held_out: share of the gain on trials left out over that in sample, or None.
-        beside: other laws and causes that were named.
+        beside: other laws and causes that were named and are not there, or are there as something else.
+        grounded: causes that were named and that the background drew.
     """
 
     stated: bool
@@ -41,6 +43,7 @@ class LawScore:
     amplitude: float | None = None
     held_out: float | None = None
     beside: int = 0
+    grounded: int = 0
 
 
 def stated_series(diagnosis: Any) -> list[list[dict[str, Any]]]:
@@ -60,23 +63,29 @@ def stated_series(diagnosis: Any) -> list[list[dict[str, Any]]]:
     return out
 
 
-def score_law(result: Item, trials: Sequence[Path]) -> LawScore:
-    """The law of a result that comes nearest to its one unlisted effect."""
-    (effect,) = result["truth"]["effects"]
-    causes = result["verdict"]["causes"]
+def score_laws(result: Item, trials: Sequence[Path]) -> list[LawScore]:
+    """For every unlisted effect of a result the law that comes nearest to it."""
+    effects, causes = result["truth"]["effects"], result["verdict"]["causes"]
     laws = [cause for cause in causes if cause["cause"] == "law"]
+    listed = [cause for cause in causes if cause["cause"] != "law"]
+    grounded = sum(of_the_background(cause, result["truth"]) for cause in listed)
+    beside = len(listed) - grounded + max(len(laws) - len(effects), 0)
     if not laws:
-        return LawScore(stated=False, beside=len(causes))
+        return [LawScore(stated=False, beside=beside, grounded=grounded) for _ in effects]
     recordings = [read_recording(path) for path in trials]
-    each = [
-        _score(law, series, effect, result["truth"], recordings, len(causes) - 1)
-        for law, series in zip(laws, result["verdict"]["law_series"], strict=True)
-    ]
-    return max(each, key=lambda one: (one.place, one.variable, one.formula))
+    out = []
+    for effect in effects:
+        each = [
+            _score(law, series, effect, result["truth"], recordings)
+            for law, series in zip(laws, result["verdict"]["law_series"], strict=True)
+        ]
+        best = max(each, key=lambda one: (one.place, one.variable, one.formula))
+        out.append(replace(best, beside=beside, grounded=grounded))
+    return out
 
 
 def _score(
-    law: Item, series: Sequence[Item], effect: Item, truth: Item, recordings: Sequence[Recording], beside: int
+    law: Item, series: Sequence[Item], effect: Item, truth: Item, recordings: Sequence[Recording]
 ) -> LawScore:
     said, gain = law["law"], law["explained"]
     place = _place(law, effect, truth)
@@ -90,7 +99,6 @@ def _score(
         formula=place and (named or share < LIKE),
         amplitude=size,
         held_out=held,
-        beside=beside,
     )
 
 

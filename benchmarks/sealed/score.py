@@ -8,6 +8,7 @@ from typing import Any
 
 from discrepancy.team.causes import CAUSES
 from mocobot.campaign.score import Score, family_of, match
+from sealed.grounded import of_the_background
 
 __all__ = ["HEALTHY", "Score", "Scored", "family_of", "score"]
 
@@ -23,13 +24,15 @@ class Scored:
     Attributes:
         result: what was scored.
         scores: one for every hidden effect.
-        extras: what was named besides.
+        extras: what was named besides and is not there.
+        grounded: what was named besides and is there, because the background drew it (``grounded``).
         stated: probability and rightness of everything that was named with a probability, laws left out.
     """
 
     result: Item
     scores: tuple[Score, ...]
     extras: tuple[Item, ...]
+    grounded: tuple[Item, ...]
     stated: tuple[tuple[float, bool], ...]
 
     @property
@@ -48,7 +51,7 @@ class Scored:
         if self.extras or (self.laws and all(score.listed for score in self.scores)):
             return False
         if not self.scores:
-            return self.verdict in HEALTHY
+            return self.verdict in HEALTHY or (self.verdict == "explained" and bool(self.grounded))
         listed = [score for score in self.scores if score.listed]
         return all(score.right for score in listed) and (
             len(listed) == len(self.scores)
@@ -62,11 +65,19 @@ def score(result: Item) -> Scored:
     truth = result["truth"]
     excluded = set(result["set"]["names"]) if result["set"]["kind"] == "left-out" else set()
     causes = [cause for cause in result["verdict"]["causes"] if cause["cause"] != "law"]
+    grounded = [c for c in causes if not _hidden(c, truth) and of_the_background(c, truth)]
     found = match(
-        causes, truth, _factors(result["set"], truth["effects"]),
+        [c for c in causes if c not in grounded], truth, _factors(result["set"], truth["effects"]),
         lambda cause: cause in CAUSES and cause not in excluded,
     )  # fmt: skip
-    return Scored(result, found.scores, found.extras, found.stated)
+    there = [(float(c["probability"]), True) for c in grounded if c.get("probability") is not None]
+    return Scored(result, found.scores, found.extras, tuple(grounded), (*found.stated, *there))
+
+
+def _hidden(item: Item, truth: Item) -> bool:
+    here = item["cause"], item.get("robot"), item.get("joint")
+    answers = (effect["answer"] for effect in truth["effects"])
+    return any(here == (answer["cause"], answer.get("robot"), answer.get("joint")) for answer in answers)
 
 
 def _factors(request: Item, effects: Sequence[Item]) -> list[float]:

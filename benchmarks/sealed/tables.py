@@ -57,10 +57,13 @@ def _alarms(sets: Sequence[Scored]) -> str:
         named = sum(bool(one.extras) for one in own)
         not_healthy = sum(one.verdict not in HEALTHY for one in own)
         what = Counter(item["cause"] for one in own for item in one.extras)
+        there = Counter(item["cause"] for one in own for item in one.grounded)
         verdicts = Counter(one.verdict for one in own)
         shares = [_share(n, len(own)) for n in (named, not_healthy)]
-        rows.append([background, len(own), *shares, _counts(verdicts), _counts(what)])
-    header = ["robots", "sets", "a fault named", "a fault named, or unexplained", "verdicts", "named"]
+        rows.append([background, len(own), *shares, _counts(verdicts), _counts(what), _counts(there)])
+    header = [
+        "robots", "sets", "a fault named", "a fault named, or unexplained", "verdicts", "named", "of the background",
+    ]  # fmt: skip
     return _markdown("Nothing hidden", header, rows)
 
 
@@ -99,7 +102,7 @@ def _by_name(title: str, sets: Sequence[Scored]) -> str:
     return _markdown(f"{title}, by name", header, rows)
 
 
-LINE = ("sets", "family", "member", "and place", "missed", "named instead", "besides")
+LINE = ("sets", "family", "member", "and place", "missed", "named instead", "besides", "of the background")
 
 
 def _line(own: Sequence[Scored]) -> list[Any]:
@@ -107,9 +110,17 @@ def _line(own: Sequence[Scored]) -> list[Any]:
     count: Callable[[str], int] = lambda name: sum(getattr(s, name) for s in scores)  # noqa: E731
     instead = Counter(s.named for s in scores if s.named and not s.right)
     besides = Counter(item["cause"] for one in own for item in one.extras)
+    there = Counter(item["cause"] for one in own for item in one.grounded)
     missed = sum(s.named is None for s in scores)
     shares = [count("family"), sum(s.member or s.ambiguous for s in scores), count("right")]
-    return [len(own), *(_share(n, len(own)) for n in shares), missed, _counts(instead), _counts(besides)]
+    return [
+        len(own),
+        *(_share(n, len(own)) for n in shares),
+        missed,
+        _counts(instead),
+        _counts(besides),
+        _counts(there),
+    ]
 
 
 def _several(sets: Sequence[Scored]) -> str:
@@ -153,9 +164,10 @@ def _nobodys(title: str, sets: Sequence[Scored]) -> str:
 
 def _laws(scored: Sequence[Scored]) -> str:
     """Laws stated of unlisted effects, and of sets that have none."""
-    rows = []
-    own = [one.result["law_score"] for one in scored if "law_score" in one.result]
-    if own:
+    rows, all_scores = [], [one.result for one in scored if "law_scores" in one.result]
+    for kind in sorted({result["set"]["kind"] for result in all_scores}):
+        sets = [result["law_scores"] for result in all_scores if result["set"]["kind"] == kind]
+        own = [score for each in sets for score in each]
         stated = [score for score in own if score["stated"]]
         sizes = [score["amplitude"] for score in own if score["amplitude"] is not None]
         held = [score["held_out"] for score in stated if score["held_out"] is not None]
@@ -163,16 +175,19 @@ def _laws(scored: Sequence[Scored]) -> str:
             _share(sum(bool(s[name]) for s in own), len(own))
             for name in ("stated", "place", "variable", "formula")
         ]
+        one_right = _share(sum(any(s["formula"] for s in each) for each in sets), len(sets))
         size = f"{100 * np.median(sizes):.1f}, {100 * max(sizes):.0f}" if sizes else "-"
-        rows.append(
-            [len(own), *counts, size, f"{100 * np.median(held):.0f}, {100 * min(held):.0f}" if held else "-"]
-        )
+        gain = f"{100 * np.median(held):.0f}, {100 * min(held):.0f}" if held else "-"
+        beside = sum(each[0]["beside"] > 0 for each in sets)
+        there = sum(each[0]["grounded"] > 0 for each in sets)
+        rows.append([kind, len(sets), len(own), *counts, one_right, size, gain, beside, there])
     header = [
-        "unlisted effects", "a law stated", "place", "and signal", "and formula", "size off, median, most [%]",
-        "gain held out over in sample, median, least [%]",
+        "", "sets", "unlisted effects", "a law stated", "place", "and signal", "and formula", "one of a set right",
+        "size off, median, most [%]", "gain held out over in sample, median, least [%]",
+        "sets with a wrong one besides", "with one of the background",
     ]  # fmt: skip
     text = [_markdown("Laws", header, rows)] if rows else []
-    others = [one for one in scored if "law_score" not in one.result]
+    others = [one for one in scored if "law_scores" not in one.result]
     if others:
         false = sum(bool(one.laws) for one in others)
         text.append(

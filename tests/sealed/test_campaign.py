@@ -111,7 +111,9 @@ def _named(cause="joint_friction", robot=2, joint=1, probability=None, alternati
     }  # fmt: skip
 
 
-def _result(effects, named, verdict="explained", kind="single", factor=4.0, names=None, background="x1"):
+def _result(
+    effects, named, verdict="explained", kind="single", factor=4.0, names=None, background="x1", drawn=()
+):
     names = [effect["cause"] for effect in effects] if names is None else names
     return {
         "key": f"1_{kind}", "engine": "e", "error": None,
@@ -119,7 +121,9 @@ def _result(effects, named, verdict="explained", kind="single", factor=4.0, name
         "verdict": {
             "verdict": verdict, "causes": named, "cpu_s": 10.0, "peak_gb": 0.5, "residual": {"chi2_per_n": 1.0}
         },
-        "truth": {"effects": effects, "gimbal_axes_1": np.tile(np.eye(3), (3, 1, 1)).tolist()},
+        "truth": {
+            "effects": effects, "background": list(drawn), "gimbal_axes_1": np.tile(np.eye(3), (3, 1, 1)).tolist()
+        },
     }  # fmt: skip
 
 
@@ -179,6 +183,20 @@ def test_nothing_hidden_and_nothing_named():
     assert score(_result([], [], "miscalibrated", "clean")).whole
     assert not score(_result([], [], "unexplained", "clean")).whole
     assert not score(_result([], [_named()], "explained", "clean")).whole
+
+
+def test_what_a_wide_background_drew_is_neither_an_alarm_nor_a_miss():
+    """A friction of twelve tolerances, named at its size, in a clean set; of another joint, it is an alarm."""
+    drawn = [_effect(joint=1, coulomb_Nm=0.05, viscous_Nms_per_rad=0.024)]
+    named = _named(probability=0.9, viscous_Nms_per_rad=(0.02, 0.002), coulomb_Nm=(0.051, 0.001))
+    there = score(_result([], [named], "explained", "clean", background="x10", drawn=drawn))
+    assert (there.extras, len(there.grounded), there.stated) == ((), 1, ((0.9, True),))
+    elsewhere = score(_result([], [{**named, "joint": 2}], "explained", "clean", drawn=drawn))
+    assert (len(elsewhere.extras), elsewhere.grounded, elsewhere.stated) == (1, (), ((0.9, False),))
+    # Hidden and drawn at one place: it answers for what was hidden.
+    both = score(_result([_effect()], [named], drawn=drawn))
+    assert both.scores[0].right
+    assert not both.grounded
 
 
 def test_what_nobody_lists_should_stay_unexplained():

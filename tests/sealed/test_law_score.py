@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sealed.law_score import FORMULAS, PLACES, VARIABLES, score_law
+from sealed.law_score import FORMULAS, PLACES, VARIABLES, score_laws
 from sealed.law_truth import SHAPES, instants
 from sealed.registry import OUTSIDE, UNLISTED
 from team_case import exact
@@ -15,6 +15,13 @@ EFFECT = {
     "law": {"of": "tau reading", "place": {"robot": 2, "joint": 1}},
 }
 
+DRAG = {
+    "cause": "drag", "family": "environment", "robot": None, "joint": None, "law": None,
+    "parameters": {
+        "coefficient_Ns_per_m": {"value": 0.93, "se": 0.06}, "turning_Nms_per_rad": {"value": 0.02, "se": 0.01}
+    },
+}  # fmt: skip
+
 
 def test_every_unlisted_effect_can_be_scored():
     assert set(FORMULAS) == NAMES
@@ -25,7 +32,14 @@ def test_every_unlisted_effect_can_be_scored():
 
 
 def scored(
-    monkeypatch, function="square", of="tau_2_1", place="tau reading", joint=1, factor=1.0, offset=0.0
+    monkeypatch,
+    function="square",
+    of="tau_2_1",
+    place="tau reading",
+    joint=1,
+    factor=1.0,
+    offset=0.0,
+    background=(),
 ):
     recording = exact().carried.recording
     monkeypatch.setattr("sealed.law_score.read_recording", lambda path: recording)
@@ -40,8 +54,10 @@ def scored(
         "explained": {"in_sample": 0.5, "held_out": 0.4},
     }
     series = [[{"time_s": recording.time[at].tolist(), "values": [values.tolist()]}]]
-    verdict = {"causes": [cause, {"cause": "drag", "law": None}], "law_series": series}
-    return score_law({"truth": {"effects": [EFFECT]}, "verdict": verdict}, ["one"])
+    verdict = {"causes": [cause, DRAG], "law_series": series}
+    truth = {"effects": [EFFECT], "background": background}
+    (one,) = score_laws({"truth": truth, "verdict": verdict}, ["one"])
+    return one
 
 
 def test_the_hidden_law_itself(monkeypatch):
@@ -71,8 +87,8 @@ def test_wrong_places_and_signals(monkeypatch):
 
 
 def test_nothing_stated():
-    verdict = {"causes": [{"cause": "drag", "law": None}], "law_series": []}
-    one = score_law({"truth": {"effects": [EFFECT]}, "verdict": verdict}, [])
+    truth = {"effects": [EFFECT], "background": []}
+    (one,) = score_laws({"truth": truth, "verdict": {"causes": [DRAG], "law_series": []}}, [])
     assert (one.stated, one.place, one.beside) == (False, False, 1)
 
 
@@ -82,3 +98,18 @@ def test_instants_leave_out_the_ends():
     assert recording.time[at[0]] == pytest.approx(2.0)
     assert recording.time[at[-1]] <= recording.time[-1] - 2.0 + 1e-9
     assert np.ptp(np.diff(at)) == 0
+
+
+def test_what_the_background_drew_is_not_wrong(monkeypatch):
+    """A drag of 18 tolerances is there; one of two is within them, and one of half the size is another."""
+    for size, wrong in ((0.9, 0), (0.1, 1), (0.45, 1)):
+        drawn = {"cause": "drag", "parameters": {"coefficient_Ns_per_m": size, "turning_Nms_per_rad": 0.001}}
+        one = scored(monkeypatch, background=[drawn])
+        assert (one.beside, one.grounded) == (wrong, 1 - wrong)
+
+
+def test_of_two_hidden_effects_each_has_its_score():
+    other = {**EFFECT, "cause": "warming_zero"}
+    truth = {"effects": [EFFECT, other], "background": []}
+    scores = score_laws({"truth": truth, "verdict": {"causes": [], "law_series": []}}, [])
+    assert [one.stated for one in scores] == [False, False]

@@ -6,8 +6,8 @@ from typing import ClassVar
 from discrepancy.causes.base import Cause
 from discrepancy.causes.numbers import Numbers
 from discrepancy.laws.candidate import LawCandidate
-from discrepancy.laws.guess import experiment
-from discrepancy.laws.words import sentence
+from discrepancy.laws.said.guess import experiment
+from discrepancy.laws.said.sentence import sentence
 from discrepancy.rig import Candidate
 
 

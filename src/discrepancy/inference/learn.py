@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_solve, cholesky, get_lapack_funcs
 
 from discrepancy import rules
+from discrepancy.inference.twins import twins
 from discrepancy.least_squares.problem import Problem
 from estimator.arrays import Array
 
@@ -45,6 +46,7 @@ class _Parts:
         least, most: spread that a group has at least and at most, shape (groups,).
         weight: numbers that its prior counts for, shape (groups,).
         own: which groups are spreads of free candidates.
+        kinds: group of every kind with a spread.
     """
 
     grams: Array
@@ -54,6 +56,7 @@ class _Parts:
     most: Array
     weight: Array
     own: NDArray[np.bool_]
+    kinds: Mapping[str, int]
 
 
 def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN_ROUNDS) -> Learnt:
@@ -67,14 +70,18 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
     names, parts = _parts(problem, free)
     power = np.concatenate([p[c.sizes > 0] for p, c in zip(problem.power, problem.cells, strict=True)])
     start = np.array([np.sqrt(np.mean(problem.spread[at] ** 2)) for at in names])
-    spread = np.clip(start, parts.least, parts.most)
-    last = -np.inf
-    for _ in range(rounds):
-        evidence, power_next, spread_next = _step(parts, power, spread)
-        if evidence - last < rules.LEARN_NATS and np.isfinite(last):
-            break
-        last, power, spread = evidence, power_next, spread_next
-    evidence = _step(parts, power, spread)[0] - problem.price
+    evidence, power, spread = _climbed(parts, power, np.clip(start, parts.least, parts.most), rounds)
+    # Two kinds that leave the same trace share a scatter, a saddle: one of them alone is likelier.
+    wide = [kind for kind, group in parts.kinds.items() if spread[group] > rules.HELD_FACTOR]
+    for pair in twins(problem, wide):
+        a, b = (parts.kinds[kind] for kind in pair)
+        for one, other in ((a, b), (b, a)):
+            apart = np.array(spread)
+            apart[one], apart[other] = min(np.sqrt(2.0) * spread[one], parts.most[one]), parts.least[other]
+            alone = _climbed(parts, power, apart, rounds)
+            if alone[0] > evidence:
+                evidence, power, spread = alone
+    evidence -= problem.price
     found, at = [], 0
     for old, cells in zip(problem.power, problem.cells, strict=True):
         new, filled = np.array(old), cells.sizes > 0
@@ -87,6 +94,17 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
     return Learnt(problem.with_noise(found, spreads), tuple(free), evidence)
 
 
+def _climbed(parts: _Parts, power: Array, spread: Array, rounds: int) -> tuple[float, Array, Array]:
+    """Log evidence, powers and spreads at the maximum uphill from some, or after so many steps."""
+    last = -np.inf
+    for _ in range(rounds):
+        evidence, power_next, spread_next = _step(parts, power, spread)
+        if evidence - last < rules.LEARN_NATS and np.isfinite(last):
+            break
+        last, power, spread = evidence, power_next, spread_next
+    return _step(parts, power, spread)[0], power, spread
+
+
 def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts]:
     count = problem.shared + len(problem.tolerant)
     group = np.full(count, -2)
@@ -97,9 +115,9 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
     for index, candidate in enumerate(problem.candidates):
         if index not in free and problem.has_tolerance(index):
             kinds.setdefault(candidate.cause, []).append(index)
-    base: dict[str, int] = {}
+    groups: dict[str, int] = {}
     for kind, members in kinds.items():
-        base[kind] = len(names)
+        groups[kind] = len(names)
         at = np.concatenate([np.r_[problem.columns_of(i)] for i in members])
         group[problem.shared + at] = len(names)
         names.append(at)
@@ -128,7 +146,7 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
         np.take(gram[both], both, axis=1, out=one, mode="clip")
     parts = _Parts(
         grams.reshape(len(grams), -1), np.concatenate(sizes).astype(float), group[used], np.array(least),
-        np.array(most), np.array(weight), np.array(own, dtype=bool),
+        np.array(most), np.array(weight), np.array(own, dtype=bool), groups,
     )  # fmt: skip
     return names, parts
 

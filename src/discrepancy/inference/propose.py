@@ -12,6 +12,7 @@ from discrepancy.inference.best_shape import nearest_shape
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.imitation import imitated
 from discrepancy.inference.scan import Scanned, scan, score_of, score_with
+from discrepancy.inference.twins import twins
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Rig
@@ -74,10 +75,18 @@ def _with_kinds_held(base: Hypothesis) -> list[Scanned]:
     for index, candidate in enumerate(problem.candidates):
         if index not in base.free and problem.has_tolerance(index):
             kinds.setdefault(candidate.cause, []).append(index)
-    for members in kinds.values():
-        if problem.spread[problem.columns_of(members[0])][0] > rules.HELD_FACTOR:
+    wide = {
+        kind
+        for kind, members in kinds.items()
+        if problem.spread[problem.columns_of(members[0])][0] > rules.HELD_FACTOR
+    }
+    same = twins(problem, kinds) if wide else []
+    for kind, members in kinds.items():
+        held = wide & {kind, *(k for pair in same if kind in pair for k in pair)}
+        if held:
             spread = problem.spread.copy()
-            for index in members:
+            # What leaves the same trace would take the fault for a scatter of its own.
+            for index in (i for one in held for i in kinds[one]):
                 spread[problem.columns_of(index)] = 1.0
             fit = Fit.of(replace(problem, spread=spread), base.free)
             for index in members:

@@ -77,7 +77,10 @@ def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Se
             break
         say(f"refit {added.causes[-1].label}")
         little = added.score - best.score < rules.LITTLE_SHARE * nats_left(best)
-        best, rivals = settled(rig, exact(rig, added, nothing), nothing)
+        found, beside = settled(rig, exact(rig, added, nothing), nothing)
+        if found.score - best.score < rules.NAMED_NATS:
+            break  # what pays where all is linear need not do so where it is exact
+        best, rivals = found, beside
         last = best.free[-1] if best.free else None
         likely = last is None or _law_holds(rig, best, last)
         doubtful = doubtful + 1 if little and not likely else 0

@@ -16,10 +16,11 @@ class Place:
         robot, joint: where, from 1, or None.
         targets: the simulator's name of what each component adds to, such as ``tau_2_1``.
         axes: names of the components in words; one empty name where there is one.
-        unit: of the error; one for all, or one for each component.
+        unit: of the error.
         title: in words, with the part in braces as in ``Candidate.title``.
         own: signals of the same joint or robot: those that it most likely depends on.
         offset: whether a constant has to go with every law, because no cause of the catalogue is one here.
+        units: of each component where they differ from ``unit``; empty where they do not.
         twin: name of a place whose rows are the same, minus these; only the response to the commands separates them.
     """
 
@@ -32,6 +33,7 @@ class Place:
     title: str
     own: tuple[Variable, ...] = ()
     offset: bool = False
+    units: tuple[str, ...] = ()
     twin: str | None = None
 
     @property

@@ -17,6 +17,7 @@ from discrepancy.inference.scan import Scanned
 from discrepancy.inference.search import Rival, Searched, continued, settled
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate, candidate_of
+from discrepancy.laws.place import Place
 from discrepancy.laws.what import Judged, judged
 from discrepancy.laws.where import Located, located
 from discrepancy.least_squares.fit import Fit
@@ -58,7 +59,7 @@ def with_laws(
         starts = [searched]
         if searched.best.free and not rivals:
             # Causes that were named may have stood for what nobody lists.
-            starts.append(Searched(searched.rig, searched.nothing, searched.nothing, ()))
+            starts.insert(0, Searched(searched.rig, searched.nothing, searched.nothing, ()))
         found = []
         for start in starts:
             places = located_in(start, bench, say)
@@ -67,6 +68,8 @@ def with_laws(
             if step is not None:
                 enough = min(most, len(step[0].best.free) + rules.LAW_CAUSES)
                 found.append((continued(step[0], enough, say), step[1]))
+                if _suffices(found[-1][0].best, searched.best):
+                    break
         if not found:
             break
         best, more = max(found, key=lambda one: one[0].best.score)
@@ -74,6 +77,15 @@ def with_laws(
             break
         searched, rivals = best, rivals | more
     return Lawful(_with_rivals(searched, rivals), first)
+
+
+def _suffices(found: Hypothesis, named: Hypothesis) -> bool:
+    """Whether a law, with what it goes with, is likelier than what was named and leaves noise, or holds all of that."""
+    enough = (
+        unlisted_nats(found) < rules.UNLISTED_NATS
+        or {cause.key for cause in named.causes} <= {cause.key for cause in found.causes}
+    )  # fmt: skip
+    return enough and found.score >= named.score + rules.NAMED_NATS
 
 
 def located_in(searched: Searched, bench: Bench, say: Callable[[str], object]) -> list[Located]:
@@ -119,7 +131,7 @@ def _proposals(
     """Hypotheses with one law more, each with the best numbers inside."""
     base = searched.best
     say("try formulas")
-    ranked = judged(base.fit, bench, [one.place for one in places[: rules.LAW_PLACES]])
+    ranked = judged(base.fit, bench, _tried(places))
     best, scores = None, []
     leaders = _leaders(ranked, base)
     for item in leaders:
@@ -130,6 +142,13 @@ def _proposals(
         if best is None or new.score > best.score:
             best = new
     return Proposed(best, tuple(sorted(scores, key=lambda one: -one[1])))
+
+
+def _tried(places: Sequence[Located]) -> list[Place]:
+    """The likeliest places, and all of several components: their curves are too slow to show all that laws do there."""
+    likeliest = [one.place for one in places[: rules.LAW_PLACES]]
+    vectors = [one.place for one in places if len(one.place.axes) > 1 and one.place not in likeliest]
+    return [*likeliest, *vectors]
 
 
 def _leaders(ranked: Sequence[Judged], base: Hypothesis) -> list[Judged]:

@@ -18,8 +18,9 @@ causes              list, in the order of discovery, of
                                    alternatives they add up to 1
     folds                          gain of chi-square on every trial when fitted to the others
     law                            of what no catalogue lists {place, unit, targets, function, of, times, numbers,
-                                   formula}: an error at ``targets`` that is a function of signals, and ``traces`` of
-                                   the error as it was located beside it (``laws.trace``); else null
+                                   formula, units of the parameters}: an error at ``targets`` that is a function of
+                                   signals, and ``traces`` of the error as it was located beside it
+                                   (``laws.said.trace``); else null
     shape                          numbers that change the cause's columns, such as a pendulum's length
     separate                       what would tell the cause from its look-alikes
     alternatives                   list of {cause, kind, name, family, robot, joint, place, probability,
@@ -73,8 +74,9 @@ from discrepancy.engine.diagnose import Diagnosis
 from discrepancy.engine.explanation import Found
 from discrepancy.engine.gain import Gain, Response
 from discrepancy.laws.candidate import LawCandidate
-from discrepancy.laws.report import law_to_dict
-from discrepancy.laws.trace import places_to_dict, traces_of
+from discrepancy.laws.said.numbers import law_to_dict, physical
+from discrepancy.laws.said.trace import places_to_dict, traces_of
+from discrepancy.laws.said.units import units_of
 from discrepancy.laws.where import Located
 from discrepancy.least_squares.fit import Fit
 from discrepancy.result.evidence_list import at_of, evidence_list, place_of
@@ -182,7 +184,12 @@ def _cause(
 
 
 def _law(candidate: LawCandidate, values: Array, rig: Rig, located: Sequence[Located]) -> dict[str, Any]:
-    return {**law_to_dict(candidate), "traces": traces_of(candidate, values, located, rig.bench)}
+    units = units_of(candidate, physical(candidate, values, candidate.shape))
+    return {
+        **law_to_dict(candidate),
+        "units": units,
+        "traces": traces_of(candidate, values, located, rig.bench),
+    }
 
 
 def _suspected(found: Found, rig: Rig, words: Words) -> dict[str, Any]:

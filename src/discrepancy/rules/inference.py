@@ -74,6 +74,8 @@ LEAST_SIZE = 1e-6
 """Of a cause without a tolerance over its typical size. Derived: not to divide by nought."""
 LEARN_ROUNDS, LEARN_NATS = 30, 0.05
 """Steps of powers and spreads at most, and the gain of evidence below which they have settled. Chosen."""
+SAME_TRACE = 1e-6
+"""Sine, squared, between columns that are one. Derived: more than rounding, less than what any data could tell."""
 LEAST_POWER = 0.5
 """Of a cell over that of its whitening. Chosen: some noise of healthy robots is drawn larger than it is."""
 FLAT_SHARE = 1e-10

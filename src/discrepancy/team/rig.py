@@ -11,7 +11,7 @@ from typing import Any
 from discrepancy.engine.explanation import Explanation
 from discrepancy.engine.gain import fit_to_simulate
 from discrepancy.laws.candidate import LawCandidate
-from discrepancy.laws.report import report
+from discrepancy.laws.said.numbers import report
 from discrepancy.rig import Candidate
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context

@@ -17,7 +17,7 @@ Values = Mapping[str, Any]
 def cause_tables(causes: Sequence[Values]) -> list[Node]:
     """What is named, what supports it, and what else it might be."""
     units = one_each(
-        (parameter(name)[1], entry["value"])
+        (_said(cause, name)[1], entry["value"])
         for cause in causes
         for name, entry in cause["parameters"].items()
     )
@@ -26,7 +26,7 @@ def cause_tables(causes: Sequence[Values]) -> list[Node]:
     for cause in causes:
         who = cause_name(name_of(cause), cause["cause"])
         for k, (name, entry) in enumerate(cause["parameters"].items()):
-            words, unit = parameter(name)
+            words, unit = _said(cause, name)
             unit, scale = units[unit] if unit in ("s", "m", "rad", "m/N") else (unit, 1.0)
             se = None if entry["se"] is None else scale * entry["se"]
             shown = measurement(scale * entry["value"], se, spelled(unit))
@@ -53,6 +53,14 @@ def cause_tables(causes: Sequence[Values]) -> list[Node]:
         *_rivals(causes),
         *_shapes(causes),
     ]
+
+
+def _said(cause: Values, name: str) -> tuple[str, str]:
+    """A parameter's name in words and its unit: a law brings its own, others carry theirs in the name."""
+    law = cause.get("law")
+    return (
+        parameter(name) if law is None else (name.removesuffix("_rad").replace("_", " "), law["units"][name])
+    )
 
 
 def _rivals(causes: Sequence[Values]) -> list[Node]:
@@ -87,7 +95,7 @@ def _shapes(causes: Sequence[Values]) -> list[Node]:
     """Numbers that change a cause's columns and were chosen, not fitted."""
     entries = []
     for cause in causes:
-        named = ((*parameter(name), number) for name, number in cause["shape"].items())
+        named = ((*_said(cause, name), number) for name, number in cause["shape"].items())
         said = ", ".join(
             f"{words} {plain(number, 4)} {spelled(unit)}".rstrip() for words, unit, number in named
         )

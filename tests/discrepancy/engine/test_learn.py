@@ -8,6 +8,7 @@ import pytest
 from dense_evidence import dense_evidence, log_prior
 from discrepancy import rules
 from discrepancy.inference.learn import learnt, worth_a_spread
+from discrepancy.inference.twins import twins
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Candidate, Parameter, Rows
 from linear_problem import cosines, random_rows, with_residuals
@@ -224,3 +225,45 @@ def test_learning_starts_anywhere(rows):
     problem = Problem.of(rows, CANDIDATES)
     far = replace(problem, spread=20.0 * problem.spread, power=tuple(4.0 * p for p in problem.power))
     assert learnt(far).log_evidence == pytest.approx(learnt(problem).log_evidence, abs=4 * rules.LEARN_NATS)
+
+
+def with_twins(rng, values, rows=60):
+    """Two kinds of five places with the same columns, and a third that is apart."""
+    candidates = tuple(place(kind, joint) for kind in ("one", "other", "apart") for joint in range(1, 6))
+    columns = [rng.standard_normal((rows, 2, 1)) for _ in range(10)]
+    causes = [*columns[:5], *(-c for c in columns[:5]), *columns[5:]]
+    x = rng.standard_normal((rows, 2)) + sum(c[..., 0] * v for c, v in zip(columns, values, strict=False))
+    none = np.zeros((rows, 2, 0))
+    return [Rows("a", x, none, none, causes, np.arange(rows) / 10.0)], candidates
+
+
+def test_of_two_kinds_with_one_trace_one_scatters(rng):
+    """Half of it each is a fixed point, too, but a saddle; the likeliest spreads are those of a grid."""
+    rows, candidates = with_twins(rng, 20.0 * 0.5 * rng.standard_normal(5))
+    problem = Problem.of(rows, candidates)
+    one = learnt(problem)
+    spreads = one.problem.spread[[0, 5]]
+    assert min(spreads) < 1.1
+    assert max(spreads) > 2.0
+
+    def judged(first, second):
+        spread = np.array(one.problem.spread)
+        spread[:5], spread[5:10] = first, second
+        kinds = [[*range(k, k + 5)] for k in (0, 5, 10)]
+        return dense_evidence(rows, one.problem, (), spread=spread) + log_prior(
+            one.problem, kinds, spread=spread
+        )
+
+    grid = np.geomspace(1.0, 50.0, 18)
+    best = max(judged(a, b) for a in grid for b in grid)
+    assert judged(*spreads) > best - 0.1
+    assert best - max(judged(a, a) for a in grid) > 1.0
+
+
+def test_twins_are_kinds_of_the_same_columns_at_every_place(rng):
+    rows, candidates = with_twins(rng, np.ones(5))
+    problem = Problem.of(rows, candidates)
+    assert twins(problem, ["one", "other", "apart"]) == [("one", "other")]
+    assert twins(problem, ["one", "apart"]) == []
+    rows[0].causes[7][:] += 0.01 * rng.standard_normal((60, 2, 1))  # of one place
+    assert twins(Problem.of(rows, candidates), ["one", "other", "apart"]) == []

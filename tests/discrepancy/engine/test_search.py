@@ -9,6 +9,7 @@ from discrepancy import rules
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.engine.explanation import explain
 from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.propose import proposals
 from discrepancy.inference.scan import score_of
 from discrepancy.inference.search import search
 from discrepancy.least_squares.fit import Fit
@@ -412,3 +413,15 @@ def test_linearising_again_ends():
     np.testing.assert_array_equal(
         searched.nothing.problem.raw_columns(0, slice(None)), own.raw_columns(0, slice(None))
     )
+
+
+def test_a_fault_of_one_of_two_kinds_with_one_trace_is_seen_in_both():
+    """Either could be it; while the one is looked at, the other may not take it for a scatter of its own."""
+    catalogue = tuple(cause(kind, robot) for kind in ("lag", "late") for robot in (1, 2, 3))
+    rig = FakeRig({4: 200.0}, catalogue=catalogue, twins={k + 3: (k, 0.0) for k in range(3)})
+    nothing = Hypothesis.of(Problem.of(rig.rows(catalogue), catalogue), ())
+    wide = nothing.problem.spread[[0, 3]]
+    assert min(wide) < 1.5 < 3.0 < max(wide)
+    seen = {c.key: score for c, score in proposals(rig, nothing, events=False).scores}
+    assert seen["lag", 2, None] == pytest.approx(seen["late", 2, None], abs=0.5)
+    assert seen["late", 2, None] > nothing.score

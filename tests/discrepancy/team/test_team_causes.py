@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 from discrepancy.rig import Transient
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
+from discrepancy.team.causes.shift import Late
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import Sensed
@@ -207,6 +208,19 @@ def test_columns_are_what_the_error_adds(case, name, robot):
                 single[k] = value
                 change = residual_of(case, spoiled(case, name, robot, joint, single)) - case.linear.residual
                 assert_close(column[..., k] * value, change, TOLERANCE.get(name, 0.01))
+
+
+def test_clocks_late_by_as_much_are_nothing(case):
+    """Beside another error, here friction: what that adds is made of the same readings, and late, too."""
+    s, late_s, coulomb = spoiled(case, "joint_friction", 1, 0, [0.05, 0.0]), 0.02, np.array([0.05, 0.0])
+    late = Signals(s.time, *(resampled(x, late_s) for x in (s.phi, s.theta, s.tau)), s.rate_hz)
+    linear = linearise(late, case.shared, case.bases, DESIGN, case.reduction, full=True)
+    friction = CAUSES["joint_friction"].columns(linear, 1, 0, CAUSES["joint_friction"].shapes[0]) @ coulomb
+    left = np.linalg.norm((linear.residual - friction)[5:-5, -6:], axis=0)
+    each = [CAUSES["clock_delay"].columns(linear, robot, 0, {}) for robot in range(3)]
+    assert np.abs(np.sum(each, axis=0)).max() < 1e-9 * np.abs(each).max()
+    shift = sum(Late.columns(CAUSES["clock_delay"], linear, robot, 0, {}) for robot in range(3))[..., 0]
+    assert np.linalg.norm(left) < 0.2 * np.linalg.norm(late_s * shift[5:-5, -6:])
 
 
 @pytest.mark.parametrize("name", READINGS)

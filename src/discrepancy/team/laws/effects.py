@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from discrepancy.laws.candidate import LawCandidate
-from discrepancy.laws.report import parts_of
+from discrepancy.laws.said.numbers import parts_of
 from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.effects.base import Effect

@@ -41,7 +41,7 @@ def places_of(robots: int) -> list[Place]:
     out += [
         _payload("force on payload", (*(f"payload_force_{a}" for a in XYZ), *(f"payload_moment_{a}" for a in XYZ)),
                  ("force x", "force y", "force z", "moment x", "moment y", "moment z"), "N",
-                 "force and moment on the payload, in the world", own),
+                 "force and moment on the payload, in the world", own, units=("N",) * 3 + ("N m",) * 3),
         _payload("payload mass", ("payload_mass",), ("",), "kg", "mass of the payload", ()),
         _payload("payload centre", tuple(f"payload_first_moment_{a}" for a in XYZ), XYZ, "kg m",
                  "first moment of the payload's mass", inner),
@@ -55,7 +55,9 @@ def _joint(
     name: str, robot: int, joint: int, target: str, unit: str, title: str, own: tuple[Variable, ...], *,
     offset: bool = False, twin: str | None = None,
 ) -> Place:  # fmt: skip
-    return Place(name, robot, joint, (f"{target}_{robot}_{joint}",), ("",), unit, title, own, offset, twin)
+    return Place(
+        name, robot, joint, (f"{target}_{robot}_{joint}",), ("",), unit, title, own, offset, twin=twin
+    )
 
 
 def _payload(
@@ -65,8 +67,9 @@ def _payload(
     unit: str,
     title: str,
     own: tuple[Variable, ...],
+    units: tuple[str, ...] = (),
 ) -> Place:
-    return Place(name, None, None, targets, axes, unit, title, own)
+    return Place(name, None, None, targets, axes, unit, title, own, units=units)
 
 
 def twin_of(place: Place) -> Place | None:

@@ -1,10 +1,12 @@
-"""Torques at their adjusted values, for columns that are made of them.
+"""Signals at their adjusted values: where all is linearised, and what columns are made of.
 
-A spring's scale or hardening adds a function of the torque to the residual. With the torque as measured, its noise is
-in column and residual alike, and they correlate: the scales of all springs together, which only the arms' own weight
-tells from the payload's mass, came out 1.5 % low, 13 standard errors. Of the torques as least squares adjusts them to
-the payload's motion, the noise is independent of the residual; to linearise at adjusted observations is the rule for
-such models (W. E. Deming, Statistical Adjustment of Data, 1943).
+A spring's scale adds a function of the torque to the residual, a payload's mass one of its motion, a length one of the
+pose. With signals as measured, their noise is in column and residual alike, and they correlate. The scales of all
+springs together, which only the arms' own weight tells from the payload's mass, came out 1.5 % low for noise of the
+torques, 13 standard errors; for that of 12-bit encoders, whose accelerations are in the mass's column, mass and all
+springs shrank by half; and all lengths together, which no angle tells, shrank with the noise of the loops. Of the
+signals as least squares adjusts them to closed loops and balanced wrenches, the noise is independent of the residual;
+to linearise at adjusted observations is the rule for such models (W. E. Deming, Statistical Adjustment of Data, 1943).
 """
 
 from __future__ import annotations
@@ -13,49 +15,57 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discrepancy.team.linear.trial_linear import TrialLinear
+from discrepancy.team.linear.jacobian import by_signals
+from discrepancy.team.linear.trial_linear import TrialLinear, by_bases, by_shared
 from estimator.arrays import Array
-from estimator.rigid_team.residual import balance
-from estimator.rigid_team.slots import TAU
+from estimator.rigid_team.residual import balance, grasp_data, pose_error
 
 
 @dataclass(frozen=True, eq=False)
-class TorqueNoise:
-    """What the sensors' noise leaves in rows of one trial, those in motion first and the holds second.
+class SignalNoise:
+    """What a residual tells of the noise of every signal in a trial.
 
     Attributes:
-        variance: of the reduced torques [N^2 m^2], two arrays (N, 3).
-        information: inverse covariance of the wrench balance's six channels, two arrays (6, 6).
+        told: regression of the signals' noise on the residual's channels, in motion and in holds, (N, 21, C) each.
     """
 
-    variance: tuple[Array, Array]
-    information: tuple[Array, Array]
+    told: tuple[Array, Array]
 
     @classmethod
-    def of(cls, rows: Array, torques: Array, moving: int) -> TorqueNoise:
-        """From draws of the noise alone: residuals (D, n, C), reduced torques (D, n, N, 3)."""
-        parts = [(x[:, :moving], x[:, moving:]) for x in (rows[..., -6:], torques)]
-        information = []
-        for x in parts[0]:
-            flat = x.reshape(-1, 6)
-            # Nothing to adjust where there are no such rows.
-            information.append(np.linalg.pinv(flat.T @ flat / len(flat)) if len(flat) else np.zeros((6, 6)))
-        variance = [np.mean(x**2, axis=(0, 1)) if x.shape[1] else np.zeros(x.shape[2:]) for x in parts[1]]
-        return cls((variance[0], variance[1]), (information[0], information[1]))
+    def of(cls, rows: Array, signals: Array, moving: int) -> SignalNoise:
+        """From draws of the noise alone: residuals (D, n, C), reduced signals (D, n, N, 21)."""
+        kinds = slice(None, moving), slice(moving, None)
+        moves, holds = (_regression(rows[:, at], signals[:, at]) for at in kinds)
+        return cls((moves, holds))
 
 
-def with_adjusted_torques(linear: TrialLinear, noise: TorqueNoise) -> TrialLinear:
-    """The trial with its torques (in ``s``) moved the likeliest way that makes the wrenches balance.
+def _regression(rows: Array, signals: Array) -> Array:
+    """E[s r^T] E[r r^T]^-1, shape (N, 21, C); few draws tell of every channel by itself, none of nothing."""
+    r, s = rows.reshape(-1, rows.shape[2]), signals.reshape(-1, *signals.shape[2:])
+    squares, weight = r.T @ r, min(1.0, r.shape[1] / max(len(r), 1))
+    size = np.sqrt(np.maximum(np.diag(squares), 1e-300))
+    alike = (1.0 - weight) * squares / np.outer(size, size) + weight * np.diag(np.diag(squares) / size**2)
+    inverse = np.linalg.pinv(alike, hermitian=True) / np.outer(size, size)
+    return np.asarray(np.einsum("kns,kc->nsc", s, r, optimize=True) @ inverse)
 
-    By S J^T C^-1 r: S the torques' variance, J the balance's derivative by them, C its covariance, r what it leaves.
-    Accelerations, which are noisy, too, take their share of r.
-    """
-    residual = balance(linear.data, linear.shared)[0]
+
+def with_adjusted_signals(linear: TrialLinear, noise: SignalNoise) -> TrialLinear:
+    """The trial linear at its signals moved the likeliest way that leaves no residual."""
+    data, shared, bases, arms = linear.data, linear.shared, linear.bases, linear.arms
+    residual = np.concatenate(
+        [pose_error(data.R_bi, data.p_bi, shared, bases), balance(data, shared)[0]], axis=1
+    )
     held = np.zeros(len(residual), dtype=bool)
     held[linear.reduction.operator[linear.reduction.moving :].indices] = True
-    s, by_torque = linear.s.copy(), linear.J.dense(TAU)[:, :, -6:]
-    for rows, variance, information in zip((~held, held), noise.variance, noise.information, strict=True):
-        weighed = residual[rows] @ information
-        moved = np.einsum("iqcs,qc->qis", by_torque[:, rows], weighed, optimize=True)
-        s[rows, :, TAU] -= variance * moved
-    return replace(linear, s=s)
+    s = linear.s.copy()
+    for rows, told in zip((~held, held), noise.told, strict=True):
+        s[rows] -= np.einsum("nsc,qc->qns", told, residual[rows], optimize=True)
+    data = grasp_data(s, arms, linear.signals.rate_hz)
+    return replace(
+        linear,
+        s=s,
+        data=data,
+        J=by_signals(s, data, shared, bases, arms),
+        by_shared=linear.reduction(by_shared(data, shared, bases)),
+        by_bases=linear.reduction(by_bases(data, shared, bases)),
+    )

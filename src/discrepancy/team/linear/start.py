@@ -10,7 +10,7 @@ from joblib import Parallel, delayed
 
 from discrepancy import rules
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.team.linear.adjust import TorqueNoise, with_adjusted_torques
+from discrepancy.team.linear.adjust import SignalNoise, with_adjusted_signals
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.rest import Resting, Tolerances
@@ -51,12 +51,12 @@ class Sensed:
     Attributes:
         noise: resolution of the sensors.
         whitening: of every trial.
-        torques: what it leaves of the torques, of every trial.
+        signals: what the residual tells of it in the signals, of every trial.
     """
 
     noise: Noise
     whitening: tuple[Whitening, ...]
-    torques: tuple[TorqueNoise, ...]
+    signals: tuple[SignalNoise, ...]
 
 
 def linearised_trials(
@@ -88,12 +88,12 @@ def linearised_trials(
     bases = [start_bases(*poses(s.phi[s.keep], s.theta[s.keep], arms), shared) for s in signals]
     run = Parallel(n_jobs=jobs, prefer="processes" if jobs > 1 else "threads")
     tasks = zip(signals, bases, reductions, strict=True)
-    each = run(delayed(linearise)(s, shared, b, arms, r, full=True) for s, b, r in tasks)
+    each = run(delayed(linearise)(s, shared, b, arms, r, full=sensed is None) for s, b, r in tasks)
     linear = tuple(cast("list[TrialLinear]", each))
     if sensed is None:
         left = run(delayed(what_noise_leaves)(t, noise, k, tolerances) for k, t in enumerate(linear))
-        whitening, torques = zip(*cast("list[tuple[Whitening, TorqueNoise]]", left), strict=True)
-        sensed = Sensed(noise, tuple(whitening), tuple(torques))
+        whitening, told = zip(*cast("list[tuple[Whitening, SignalNoise]]", left), strict=True)
+        sensed = Sensed(noise, tuple(whitening), tuple(told))
     for _ in range(2):
         shared, bases = gauss_newton(linear, sensed.whitening)
         linear = tuple(
@@ -102,20 +102,20 @@ def linearised_trials(
             )
             for t, b in zip(linear, bases, strict=True)
         )
-    pairs = zip(linear, sensed.torques, strict=True)
-    return tuple(with_adjusted_torques(*pair) for pair in pairs), sensed
+    pairs = zip(linear, sensed.signals, strict=True)
+    return tuple(with_adjusted_signals(*pair) for pair in pairs), sensed
 
 
 def what_noise_leaves(
     trial: TrialLinear, noise: Noise, k: int, tolerances: Tolerances
-) -> tuple[Whitening, TorqueNoise]:
-    """What noise and friction at rest leave in the rows of trial number k, and noise of its torques."""
-    draws, torques = noise_rows(trial, noise, np.random.default_rng([rules.NOISE_SEED, k]))
+) -> tuple[Whitening, SignalNoise]:
+    """What noise and friction at rest leave in the rows of trial number k, and what these tell of its signals."""
+    draws, errors = noise_rows(trial, noise, np.random.default_rng([rules.NOISE_SEED, k]))
     rng, resting = np.random.default_rng([rules.NOISE_SEED, k, 1]), Resting(trial, tolerances)
     moving = trial.reduction.moving
-    torque_noise = TorqueNoise.of(draws, torques, moving)
+    told = SignalNoise.of(draws, errors, moving)
     draws = draws + resting(rng, len(draws))
-    return Whitening.of(draws, moving, uneven=True), torque_noise
+    return Whitening.of(draws, moving, uneven=True), told
 
 
 def exact_residual(signals: Signals, shared: Shared, bases: Bases, arms: Arms, reduction: Reduction) -> Array:
@@ -145,11 +145,11 @@ def gauss_newton(linear: Sequence[TrialLinear], whitening: Sequence[Whitening]) 
 
 
 def noise_rows(trial: TrialLinear, noise: Noise, rng: np.random.Generator) -> tuple[Array, Array]:
-    """What the sensors' errors alone would leave: residuals (draws, n, C), and the torques' own (draws, n, N, 3)."""
-    out, torques = [], []
+    """What the sensors' errors alone would leave: residuals (draws, n, C), and signals (draws, n, N, 21)."""
+    out: list[tuple[Array, Array]] = []
     errors = noise.draws(trial.signals, rng, rules.NOISE_DRAWS)
     while some := list(islice(errors, rules.DRAWS_AT_A_TIME)):  # not all at once, for the sake of memory
         phi, theta, tau = (np.array([getattr(e, kind) for e in some]) for kind in ("phi", "theta", "tau"))
         out.append(trial.of_all_signals(phi, theta, tau))
-        torques += [trial.reduction(x) for x in tau]
-    return np.concatenate(out), np.array(torques)
+    rows, signals = zip(*out, strict=True)
+    return np.concatenate(rows), np.concatenate(signals)

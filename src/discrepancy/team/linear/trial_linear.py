@@ -77,7 +77,7 @@ class TrialLinear:
 
     @property
     def adjusted(self) -> Signals:
-        """The signals filtered, and with their torques at their adjusted values."""
+        """The signals filtered, and at their adjusted values."""
         phi, theta, tau = (self.s[..., kind] for kind in (PHI, THETA, TAU))
         return Signals(self.signals.time, phi, theta, tau, self.signals.rate_hz)
 
@@ -105,8 +105,11 @@ class TrialLinear:
             total += self.J(robot, TAU, tau)
         return self.reduction(total)
 
-    def of_all_signals(self, phi: Array, theta: Array, tau: Array) -> Array:
-        """What errors of all robots' readings add together, many at once, (D, Q, N, 3) each -> (D, n, C)."""
+    def of_all_signals(self, phi: Array, theta: Array, tau: Array) -> tuple[Array, Array]:
+        """What errors of all robots' readings add together, many at once, (D, Q, N, 3) each.
+
+        To the residual, shape (D, n, C), and to the reduced signals, (D, n, N, 21).
+        """
         D, samples, N = phi.shape[:3]
         angles = with_rates(np.stack([phi, theta], axis=3).transpose(1, 2, 3, 4, 0), self.signals.rate_hz)
         # (3, Q, N, 2, 3, D) to slots, which are value, rate and acceleration of phi, then of theta, then tau
@@ -120,7 +123,7 @@ class TrialLinear:
         total = self.J(0, slice(None), parts[:, 0])
         for i in range(1, N):
             total += self.J(i, slice(None), parts[:, i])
-        return np.moveaxis(self.reduction(total), -1, 0)
+        return np.moveaxis(self.reduction(total), -1, 0), np.moveaxis(self.reduction(parts), -1, 0)
 
     def of_wrench(self, force: Array, moment: Array) -> Array:
         """What an outside wrench at the origin of {1} on the payload, in {1}, adds, shape (n, C).
@@ -209,32 +212,40 @@ def linearise(
 ) -> TrialLinear:
     """Linearise one trial; without ``full`` the robots' signals are left out (J is empty)."""
     s = filtered(signals)
-    Q, N = s.shape[:2]
     data = grasp_data(s, arms, signals.rate_hz)
-    force, Y = balance(data, shared)
     pose = pose_residual(signals.phi, signals.theta, shared, bases, arms)
-    residual = reduction(np.concatenate([pose, force], axis=1))
+    residual = reduction(np.concatenate([pose, balance(data, shared)[0]], axis=1))
+    columns = reduction(by_shared(data, shared, bases)), reduction(by_bases(data, shared, bases))
+    J = by_signals(s, data, shared, bases, arms) if full else BySignals.none(s.shape[1], 6 * s.shape[1])
+    return TrialLinear(signals, s, data, shared, bases, arms, reduction, residual, J, *columns)
 
-    C, split = 6 * N, 6 * (N - 1)
-    by_shared = np.zeros((Q, C, split + 10))
-    by_shared[:, split:, split:] = -Y
+
+def by_shared(data: GraspData, shared: Shared, bases: Bases) -> Array:
+    """Derivative of the residual's samples by ``Shared.moved``, shape (Q, 6 N, 6 (N - 1) + 10)."""
+    N, split = data.robots, 6 * (data.robots - 1)
+    out = np.zeros((data.samples, 6 * N, split + 10))
+    out[:, split:, split:] = -balance(data, shared)[1]
     for k in range(split):
-        by_shared[:, split:, k] = _slope(lambda x: balance(data, shared.moved(x))[0], np.eye(split + 10)[k])
+        out[:, split:, k] = _slope(lambda x: balance(data, shared.moved(x))[0], np.eye(split + 10)[k])
     # A loop knows its own robot's grasp and base alone: all loops at once.
-    by_bases = np.zeros((Q, C, 4 * (N - 1)))
     for k in range(6):
         all_grasps = np.append(np.tile(np.eye(6)[k], N - 1), np.zeros(10))
         slope = _slope(lambda x: pose_error(data.R_bi, data.p_bi, shared.moved(x), bases), all_grasps)
         for i in range(N - 1):
-            by_shared[:, 6 * i : 6 * i + 6, 6 * i + k] = slope[:, 6 * i : 6 * i + 6]
+            out[:, 6 * i : 6 * i + 6, 6 * i + k] = slope[:, 6 * i : 6 * i + 6]
+    return out
+
+
+def by_bases(data: GraspData, shared: Shared, bases: Bases) -> Array:
+    """The same by ``Bases.moved``, shape (Q, 6 N, 4 (N - 1))."""
+    N = data.robots
+    out = np.zeros((data.samples, 6 * N, 4 * (N - 1)))
     for k in range(4):
         all_bases = np.tile(np.eye(4)[k], N - 1)
         slope = _slope(lambda x: pose_error(data.R_bi, data.p_bi, shared, bases.moved(x)), all_bases)
         for i in range(N - 1):
-            by_bases[:, 6 * i : 6 * i + 6, 4 * i + k] = slope[:, 6 * i : 6 * i + 6]
-    J = by_signals(s, data, shared, bases, arms) if full else BySignals.none(N, C)
-    columns = reduction(by_shared), reduction(by_bases)
-    return TrialLinear(signals, s, data, shared, bases, arms, reduction, residual, J, *columns)
+            out[:, 6 * i : 6 * i + 6, 4 * i + k] = slope[:, 6 * i : 6 * i + 6]
+    return out
 
 
 def _slope(of: Callable[[Array], Array], along: Array) -> Array:

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from discrepancy.causes.numbers import number
 from discrepancy.causes.units import SMALL, fitting
 from discrepancy.laws.candidate import LawCandidate
-from discrepancy.laws.guess import guess
+from discrepancy.laws.said.guess import guess
+from discrepancy.laws.said.units import units_of
 from discrepancy.laws.variable import Variable
 
 
@@ -16,7 +17,7 @@ def sentence(candidate: LawCandidate, values: Mapping[str, float], se: Mapping[s
 
     Args:
         candidate: the law.
-        values, se: of ``report.report``.
+        values, se: of ``numbers.report``.
     """
     term, place = candidate.term, candidate.at
     what = candidate.where_it_is
@@ -59,28 +60,9 @@ def _formula(candidate: LawCandidate, values: Mapping[str, float], se: Mapping[s
 def _amplitude(
     candidate: LawCandidate, values: Mapping[str, float], se: Mapping[str, float], end: str
 ) -> str:
-    unit = _unit(candidate)
+    unit = units_of(candidate, [f"amplitude{end}"])[f"amplitude{end}"]
     top = fitting(unit, abs(values[f"amplitude{end}"])) if unit in SMALL else (unit, 1.0)
     return number(values[f"amplitude{end}"], se.get(f"amplitude{end}"), top[0], top[1])
-
-
-def _unit(candidate: LawCandidate) -> str:
-    """Unit of the amplitude: that of the place over that of what it multiplies."""
-    term = candidate.term
-    power = {
-        "linear": 1, "absolute": 1, "above": 1, "below": 1, "beyond": 1, "square": 2, "signed_square": 2,
-        "cube": 3, "lag": 1, "second_order": 1,
-    }.get(term.function, 0)  # fmt: skip
-    below = [f"({term.of.unit})^{power}" if power > 1 else term.of.unit] if power else []
-    if term.function == "lag":
-        below = [f"({term.of.unit}/s)"]
-    below += [] if term.times is None else [term.times.unit]
-    below = [unit for unit in below if unit != "1"]
-    if not below:
-        return candidate.at.unit
-    if below == [candidate.at.unit]:
-        return ""
-    return f"{candidate.at.unit}/({' '.join(below)})"
 
 
 def _phase(values: Mapping[str, float], end: str) -> str:

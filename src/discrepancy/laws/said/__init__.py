@@ -1,0 +1,1 @@
+"""Laws in words, numbers and units, as people and the simulator take them."""
