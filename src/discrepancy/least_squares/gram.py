@@ -4,10 +4,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from discrepancy import rules
 from estimator.arrays import Array
-
-AT_A_TIME = 1024
-"""Rows of single precision that are turned into double precision together: as many as a processor's cache holds."""
 
 
 def gram_of(a: Array, b: Array) -> Array:
@@ -34,7 +32,7 @@ def added_up(a: Array, x: Array) -> Array:
 
 
 def _parts(count: int) -> Iterator[slice]:
-    return (slice(start, start + AT_A_TIME) for start in range(0, count, AT_A_TIME))
+    return (slice(start, start + rules.WIDENED_ROWS) for start in range(0, count, rules.WIDENED_ROWS))
 
 
 def orthonormal(columns: Array) -> Array:
