@@ -219,11 +219,16 @@ def picture(results: Sequence[dict[str, Any]], path: Path) -> None:
                 if point.command == command and all(getattr(point, k) == v for k, v in fixed.items())
             ]  # fmt: skip
             chosen.sort(key=lambda r: r[name])
+            if len(chosen) < 2:
+                continue
             for row, value in enumerate(("cpu_s", "memory_MB")):
                 label = {"diagnose": "diagnose, rows alone", "simulated": "diagnose"}.get(command, command)
                 x, y = [r[name] for r in chosen], [r[value] for r in chosen]
                 axes[row, column].loglog(x, y, "o-", ms=4, lw=1.2, color=colour, label=label)
         axes[1, column].set_xlabel(title)
+        at = {"minutes": MINUTES, "robots": ROBOTS, "kinds": KINDS}[name]
+        axes[1, column].set_xticks(at, [str(value) for value in at])
+        axes[1, column].minorticks_off()
     for row, (bar, name) in enumerate(((180.0, "CPU [s]"), (2000.0, "largest memory [MB]"))):
         axes[row, 0].set_ylabel(name)
         for axis in axes[row]:
