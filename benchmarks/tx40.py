@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
+from discrepancy.candidate import Candidate
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate
 from discrepancy.rules import serial as rules
 from discrepancy.serial.diagnosis import diagnose_rig
 from discrepancy.serial.errors import with_errors

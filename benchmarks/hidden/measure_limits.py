@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from joblib import Parallel, delayed
 
+from discrepancy.candidate import Transient
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Transient
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances, read_tolerances

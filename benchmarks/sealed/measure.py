@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discrepancy.rig import Candidate, Transient
+from discrepancy.candidate import Candidate, Transient
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import exact_residual

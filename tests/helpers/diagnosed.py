@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
+from discrepancy.candidate import Candidate, Parameter
 from discrepancy.engine.explanation import Scatter
 from discrepancy.result.remains import remains, scatter_to_dict
-from discrepancy.rig import Candidate, Parameter
 
 VERDICTS = ("consistent", "miscalibrated", "explained", "partly_explained", "unexplained")
 PLACE = {"cause", "kind", "name", "family", "robot", "joint", "place"}

@@ -4,7 +4,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from discrepancy.rig import Candidate, Channel, Parameter, Rig, Rows, Transient
+from discrepancy.candidate import Candidate, Parameter, Transient
+from discrepancy.rig import Channel, Rig, Rows
 
 ROWS, CHANNELS, RATE_HZ = 120, 4, 12.5
 

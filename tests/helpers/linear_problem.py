@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from discrepancy.rig import Candidate, Parameter, Rows
+from discrepancy.candidate import Candidate, Parameter
+from discrepancy.rig import Rows
 
 
 def candidate(name, *parameters, transient=None):

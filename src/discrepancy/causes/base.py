@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
+from discrepancy.candidate import Candidate, Parameter, Transient
 from discrepancy.causes.numbers import Numbers, number
-from discrepancy.rig import Candidate, Parameter, Transient
 from estimator.arrays import Array
 
 Shape = Mapping[str, float]
@@ -27,6 +27,7 @@ class Cause(ABC):
         scales: their typical sizes, where there are no tolerances.
         positive: parameters that cannot be negative.
         transient: whether it acts for a while in one trial.
+        form_share: of its trace, in amplitude, by which a real one has another form than its law.
         where: the part of the machine, of what sits at no robot.
         separate: what experiment would tell it from its look-alikes.
     """
@@ -39,6 +40,7 @@ class Cause(ABC):
     scales: ClassVar[tuple[float, ...]] = ()
     positive: ClassVar[tuple[str, ...]] = ()
     transient: ClassVar[bool] = False
+    form_share: ClassVar[float] = 0.0
     where: ClassVar[str] = "payload"
     separate: ClassVar[str] = ""
 
@@ -60,7 +62,8 @@ class Cause(ABC):
             for name, scale in zip(self.parameters, self.tolerances or self.scales, strict=True)
         )
         return Candidate(
-            self.name, self.family, robot, joint, parameters, dict(shape), where=self.where, title=self.title
+            self.name, self.family, robot, joint, parameters, dict(shape), where=self.where, title=self.title,
+            form_share=self.form_share,
         )  # fmt: skip
 
     def event(self, given: Mapping[str, float], when: Transient) -> Candidate:

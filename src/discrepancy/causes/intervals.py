@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from discrepancy import rules
-from discrepancy.rig import Transient
+from discrepancy.candidate import Transient
 from estimator.arrays import Array
 
 

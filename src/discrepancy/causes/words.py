@@ -3,12 +3,12 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
+from discrepancy.candidate import Candidate
 from discrepancy.causes.base import Cause
 from discrepancy.causes.numbers import Numbers
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.said.guess import experiment
 from discrepancy.laws.said.sentence import sentence
-from discrepancy.rig import Candidate
 
 
 class Words:

@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.causes.base import Hints
 from discrepancy.emps.noise import dither
 from discrepancy.emps.recording.signals import Signals
 from discrepancy.emps.reduction import Reduction
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.rig import Candidate
 from estimator.arrays import Array
 
 Tolerances = Mapping[str, Mapping[str, float]]

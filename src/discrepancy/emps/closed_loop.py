@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG, LIMIT_V, AxisLog
 from discrepancy.emps.recording.signals import Signals
-from discrepancy.rig import Candidate
 from estimator.arrays import Array
 from mocobot_sim.emps.effects import AxisEffect, apply_effects
 from mocobot_sim.emps.loop import Start, run

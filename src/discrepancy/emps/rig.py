@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.causes.intervals import intervals_near, worst_intervals
 from discrepancy.emps.blocks import blocks, period_of
@@ -33,7 +34,7 @@ from discrepancy.emps.reduction import Reduction
 from discrepancy.emps.undecidable import statements
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.rig import Candidate, Channel, Rig, Rows
+from discrepancy.rig import Channel, Rig, Rows
 from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.emps.extended import write_extended

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from discrepancy.candidate import Candidate
 from discrepancy.emps.rig import EmpsRig
 from discrepancy.engine.explanation import Explanation
 from discrepancy.least_squares.fit import Fit
-from discrepancy.rig import Candidate
 from estimator.arrays import Array
 from estimator.statistics import rms
 

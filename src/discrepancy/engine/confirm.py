@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation, Found, explain
 from discrepancy.engine.gain import Gain, mean_chi2, responses
 from discrepancy.inference.hypothesis import Hypothesis
@@ -13,7 +14,7 @@ from discrepancy.inference.probability import probability
 from discrepancy.inference.refit import exact
 from discrepancy.inference.search import Rival, Searched
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate, Rig
+from discrepancy.rig import Rig
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.engine.held_out import held_out_gains, shares
 from discrepancy.inference.best_shape import covariance_with_shape
 from discrepancy.inference.hypothesis import Hypothesis
@@ -17,7 +18,7 @@ from discrepancy.inference.remainder import share_left, unlisted_nats
 from discrepancy.inference.search import Rival, Searched
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate, Rig
+from discrepancy.rig import Rig
 from estimator.arrays import Array
 
 

@@ -7,9 +7,10 @@ import numpy as np
 from joblib import Parallel, delayed
 from scipy.stats import t as student
 
+from discrepancy.candidate import Candidate
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate, Rig
+from discrepancy.rig import Rig
 from estimator.arrays import Array
 
 Active = list[tuple[Candidate, Array]]

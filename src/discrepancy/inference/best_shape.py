@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from discrepancy.candidate import Candidate
 from discrepancy.least_squares.fit import Fit
-from discrepancy.rig import Candidate, Rig
+from discrepancy.rig import Rig
 from estimator.arrays import Array
 
 

@@ -6,11 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from discrepancy.candidate import Candidate
 from discrepancy.inference.learn import Learnt, learnt
 from discrepancy.inference.prior import log_prior_odds
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate, Rig
+from discrepancy.rig import Rig
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,8 +1,9 @@
 """Is it what it seems, or something simpler, such as one sensor that was wrong for as long?"""
 
+from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.scan import log_bayes_factor
-from discrepancy.rig import Candidate, Rig
+from discrepancy.rig import Rig
 
 
 def imitated(rig: Rig, base: Hypothesis, candidate: Candidate) -> bool:

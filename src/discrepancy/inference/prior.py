@@ -3,8 +3,8 @@
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate
 
 
 def log_prior_odds(problem: Problem, candidate: Candidate) -> float:

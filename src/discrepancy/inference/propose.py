@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.inference.best_shape import nearest_shape
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.imitation import imitated
@@ -15,7 +16,7 @@ from discrepancy.inference.scan import Scanned, scan, score_of, score_with
 from discrepancy.inference.twins import twins
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate, Rig
+from discrepancy.rig import Rig
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,6 +6,7 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.least_squares.problem import Problem
 from estimator.arrays import Array
 
 
@@ -26,14 +27,33 @@ def nats_left(hypothesis: Hypothesis) -> float:
 def unlisted_nats(hypothesis: Hypothesis) -> float:
     """By how many nats a process of its own in every cell is likelier than clean noise; each has to pay for itself.
 
-    Rows that stand alone do not count: friction at rest, within its tolerance, shows in them alone.
+    Clean is noise and what laws of another form than real ones leave (``Candidate.form_share``). Rows that stand alone
+    do not count: friction at rest, within its tolerance, shows in them alone.
     """
     left, sizes = left_in_cells(hypothesis)
     series = np.tile(np.arange(rules.CELL_BANDS + 1) < rules.CELL_BANDS, len(sizes) // (rules.CELL_BANDS + 1))
     at = (sizes > 0) & series
-    clean = np.maximum(left[at] / sizes[at], rules.CLEAN_CHI2_PER_N) / rules.CLEAN_CHI2_PER_N
+    level = rules.CLEAN_CHI2_PER_N + _other_forms(hypothesis)[at] / sizes[at]
+    clean = np.maximum(left[at] / sizes[at], level) / level
     gain = 0.5 * sizes[at] * (clean - 1.0 - np.log(clean)) - rules.CELL_NATS
     return float(np.sum(np.maximum(gain, 0.0)))
+
+
+def _other_forms(hypothesis: Hypothesis) -> Array:
+    """Sum of squares in every cell of all trials that causes leave whose law has another form, free or tolerated."""
+    problem, coefficients = hypothesis.problem, hypothesis.fit.coefficients
+    total = np.zeros(sum(cells.sizes.size for cells in problem.cells))
+    for candidate, span in zip(problem.candidates, problem.spans, strict=True):
+        if candidate.form_share:
+            values = candidate.form_share * coefficients[span]
+            total += _power(problem, span, values)
+    return total
+
+
+def _power(problem: Problem, span: slice, values: Array) -> Array:
+    """Sum of squares in every cell of all trials of some columns with their values."""
+    each = [np.einsum("i,kij,j->k", values, grams[:, span, span], values) for grams in problem.cell_grams]
+    return np.concatenate(each)
 
 
 def share_left(hypothesis: Hypothesis, index: int) -> float:
@@ -43,9 +63,7 @@ def share_left(hypothesis: Hypothesis, index: int) -> float:
     """
     problem, span = hypothesis.problem, hypothesis.problem.spans[index]
     values = hypothesis.fit.part(index)[0]
-    trace = np.concatenate(
-        [np.einsum("i,kij,j->k", values, g[:, span, span], values) for g in problem.cell_grams]
-    )
+    trace = _power(problem, span, values)
     left, sizes = left_in_cells(hypothesis)
     excess = np.maximum(left - rules.CLEAN_CHI2_PER_N * sizes, 0.0)
     shares = excess / np.maximum(excess + trace, 1e-300)

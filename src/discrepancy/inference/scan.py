@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.inference.prior import log_prior_odds
 from discrepancy.least_squares.fit import Fit
-from discrepancy.rig import Candidate
 from estimator.arrays import Array
 
 

@@ -6,13 +6,14 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.probability import probability
 from discrepancy.inference.propose import proposals
 from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import nats_left, share_left
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate, Rig
+from discrepancy.rig import Rig
 
 
 @dataclass(frozen=True, eq=False)

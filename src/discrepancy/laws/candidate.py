@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate, Parameter
 from discrepancy.laws.dictionary import nearby
 from discrepancy.laws.place import Place
 from discrepancy.laws.term import Term
-from discrepancy.rig import Candidate, Parameter
 
 CAUSE, FAMILY = "law", "unlisted"
 

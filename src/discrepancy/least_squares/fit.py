@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.candidate import Candidate
 from discrepancy.least_squares.gram import flat_inverse, gram_of
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate
 from estimator.arrays import Array
 
 

@@ -10,11 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.least_squares.cells import Cells
 from discrepancy.least_squares.columns import Columns, held
 from discrepancy.least_squares.gram import added_up, gram_of, orthonormal, project
 from discrepancy.least_squares.opened import Opened, through
-from discrepancy.rig import Candidate, Rows
+from discrepancy.rig import Rows
 from estimator.arrays import Array
 
 Key = tuple[str, int | None, int | None]

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.prior import log_prior_odds
@@ -14,7 +15,6 @@ from discrepancy.inference.scan import scan
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.result.read import kind_of, name_of
-from discrepancy.rig import Candidate
 
 MOST, CLOSELY = 14, 16
 """Candidates that are listed, and that are looked at for it."""

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation
 from discrepancy.result.evidence_list import needed_nats
-from discrepancy.rig import Candidate
 from estimator.arrays import Array
 
 HALVINGS = 8

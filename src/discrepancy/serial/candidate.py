@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from discrepancy.rig import Candidate
+from discrepancy.candidate import Candidate
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
+from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation
-from discrepancy.rig import Candidate, Channel, Rig, Rows
+from discrepancy.rig import Channel, Rig, Rows
 from discrepancy.serial.rig import SerialRig
 from estimator.arrays import Array
 

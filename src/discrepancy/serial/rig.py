@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from discrepancy.candidate import Candidate
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.engine.explanation import Explanation
-from discrepancy.rig import Candidate, Channel, Rig, Rows
+from discrepancy.rig import Channel, Rig, Rows
 from discrepancy.rules import LAW_SHARE
 from discrepancy.rules import serial as rules
 from discrepancy.serial import catalogue, shapes

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.candidate import Candidate
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.rig import Candidate
 from discrepancy.rules import serial as rules
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES

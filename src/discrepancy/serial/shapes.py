@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from discrepancy.candidate import Candidate
 from discrepancy.causes.intervals import intervals_near, worst_intervals
-from discrepancy.rig import Candidate
 from discrepancy.rules import serial as rules
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.base import Hints

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.rig import Candidate
+from discrepancy.candidate import Candidate
 from discrepancy.rules import serial as rules
 from discrepancy.serial.causes import CAUSES
 from estimator.arrays import Array

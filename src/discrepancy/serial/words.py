@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from discrepancy.candidate import Candidate
 from discrepancy.causes.numbers import Numbers
 from discrepancy.causes.words import Words
-from discrepancy.rig import Candidate
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.base import parameter_name

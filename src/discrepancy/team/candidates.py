@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate, Transient
 from discrepancy.causes.intervals import intervals_near, worst_intervals
-from discrepancy.rig import Candidate, Transient
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.reduction import Reduction
 from estimator.arrays import Array

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from discrepancy import rules
-from discrepancy.rig import Candidate
+from discrepancy.candidate import Candidate
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.linear.noise import Noise

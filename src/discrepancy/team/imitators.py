@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from discrepancy.candidate import Candidate
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.rig import Candidate
 from discrepancy.team.causes.base import one_joint
 from discrepancy.team.causes.push import during
 from discrepancy.team.linear.trial_linear import TrialLinear

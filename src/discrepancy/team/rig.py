@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation
 from discrepancy.engine.gain import fit_to_simulate
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.said.numbers import report
-from discrepancy.rig import Candidate
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.closed_loop import (

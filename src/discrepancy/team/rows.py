@@ -9,10 +9,11 @@ from typing import Any, Self
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.rig import Candidate, Channel, Rig, Rows
+from discrepancy.rig import Channel, Rig, Rows
 from discrepancy.team.candidates import (
     every_candidate,
     nearby_events,

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate, Transient
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate, Transient
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.rig import TeamRig
 from estimator.arrays import Array

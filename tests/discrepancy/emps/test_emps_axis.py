@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from discrepancy.candidate import Candidate, Parameter
 from discrepancy.emps.causes import CAUSES
 from discrepancy.emps.causes.base import Hints
 from discrepancy.emps.closed_loop import plant_of
 from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG
-from discrepancy.rig import Candidate, Parameter
 from emps_made import GAIN, KP, KV, nominal
 from estimator.errors import InputError
 from mocobot_sim.emps.effects import CHANGES

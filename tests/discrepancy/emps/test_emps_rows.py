@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from discrepancy.candidate import Candidate, Parameter
 from discrepancy.emps.blocks import blocks, period_of
 from discrepancy.emps.catalogue import candidate_of
 from discrepancy.emps.causes import CAUSES
@@ -23,7 +24,7 @@ from discrepancy.inference.search import search
 from discrepancy.least_squares.block_errors import block_covariance
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate, Parameter, Rows
+from discrepancy.rig import Rows
 from emps_errors import bootstrap
 from emps_made import CYCLE_S, CYCLES, GAIN, RATE_HZ, nominal, recorded, reference
 from estimator.errors import InputError

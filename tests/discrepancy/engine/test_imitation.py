@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from discrepancy.candidate import Transient
 from discrepancy.engine.explanation import explain
 from discrepancy.inference.search import search
-from discrepancy.rig import Transient
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.imitators import wrong_torques
 from fake_rig import FakeRig

@@ -7,10 +7,11 @@ import pytest
 
 from dense_evidence import dense_evidence, log_prior
 from discrepancy import rules
+from discrepancy.candidate import Candidate, Parameter
 from discrepancy.inference.learn import learnt, worth_a_spread
 from discrepancy.inference.twins import twins
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Candidate, Parameter, Rows
+from discrepancy.rig import Rows
 from linear_problem import cosines, random_rows, with_residuals
 
 

@@ -7,11 +7,11 @@ from scipy.stats import multivariate_normal
 
 from dense_evidence import dense_evidence
 from discrepancy import rules
+from discrepancy.candidate import Transient
 from discrepancy.inference.prior import log_prior_odds
 from discrepancy.inference.scan import log_bayes_factor, scan, score_of, score_with
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Transient
 from linear_problem import CANDIDATES, candidate, random_rows, with_residuals
 
 

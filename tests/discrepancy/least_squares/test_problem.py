@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from discrepancy.candidate import Transient
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
-from discrepancy.rig import Transient
 from linear_problem import CANDIDATES, brute, candidate, noise_covariance, random_rows, with_residuals
 
 

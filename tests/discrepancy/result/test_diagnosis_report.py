@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from diagnosed import small_diagnosis
+from discrepancy.candidate import Candidate
 from discrepancy.causes.numbers import number
 from discrepancy.emps.causes import CAUSES as AXIS
 from discrepancy.least_squares.whitening import Whitening
@@ -19,7 +20,7 @@ from discrepancy.result.pictures.plots_evidence import closed_loop_figure
 from discrepancy.result.text import WIDTH, format_diagnosis, probability_words
 from discrepancy.result.text_gain import response_units
 from discrepancy.result.traces import Trace, group_units, groups
-from discrepancy.rig import Candidate, Channel
+from discrepancy.rig import Channel
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Cause
 from discrepancy.team.estimates import errors

@@ -8,7 +8,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.optimize import brentq
 from scipy.signal import lfilter
 
-from discrepancy.rig import Transient
+from discrepancy.candidate import Transient
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.causes.shift import Late

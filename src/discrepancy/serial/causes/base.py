@@ -8,9 +8,9 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy.candidate import Parameter
 from discrepancy.causes import base
 from discrepancy.causes.base import Shape
-from discrepancy.rig import Parameter
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.rows.signals import Signals

@@ -7,9 +7,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from discrepancy.candidate import Candidate
 from discrepancy.causes import base
 from discrepancy.causes.base import Shape
-from discrepancy.rig import Candidate
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.design import OmnidDesign

@@ -20,6 +20,7 @@ class GraspPlay(Cause):
     at = "grasp"
     shapes = ({"force_N": rules.PLAY_FORCE_N},)
     positive = ("play_m",)
+    form_share = rules.FRICTION_FORM_SHARE
     separate = "Internal forces of both signs at rest separate play from flexibility."
 
     def sentence(self, n):

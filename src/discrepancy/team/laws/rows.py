@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from functools import cached_property
 
+from discrepancy.candidate import Candidate
 from discrepancy.laws.candidate import LawCandidate, law_steps, refined
-from discrepancy.rig import Candidate
 from discrepancy.team.laws.bench import TeamBench
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.rows import TeamRows

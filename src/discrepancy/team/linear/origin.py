@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from discrepancy.rig import Candidate
+from discrepancy.candidate import Candidate
 from estimator.arm.unit import AT, ArmUnit
 from estimator.arrays import Array
 

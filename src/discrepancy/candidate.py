@@ -1,0 +1,125 @@
+"""A cause at a place, with its numbers and, of an event, when it acts."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from estimator.arrays import Array
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One number of a cause.
+
+    Attributes:
+        name: as in the JSON, its unit as suffix.
+        tolerance: standard deviation that is normal for such a rig; 0 where the cause is an event, not a tolerance.
+        scale: a typical size, in which columns are expressed where the tolerance is 0.
+    """
+
+    name: str
+    tolerance: float
+    scale: float
+
+    @property
+    def unit(self) -> float:
+        """The size in which the diagnosis counts it."""
+        return self.tolerance if self.tolerance > 0 else self.scale
+
+
+@dataclass(frozen=True)
+class Transient:
+    """When an event acts.
+
+    Attributes:
+        trial: index of its trial, from 0.
+        start_s, duration_s: its interval on the trial's clock [s].
+    """
+
+    trial: int
+    start_s: float
+    duration_s: float
+
+    @property
+    def shape(self) -> dict[str, float]:
+        """The interval as the shape of a candidate."""
+        return {"start_s": self.start_s, "duration_s": self.duration_s}
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One cause at one place.
+
+    Attributes:
+        cause: name of the cause.
+        family: causes of one family look alike.
+        robot, joint: where, counted from 1; None where the cause has no such place.
+        parameters: its numbers, in the order of its columns.
+        shape: further numbers that change the columns themselves, by name.
+        transient: when it acts, of an event; None of what lasts.
+        where: the place in words, of what sits at no robot and no joint.
+        title: the cause in words (``causes.base.Cause``).
+        among: of how many of its kind it is one, where the problem does not list them; 0 where it does.
+        form_share: of its trace, in amplitude, by which a real one has another form than its law.
+    """
+
+    cause: str
+    family: str
+    robot: int | None
+    joint: int | None
+    parameters: tuple[Parameter, ...]
+    shape: Mapping[str, float] = field(default_factory=dict)
+    transient: Transient | None = None
+    where: str = "payload"
+    title: str = ""
+    among: int = 0
+    form_share: float = 0.0
+
+    def acts_in(self, trial: int) -> bool:
+        """Whether it can act in a trial (index from 0)."""
+        return self.transient is None or self.transient.trial == trial
+
+    def overlaps(self, other: Candidate) -> bool:
+        """Whether both are events of one cause that act at the same time."""
+        a, b = self.transient, other.transient
+        if not (a and b) or self.cause != other.cause or a.trial != b.trial:
+            return False
+        return max(a.start_s, b.start_s) < min(a.start_s + a.duration_s, b.start_s + b.duration_s)
+
+    @property
+    def units(self) -> Array:
+        """Unit of every parameter, shape (k,)."""
+        return np.array([p.unit for p in self.parameters])
+
+    @property
+    def place(self) -> str:
+        """The place in words."""
+        words = [f"robot {self.robot}"] if self.robot else []
+        words += [f"joint {self.joint}"] if self.joint else []
+        return ", ".join(words) or self.where
+
+    @property
+    def kind(self) -> str:
+        """The cause in words, wherever it sits: ``friction in a driven joint``."""
+        return re.sub(r"\{(.*?)\}", r"a \1", self.title) or self.cause.replace("_", " ")
+
+    @property
+    def label(self) -> str:
+        """The cause at its place, in words: ``friction in joint 1 of robot 2``."""
+        if "{" not in self.title:
+            return f"{self.kind} ({self.place})" if self.robot else self.kind
+        return re.sub(r"\{(.*?)\}", lambda part: self._at(part[1]), self.title)
+
+    def _at(self, part: str) -> str:
+        if self.joint:
+            return f"{part.removeprefix('driven ')} {self.joint} of robot {self.robot}"
+        return f"robot {self.robot}" if part == "robot" else f"the {part} of robot {self.robot}"
+
+    @property
+    def key(self) -> tuple[str, int | None, int | None]:
+        """Identity: cause and place."""
+        return self.cause, self.robot, self.joint
