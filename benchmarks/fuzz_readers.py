@@ -5,12 +5,13 @@ Reading happens in a process of its own, so that a crash in a library counts as 
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 import sys
 import tempfile
 from collections import Counter
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from multiprocessing.connection import Connection
 from pathlib import Path
 
@@ -32,24 +33,27 @@ class Options:
         seed: of the first one.
         formats: which; all if none is given.
         show: print so many of the refusals of each format, too.
+        kept: file that outcomes are added to; what is in it is not done again, and counts.
     """
 
     runs: int = 2000
     seed: int = 0
     formats: tuple[str, ...] = FORMATS
     show: int = 0
+    kept: Path | None = None
 
 
 def main(options: Options) -> None:
     """Run, and print what happened; exit code 1 if a reader did what it must not."""
     each = -(-options.runs // len(options.formats))
+    earlier = read(options.kept)
     counts: Counter[tuple[str, str]] = Counter()
     slowest: dict[str, float] = {}
     faults: list[Outcome] = []
     with bar(each * len(options.formats), "fuzzing", "log") as advance:
         for kind in options.formats:
             shown = 0
-            for outcome in run(kind, range(options.seed, options.seed + each)):
+            for outcome in outcomes(kind, range(options.seed, options.seed + each), earlier, options.kept):
                 counts[kind, outcome.result] += 1
                 slowest[kind] = max(slowest.get(kind, 0.0), outcome.seconds)
                 if outcome.is_fault:
@@ -70,7 +74,26 @@ def main(options: Options) -> None:
     sys.exit(bool(faults))
 
 
-def run(kind: str, seeds: range) -> Iterator[Outcome]:
+def read(kept: Path | None) -> dict[tuple[str, int], Outcome]:
+    """Outcomes of earlier runs."""
+    lines = kept.read_text(encoding="utf-8").splitlines() if kept and kept.is_file() else []
+    done = (Outcome(**json.loads(line)) for line in lines)
+    return {(outcome.kind, outcome.seed): outcome for outcome in done}
+
+
+def outcomes(
+    kind: str, seeds: range, earlier: Mapping[tuple[str, int], Outcome], kept: Path | None
+) -> Iterator[Outcome]:
+    """Outcomes of one format, those of earlier runs first."""
+    yield from (earlier[kind, seed] for seed in seeds if (kind, seed) in earlier)
+    for outcome in run(kind, [seed for seed in seeds if (kind, seed) not in earlier]):
+        if kept:
+            with kept.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(asdict(outcome)) + "\n")
+        yield outcome
+
+
+def run(kind: str, seeds: Sequence[int]) -> Iterator[Outcome]:
     """Outcomes of damaged logs of one format, in the order of the seeds."""
     context = multiprocessing.get_context("spawn")
     todo = list(seeds)

@@ -4,7 +4,8 @@
     python benchmarks/soak.py --faults           a full disk and a read-only one (tmpfs, which needs root), two at once
     python benchmarks/soak.py --tables           what there is
 
-Every command is run once undisturbed; whatever else it leaves behind must be nothing or the same bytes.
+Every command is run once undisturbed; whatever else it leaves behind must be nothing or the same bytes. So the sources
+must stay as they are meanwhile, the commit included, which provenance names.
 """
 
 from __future__ import annotations

@@ -194,7 +194,7 @@ def _logs(payload: str, schedule: Schedule, seed: int, effects: Sequence[Effect]
 
 def _columns(rig: TeamRig, candidates: Sequence[Candidate]) -> np.ndarray:
     """Derivatives of all rows, shape (rows, k): of causes, of shared unknowns, of every trial's own."""
-    rows, blocks = rig.rows(candidates), []
+    rows, blocks = list(rig.rows(candidates)), []
     for t, trial in enumerate(rows):
         local = [
             other.local if s == t else np.zeros((*trial.residual.shape, other.local.shape[2]))

@@ -1,4 +1,4 @@
-"""Speed of a simulated trial: against bare physics on the same model, and against real time, in one run.
+"""Speed of a simulated trial: against bare physics on the same model, and against real time, in seconds of CPU.
 
 Bare physics: a Python loop over ``mj_step`` from the same start with the motors at their resting torque, reset
 every simulated second so that the uncontrolled arms stay near home.
@@ -19,7 +19,7 @@ from mocobot_sim.trial.trial import run_trial
 
 
 def seconds_per_step_bare(payload: str, seconds: int = 10) -> float:
-    """Wall time per step of a bare ``mj_step`` loop [s]."""
+    """CPU time per step of a bare ``mj_step`` loop [s]."""
     scene = build_team(payload)
     model = scene.compile()
     data = mujoco.MjData(model)
@@ -27,10 +27,10 @@ def seconds_per_step_bare(payload: str, seconds: int = 10) -> float:
     spent = 0.0
     for _ in range(seconds):
         assemble_at_home(scene, model, data, index)
-        start = time.perf_counter()
+        start = time.process_time()
         for _ in range(1000):
             mujoco.mj_step(model, data)
-        spent += time.perf_counter() - start
+        spent += time.process_time() - start
     return spent / (1000 * seconds)
 
 
@@ -45,9 +45,9 @@ def main() -> None:
     trials, bares = [], []
     for _ in range(5):  # alternate, so that a slow spell of the machine hits both
         bares.append(seconds_per_step_bare(payload))
-        start = time.perf_counter()
+        start = time.process_time()
         run_trial(scene, trajectory)
-        trials.append((time.perf_counter() - start) / (1000 * trajectory.duration_s))
+        trials.append((time.process_time() - start) / (1000 * trajectory.duration_s))
     bare, trial = np.median(bares), np.median(trials)
     print(f"bare mj_step loop   {1e6 * bare:6.1f} us per 1 ms step")
     print(f"trial, all included {1e6 * trial:6.1f} us per 1 ms step")

@@ -30,7 +30,14 @@ REFERENCE = {
 }  # fmt: skip
 """Pages of the reference, and where the modules are whose public names they show; mocobot's own modules have theirs."""
 NAV = {
-    "Start": ["index.md", "commands/README.md", "notation.md", "model.md", "models"],
+    "Start": [
+        "index.md",
+        "commands/README.md",
+        "commands/performance.md",
+        "notation.md",
+        "model.md",
+        "models",
+    ],
     "Simulate": ["simulation.md", "base.md", "effects.md"],
     "Logs": ["recording.md", "measured-data.md", "inspect.md", "commands/watch.md"],
     "Estimate": ["method.md", "method-arm.md"],

@@ -87,8 +87,8 @@ class Rig(ABC):
         return 0
 
     @abstractmethod
-    def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
-        """Whitened rows of every trial at the nominal unknowns."""
+    def rows(self, candidates: Sequence[Candidate]) -> Iterable[Rows]:
+        """Whitened rows of every trial at the nominal unknowns; they may come one at a time."""
 
     @abstractmethod
     def columns(self, candidate: Candidate) -> list[Array]:
@@ -98,12 +98,7 @@ class Rig(ABC):
     def residual(
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
     ) -> list[Array]:
-        """Exact whitened residual of every trial, with the unknowns moved and causes taken out or modelled.
-
-        Args:
-            shared, local: displacements of the shared unknowns, and of every trial's own.
-            active: causes with the values of their parameters.
-        """
+        """Exact whitened residual of every trial, with shared and own unknowns moved, causes taken out or modelled."""
 
     def directions(self, trial: int) -> dict[str, Array]:
         """Orthonormal directions in the whitened channels of what single sources can do, shape (n, C, k)."""
@@ -171,6 +166,11 @@ class Rig(ABC):
 
         It returns recorded minus simulated response by channel, or None where that cannot be simulated.
         """
+
+    @property
+    def resimulated(self) -> Sequence[int]:
+        """Trials of which the commands can be simulated again, from where they begin."""
+        return range(len(self.trials))
 
     @abstractmethod
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:

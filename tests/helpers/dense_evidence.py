@@ -22,7 +22,12 @@ def dense_evidence(rows, problem, free, power=None, spread=None, noise=None):
     spread = problem.spread if spread is None else spread
     if noise is None:
         noise = [noise_covariance(r, p[c.index]) for r, p, c in zip(rows, power, problem.cells, strict=True)]
-    columns = np.concatenate([x[..., :-1].reshape(-1, x.shape[2] - 1) for x in problem.raw])
+    columns = np.concatenate(
+        [
+            x[..., :-1].reshape(-1, x.shape[2] - 1)
+            for x in (problem.raw_columns(t, slice(None)) for t in problem.trials)
+        ]
+    )
     X, A = columns[:, : problem.shared], columns[:, problem.shared :]
     used = problem.tolerant.copy()
     for index in free:

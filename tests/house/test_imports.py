@@ -124,3 +124,27 @@ def test_rigs_do_not_know_each_other(rig: str, other: str) -> None:
     assert len(files) > 20
     for module, path in files.items():
         assert not any(name.startswith(f"discrepancy.{other}") for name in imported_modules(path)), module
+
+
+OPTIONAL = ("numba", "matplotlib", "PIL", "rerun", "distributed", "dask")
+DRAW = ("plots", "picture", "labels")
+
+
+def test_only_what_draws_or_replays_needs_an_extra() -> None:
+    """Everything else can be imported without any of them; numba is asked for by one module, which does without."""
+    names = sorted(name for name in module_files() if not name.endswith("__main__"))
+    code = (
+        f"import importlib, sys\n"
+        f"for name in {OPTIONAL!r}: sys.modules[name] = None\n"
+        f"for name in {names!r}:\n"
+        "    try: importlib.import_module(name)\n"
+        "    except ModuleNotFoundError as error: print(name, error.name.split('.')[0])\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    needs = dict(line.split() for line in done.stdout.splitlines())
+    assert len(needs) > 10
+    drawing = {name for name, package in needs.items() if package in ("matplotlib", "PIL")}
+    assert all(name.rsplit(".", 1)[-1].startswith(DRAW) for name in drawing), drawing
+    replaying = {name for name in set(needs) - drawing if needs[name] == "rerun"}
+    assert {name.rsplit(".", 1)[0] for name in replaying} == {"mocobot_view.joints", "mocobot_view.replay"}
+    assert set(needs) == drawing | replaying

@@ -136,7 +136,7 @@ def test_without_rerun(
     monkeypatch.setitem(sys.modules, "rerun", None)
     message = refused(capsys, *command)
     assert "is not installed" in message
-    assert "pip install 'rerun-sdk>=0.41,<0.42'" in message
+    assert "pip install 'mocobot[replay]'" in message
 
 
 def test_rerun_switched_off(

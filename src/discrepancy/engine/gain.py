@@ -34,7 +34,7 @@ class Response:
 
 @dataclass(frozen=True)
 class Gain:
-    """Responses of every trial without and with the causes, each simulated with what the other trials say.
+    """Responses of every trial that can be simulated, without and with the causes, by what the other trials say.
 
     Attributes:
         before, after: one per trial; None where the simulation failed.
@@ -85,7 +85,7 @@ def responses(
     trials = problem.trials
     tasks = []
     for free in hypotheses:
-        for t in trials:
+        for t in rig.resimulated:
             others = [k for k in trials if k != t] or [t]
             # A push says nothing about other trials; its own trial has to tell it.
             if any(problem.candidates[i].transient for i in free):
@@ -98,7 +98,7 @@ def responses(
         done.append(None if errors is None else _response(errors, rig.response_scale(task[0])))
         if progress:
             progress(1)
-    count = len(trials)
+    count = len(rig.resimulated)
     return [tuple(done[k * count : (k + 1) * count]) for k in range(len(hypotheses))]
 
 
@@ -119,10 +119,10 @@ def fit_to_simulate(
         return Fit.of(problem, free, trials, background=False), []
     found = Fit.of(problem, free, trials)
     parts = {i: found.part(i)[0] for i in carried}
-    left = [
-        raw[..., -1] - np.sum([raw[..., problem.spans[i]] @ part for i, part in parts.items()], axis=0)
-        for raw in problem.raw
-    ]
+    values = np.append(np.zeros(problem.width - 1), 1.0)
+    for i, part in parts.items():
+        values[problem.spans[i]] = -part
+    left = [problem.raw_times(t, values) for t in problem.trials]
     fit = Fit.of(problem.with_residual(left), free, trials, background=False)
     return fit, [(problem.candidates[i], part * problem.candidates[i].units) for i, part in parts.items()]
 

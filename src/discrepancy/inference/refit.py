@@ -33,12 +33,12 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         # The problem counts total values, so what its columns stand for is added back.
         back = []
         for t, total in zip(trials, residual, strict=True):
-            raw = fit.problem.raw[t]
-            total = total + raw[..., : fit.problem.shared] @ shared
-            total += fit.problem.local[t][..., :own] @ local[t]
+            values = np.zeros(fit.problem.width)
+            values[: fit.problem.shared] = shared
+            total = total + fit.problem.local[t][..., :own] @ local[t]
             for i in hypothesis.free:
-                total += raw[..., fit.problem.spans[i]] @ fit.part(i)[0]
-            back.append(total)
+                values[fit.problem.spans[i]] = fit.part(i)[0]
+            back.append(total + fit.problem.raw_times(t, values))
         new = Hypothesis.of(fit.problem.with_residual(back), hypothesis.free, hypothesis.allowed)
         if new.learnt.log_evidence < hypothesis.learnt.log_evidence - rules.DIVERGED_NATS:
             break  # it diverges: the linear answer is the better one

@@ -20,14 +20,8 @@ class Beside:
     def __init__(self, fit: Fit) -> None:
         self._fit = fit
         problem = fit.problem
-        columns = np.append(fit.used, problem.raw[0].shape[2] - 1)
-        roots = [np.sqrt(weights) for weights in problem.weights]
-        self._roots = [root.reshape(-1, 1) for root in roots]
-        # Rows of the model and the residual, over the noise, as flat matrices.
-        self._model = [
-            (spectra[..., columns] * root).reshape(-1, len(columns))
-            for spectra, root in zip(problem.spectra, roots, strict=True)
-        ]
+        self._roots = [np.sqrt(weights).reshape(-1, 1) for weights in problem.weights]
+        self._columns = np.append(fit.used, problem.width - 1)
 
     def rows(self, trial: int, columns: Array) -> Array:
         """Whitened columns (n, C, k) of one trial in the transform and over the noise, shape (n C, k)."""
@@ -36,7 +30,9 @@ class Beside:
 
     def edges(self, trial: int, rows: Array) -> tuple[Array, Array]:
         """Products of such rows with the model's columns, (used, k), and their score vector beside the fit, (k,)."""
-        edge = self._model[trial].T @ rows
+        problem = self._fit.problem
+        weighted = (rows * self._roots[trial]).reshape(*problem.cells[trial].index.shape, -1)
+        edge = problem.products(trial, weighted)[self._columns]
         return edge[:-1], edge[-1] - self._fit.solution @ edge[:-1]
 
     def each(self, blocks: Sequence[Array], groups: Sequence[int]) -> list[tuple[Array, Array]]:

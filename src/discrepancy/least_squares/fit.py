@@ -147,7 +147,7 @@ class Fit:
     def local(self, trial: int) -> Array:
         """Values of a trial's own unknowns that go with the solution, shape (l,)."""
         own = self.problem.local[trial]
-        left = self.problem.raw[trial] @ np.append(-self.coefficients, 1.0)
+        left = self.problem.raw_times(trial, np.append(-self.coefficients, 1.0))
         # What causes leave open has unit size: so many rows more.
         opened = [each[trial].columns for each in self.problem.opened.values()]
         columns = np.concatenate([own, *opened], axis=2).reshape(left.size, -1)
@@ -158,7 +158,7 @@ class Fit:
 
     def remaining(self, trial: int) -> Array:
         """Whitened residual that the solution leaves in one trial, shape (n, C)."""
-        left = self.problem.raw[trial] @ np.append(-self.coefficients, 1.0)
+        left = self.problem.raw_times(trial, np.append(-self.coefficients, 1.0))
         return self.problem.without_own(trial, left[..., None])[..., 0]
 
     def solution_with(self, columns: Sequence[Array]) -> tuple[Array, Array]:
@@ -176,7 +176,7 @@ class Fit:
                 own = self.problem.spectrum(t, new)
                 weighted = own * self.problem.weights[t]
                 information += gram_of(weighted, own)
-                edge += gram_of(self.problem.spectra[t], weighted)
+                edge += self.problem.products(t, weighted)
         cross = edge[self.used].T
         return information - cross @ self.covariance @ cross.T, edge[-1] - cross @ self.solution
 

@@ -1,13 +1,38 @@
 """Gram matrices of rows, and rows without what a trial's own unknowns can explain."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
+from discrepancy import rules
 from estimator.arrays import Array
 
 
 def gram_of(a: Array, b: Array) -> Array:
-    """a^T b over rows and channels, shapes (n, C, k), (n, C, l) -> (k, l)."""
-    return a.reshape(-1, a.shape[2]).T @ b.reshape(-1, b.shape[2])
+    """a^T b over rows and channels, in double precision, shapes (n, C, k), (n, C, l) -> (k, l)."""
+    count = a.shape[0] * a.shape[1]
+    a, b = a.reshape(count, a.shape[2]), b.reshape(count, b.shape[2])
+    if a.dtype == np.float64:
+        return a.T @ b
+    out = np.zeros((a.shape[1], b.shape[1]))
+    for part in _parts(count):
+        out += a[part].astype(np.float64).T @ b[part]
+    return out
+
+
+def added_up(a: Array, x: Array) -> Array:
+    """The columns of a, each times its number in x, in double precision, shapes (n, C, k), (k, ...) -> (n, C, ...)."""
+    if a.dtype == np.float64:
+        return a @ x
+    count = a.shape[0] * a.shape[1]
+    flat, out = a.reshape(count, a.shape[2]), np.empty((count, *x.shape[1:]))
+    for part in _parts(count):
+        out[part] = flat[part].astype(np.float64) @ x
+    return out.reshape(*a.shape[:2], *x.shape[1:])
+
+
+def _parts(count: int) -> Iterator[slice]:
+    return (slice(start, start + rules.WIDENED_ROWS) for start in range(0, count, rules.WIDENED_ROWS))
 
 
 def orthonormal(columns: Array) -> Array:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from discrepancy.least_squares.gram import added_up, gram_of
 from estimator.arrays import Array
 
 
@@ -19,7 +20,7 @@ class Opened:
 
     Attributes:
         columns: of the unknowns in units of their size, as they were given, shape (n, C, k).
-        basis: Q, shape (n, C, r).
+        basis: Q, of the rows that ``of`` was given as ``left``: here in the cells' transform, shape (n, C, r).
         shrink: f, shape (r,).
         price: log sqrt det of the covariance [nats].
     """
@@ -49,12 +50,21 @@ class Opened:
         basis = np.ascontiguousarray(u[:, keep]).reshape(*columns.shape[:2], -1)
         return cls(given, basis, 1.0 - variance**-0.5, 0.5 * float(np.sum(np.log(variance))))
 
+    def single(self) -> Opened:
+        """The same in single precision."""
+        return replace(self, columns=self.columns.astype(np.float32), basis=self.basis.astype(np.float32))
+
+    def along(self, x: Array) -> Array:
+        """How much of columns lies along the unknowns, and is taken out, shape (n, C, l) -> (r, l)."""
+        if not len(self.shrink):
+            return np.zeros((0, x.shape[2]))
+        return self.shrink[:, None] * gram_of(self.basis, x)
+
     def __call__(self, x: Array) -> Array:
         """Rows that are white with these unknowns integrated out, shape (n, C, l) -> the same."""
         if not len(self.shrink) or not x.size:
             return x
-        q, flat = self.basis.reshape(-1, len(self.shrink)), x.reshape(-1, x.shape[2])
-        return np.asarray(flat - q @ (self.shrink[:, None] * (q.T @ flat))).reshape(x.shape)
+        return np.asarray(x - added_up(self.basis, self.along(x)))
 
 
 def through(opened: Sequence[Opened], x: Array) -> Array:

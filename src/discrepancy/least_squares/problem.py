@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.least_squares.cells import Cells
-from discrepancy.least_squares.gram import gram_of, orthonormal, project
+from discrepancy.least_squares.columns import Columns, held
+from discrepancy.least_squares.gram import added_up, gram_of, orthonormal, project
 from discrepancy.least_squares.opened import Opened, through
 from discrepancy.rig import Rows
 from estimator.arrays import Array
@@ -29,24 +30,23 @@ class Problem:
 
     Attributes:
         candidates: the candidates of the columns.
-        raw: rows per trial, shape (n, C, columns).
-        spectra: the same without what the trial's own unknowns can explain, in the cells' cosine transform.
+        columns: of every trial, without what its own unknowns can explain.
         local: columns of the trial's own unknowns, shape (n, C, l).
         explicable: orthonormal columns that span the same.
         cells: of every trial.
-        cell_grams: Gram matrices of ``spectra`` over every cell of a trial, shape (K, columns, columns) each.
+        cell_grams: Gram matrices over every cell of a trial, shape (K, columns, columns) each.
         power: variance of the noise in every cell of a trial, shape (K,) each; 1 as whitened.
         shared: number of shared unknowns.
         spans: columns of every candidate.
         tolerant: which candidate columns have a tolerance and are no event, shape (all candidate columns,).
         spread: standard deviation of the candidates' parameters in units, shape (all candidate columns,).
         opened: what causes leave open in every trial, by cause.
+        shares: how much of every column lies along what they leave open, (r, columns) per trial, by cause.
         odds: of any cause being there before the data are seen, at all its places together.
     """
 
     candidates: tuple[Candidate, ...]
-    raw: tuple[Array, ...]
-    spectra: tuple[Array, ...]
+    columns: tuple[Columns, ...]
     local: tuple[Array, ...]
     explicable: tuple[Array, ...]
     cells: tuple[Cells, ...]
@@ -57,50 +57,91 @@ class Problem:
     tolerant: NDArray[np.bool_]
     spread: Array
     opened: Mapping[Key, tuple[Opened, ...]] = field(default_factory=dict)
+    shares: Mapping[Key, tuple[Array, ...]] = field(default_factory=dict)
     odds: float = rules.PRIOR_ODDS
 
     @classmethod
-    def of(cls, trials: Sequence[Rows], candidates: Sequence[Candidate]) -> Problem:
-        """Assemble the problem; columns become unit parameters by the candidates' units."""
+    def of(cls, trials: Iterable[Rows], candidates: Sequence[Candidate]) -> Problem:
+        """Assemble the problem; columns become unit parameters by the candidates' units.
+
+        Args:
+            trials: rows, each with the columns of all candidates; they may come one at a time.
+            candidates: of these columns.
+        """
         units = [c.units for c in candidates]
-        raw, cells = [], []
+        columns, local, explicable, cells, grams, shared = [], [], [], [], [], 0
         for trial in trials:
             parts = [trial.shared, *(a * u for a, u in zip(trial.causes, units, strict=True))]
-            raw.append(np.concatenate([*parts, trial.residual[..., None]], axis=2))
+            raw = np.concatenate([*parts, trial.residual[..., None]], axis=2)
+            shared = trial.shared.shape[2]
             rows, channels = trial.residual.shape
             cells.append(Cells.of(rows, channels, trial.moving, trial.groups))
-        shared, spans, at = trials[0].shared.shape[2], [], trials[0].shared.shape[2]
+            local.append(trial.local)
+            explicable.append(orthonormal(trial.local))
+            columns.append(Columns.of(raw, explicable[-1], cells[-1]))
+            grams.append(columns[-1].own_grams(cells[-1]))
+            columns = held(columns, rules.ROWS_BYTES)
+        spans, at = [], shared
         for candidate in candidates:
             spans.append(slice(at, at + len(candidate.parameters)))
             at += len(candidate.parameters)
         tolerant = np.array([x for c in candidates for x in _tolerant(c)], dtype=bool)
         power = tuple(np.ones(len(c.sizes)) for c in cells)
-        spread = np.ones(len(tolerant))
-        own = [trial.local for trial in trials]
-        return cls._from(candidates, raw, own, cells, power, shared, spans, tolerant, spread)
-
-    @classmethod
-    def _from(
-        cls, candidates: Sequence[Candidate], raw: Sequence[Array], local: Sequence[Array], cells: Sequence[Cells],
-        power: tuple[Array, ...], shared: int, spans: Sequence[slice], tolerant: NDArray[np.bool_], spread: Array,
-    ) -> Problem:  # fmt: skip
-        explicable = tuple(orthonormal(own) for own in local)
-        spectra = tuple(c.spectrum(project(x, own)) for x, own, c in zip(raw, explicable, cells, strict=True))
-        grams = tuple(c.grams(x, x) for x, c in zip(spectra, cells, strict=True))
         return cls(
-            tuple(candidates), tuple(raw), spectra, tuple(local), explicable, tuple(cells), grams, power, shared,
-            tuple(spans), tolerant, spread,
+            tuple(candidates), tuple(columns), tuple(local), tuple(explicable), tuple(cells), tuple(grams), power,
+            shared, tuple(spans), tolerant, np.ones(len(tolerant)),
         )  # fmt: skip
+
+    @property
+    def width(self) -> int:
+        """Number of columns, the residual's included."""
+        return self.shared + len(self.tolerant) + 1
+
+    def raw_columns(self, trial: int, span: slice) -> Array:
+        """Some columns of a trial as they are, with what its own unknowns can explain, shape (n, C, k)."""
+        x, inside = self.columns[trial].take(span), self.columns[trial].inside[:, span]
+        return self.cells[trial].series(x) + self.explicable[trial] @ inside
+
+    def raw_times(self, trial: int, values: Array) -> Array:
+        """All columns as they are, added up with their values (columns,) or (columns, k): (n, C) or (n, C, k)."""
+        own = self.columns[trial]
+        return self.cells[trial].series(own.times(values)) + self.explicable[trial] @ (own.inside @ values)
+
+    def spectra_of(self, trial: int, span: slice) -> Array:
+        """Some columns without what the trial's own unknowns and those of causes can explain, in the transform."""
+        x = self.columns[trial].take(span)
+        for one, shares in self._open(trial):
+            x = x - added_up(one.basis, shares[:, span])
+        return x
+
+    def _open(self, trial: int) -> list[tuple[Opened, Array]]:
+        """What causes leave open in a trial, and how much of every column lies along it."""
+        pairs = ((own[trial], self.shares[key][trial]) for key, own in self.opened.items())
+        return [pair for pair in pairs if len(pair[1])]
+
+    def products(self, trial: int, b: Array) -> Array:
+        """Products of all such columns with others in the transform, (n, C, k) -> (columns, k)."""
+        out = self.columns[trial].products(b)
+        for one, shares in self._open(trial):
+            out -= shares.T @ gram_of(one.basis, b)
+        return out
+
+    def _grams(self, trial: int, b: Array) -> Array:
+        """The same over every cell, shape (n, C, k) -> (K, columns, k)."""
+        cells, out = self.cells[trial], self.columns[trial].grams(self.cells[trial], b)
+        for one, shares in self._open(trial):
+            out -= shares.T @ cells.grams(one.basis, b)
+        return out
 
     @property
     def samples(self) -> int:
         """Number of whitened residuals in all trials."""
-        return sum(r.shape[0] * r.shape[1] for r in self.raw)
+        return sum(cells.index.size for cells in self.cells)
 
     @property
     def trials(self) -> range:
         """Indices of the trials."""
-        return range(len(self.raw))
+        return range(len(self.cells))
 
     @cached_property
     def grams(self) -> Array:
@@ -131,19 +172,23 @@ class Problem:
 
     def rows(self, trial: int) -> Array:
         """Rows without what the trial's own unknowns can explain, in time, shape (n, C, columns)."""
-        return self.without_own(trial, self.raw[trial])
+        return self.cells[trial].series(self.spectra_of(trial, slice(None)))
 
     def weighted(self, trial: int) -> Array:
         """The same as a fit weighs them: every cell of the noise over its power, shape (n, C, columns)."""
-        return self.cells[trial].series(self.spectra[trial] * np.sqrt(self.weights[trial]))
+        weighted = self.spectra_of(trial, slice(None)) * np.sqrt(self.weights[trial])
+        return self.cells[trial].series(weighted)
 
     def without_own(self, trial: int, x: Array) -> Array:
         """Rows without what the trial's own unknowns, and those that causes leave open, can explain, (n, C, k)."""
-        return through([each[trial] for each in self.opened.values()], project(x, self.explicable[trial]))
+        if not self._open(trial):
+            return project(x, self.explicable[trial])
+        return self.cells[trial].series(self.spectrum(trial, x))
 
     def spectrum(self, trial: int, columns: Array) -> Array:
         """Further columns, shape (n, C, k), without what the trial's own unknowns can explain, in the transform."""
-        return self.cells[trial].spectrum(self.without_own(trial, columns))
+        own = [each[trial] for each in self.opened.values()]
+        return through(own, self.cells[trial].spectrum(project(columns, self.explicable[trial])))
 
     def has_tolerance(self, index: int) -> bool:
         """Whether a candidate has a tolerance; a cause has one for all of its parameters or for none."""
@@ -163,9 +208,7 @@ class Problem:
 
     def with_residual(self, residuals: Sequence[Array]) -> Problem:
         """The same columns with another residual, shape (n, C) per trial."""
-        return self._with(
-            len(self.tolerant) + self.shared, [r[..., None] for r in residuals], self.candidates
-        )
+        return self._with(self.width - 1, [r[..., None] for r in residuals], self.candidates)
 
     def with_columns(self, index: int, candidate: Candidate, columns: Sequence[Array]) -> Problem:
         """One candidate replaced by another of as many parameters."""
@@ -176,57 +219,56 @@ class Problem:
         self, start: int, columns: Sequence[Array], candidates: tuple[Candidate, ...], room: int = 0
     ) -> Problem:
         """With other columns from ``start`` on, for which so many of them may be made first."""
-        raw, spectra, grams, place = [], [], [], [start] * room
-        for t, new in enumerate(columns):
-            at = slice(start, start + new.shape[2])
-            raw.append(np.insert(self.raw[t], place, 0.0, axis=2))
-            spectra.append(np.insert(self.spectra[t], place, 0.0, axis=2))
+        made, grams, place = [], [], [start] * room
+        shares: dict[Key, list[Array]] = {key: [] for key in self.opened}
+        for t, raw in enumerate(columns):
+            at = slice(start, start + raw.shape[2])
+            stop = start if room else at.stop
+            new = Columns.of(raw, self.explicable[t], self.cells[t])
+            made.append(self.columns[t].replaced(start, stop, new))
+            (left,) = new.pieces
+            for key, own in self.opened.items():
+                along = own[t].along(left)
+                left, old = left - added_up(own[t].basis, along), self.shares[key][t]
+                shares[key].append(np.concatenate([old[:, :start], along, old[:, stop:]], axis=1))
             grams.append(np.insert(np.insert(self.cell_grams[t], place, 0.0, axis=1), place, 0.0, axis=2))
-            raw[t][..., at], spectra[t][..., at] = new, self.spectrum(t, new)
-            edge = self.cells[t].grams(spectra[t], spectra[t][..., at])
+            edge = self._grams(t, left)
+            inside = self.cells[t].grams(left, left)
+            edge = np.concatenate([edge[:, :start], inside, edge[:, stop:]], axis=1)
             grams[t][:, :, at], grams[t][:, at] = edge, np.swapaxes(edge, 1, 2)
-        parts: Mapping[str, tuple[Array, ...]] = {
-            "raw": tuple(raw), "spectra": tuple(spectra), "cell_grams": tuple(grams)
-        }  # fmt: skip
-        return replace(self, candidates=candidates, **parts)
+        return replace(
+            self, candidates=candidates, columns=tuple(made), cell_grams=tuple(grams),
+            shares={key: tuple(each) for key, each in shares.items()},
+        )  # fmt: skip
 
     def with_unknowns(self, key: Key, unknowns: Sequence[Array], size: float) -> Problem:
-        """The problem with what a cause leaves open in every trial.
-
-        Args:
-            key: of the cause.
-            unknowns: columns, shape (n, C, k) per trial.
-            size: standard deviation of their values.
-        """
+        """The problem with what a cause leaves open: columns (n, C, k) per trial, values that scatter by ``size``."""
         if key in self.opened or not any(u.shape[2] for u in unknowns):
             return self
-        own = [Opened.of(u, size, self.without_own(t, u)) for t, u in enumerate(unknowns)]
-        spectra, grams = [], []
-        for one, cells, old, gram in zip(own, self.cells, self.spectra, self.cell_grams, strict=True):
+        own = [Opened.of(u, size, self.spectrum(t, u)) for t, u in enumerate(unknowns)]
+        own = [one.single() if x.is_single else one for one, x in zip(own, self.columns, strict=True)]
+        shares, grams = [], []
+        for t, (one, cells, gram) in enumerate(zip(own, self.cells, self.cell_grams, strict=True)):
             if not len(one.shrink):
-                spectra.append(old)
+                shares.append(np.zeros((0, self.width)))
                 grams.append(gram)
                 continue
-            along = cells.spectrum(one.basis)
-            shares = one.shrink[:, None] * gram_of(along, old)  # the transform is orthonormal
-            spectra.append(old - along @ shares)
-            edge = cells.grams(along, old)
-            inside = cells.grams(along, along) @ shares
-            cross = np.einsum("ji,kjl->kil", shares, edge - 0.5 * inside, optimize=True)
+            shares.append(one.shrink[:, None] * self.products(t, one.basis).T)  # the transform is orthonormal
+            edge = np.swapaxes(self._grams(t, one.basis), 1, 2)
+            inside = cells.grams(one.basis, one.basis) @ shares[t]
+            cross = np.einsum("ji,kjl->kil", shares[t], edge - 0.5 * inside, optimize=True)
             grams.append(gram - cross - np.swapaxes(cross, 1, 2))
         return replace(
-            self, spectra=tuple(spectra), cell_grams=tuple(grams), opened={**self.opened, key: tuple(own)}
-        )
+            self, cell_grams=tuple(grams), opened={**self.opened, key: tuple(own)},
+            shares={**self.shares, key: tuple(shares)},
+        )  # fmt: skip
 
     def without_unknowns(self, keep: Collection[Key]) -> Problem:
         """The problem without what causes other than those to keep leave open."""
         if all(key in keep for key in self.opened):
             return self
-        again = Problem._from(
-            self.candidates, self.raw, self.local, self.cells, self.power, self.shared, self.spans, self.tolerant,
-            self.spread,
-        )  # fmt: skip
-        again = replace(again, odds=self.odds)
+        grams = tuple(x.own_grams(c) for x, c in zip(self.columns, self.cells, strict=True))
+        again = replace(self, cell_grams=grams, opened={}, shares={})
         for key, own in self.opened.items():
             if key in keep:
                 again = again.with_unknowns(key, [one.columns for one in own], 1.0)

@@ -10,7 +10,6 @@ from typing import Any
 from discrepancy.causes.words import Words
 from discrepancy.engine.diagnose import Diagnosis
 from discrepancy.result.json import diagnosis_to_dict
-from discrepancy.result.pictures.plots import PLOTS, save_plots
 from discrepancy.result.read import FORMAT, NAME
 from discrepancy.result.text import format_diagnosis
 from discrepancy.result.traces import Trace
@@ -18,9 +17,11 @@ from discrepancy.result.traces_file import NAME as RESIDUALS
 from discrepancy.result.traces_file import save_traces
 from discrepancy.rig import Rig
 from estimator.errors import InputError
+from estimator.extras import draws_plots
 from estimator.files import write_json, write_text
 
 REPORT, EXTENDED, PAGE = "report.txt", "extended", "report.html"
+PLOTS = ("residual_*.png", "evidence.png", "closed_loop.png", "law.png")
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +73,10 @@ class Diagnosed:
                 values["notes"] = [*(n for n in values["notes"] if n != note), note]
         residuals = self.traces()
         save_traces(residuals, self.rig.channels, folder / RESIDUALS)
-        save_plots(values, residuals, self.rig.channels, self.words, folder)
+        if draws_plots():
+            from discrepancy.result.pictures.plots import save_plots
+
+            save_plots(values, residuals, self.rig.channels, self.words, folder)
         write_json(folder / NAME, values | more)
         write_text(folder / REPORT, f"{self}\n")
 

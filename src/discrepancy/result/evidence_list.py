@@ -45,12 +45,17 @@ def needed_nats(problem: Problem, candidate: Candidate) -> float:
     return rules.NAMED_NATS - log_prior_odds(problem, candidate)
 
 
+def drawn(strongest: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
+    """Candidates with at least 1 nat; less is nothing on a scale of multiples."""
+    return [entry for entry in strongest if entry["nats"] >= 1.0]
+
+
 def _with_shapes(explanation: Explanation) -> tuple[Problem, dict[int, Problem]]:
     """The problem without causes, their columns in it as found; and for each cause with what it leaves open."""
     best, problem, at = explanation.hypothesis, explanation.nothing.problem, []
     for index in best.free:
         candidate, span = best.problem.candidates[index], best.problem.spans[index]
-        columns = [x[..., span] / candidate.units for x in best.problem.raw]
+        columns = [best.problem.raw_columns(t, span) / candidate.units for t in best.problem.trials]
         known = problem.index_of(candidate)
         at.append(len(problem.candidates) if known is None else known)
         if known is None:

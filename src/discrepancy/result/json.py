@@ -229,7 +229,8 @@ class _Instead:
 def _gain(gain: Gain, rig: Rig, words: Words) -> dict[str, Any]:
     channels = list(next((a.rms for a, _ in gain.pairs), {}))
     removed = gain.removed()
-    both = zip(rig.trials, gain.before, gain.after, strict=True)
+    names = [rig.trials[t] for t in rig.resimulated]
+    both = zip(names, gain.before, gain.after, strict=True)
     return {
         "held_out": {
             name: _mean([pair[k] for pair in gain.pairs]) for k, name in enumerate(("before", "after"))

@@ -59,6 +59,10 @@ VISIBLE_CHI2_PER_N = 3.0
 
 CELL_BANDS = 6
 """Octaves of frequency in which the noise has powers of its own, of every group of channels and trial. Chosen."""
+ROWS_BYTES = 4e8
+"""Of all columns of all trials, from which they are kept in single precision. Chosen: memory."""
+WIDENED_ROWS = 1024
+"""Of these, turned into double precision together. Chosen: as many as a processor's cache holds."""
 POWER_NUMBERS = 20.0
 """Numbers that the prior of a power counts for, at 1: whitening is right to 30 % without data. Chosen."""
 SPREAD_NUMBERS = 4.0

@@ -17,6 +17,9 @@ TEAM_ROWS_HZ = 12.5
 """Chosen with the cut-off: it leaves filtered noise nearly white."""
 TEAM_JACOBIAN_HZ = 25.0
 """Rate of derivatives, interpolated between. Chosen: twice the rows'."""
+PART_S = 180.0
+"""Of a recording at most that is looked at as one trial. Chosen: what a trial leaves open costs its square, and ten of
+its overlaps are a tenth of that; longer than any trial of the experiment."""
 TEAM_TRIM_S = 2.0
 """Left out at both ends of a recording. Chosen."""
 STILL_RAD_PER_S = 1e-3

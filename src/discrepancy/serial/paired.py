@@ -62,7 +62,7 @@ class PairedRig(Rig):
         return {name: np.concatenate([own[name] for own in each]) for name in each[0]}
 
     def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
-        blocks = self.inner.rows(candidates)
+        blocks = list(self.inner.rows(candidates))
         return [self._together([blocks[k] for k in self.blocks_of(t)]) for t in range(self.inner.changed)]
 
     def _together(self, blocks: Sequence[Rows]) -> Rows:

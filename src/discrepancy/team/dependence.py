@@ -22,9 +22,9 @@ def quantities_of(linear: TrialLinear) -> dict[str, Array]:
 
 def directions_of(linear: TrialLinear, white: Whitening) -> dict[str, Array]:
     """Unit directions in the whitened rows of every spring torque and angle, shape (n, C, 1) each."""
-    of_all = linear.J.dense()[:, linear.reduction.sample]
     out = {}
-    for robot, J in enumerate(of_all):
+    for robot in range(linear.robots):
+        J = linear.J.at(robot, slice(None), linear.reduction.sample)
         whose = f"robot {robot + 1}'s"
         tau, phi, theta = (J[:, :, kind] for kind in (TAU, PHI, THETA))
         for k in range(3):

@@ -10,6 +10,7 @@ from discrepancy.engine.diagnose import When, diagnose
 from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.team.checks import check_estimate, check_recordings
 from discrepancy.team.estimates import errors, estimates
+from discrepancy.team.parts import parted, said
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.traces import traces
@@ -53,13 +54,14 @@ def diagnose_team(
     check_estimate(estimate)
     known = read_tolerances(None) if tolerances is None else tolerances
     say("linearise")
-    rig = TeamRig.of(recordings, estimate, known, excluded, jobs)
+    rig = TeamRig.of(parted(recordings), estimate, known, excluded, jobs)
     found = diagnose(
         rig, closed_loop=closed_loop, laws=laws, odds=odds, jobs=jobs, say=say, simulated=simulated
     )
     assert isinstance(found.rig, TeamRig)
-    payload = estimates(found.rig, found.explanation)
-    return Diagnosed(found.rig, found, TeamWords(), partial(traces, found.rig, found.explanation), payload)
+    payload, own = estimates(found.rig, found.explanation), partial(traces, found.rig, found.explanation)
+    found = replace(found, notes=(*found.notes, *said(recordings)))
+    return Diagnosed(found.rig, found, TeamWords(), own, payload)
 
 
 def against_truth(found: Diagnosed, truth: Mapping[str, Any]) -> Diagnosed:

@@ -27,6 +27,7 @@ from discrepancy.team.closed_loop import (
 from discrepancy.team.laws.effects import effects_of
 from discrepancy.team.laws.rows import LawfulRows
 from discrepancy.team.linear.origin import origin_of, places_of
+from discrepancy.team.parts import LaterPart
 from discrepancy.team.undecidable import statements
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
@@ -64,6 +65,10 @@ class TeamRig(LawfulRows):
 
     def can_resimulate(self) -> str | None:
         return next(filter(None, map(why_not, self.recordings)), None)
+
+    @property
+    def resimulated(self) -> Sequence[int]:
+        return [t for t, recording in enumerate(self.recordings) if not isinstance(recording, LaterPart)]
 
     def carried(self, candidate: Candidate) -> bool:
         return origin_of(candidate, self.origin) is not None

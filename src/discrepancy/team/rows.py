@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
@@ -207,26 +207,22 @@ class TeamRows(Rig):
             out.append(white(np.stack(columns, axis=-1)) if columns else empty)
         return out
 
-    def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
-        out = []
+    def rows(self, candidates: Sequence[Candidate]) -> Iterator[Rows]:
         for t, linear in enumerate(self.linear):
             causes = [self._columns(t, candidate) for candidate in candidates]
             residual = self.whitening[t](linear.residual)
             for candidate, columns in zip(candidates, causes, strict=True):
                 residual += self._at_origin(candidate, columns)
-            out.append(
-                Rows(
-                    self.recordings[t].name,
-                    residual,
-                    self.whitening[t](np.concatenate([linear.by_bases, linear.by_clocks], axis=2)),
-                    self.whitening[t](linear.by_shared),
-                    causes,
-                    linear.reduction.time,
-                    linear.reduction.moving,
-                    self._groups,
-                )
+            yield Rows(
+                self.recordings[t].name,
+                residual,
+                self.whitening[t](np.concatenate([linear.by_bases, linear.by_clocks], axis=2)),
+                self.whitening[t](linear.by_shared),
+                causes,
+                linear.reduction.time,
+                linear.reduction.moving,
+                self._groups,
             )
-        return out
 
     def _at_origin(self, candidate: Candidate, columns: Array) -> Array | float:
         """What the robots, as they were found, take out of the residual: values are counted from the design."""

@@ -14,7 +14,7 @@ from mocobot_view.facts.body_facts import BodyFacts
 from mocobot_view.facts.placement import Grasps
 from mocobot_view.replay.replay_trial import distinct_names, replay_trial
 
-INSTALL = "pip install 'rerun-sdk>=0.41,<0.42'"
+INSTALL = "pip install 'mocobot[replay]'"
 SUFFIX = ".rrd"
 
 

@@ -9,6 +9,7 @@ from typing import Any
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.tolerances import read_tolerances
 from estimator.errors import InputError
+from estimator.extras import draws_plots
 from estimator.files import file_facts, write_json, write_text
 from mocobot.campaign.folder import REPORT, SUMMARY, TABLE
 from mocobot.campaign.plan import CampaignPlan
@@ -111,10 +112,12 @@ def _words(value: Any) -> str:
 
 def _write(folder: Path, summary: Mapping[str, Any]) -> list[Path]:
     """Write summary, table, report and plots, and say where."""
-    from mocobot.campaign.plots import save_plots  # matplotlib, which printing needs not
-
     data, table, report = (folder / name for name in (SUMMARY, TABLE, REPORT))
     write_json(data, summary)
     write_text(table, csv_table(summary))
     write_text(report, f"{format_campaign(summary)}\n")
+    if not draws_plots():
+        return [data, table, report]
+    from mocobot.campaign.plots import save_plots  # matplotlib, which printing needs not
+
     return [data, table, report, *save_plots(summary, folder)]

@@ -5,6 +5,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 from estimator.calibrate.json import calibration_to_dict
+from estimator.extras import draws_plots
 from estimator.files import write_json, write_text
 from estimator.recording.parquet import write_recording
 from mocobot.checks.paper import SCORES
@@ -64,8 +65,6 @@ def _summary(result: PaperResult) -> str:
 
 def _write(folder: Path, plan: PaperPlan, result: PaperResult, tables: str) -> list[Path]:
     """Write scores, tables, estimates, fits and plots, and say where."""
-    from mocobot_sim.paper.plots import save_plots  # matplotlib, which printing needs not
-
     scores, text, trials = (folder / name for name in (SCORES, "tables.txt", "trials.json"))
     write_json(scores, result.scores)
     write_text(text, tables + "\n")
@@ -80,6 +79,10 @@ def _write(folder: Path, plan: PaperPlan, result: PaperResult, tables: str) -> l
         for payload, found in fits.items():
             written.append(folder / "fits" / f"{payload}_{column.replace(', ', '_').replace(' ', '_')}.json")
             write_json(written[-1], calibration_to_dict(found))
+    if not draws_plots():
+        return written
+    from mocobot_sim.paper.plots import save_plots  # matplotlib, which printing needs not
+
     return written + save_plots(result.scores, folder)
 
 

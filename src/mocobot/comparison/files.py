@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from estimator.extras import draws_plots
 from estimator.files import write_json, write_text
 from mocobot.comparison.comparison import Comparison
 from mocobot.comparison.text import format_comparison
@@ -25,7 +26,7 @@ def write_into(folder: Path, found: Comparison, made_with: Mapping[str, Any] | N
     more = {} if made_with is None else {"provenance": dict(made_with)}
     write_json(folder / NAME, found.to_dict() | more)
     write_text(folder / REPORT, f"{format_comparison(found)}\n")
-    if found.groups:
+    if found.groups and draws_plots():
         from mocobot.comparison.picture import save_picture  # matplotlib
 
         save_picture(found, folder / PICTURE)

@@ -18,11 +18,13 @@ from estimator.calibrate.json import FORMAT, calibration_from_dict, calibration_
 from estimator.calibrate.outcome.text import format_calibration
 from estimator.calibrate.outcome.unit_toml import unit_toml
 from estimator.errors import InputError
+from estimator.extras import draws_plots
 from estimator.files import write_json, write_text
 from estimator.strict import read_json
 from mocobot.files.targets import CALIBRATION as NAME
 
 REPORT, MODEL, PAGE = "report.txt", "model", "report.html"
+PLOTS = ("deviations.png", "recordings.png", "shares.png")
 
 
 def read_calibration(path: Path | str) -> Calibration:
@@ -67,8 +69,7 @@ def write_into(
     Raises:
         InputError: something cannot be written.
     """
-    # matplotlib and MuJoCo, which reading does not need
-    from mocobot_report.calibration.plots import save_plots
+    # MuJoCo, which reading does not need
     from mocobot_sim.extended.calibrated import write_calibrated
 
     notes = []
@@ -80,7 +81,10 @@ def write_into(
             notes.append(f"there is no {name}: {error}")
     for robot in range(1, calibration.robots + 1):
         write_text(folder / f"omnid{robot}.toml", unit_toml(calibration, robot))
-    save_plots(calibration, folder)
+    if draws_plots():
+        from mocobot_report.calibration.plots import save_plots  # matplotlib, which reading does not need
+
+        save_plots(calibration, folder)
     write_calibration(folder / NAME, calibration, made_with)
     write_text(folder / REPORT, f"{format_calibration(calibration)}\n")
     return notes
@@ -88,8 +92,6 @@ def write_into(
 
 def is_calibration(folder: Path) -> bool:
     """Whether a folder holds a calibration and nothing that someone else put there."""
-    from mocobot_report.calibration.plots import PLOTS
-
     try:
         ours = json.loads((folder / NAME).read_text(encoding="utf-8"))["format"] == FORMAT
     except (OSError, ValueError, TypeError, KeyError):

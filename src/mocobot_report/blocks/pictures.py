@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from estimator.errors import InputError
 from mocobot_report.blocks.html import Node, add, el
@@ -67,6 +66,8 @@ class Gallery:
 
 def data_uri(pixels: NDArray[np.uint8]) -> str:
     """An image as a data URI, JPEG."""
+    from PIL import Image  # an extra: without it nothing is rendered
+
     file = io.BytesIO()
     Image.fromarray(pixels).save(file, "JPEG", quality=QUALITY, optimize=True, subsampling=0)
     return "data:image/jpeg;base64," + base64.b64encode(file.getvalue()).decode("ascii")

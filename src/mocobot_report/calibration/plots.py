@@ -16,14 +16,17 @@ from mocobot_report.blocks.palette import LIGHT
 from mocobot_report.blocks.units import short_names
 from mocobot_report.calibration.charts import COLOURS, FITS, hidden_kinds, kind_names
 
-PLOTS = ("deviations.png", "recordings.png", "shares.png")
 MARKERS = {"circle": "o", "square": "s", "diamond": "D"}
 
 
 def save_plots(calibration: Calibration, folder: Path) -> list[Path]:
-    """Draw ``PLOTS`` into an existing folder and return their paths."""
-    figures = _deviations(calibration), _recordings(calibration), _shares(calibration)
-    return [_save(figure, folder / name) for figure, name in zip(figures, PLOTS, strict=True)]
+    """Draw everything into an existing folder and return the paths."""
+    figures = {
+        "deviations.png": _deviations(calibration),
+        "recordings.png": _recordings(calibration),
+        "shares.png": _shares(calibration),
+    }
+    return [_save(figure, folder / name) for name, figure in figures.items()]
 
 
 def _save(figure: Figure, path: Path) -> Path:

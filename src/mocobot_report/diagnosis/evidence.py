@@ -5,8 +5,7 @@ from typing import Any
 
 import plotly.graph_objects as go
 
-from discrepancy.result.evidence_list import label, relation
-from discrepancy.result.pictures.plots_evidence import drawn
+from discrepancy.result.evidence_list import drawn, label, relation
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.charts import Axis, axis, chart, dots, figure, log_axis, row_axis
 from mocobot_report.blocks.html import Node, el

@@ -1,11 +1,11 @@
-"""Arithmetic of the drives (see ``drive``), compiled with numba."""
+"""Arithmetic of the drives (see ``drive``), compiled where numba is installed."""
 
-import numpy as np
+import math
 
-from mocobot_sim.compiled import compiled
+from mocobot_sim.compiled import entry
 
 
-@compiled
+@entry
 def update_drives(
     qpos, qvel, ctrl, wheel_qpos, wheel_dof, drive, matrix, inverse, constants, pose, twist, odometry, angle, lag, speed
 ):  # fmt: skip
@@ -33,17 +33,17 @@ def update_drives(
             across += inverse[2, k] * step
         # As planar.moved: the chord of the arc.
         half = 0.5 * turn
-        chord = np.sin(half) / half if abs(half) > 1e-9 else 1.0
-        cos, sin = np.cos(odometry[i, 2] + half), np.sin(odometry[i, 2] + half)
+        chord = math.sin(half) / half if abs(half) > 1e-9 else 1.0
+        cos, sin = math.cos(odometry[i, 2] + half), math.sin(odometry[i, 2] + half)
         odometry[i, 0] += chord * (cos * along - sin * across)
         odometry[i, 1] += chord * (sin * along + cos * across)
         odometry[i, 2] += turn
 
         ahead, aside = pose[i, 0] - odometry[i, 0], pose[i, 1] - odometry[i, 1]
-        cos, sin = np.cos(odometry[i, 2]), np.sin(odometry[i, 2])
+        cos, sin = math.cos(odometry[i, 2]), math.sin(odometry[i, 2])
         rest = pose[i, 2] - odometry[i, 2]
         # The planned twist is in the planned frame, which the base has not quite reached.
-        cos_rest, sin_rest = np.cos(rest), np.sin(rest)
+        cos_rest, sin_rest = math.cos(rest), math.sin(rest)
         v_x = cos_rest * twist[i, 1] - sin_rest * twist[i, 2] + position_gain * (cos * ahead + sin * aside)
         v_y = sin_rest * twist[i, 1] + cos_rest * twist[i, 2] + position_gain * (cos * aside - sin * ahead)
         w = twist[i, 0] + position_gain * rest

@@ -1,16 +1,16 @@
-"""Arithmetic of the wrist controller (see ``control``), compiled with numba."""
+"""Arithmetic of the wrist controller (see ``control``), compiled where numba is installed."""
 
-import numpy as np
+from math import cos, sin, sqrt
 
-from mocobot_sim.compiled import compiled
+from mocobot_sim.compiled import compiled, entry
 
 # The kernel works on tuples of three floats: an array per vector would cost more than the arithmetic.
 
 _COS = (1.0, -0.5, -0.5)
-_SIN = (0.0, float(np.sqrt(0.75)), -float(np.sqrt(0.75)))
+_SIN = (0.0, sqrt(0.75), -sqrt(0.75))
 
 
-@compiled
+@entry
 def update_team(
     qpos, ctrl, address, offset, constants, state, ref, ref_dot, first, take_up, lag, home, sensed
 ):  # fmt: skip
@@ -18,42 +18,43 @@ def update_team(
     (reach, proximal, rod, stiffness, link_gravity, wrist_weight, impedance, damping,
      torque_gain, rate_gain, period, rate_weight, take_up_weight, limit) = constants  # fmt: skip
     for i in range(address.shape[0]):
-        robot = state[i]
         for k in range(3):
             deflection = qpos[address[i, 1, k]]
             phi = qpos[address[i, 0, k]] + deflection + offset[i, 0, k]
             read = -stiffness * deflection
             if lag[i, 2] > 0.0:
-                before = robot[5, k]
-                robot[5, k] = read
-                read = read if first else lag[i, 0] * robot[6, k] + lag[i, 1] * before + lag[i, 2] * read
-                robot[6, k] = read
+                before = state[i, 5, k]
+                state[i, 5, k] = read
+                read = read if first else lag[i, 0] * state[i, 6, k] + lag[i, 1] * before + lag[i, 2] * read
+                state[i, 6, k] = read
             sensed[i, 0, k] = home + qpos[address[i, 0, k]] + deflection
             sensed[i, 1, k] = qpos[address[i, 3, k]]
             sensed[i, 2, k] = read
             tau = read + offset[i, 1, k]
             if not first:
-                robot[2, k] += rate_weight * ((phi - robot[0, k]) / period - robot[2, k])
-                robot[3, k] += rate_weight * ((tau - robot[1, k]) / period - robot[3, k])
-            robot[0, k] = phi
-            robot[1, k] = tau
-        h, s, lever, cos_phi = wrist(robot[0], reach, proximal, rod)
+                state[i, 2, k] += rate_weight * ((phi - state[i, 0, k]) / period - state[i, 2, k])
+                state[i, 3, k] += rate_weight * ((tau - state[i, 1, k]) / period - state[i, 3, k])
+            state[i, 0, k] = phi
+            state[i, 1, k] = tau
+        h, s, lever, cos_phi = wrist((state[i, 0, 0], state[i, 0, 1], state[i, 0, 2]), reach, proximal, rod)
         # h_dot = S^-1 (lever * phi_dot); f_measured = S^T (tau without the arm's gravity / lever)
-        h_dot = _solve(s, (lever[0] * robot[2, 0], lever[1] * robot[2, 1], lever[2] * robot[2, 2]))
+        h_dot = _solve(s, (lever[0] * state[i, 2, 0], lever[1] * state[i, 2, 1], lever[2] * state[i, 2, 2]))
         if take_up:
             for j in range(3):
                 measured = -wrist_weight if j == 2 else 0.0
                 for k in range(3):
-                    measured += s[k][j] * (robot[1, k] - link_gravity * cos_phi[k]) / lever[k]
-                robot[4, j] += (1.0 if first else take_up_weight) * (measured - robot[4, j])
+                    measured += s[k][j] * (state[i, 1, k] - link_gravity * cos_phi[k]) / lever[k]
+                state[i, 4, j] += (1.0 if first else take_up_weight) * (measured - state[i, 4, j])
         fx = impedance * (ref[i, 0] - h[0]) + damping * (ref_dot[i, 0] - h_dot[0])
         fy = impedance * (ref[i, 1] - h[1]) + damping * (ref_dot[i, 1] - h_dot[1])
         fz = impedance * (ref[i, 2] - h[2]) + damping * (ref_dot[i, 2] - h_dot[2])
         transposed = ((s[0][0], s[1][0], s[2][0]), (s[0][1], s[1][1], s[2][1]), (s[0][2], s[1][2], s[2][2]))
-        along_rods = _solve(transposed, (fx + robot[4, 0], fy + robot[4, 1], fz + robot[4, 2] + wrist_weight))
+        along_rods = _solve(
+            transposed, (fx + state[i, 4, 0], fy + state[i, 4, 1], fz + state[i, 4, 2] + wrist_weight)
+        )
         for k in range(3):
             desired = lever[k] * along_rods[k] + link_gravity * cos_phi[k]
-            command = desired + torque_gain * (desired - robot[1, k]) - rate_gain * robot[3, k]
+            command = desired + torque_gain * (desired - state[i, 1, k]) - rate_gain * state[i, 3, k]
             ctrl[address[i, 2, k]] = min(max(command, -limit), limit)
 
 
@@ -65,15 +66,15 @@ def wrist(phi, reach, proximal, rod):
     s_k = h - c_k and lever_k = s_k . dc_k/dphi_k the rates obey S h_dot = lever * phi_dot.
 
     Args:
-        phi: driven angles [rad], shape (3,).
+        phi: driven angles [rad], three.
         reach: base radius minus platform radius [m].
         proximal, rod: lengths [m].
 
     Returns:
         h [m], (s_1, s_2, s_3) [m], lever [m^2/rad], cos(phi): tuples of three.
     """
-    cos_phi = (np.cos(phi[0]), np.cos(phi[1]), np.cos(phi[2]))
-    sin_phi = (np.sin(phi[0]), np.sin(phi[1]), np.sin(phi[2]))
+    cos_phi = (cos(phi[0]), cos(phi[1]), cos(phi[2]))
+    sin_phi = (sin(phi[0]), sin(phi[1]), sin(phi[2]))
     c0 = _knee(cos_phi[0], sin_phi[0], 0, reach, proximal)
     c1 = _knee(cos_phi[1], sin_phi[1], 1, reach, proximal)
     c2 = _knee(cos_phi[2], sin_phi[2], 2, reach, proximal)
@@ -89,7 +90,7 @@ def wrist(phi, reach, proximal, rod):
         half * (aa * bn[2] + bb * na[2]),
     )
     # The normal points up for every phi in range. Out of reach there is no root; the trial's checks report it.
-    rise = np.sqrt(max(rod * rod - _dot(centre, centre), 1e-8) / nn)
+    rise = sqrt(max(rod * rod - _dot(centre, centre), 1e-8) / nn)
     h = (
         c0[0] + centre[0] + rise * n[0],
         c0[1] + centre[1] + rise * n[1],

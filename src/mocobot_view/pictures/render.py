@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.arrays import Array
+from estimator.extras import NO_PLOTS, has_plots
 from mocobot_view.pictures.camera import Camera, pixels
-from mocobot_view.pictures.labels import with_labels
 from mocobot_view.pictures.marks import Marks
 
 Picture = NDArray[np.uint8]
@@ -86,6 +86,10 @@ def render_shots(shots: Sequence[Shot], width: int = 1600, height: int = 1000) -
     """
     if not shots:
         return []
+    if not has_plots():
+        return NO_PLOTS
+    from mocobot_view.pictures.labels import with_labels  # matplotlib, an extra
+
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         _write_task(folder, shots, width, height)

@@ -88,6 +88,24 @@ def test_responses_by_hand():
         assert with_it[t] == without[t]
 
 
+def test_only_what_can_be_is_simulated_again():
+    """By what all the other trials say."""
+
+    class FirstAndThird(ThreeChannels):
+        resimulated = (0, 3)
+
+    whole, some = ThreeChannels({2: 25.0}), FirstAndThird({2: 25.0})
+    for rig in (whole, some):
+        problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
+        (answers,) = responses(rig, problem, [[2]])
+        assert len(answers) == len(rig.resimulated)
+    assert [call[0] for call in some.calls] == [0, 3]
+    expected = [call for call in whole.calls if call[0] in (0, 3)]
+    for one, other in zip(some.calls, expected, strict=True):
+        np.testing.assert_array_equal(one[1], other[1])
+        assert one[3] == other[3]
+
+
 def test_unknowns_and_causes_of_a_simulation_come_from_the_other_trials():
     rig = ThreeChannels({2: 25.0})
     problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())

@@ -172,7 +172,15 @@ def test_a_kind_within_its_tolerance_does_not_scatter(rng):
 def test_worth_of_a_spread_is_the_evidence_over_that_without(rng):
     problem = nine_places(rng, 3.0 * rng.standard_normal(9))
     one = learnt(problem)
-    rows = [Rows("a", problem.raw[0][..., -1], *(np.zeros((60, 2, 0)),) * 2, (), np.arange(60) / 10.0)]
+    rows = [
+        Rows(
+            "a",
+            problem.raw_columns(0, slice(-1, None))[..., 0],
+            *(np.zeros((60, 2, 0)),) * 2,
+            (),
+            np.arange(60) / 10.0,
+        )
+    ]
     held = np.ones(9)
     expected = dense_evidence(rows, one.problem, ()) - dense_evidence(rows, one.problem, (), spread=held)
     expected += log_prior(one.problem, [list(range(9))]) - log_prior(

@@ -82,7 +82,7 @@ def test_values_are_counted_from_where_the_robots_were_believed_to_be(case):
     origin = ArmUnit(DESIGN, 0.1 * SIZES * rng.standard_normal((3, COUNT)))
     here, there = team(case), team(case, origin)
     candidates = there.candidates()
-    plain, moved = here.rows(candidates)[0], there.rows(candidates)[0]
+    plain, moved = (next(iter(rig.rows(candidates))) for rig in (here, there))
     back = moved.residual.copy()
     for candidate, columns in zip(candidates, moved.causes, strict=True):
         value = origin_of(candidate, origin)
@@ -100,7 +100,7 @@ def test_exact_residual_is_counted_from_there_too(case, name):
     origin = ArmUnit(DESIGN, 0.1 * SIZES * rng.standard_normal((3, COUNT)))
     rig = team(case, origin)
     candidate = next(c for c in CANDIDATES if c.cause == name and c.robot == 3)
-    rows, (columns,) = rig.rows([])[0].residual, rig.columns(candidate)
+    rows, (columns,) = next(iter(rig.rows([]))).residual, rig.columns(candidate)
     for other in rig.candidates():
         if origin_of(other, origin) is not None and other.key != candidate.key:
             rows = rows + rig.columns(other)[0] @ origin_of(other, origin)

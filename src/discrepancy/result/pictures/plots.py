@@ -19,7 +19,6 @@ from discrepancy.result.pictures.residual_statistics import multiples
 from discrepancy.result.traces import Group, Trace, group_units, groups
 from estimator.arrays import Array
 
-PLOTS = ("residual_*.png", "evidence.png", "closed_loop.png", "law.png")
 CLEAN_BAND = "#d9dde3"
 COMPONENTS = ("#7a5195", "#d99a2b", "#2a9d8f")
 

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 
-from discrepancy.result.evidence_list import label, relation
+from discrepancy.result.evidence_list import drawn, label, relation
 from discrepancy.result.pictures.plots_against import AFTER, BEFORE, log_scale, titled
 from discrepancy.result.text_gain import response_units
 
@@ -39,11 +39,6 @@ def evidence_figure(values: Mapping[str, Any]) -> Figure:
     words = [*(word for word, _, _ in shown.values()), "needed to be named"]
     title = "Evidence that a cause is there"
     return titled(figure, title, handles, words, len(words))
-
-
-def drawn(strongest: Sequence[Mapping[str, Any]]) -> list[Mapping[str, Any]]:
-    """Candidates with at least 1 nat; less is nothing on a scale of multiples."""
-    return [entry for entry in strongest if entry["nats"] >= 1.0]
 
 
 def _dots(axis: Axes, strongest: Sequence[Mapping[str, Any]], causes: Sequence[Mapping[str, Any]]) -> None:

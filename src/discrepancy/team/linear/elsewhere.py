@@ -93,12 +93,11 @@ def _as_read(trial: TrialLinear) -> tuple[Array, Array, Array]:
 def _straight(nothing: Hypothesis, t: int, own: int, moved: Sequence[int]) -> Array:
     """What straight columns say of the same rows, shape (n, C)."""
     problem, fit = nothing.problem, nothing.fit
-    raw = problem.raw[t]
-    rows = raw[..., -1] - raw[..., : problem.shared] @ fit.shared
-    rows = rows - problem.local[t][..., :own] @ fit.local(t)[:own]
+    values = np.append(np.zeros(problem.width - 1), 1.0)
+    values[: problem.shared] = -fit.shared
     for index in moved:
-        rows = rows - raw[..., problem.spans[index]] @ fit.part(index)[0]
-    return rows
+        values[problem.spans[index]] = -fit.part(index)[0]
+    return problem.raw_times(t, values) - problem.local[t][..., :own] @ fit.local(t)[:own]
 
 
 def resting_of(nothing: Hypothesis) -> dict[str, float]:

@@ -23,29 +23,35 @@ from estimator.so3 import cross
 class BySignals:
     """Derivative of the residual's samples by every robot's signals, (Q, C, 21) each; kept at every so-many-th sample.
 
-    It varies as slowly as the motion: a straight line between its values is good to 1e-3.
+    It varies as slowly as the motion: a straight line between its values is good to 1e-3, and single precision is
+    enough. A robot moves its own loop and the balance of wrenches (the first one all loops), and no more is kept.
 
     Attributes:
-        knots: its values, shape (N, K, C, 21).
-        every: samples from one to the next.
+        knots: values of every robot, shape (K, channels that it moves, 21).
+        moved: which these are, for every robot.
+        channels: C.
+        every: samples from one knot to the next.
         samples: Q.
     """
 
-    knots: Array
+    knots: tuple[NDArray[np.float32], ...]
+    moved: tuple[NDArray[np.intp], ...]
+    channels: int
     every: int
     samples: int
 
     @classmethod
     def none(cls, robots: int, channels: int) -> BySignals:
         """Where nobody asks for it."""
-        return cls(np.zeros((robots, 0, channels, COUNT)), 1, 0)
+        empty = np.zeros((0, 0, COUNT), np.float32)
+        return cls((empty,) * robots, (np.zeros(0, np.intp),) * robots, channels, 1, 0)
 
     def __call__(self, robot: int, slots: slice, change: Array) -> Array:
         """What changes of some of one robot's signals do, (Q, s) -> (Q, C); of several (Q, s, k) -> (Q, C, k).
 
         A change that stays is of shape (s,).
         """
-        J = self.knots[robot][..., slots]
+        J = self.knots[robot][..., slots].astype(np.float64)
         after = np.concatenate([J[1:], J[-1:]])
         if change.ndim == 1:
             change = np.broadcast_to(change, (self.samples, len(change)))
@@ -58,22 +64,23 @@ class BySignals:
         out = J @ (each * (1.0 - weight)).reshape(len(J), -1, parts * self.every)
         out += after @ (each * weight).reshape(len(J), -1, parts * self.every)
         out = np.moveaxis(out.reshape(len(J), rows, parts, self.every), 3, 1)
-        return out.reshape(-1, rows, *several)[: self.samples]
+        whole = np.zeros((self.samples, self.channels, *several))
+        whole[:, self.moved[robot]] = out.reshape(-1, rows, *several)[: self.samples]
+        return whole
 
     def at(self, robot: int, slots: slice, samples: NDArray[np.intp]) -> Array:
         """Of one robot at some samples, shape (k,) -> (k, C, s)."""
-        J = self.knots[robot][..., slots]
+        J = self.knots[robot][..., slots].astype(np.float64)
         low, rest = np.divmod(samples, self.every)
         after = J[np.minimum(low + 1, len(J) - 1)]
-        return J[low] + (after - J[low]) * (rest / self.every)[:, None, None]
+        whole = np.zeros((len(samples), self.channels, J.shape[2]))
+        whole[:, self.moved[robot]] = J[low] + (after - J[low]) * (rest / self.every)[:, None, None]
+        return whole
 
     def dense(self, slots: slice = slice(None)) -> Array:
         """At every sample, shape (N, Q, C, s)."""
-        J = self.knots[..., slots]
-        low, rest = np.divmod(np.arange(self.samples), self.every)
-        out = J[:, low]
-        after = J[:, np.minimum(low + 1, J.shape[1] - 1)]
-        return out + (after - out) * (rest / self.every)[:, None, None]
+        every = np.arange(self.samples)
+        return np.array([self.at(robot, slots, every) for robot in range(len(self.knots))])
 
 
 def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Arms) -> BySignals:
@@ -90,8 +97,9 @@ def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Ar
     grasps = shared.grasps
     motion = fuse(data, grasps)
     fused = data.twist.reshape(Q, -1) @ fusion_matrix(grasps).T
-    J = np.zeros((N, Q, 6 * N, COUNT))
+    knots_of, moved = [], []
     for i in range(N):
+        J = np.zeros((Q, 6 * N, COUNT))
         G = fusion_matrix(grasps)[:, 6 * i : 6 * i + 6]
         R_1i, p_1i = grasps.R_1i[i], grasps.p_1i[i]
         dR, dh, dV, dV_dot, dF = _changes(s[:, i], arm_of(arms, i))  # (21, Q, ...)
@@ -99,19 +107,22 @@ def by_signals(s: Array, data: GraspData, shared: Shared, bases: Bases, arms: Ar
         for j in range(1, N):
             at = 6 * (j - 1)
             if i == 0:
-                J[i, :, at : at + 3] = np.moveaxis(-turn, 0, -1)
-                J[i, :, at + 3 : at + 6] = np.moveaxis(-dh - dR @ grasps.p_1i[j], 0, -1)
+                J[:, at : at + 3] = np.moveaxis(-turn, 0, -1)
+                J[:, at + 3 : at + 6] = np.moveaxis(-dh - dR @ grasps.p_1i[j], 0, -1)
             elif i == j:
-                J[i, :, at : at + 3] = np.moveaxis(turn @ bases.R[j].T, 0, -1)
-                J[i, :, at + 3 : at + 6] = np.moveaxis(dh @ bases.R[j].T, 0, -1)
+                J[:, at : at + 3] = np.moveaxis(turn @ bases.R[j].T, 0, -1)
+                J[:, at + 3 : at + 6] = np.moveaxis(dh @ bases.R[j].T, 0, -1)
         d_up = dR[..., 2, :] @ R_1i.T / N
         d_up -= np.sum(d_up * motion.up, axis=-1, keepdims=True) * motion.up
         needed = needed_wrench(fused, dV @ G.T, dV_dot @ G.T, data.gravity_mps2 * d_up, shared.pi)
         d_force, d_moment = dF[..., 3:] @ R_1i.T, dF[..., :3] @ R_1i.T
         d_moment = d_moment + cross(p_1i, d_force)
-        J[i, :, -6:-3] = np.moveaxis(d_force - needed[0], 0, -1)
-        J[i, :, -3:] = np.moveaxis(d_moment - needed[1], 0, -1)
-    return BySignals(J, every, samples)
+        J[:, -6:-3] = np.moveaxis(d_force - needed[0], 0, -1)
+        J[:, -3:] = np.moveaxis(d_moment - needed[1], 0, -1)
+        own = np.arange(6 * (N - 1)) if i == 0 else np.arange(6 * (i - 1), 6 * i)
+        moved.append(np.concatenate([own, np.arange(6 * (N - 1), 6 * N)]))
+        knots_of.append(J[:, moved[i]].astype(np.float32))
+    return BySignals(tuple(knots_of), tuple(moved), 6 * N, every, samples)
 
 
 def _changes(s: Array, arm: Arms) -> ArmData:

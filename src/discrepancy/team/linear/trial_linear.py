@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discrepancy.team.linear.jacobian import BySignals, by_signals
 from discrepancy.team.linear.reduction import Reduction
@@ -119,7 +120,9 @@ class TrialLinear:
             ],
             axis=2,
         )
-        total = np.sum([self.J(i, slice(None), parts[:, i]) for i in range(N)], axis=0)
+        total = self.J(0, slice(None), parts[:, 0])
+        for i in range(1, N):
+            total += self.J(i, slice(None), parts[:, i])
         return np.moveaxis(self.reduction(total), -1, 0), np.moveaxis(self.reduction(parts), -1, 0)
 
     def of_wrench(self, force: Array, moment: Array) -> Array:
@@ -183,14 +186,15 @@ class TrialLinear:
         return np.stack(columns, axis=2) if columns else np.zeros((*self.residual.shape, 0))
 
     @cached_property
-    def by_wrist(self) -> Array:
+    def by_wrist(self) -> NDArray[np.float32]:
         """Derivative of the balance by velocity and acceleration of a wrist in {b_i}, shape (N, Q, 6, 6).
 
-        Only by the payload's motion, which is taken from all wrists; the arm really moves so.
+        Only by the payload's motion, which is taken from all wrists; the arm really moves so. In single precision, as
+        it is there for long.
         """
         samples, G = len(self.s), fusion_matrix(self.shared.grasps)
         motion = self.data.twist.reshape(samples, -1) @ G.T
-        out = np.zeros((self.robots, samples, 6, 6))
+        out = np.zeros((self.robots, samples, 6, 6), np.float32)
         for i in range(self.robots):
             at = slice(6 * i + 3, 6 * i + 6)
             omega = self.data.twist[:, i, :3]

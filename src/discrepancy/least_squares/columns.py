@@ -1,0 +1,113 @@
+"""Many columns of one trial's rows, in pieces that problems share: one with other columns copies none of the rest.
+
+They are kept in the cells' cosine transform, without what the trial's own unknowns can explain (and with how much of
+these was taken out, so that rows come back as they were). Of many rows they are kept in single precision: rounding,
+6e-8 of a number, is far below the noise of 1 for whatever a fit takes out of them; sums are made in double precision.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+
+from discrepancy.least_squares.cells import Cells
+from discrepancy.least_squares.gram import added_up, gram_of, project
+from estimator.arrays import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Columns of one trial.
+
+    Attributes:
+        pieces: successive columns, shape (n, C, k) each.
+        inside: what the trial's own unknowns explain of them, by those's orthonormal columns, shape (l, columns).
+    """
+
+    pieces: tuple[Array, ...]
+    inside: Array
+
+    @classmethod
+    def of(cls, x: Array, own: Array, cells: Cells) -> Columns:
+        """From rows (n, C, columns) and the orthonormal columns (n, C, l) of the trial's own unknowns."""
+        return cls((cells.spectrum(project(x, own)),), gram_of(own, x))
+
+    @property
+    def width(self) -> int:
+        """How many columns there are."""
+        return self.inside.shape[1]
+
+    @property
+    def nbytes(self) -> int:
+        """What the pieces take in double precision."""
+        return sum(8 * piece.size for piece in self.pieces)
+
+    @property
+    def is_single(self) -> bool:
+        """Whether they are in single precision."""
+        return self.pieces[0].dtype == np.float32
+
+    def single(self) -> Columns:
+        """The same in single precision."""
+        pieces = [cast(Array, piece.astype(np.float32, copy=False)) for piece in self.pieces]
+        return Columns(tuple(pieces), self.inside)
+
+    def take(self, span: slice) -> Array:
+        """Some successive columns, shape (n, C, k)."""
+        start, stop, _ = span.indices(self.width)
+        parts, at = [], 0
+        for piece in self.pieces:
+            end = at + piece.shape[2]
+            if at < stop and start < end:
+                parts.append(piece[..., max(start - at, 0) : stop - at])
+            at = end
+        if not parts:
+            return np.zeros((*self.pieces[0].shape[:2], 0))
+        return np.asarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2), dtype=np.float64)
+
+    def times(self, x: Array) -> Array:
+        """The columns added up, each by its number in x, shape (columns,) or (columns, k) -> (n, C) or (n, C, k)."""
+        out, at = np.zeros((*self.pieces[0].shape[:2], *x.shape[1:])), 0
+        for piece in self.pieces:
+            out += added_up(piece, x[at : at + piece.shape[2]])
+            at += piece.shape[2]
+        return out
+
+    def products(self, b: Array) -> Array:
+        """Products with other columns b, over rows and channels, shape (n, C, k) -> (columns, k)."""
+        return np.concatenate([gram_of(piece, b) for piece in self.pieces])
+
+    def grams(self, cells: Cells, b: Array) -> Array:
+        """The same over every cell, shape (n, C, k) -> (K, columns, k)."""
+        return np.concatenate([cells.grams(piece, b) for piece in self.pieces], axis=1)
+
+    def own_grams(self, cells: Cells) -> Array:
+        """Gram matrices over every cell, shape (K, columns, columns)."""
+        return np.concatenate([self.grams(cells, piece) for piece in self.pieces], axis=2)
+
+    def replaced(self, start: int, stop: int, new: Columns) -> Columns:
+        """With new columns in place of those from ``start`` to ``stop``, which may be none."""
+        middle = [piece.astype(self.pieces[0].dtype, copy=False) for piece in new.pieces]
+        inside = [self.inside[:, :start], new.inside, self.inside[:, stop:]]
+        return Columns(
+            (*self._cut(0, start), *middle, *self._cut(stop, self.width)), np.concatenate(inside, axis=1)
+        )
+
+    def _cut(self, start: int, stop: int) -> list[Array]:
+        out, at = [], 0
+        for piece in self.pieces:
+            end = at + piece.shape[2]
+            if at < stop and start < end:
+                out.append(piece[..., max(start - at, 0) : min(stop, end) - at])
+            at = end
+        return out
+
+
+def held(trials: Sequence[Columns], most_bytes: float) -> list[Columns]:
+    """All trials' columns, in single precision if they take more memory than they should."""
+    if sum(columns.nbytes for columns in trials) <= most_bytes:
+        return list(trials)
+    return [columns.single() for columns in trials]

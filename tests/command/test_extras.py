@@ -1,0 +1,99 @@
+"""What an installation without the extras does: the same numbers, no pictures, and a sentence that says so."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+
+from estimator import extras
+from invented_calibration import invented_calibration
+from mocobot.files.calibrations import PLOTS, is_calibration, write_into
+from mocobot_view.pictures.camera import Camera
+from mocobot_view.pictures.render import Shot, render_shots
+
+OPTIONAL = ("numba", "matplotlib", "PIL", "rerun", "distributed", "dask")
+BLOCK = f"import sys\nfor name in {OPTIONAL!r}: sys.modules[name] = None\n"
+"""An import of a module that is None raises ModuleNotFoundError, as where nothing is installed."""
+TRIALS = """
+import hashlib, mocobot
+digest = hashlib.sha256()
+carry = mocobot.simulate("b", "random", vias=1, seed=3)
+for values in (carry.log.phi, carry.log.tau, carry.tau): digest.update(values.tobytes())
+print(digest.hexdigest(), {compiled} == ("numba" in sys.modules and sys.modules["numba"] is not None))
+"""
+
+
+@pytest.mark.slow
+def test_a_trial_has_the_same_bits_without_numba() -> None:
+    with_it, without = (
+        subprocess.run(
+            [sys.executable, "-c", head + TRIALS.format(compiled=compiled)],
+            capture_output=True, text=True, check=True,
+        ).stdout.split()
+        for head, compiled in (("import sys\n", True), (BLOCK, False))
+    )  # fmt: skip
+    assert with_it == without
+    assert with_it[1] == "True"
+
+
+def test_drives_have_the_same_bits_without_numba(monkeypatch: pytest.MonkeyPatch) -> None:
+    from mocobot_sim import compiled
+    from mocobot_sim.base.drive_kernel import update_drives
+
+    rng = np.random.default_rng(4)
+    addresses = [rng.permutation(20)[:8].reshape(2, 4) for _ in range(3)]
+    fixed = [rng.standard_normal(20), rng.standard_normal(20)]
+    kinematics = [rng.standard_normal((4, 3)), rng.standard_normal((3, 4)), (2.0, 1.5, 4.0, 3.0, 1e-3)]
+    plan = [rng.standard_normal((2, 3)), rng.standard_normal((2, 3))]
+    changed = [rng.standard_normal(shape) for shape in ((20,), (2, 3), (2, 4), (2, 4), (2, 4))]
+
+    def after(update) -> list[np.ndarray]:
+        ctrl, *others = (array.copy() for array in changed)
+        update(*fixed, ctrl, *addresses, *kinematics, *plan, *others)
+        return [ctrl, *others]
+
+    machine = after(update_drives)
+    monkeypatch.setattr(compiled, "njit", None)
+    plain = after(compiled.entry(update_drives.py_func))
+    for one, other, before in zip(machine, plain, changed, strict=True):
+        assert not np.array_equal(one, before)
+        np.testing.assert_array_equal(one, other)
+
+
+@pytest.fixture
+def no_plots(monkeypatch: pytest.MonkeyPatch):
+    """As where neither matplotlib nor pillow is installed."""
+    for name in extras.PLOTS:
+        monkeypatch.setitem(sys.modules, name, None)
+    extras.draws_plots.cache_clear()
+    yield
+    extras.draws_plots.cache_clear()
+
+
+@pytest.mark.usefixtures("no_plots")
+def test_a_folder_without_pictures_is_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for number in (1, 2):
+        (tmp_path / f"{number}").mkdir()
+        write_into(tmp_path / f"{number}", invented_calibration(seed=number))
+    assert capsys.readouterr().err == f"mocobot: {extras.NO_PLOTS}\n"  # once
+    names = {path.name for path in (tmp_path / "1").iterdir()}
+    assert {"calibration.json", "report.txt", "omnid3.toml"} <= names
+    assert not names & set(PLOTS)
+    assert is_calibration(tmp_path / "1")
+
+
+def test_a_folder_with_pictures_has_those_that_are_known(tmp_path: Path) -> None:
+    write_into(tmp_path, invented_calibration())
+    assert {path.name for path in tmp_path.glob("*.png")} == set(PLOTS)
+
+
+@pytest.mark.usefixtures("no_plots")
+def test_a_page_has_the_sentence_in_place_of_pictures() -> None:
+    model = mujoco.MjModel.from_xml_string("<mujoco/>")
+    shot = Shot(model, np.zeros(0), Camera((0.0, 0.0, 0.0), 1.0, 0.0, 0.0))
+    assert render_shots([shot]) == extras.NO_PLOTS

@@ -1,0 +1,67 @@
+"""Long recordings in parts: nothing is lost or counted twice, and the verdict is that of the whole."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mocobot
+from discrepancy import rules
+from discrepancy.team.diagnosis import diagnose_team
+from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.signals import Signals
+from discrepancy.team.parts import LaterPart, parted, said
+
+FRICTION = {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.02}
+
+
+@pytest.fixture(scope="module")
+def recording():
+    friction = mocobot.make_effect("joint_friction", FRICTION, robot=2, joint=1)
+    return mocobot.simulate("b", "random", vias=20, seed=6, effects=[friction])
+
+
+@pytest.fixture
+def short_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rules, "PART_S", 12.0)
+
+
+def test_short_recordings_stay_whole(recording) -> None:
+    assert parted([recording])[0] is recording
+    assert said([recording]) == ()
+
+
+@pytest.mark.usefixtures("short_parts")
+def test_parts_have_all_rows_of_the_whole_once(recording) -> None:
+    parts = parted([recording, recording])
+    assert len(parts) == 6
+    assert [isinstance(part, LaterPart) for part in parts] == [False, True, True] * 2
+    assert isinstance(replace(parts[1], name="x"), LaterPart)
+    assert len({part.name for part in parts[:3]}) == 3
+    for part in parts[:3]:
+        at = np.searchsorted(recording.time, part.time)
+        np.testing.assert_array_equal(recording.time[at], part.time)  # the clock stays
+        for name in ("phi", "theta", "tau", "ref"):
+            np.testing.assert_array_equal(getattr(recording, name)[at], getattr(part, name))
+    kept = np.concatenate([part.time[Signals.of(part).keep] for part in parts[:3]])
+    np.testing.assert_array_equal(kept, recording.time[Signals.of(recording).keep])
+    rows = sum(len(Reduction.of(Signals.of(part)).time) for part in parts[:3])
+    assert abs(rows - len(Reduction.of(Signals.of(recording)).time)) <= 2
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("short_parts")
+def test_verdict_of_parts(recording) -> None:
+    """The simulator's own friction, within three standard errors; only the first part is simulated again."""
+    found = diagnose_team([recording], laws="never")
+    assert found.diagnosis.verdict == "explained"
+    (cause,) = found.diagnosis.explanation.found
+    assert cause.candidate.key == ("joint_friction", 2, 1)
+    values = found.to_dict()["causes"][0]["parameters"]
+    for name, truth in FRICTION.items():
+        assert abs(values[name]["value"] - truth) < 3.0 * values[name]["se"] + 0.02 * truth
+    assert len(found.to_dict()["recordings"]) == 3
+    assert len(found.to_dict()["gain"]["trials"]) == 1
+    assert any("in 3 parts" in note for note in found.to_dict()["notes"])
