@@ -211,7 +211,7 @@ def test_extended_axis_is_read_back(tmp_path: Path) -> None:
 
 
 def test_every_cause_changes_the_plant() -> None:
-    """No cause is forgotten in the simulation, and each number of the plant belongs to one."""
+    """No cause is forgotten in the simulation, and each number of the plant belongs to one; laws are beside them."""
     hints = Hints(2.5e-3, *[{"start_s": 0.1, "period_s": 1.0, "width_s": 0.5}] * 2, 0.0, 0.0)
     touched = set()
     for name, cause in CAUSES.items():
@@ -222,8 +222,8 @@ def test_every_cause_changes_the_plant() -> None:
         different = {f.name for f in fields(Plant) if getattr(changed, f.name) != getattr(nominal(), f.name)}
         assert different, name
         touched |= different
-    assert list(CHANGES) == list(CAUSES)
-    assert {f.name for f in fields(Plant)} - touched == {"gain_N_per_V", "period_s", "limit_V"}
+    assert set(CHANGES) == {*CAUSES, "law"}
+    assert {f.name for f in fields(Plant)} - touched == {"gain_N_per_V", "period_s", "limit_V", "laws"}
 
 
 def test_a_run_that_fails_says_so() -> None:
