@@ -20,5 +20,5 @@ class TorqueScale(Cause):
         return abs(values[0]) < rules.MOST_SCALE
 
     def columns(self, signals, at, shape):
-        # The model's torque, not the measured one: that would explain itself. Friction counts as it is read.
-        return at_joint(signals, at, signals.inverse[:, at])
+        # The model's torque, not the measured one: that would explain itself. What it lacks of friction counts as read.
+        return at_joint(signals, at, signals.asked[:, at])

@@ -89,24 +89,24 @@ def reversals(
     candidates: Sequence[SerialCandidate],
     values: Sequence[Array],
 ) -> list[Array]:
-    """By how much dry friction is uncertain where joints turn round, rows (n, C) per block.
+    """By how much dry friction, the model's own and what it lacks, is uncertain where joints turn round.
 
     It has any value between its two while a joint sticks, and a smoothed velocity does not tell when that is. So much
-    it changes if the velocities are a little off.
+    it changes if the velocities are a little off. Rows (n, C) per block.
     """
     out = []
     for part in parts:
         s = part.signals
         off = rules.STICKING_SHARE * s.typical
-        total = np.zeros_like(s.q)
+        moved = [replace(s, dq=s.dq + sign * off) for sign in (1.0, -1.0)]
+        turned = moved[0].direction(s.slow) - moved[1].direction(s.slow)
+        total = s.nominal.coulomb * turned / np.sqrt(12.0)  # of an even spread
         for c, v in zip(candidates, values, strict=True):
             cause = CAUSES[c.cause]
             if cause.dry:
                 at = -1 if c.joint is None else c.joint - 1
-                ends = [
-                    cause.columns(replace(s, dq=s.dq + sign * off), at, c.shape) @ v for sign in (1.0, -1.0)
-                ]
-                total += (ends[0] - ends[1]) / np.sqrt(12.0)  # of an even spread
+                ends = [cause.columns(other, at, c.shape) @ v for other in moved]
+                total += (ends[0] - ends[1]) / np.sqrt(12.0)
         out += [np.abs(rows[:, joints]) for rows in part.reduction(np.abs(total))]
     return out
 

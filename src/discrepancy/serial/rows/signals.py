@@ -109,9 +109,14 @@ class Signals:
 
     @property
     def residual(self) -> Array:
-        """Measured torque minus what the nominal model asks for, its friction included, shape (W, J)."""
+        """Measured torque minus what the nominal model asks for, shape (W, J)."""
+        return self.torque - self.asked
+
+    @property
+    def asked(self) -> Array:
+        """Torques that the nominal model asks for, its friction included, shape (W, J)."""
         dry = self.nominal.coulomb * self.direction(self.slow)
-        return self.torque - self.inverse - dry - self.nominal.viscous * self.dq
+        return self.inverse + dry + self.nominal.viscous * self.dq
 
     @property
     def slow(self) -> Array:

@@ -1,0 +1,202 @@
+"""The arm: what its owner's model says, how a healthy one differs from it, how it moves, and what is logged of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+from discrepancy.serial.model import SerialModel, load_model
+from discrepancy.serial.recording.joint_log import Drive, JointLog
+
+Torques = Callable[[np.ndarray, np.ndarray, np.ndarray, float], np.ndarray]
+"""Torques that act on the joints besides [N m], from positions, velocities, drive torques and time."""
+
+MODEL = Path(__file__).resolve().parents[2] / "models" / "panda" / "panda.xml"
+DRY_NM = np.array([0.9, 1.1, 0.8, 0.9, 0.35, 0.3, 0.3])
+VISCOUS = np.array([0.8, 0.9, 0.6, 0.7, 0.25, 0.2, 0.2])
+ROTOR_KGM2 = np.array([0.6, 0.6, 0.45, 0.45, 0.2, 0.2, 0.15])
+"""Of the model: a lab that has identified its arm knows them. Plausible for such gears, of no certain arm."""
+CENTRE = np.array([0.0, -0.3, 0.0, -1.7, 0.0, 1.8, 0.4])
+HALF_WAY = np.array([1.1, 0.8, 1.0, 0.8, 1.2, 1.0, 1.2])
+"""Middle and half of the motion [rad]; inside the ranges by 0.3 rad."""
+TORQUE_NOISE_NM = np.array([0.04, 0.05, 0.03, 0.03, 0.012, 0.01, 0.01])
+STEP_RAD = 2.0 * np.pi / 2**17
+RATE_HZ, TIMESTEP_S, SECONDS = 500.0, 5e-4, 60.0
+BANDWIDTH_PER_S = 15.0
+"""Of the controller, critically damped."""
+
+INERTIA_SHARE, ZERO_RAD, LENGTH_M, SCALE_SHARE, DELAY_S, LEVEL_RAD = 0.1, 2e-3, 1e-3, 0.02, 5e-4, 5e-3
+"""A healthy arm: standard deviations of what its model has wrong, as ``docs/serial/method.md`` says."""
+
+
+@dataclass(frozen=True)
+class Healthy:
+    """What no model knows of one healthy arm.
+
+    Attributes:
+        spec: of the true arm.
+        zero: added to its positions where they are read [rad], shape (7,).
+        scale: of its torques where they are read, shape (7,).
+        delay_s: by which they are read late, shape (7,).
+    """
+
+    spec: mujoco.MjSpec
+    zero: np.ndarray
+    scale: np.ndarray
+    delay_s: np.ndarray
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What really happened, at the log's rate.
+
+    Attributes:
+        time: shape (n,).
+        q, dq, ddq: positions, velocities and accelerations of the joints, shape (n, 7).
+        torque: of the drives, shape (n, 7).
+    """
+
+    time: np.ndarray
+    q: np.ndarray
+    dq: np.ndarray
+    ddq: np.ndarray
+    torque: np.ndarray
+
+
+def model_spec() -> mujoco.MjSpec:
+    """The owner's model, for changes before it is compiled."""
+    spec = mujoco.MjSpec.from_file(str(MODEL))
+    for k, joint in enumerate(spec.joints):
+        joint.frictionloss, joint.armature = DRY_NM[k], ROTOR_KGM2[k]
+        joint.damping = [VISCOUS[k], 0.0, 0.0]
+        joint.limited = joint.actfrclimited = mujoco.mjtLimited.mjLIMITED_FALSE
+    return spec
+
+
+def nominal(folder: Path) -> SerialModel:
+    """The owner's model as the diagnosis reads it, from a file in a folder."""
+    path = folder / "arm.xml"
+    if not path.is_file():
+        spec = model_spec()
+        spec.compile()
+        path.write_text(spec.to_xml(), encoding="utf-8")
+    return load_model(path)
+
+
+def healthy(rng: np.random.Generator, times: float = 1.0) -> Healthy:
+    """An arm whose numbers are off within their tolerances, or so many times as far."""
+    spec = model_spec()
+    for body in spec.bodies[1:]:
+        if body.name == "link0":
+            continue
+        share = times * INERTIA_SHARE
+        body.mass *= max(1.0 + share * rng.standard_normal(), 0.3)
+        # Turned with its frame, an inertia stays one; its size changes as the mass' would.
+        body.fullinertia = np.asarray(body.fullinertia) * max(1.0 + share * rng.standard_normal(), 0.3)
+        body.ipos = np.asarray(body.ipos) * (1.0 + share * rng.standard_normal(3))
+        if body.name != "link1":
+            body.pos = np.asarray(body.pos) + times * LENGTH_M * rng.standard_normal(3)
+    tilt = times * LEVEL_RAD * rng.standard_normal(2)
+    spec.option.gravity = 9.81 * np.array([tilt[0], tilt[1], -np.sqrt(1.0 - tilt @ tilt)])
+    for joint in spec.joints:
+        joint.solref_friction, joint.solimp_friction = [0.002, 1.0], [0.99, 0.999, 0.001, 0.5, 2.0]
+    zero, scale, delay = (size * times * rng.standard_normal(7) for size in (ZERO_RAD, SCALE_SHARE, DELAY_S))
+    return Healthy(spec, zero, 1.0 + scale, delay)
+
+
+def moved(
+    spec: mujoco.MjSpec,
+    rng: np.random.Generator,
+    besides: Sequence[Torques],
+    force: Callable[[float], np.ndarray],
+) -> Motion:
+    """Let an arm follow sums of sines under a computed-torque controller.
+
+    Args:
+        spec: of the true arm.
+        rng: of the motion.
+        besides: what acts on its joints that MJCF does not say.
+        force: on the centre of mass of the last link [N], in the world, by time.
+
+    Raises:
+        RuntimeError: it did not stay near its reference.
+    """
+    spec.option.timestep, spec.option.integrator = TIMESTEP_S, mujoco.mjtIntegrator.mjINT_EULER
+    model = spec.compile()
+    data, last, J = mujoco.MjData(model), model.nbody - 1, model.nv
+    f = 0.07 + np.sort(rng.uniform(0.0, 0.6, (5, J)), axis=0)
+    size, phase = rng.uniform(0.5, 1.0, (5, J)) / f, rng.uniform(0.0, 2.0 * np.pi, (5, J))
+    # From the middle of its way, at rest.
+    span = np.linspace(0.0, SECONDS, 3000)
+    way = (size * np.sin(2.0 * np.pi * f * span[:, None, None] + phase)).sum(axis=1)
+    size *= HALF_WAY / np.abs(way).max(axis=0)
+    w, every, steps = 2.0 * np.pi * f, round(1.0 / RATE_HZ / TIMESTEP_S), round(SECONDS / TIMESTEP_S)
+    log = np.empty((4, steps // every, J))
+    inertia = np.zeros((J, J))
+    for k in range(steps):
+        t = data.time
+        start = min(t / 2.0, 1.0)
+        ease, ease1, ease2 = (
+            start**3 * (10 - 15 * start + 6 * start**2),
+            30 * (start * (1 - start)) ** 2 / 2,
+            0.0,
+        )
+        ease2 = (60 * start - 180 * start**2 + 120 * start**3) / 4
+        s, c = np.sin(w * t + phase), np.cos(w * t + phase)
+        x, x1, x2 = (size * s).sum(0), (size * w * c).sum(0), -(size * w**2 * s).sum(0)
+        r, r1 = CENTRE + ease * x, ease * x1 + ease1 * x
+        r2 = ease * x2 + 2.0 * ease1 * x1 + ease2 * x
+        if not k:
+            data.qpos[:] = r
+        mujoco.mj_step1(model, data)
+        if k % 20 == 0:
+            mujoco.mj_fullM(model, data, inertia)
+        wanted = r2 + 2.0 * BANDWIDTH_PER_S * (r1 - data.qvel) + BANDWIDTH_PER_S**2 * (r - data.qpos)
+        torque = inertia @ wanted + data.qfrc_bias
+        data.qfrc_applied[:] = torque
+        for own in besides:
+            data.qfrc_applied += own(data.qpos, data.qvel, torque, t)
+        data.xfrc_applied[last, :3] = force(t)
+        here = k // every
+        if k % every == 0:
+            log[0, here], log[1, here], log[3, here] = data.qpos, data.qvel, torque
+        mujoco.mj_step2(model, data)
+        if k % every == 0:
+            log[2, here] = data.qacc
+    if not np.isfinite(log).all() or np.abs(log[0] - CENTRE).max() > 2.0:
+        raise RuntimeError("the arm did not stay near its reference")
+    return Motion(np.arange(len(log[0])) / RATE_HZ, *log)
+
+
+def late(time: np.ndarray, torque: np.ndarray, delay_s: np.ndarray) -> np.ndarray:
+    """Torques as they are read so much later, shape (n, J)."""
+    return np.column_stack(
+        [
+            np.interp(time - d, time, torque[:, j])
+            for j, d in enumerate(np.broadcast_to(delay_s, torque.shape[1]))
+        ]
+    )
+
+
+def logged(
+    name: str, time: np.ndarray, q: np.ndarray, torque: np.ndarray, rng: np.random.Generator | None
+) -> JointLog:
+    """The log of what sensors read; without their errors if there is no generator."""
+    J = q.shape[1]
+    if rng is not None:
+        q = np.round(q / STEP_RAD) * STEP_RAD
+        torque = torque + TORQUE_NOISE_NM * rng.standard_normal(torque.shape)
+    unknown = np.full(J, np.nan)
+    drive = Drive(
+        np.full(J, 100.0), np.eye(J) / 100.0, np.ones(J), np.zeros(J, dtype=bool), "none", unknown, unknown, "torque",
+        np.full(J, np.inf),
+    )  # fmt: skip
+    names = tuple(f"joint{k}" for k in range(1, J + 1))
+    step = np.full(J, STEP_RAD)
+    return JointLog(
+        name, time, RATE_HZ, q, torque, None, None, names, drive, step, np.ones(len(q), dtype=bool), RATE_HZ
+    )

@@ -1,0 +1,187 @@
+"""Data sets of the arm: what is hidden, how large, and the log."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import mujoco
+import numpy as np
+
+from arm import machine
+from arm.forms import CAUSE_OF, MOST, NOWHERE, TYPICAL, Form
+from discrepancy.serial.recording.joint_log import JointLog
+from discrepancy.serial.rig import SerialRig
+
+GAIN = 38.0
+"""Of chi-square over noise and tolerances, at the detection limit: found nine times in ten (``mocobot.campaign``)."""
+KINDS = ("clean", "single", "single", "pairs", "single", "clean", "single", "unlisted", "triples", "left-out")
+"""Of successive seeds."""
+SIZES = (2.0, 4.0, 4.0, 8.0)
+"""Over the limit, of successive effects in turn by seed."""
+Kind = Literal["clean", "single", "pairs", "triples", "unlisted", "left-out"]
+LISTED = tuple(name for name, cause in CAUSE_OF.items() if cause)
+UNLISTED = tuple(name for name, cause in CAUSE_OF.items() if not cause)
+
+
+@dataclass(frozen=True)
+class ArmSet:
+    """What is hidden in one log; equal ones give equal bits.
+
+    Attributes:
+        seed: of everything random.
+        kind: what kind of set.
+        factor: size of its effects over their limits; None draws it.
+    """
+
+    seed: int
+    kind: Kind
+    factor: float | None = None
+
+    @classmethod
+    def of(cls, seed: int, kind: Kind | None = None, factor: float | None = None) -> ArmSet:
+        """The kind follows from the seed where none is given."""
+        return cls(seed, kind or KINDS[seed % len(KINDS)], factor)  # type: ignore[arg-type]
+
+    def rng(self, purpose: str) -> np.random.Generator:
+        """For one purpose."""
+        return np.random.default_rng([self.seed, *purpose.encode()])
+
+    @cached_property
+    def forms(self) -> tuple[Form, ...]:
+        """What is hidden, at typical sizes."""
+        if self.kind == "clean":
+            return ()
+        rng = self.rng("forms")
+        pool = UNLISTED if self.kind == "unlisted" else LISTED
+        number = {"pairs": 2, "triples": 3}.get(self.kind, 1)
+        # Every form in turn, in an order that differs from turn to turn.
+        turn, k = divmod(self.seed, len(pool))
+        first = np.random.default_rng([turn, *b"turn"]).permutation(len(pool))[k]
+        names = [pool[first]]
+        while len(names) < number:
+            name = str(rng.choice(pool))
+            if CAUSE_OF[name] not in [CAUSE_OF[n] for n in names]:
+                names.append(name)
+        out = []
+        for i, name in enumerate(names):
+            joint = (
+                None if name in NOWHERE else int(rng.integers(2 if name in ("pair", "neighbour") else 1, 8))
+            )
+            out.append(Form(name, CAUSE_OF[name], joint, TYPICAL[name], self.seed + i))
+        return tuple(out)
+
+    @property
+    def excluded(self) -> tuple[str, ...]:
+        """Causes taken out of the catalogue."""
+        return tuple(f.cause for f in self.forms if f.cause) if self.kind == "left-out" else ()
+
+
+@dataclass(frozen=True)
+class Made:
+    """A log with its truth."""
+
+    log: JointLog
+    truth: dict[str, Any]
+
+
+def make(request: ArmSet, folder: Path) -> Made:
+    """Simulate the healthy arm, size the effects by it, simulate again with them.
+
+    Raises:
+        RuntimeError: the arm with these effects did not follow its reference.
+    """
+    arm = machine.healthy(request.rng("arm"))
+    motion = machine.moved(arm.spec, request.rng("motion"), (), lambda t: np.zeros(3))
+    q, torque = _read(arm, (), motion)
+    clean = machine.logged("clean", motion.time, q, torque, request.rng("noise"))
+    rig = SerialRig.of(machine.nominal(folder), [clean])
+    ideal = machine.logged("ideal", motion.time, q, torque, None)
+    sized, told = [], []
+    sizes = request.rng("sizes")
+    for k, form in enumerate(request.forms):
+        limit = form.size * np.sqrt(GAIN / _gain(rig, ideal, _with(form, arm, motion)))
+        wanted = request.factor or SIZES[(request.seed + k) % len(SIZES)] * sizes.uniform(0.9, 1.1)
+        size = min(wanted * limit, MOST.get(form.name, np.inf))
+        sized.append(replace(form, size=float(size)))
+        told.append(
+            asdict(sized[-1])
+            | {"limit": float(limit), "factor": float(size / limit), "wanted": float(wanted)}
+        )
+    if sized:
+        spec = arm.spec.copy()
+        for form in sized:
+            form.change(spec)
+        besides = [t for form in sized if (t := form.torques()) is not None]
+        motion = machine.moved(
+            spec, request.rng("motion"), besides, lambda t: np.sum([f.force(t) for f in sized], axis=0)
+        )
+        q, torque = _read(arm, sized, motion)
+    log = machine.logged("log", motion.time, q, torque, request.rng("noise"))
+    return Made(log, {"effects": told})
+
+
+def _read(
+    arm: machine.Healthy, forms: tuple[Form, ...] | list[Form], motion: machine.Motion
+) -> tuple[np.ndarray, np.ndarray]:
+    q, torque = motion.q + arm.zero, machine.late(motion.time, motion.torque * arm.scale, arm.delay_s)
+    for form in forms:
+        q, torque = form.read(motion.time, q, torque)
+    return q, torque
+
+
+def _with(form: Form, arm: machine.Healthy, motion: machine.Motion) -> JointLog:
+    """The log of the same motion, if the form were there: drives give what it takes."""
+    torque = motion.torque.copy()
+    if (own := form.torques(1.0 / machine.RATE_HZ)) is not None:
+        for k, t in enumerate(motion.time):
+            torque[k] -= own(motion.q[k], motion.dq[k], motion.torque[k], float(t))
+    spec = arm.spec.copy()
+    form.change(spec)
+    before, after = arm.spec.copy().compile(), spec.compile()
+    pushed = form.name == "half_sine_push"
+    if form.name in ("rotor", "load", "tilt") or pushed:
+        torque += _asked(after, motion, form) - _asked(before, motion, None)
+    q, torque = _read(arm, [form], replace(motion, torque=torque))
+    return machine.logged("form", motion.time, q, torque, None)
+
+
+def _asked(model: mujoco.MjModel, motion: machine.Motion, form: Form | None) -> np.ndarray:
+    """Torques of a motion by MuJoCo, shape (n, 7)."""
+    data, out = mujoco.MjData(model), np.empty_like(motion.q)
+    jacobian = np.empty((3, model.nv))
+    last = machine.model_spec().bodies[-1].name
+    body = model.body(last).id
+    for k in range(len(motion.time)):
+        data.qpos[:], data.qvel[:], data.qacc[:] = motion.q[k], motion.dq[k], motion.ddq[k]
+        mujoco.mj_inverse(model, data)
+        out[k] = data.qfrc_inverse
+        if form is not None:
+            mujoco.mj_jacBodyCom(model, data, jacobian, None, body)
+            out[k] -= jacobian.T @ form.force(float(motion.time[k]))
+    return out
+
+
+def _gain(rig: SerialRig, ideal: JointLog, changed: JointLog) -> float:
+    """Of chi-square, that a form leaves beside everything within its tolerance."""
+    rows = [SerialRig.of(rig.model, [log]).physical_residual([]) for log in (ideal, changed)]
+    within = [c for c in rig.candidates() if all(p.tolerance > 0 for p in c.parameters)]
+    columns = [rig.columns(c) for c in within]
+    units = np.concatenate([[p.tolerance for p in c.parameters] for c in within])
+    A, b, width = [], [], len(units)
+    for t, white in enumerate(rig.whitening):
+        change = white(rows[1][t]) - white(rows[0][t])
+        X = np.concatenate([c[t] for c in columns], axis=2) * units
+        own = rig.local_columns(t)
+        n = change.size
+        X, change = X.reshape(n, width), change.reshape(n)
+        if own.size:
+            Q, _ = np.linalg.qr(own.reshape(n, -1))
+            X, change = X - Q @ (Q.T @ X), change - Q @ (Q.T @ change)
+        A.append(X)
+        b.append(change)
+    X, d = np.concatenate(A), np.concatenate(b)
+    x = np.linalg.solve(X.T @ X + np.eye(width), X.T @ d)
+    return float(d @ d - d @ (X @ x))
