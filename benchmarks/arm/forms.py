@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from arm.machine import RATE_HZ, SECONDS, TIMESTEP_S, Torques, late
+from arm.machine import RATE_HZ, ROTOR_KGM2, SECONDS, TIMESTEP_S, Torques, late
 
 GRAVITY = 9.81
 
@@ -69,12 +69,14 @@ class Form:
             self.size * way / np.linalg.norm(way) * (np.sin(np.pi * (t - start) / lasts) if inside else 0.0)
         )
 
-    def read(self, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """What sensors make of positions and torques, shape (n, 7) each."""
+    def read(
+        self, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """What sensors make of positions and torques under the gears' loads, shape (n, 7) each."""
         if self.name not in READINGS:
             return q, torque
         q, torque = q.copy(), torque.copy()
-        READINGS[self.name](self, time, q, torque)
+        READINGS[self.name](self, time, q, torque, load)
         return q, torque
 
 
@@ -222,18 +224,18 @@ def _tilt(form: Form, spec: mujoco.MjSpec) -> None:
     spec.option.gravity = np.asarray(spec.option.gravity) + GRAVITY * np.array([x, y, 0.0])
 
 
-def _warm_offset(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
+def _warm_offset(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
     torque[:, form.at] += form.size * (1.0 - 0.2 * np.exp(-time / 15.0))
 
 
-def _gain(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
+def _gain(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
     """A torque constant, with iron that saturates a little."""
     own = torque[:, form.at]
     much = 3.0 * np.sqrt(np.mean(own**2))
     torque[:, form.at] = own + form.size * own / np.sqrt(1.0 + (own / much) ** 2)
 
 
-def _slow_torque(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
+def _slow_torque(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
     """Half of it a lag of first order, half of it transport."""
     from scipy.signal import lfilter
 
@@ -244,29 +246,32 @@ def _slow_torque(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray
     torque[:, form.at] = own[0] + lfilter([1.0 - keep], [1.0, -keep], own - own[0])
 
 
-def _zero(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
+def _zero(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
     """With the disc a little off its axis."""
     turned = 0.15 * np.sin(q[:, form.at] + form.rng.uniform(0.0, 2.0 * np.pi))
     q[:, form.at] += form.size * (1.0 + turned)
 
 
-def _yielding(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
+def _yielding(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
     """The encoder sits at the motor, the gear bends with 5 ms of damping, and a little less the more it is bent."""
     from scipy.signal import lfilter
 
-    own = torque[:, form.at]
+    own = load[:, form.at]
     much = 4.0 * np.sqrt(np.mean(own**2))
     bend = form.size * own / (1.0 + np.abs(own) / much)
     keep = np.exp(-1.0 / (RATE_HZ * 5e-3))
-    q[:, form.at] += bend[0] + lfilter([1.0 - keep], [1.0, -keep], bend - bend[0])
+    bend = bend[0] + lfilter([1.0 - keep], [1.0, -keep], bend - bend[0])
+    q[:, form.at] += bend
+    # The rotor turns with the encoder.
+    torque[:, form.at] += ROTOR_KGM2[form.at] * np.gradient(np.gradient(bend, time), time)
 
 
-def _weighing(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
+def _weighing(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
     """Of no cause: a torque sensor that reads some of its neighbour's."""
     torque[:, form.at] += form.size * torque[:, form.at - 1]
 
 
-def _disc(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
+def _disc(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
     """Of no cause: an encoder's disc off its axis."""
     q[:, form.at] += form.size * np.sin(q[:, form.at] + form.rng.uniform(0.0, 2.0 * np.pi))
 

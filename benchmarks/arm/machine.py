@@ -58,6 +58,7 @@ class Motion:
         time: shape (n,).
         q, dq, ddq: positions, velocities and accelerations of the joints, shape (n, 7).
         torque: of the drives, shape (n, 7).
+        load: what of it goes through the gears to the links, rotors and friction left out, shape (n, 7).
     """
 
     time: np.ndarray
@@ -65,6 +66,7 @@ class Motion:
     dq: np.ndarray
     ddq: np.ndarray
     torque: np.ndarray
+    load: np.ndarray
 
 
 def model_spec() -> mujoco.MjSpec:
@@ -103,6 +105,7 @@ def healthy(rng: np.random.Generator, times: float = 1.0) -> Healthy:
     tilt = times * LEVEL_RAD * rng.standard_normal(2)
     spec.option.gravity = 9.81 * np.array([tilt[0], tilt[1], -np.sqrt(1.0 - tilt @ tilt)])
     for joint in spec.joints:
+        joint.armature *= max(1.0 + times * INERTIA_SHARE * rng.standard_normal(), 0.3)
         joint.solref_friction, joint.solimp_friction = [0.002, 1.0], [0.99, 0.999, 0.001, 0.5, 2.0]
     zero, scale, delay = (size * times * rng.standard_normal(7) for size in (ZERO_RAD, SCALE_SHARE, DELAY_S))
     return Healthy(spec, zero, 1.0 + scale, delay)
@@ -135,7 +138,7 @@ def moved(
     way = (size * np.sin(2.0 * np.pi * f * span[:, None, None] + phase)).sum(axis=1)
     size *= HALF_WAY / np.abs(way).max(axis=0)
     w, every, steps = 2.0 * np.pi * f, round(1.0 / RATE_HZ / TIMESTEP_S), round(SECONDS / TIMESTEP_S)
-    log = np.empty((4, steps // every, J))
+    log = np.empty((5, steps // every, J))
     inertia = np.zeros((J, J))
     for k in range(steps):
         t = data.time
@@ -167,6 +170,8 @@ def moved(
         mujoco.mj_step2(model, data)
         if k % every == 0:
             log[2, here] = data.qacc
+            gone = data.qfrc_passive + data.qfrc_constraint - model.dof_armature * data.qacc
+            log[4, here] = data.qfrc_applied + gone
     if not np.isfinite(log).all() or np.abs(log[0] - CENTRE).max() > 2.0:
         raise RuntimeError("the arm did not stay near its reference")
     return Motion(np.arange(len(log[0])) / RATE_HZ, *log)

@@ -128,7 +128,7 @@ def _read(
 ) -> tuple[np.ndarray, np.ndarray]:
     q, torque = motion.q + arm.zero, machine.late(motion.time, motion.torque * arm.scale, arm.delay_s)
     for form in forms:
-        q, torque = form.read(motion.time, q, torque)
+        q, torque = form.read(motion.time, q, torque, motion.load)
     return q, torque
 
 

@@ -14,6 +14,10 @@ from mocobot.campaign.shares import interval, reliability
 
 Item = Mapping[str, Any]
 SILENT = ("consistent", "miscalibrated")
+RUBS = (
+    "friction", "stribeck", "sublinear_friction", "load_friction", "asymmetric_coulomb", "asymmetric_viscous",
+)  # fmt: skip
+"""Terms of one friction over speed, direction and load: a form of its own needs several."""
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,7 @@ class Scored:
         result: of the campaign.
         hits: for every hidden effect: whether its cause and joint are named, or among what cannot be told from it.
         families: the same of its family.
-        extras: what was named besides.
+        extras: what was named besides; terms of a friction that is there are not.
         stated: probability and rightness of every named cause.
     """
 
@@ -50,6 +54,11 @@ class Scored:
         return all(self.hits) and not self.extras
 
 
+ALSO: Mapping[str, tuple[str, ...]] = {"grease": ("friction",), "one_way": ("torque_offset",)}
+"""Causes that a form is as well: friction over the logarithm of the speed is hardly bent; what rubs forwards alone is
+a constant while it moves."""
+
+
 def score(result: Item) -> Scored:
     """Hold one result against its truth."""
     named = list(result["verdict"]["causes"])
@@ -57,11 +66,17 @@ def score(result: Item) -> Scored:
     hits, families, right = [], [], []
     for effect in result["truth"]["effects"]:
         cause = None if excluded else effect["cause"]
-        here = [n for n in named if cause and _is(n, effect, cause)]
+        causes = [cause, *ALSO.get(effect["name"], ())] if cause else []
+        here = [n for c in causes for n in named if _is(n, effect, c)]
         hits.append(bool(here))
         right += here[:1]
         family = CAUSES[effect["cause"]].family if effect["cause"] else None
         families.append(any(n["family"] == family for n in named))
+    effects = [] if excluded else result["truth"]["effects"]
+    rubbing = [e["joint"] for e in effects if e["cause"] in RUBS]
+    right += [
+        n for n in named if n["cause"] in RUBS and n["joint"] in rubbing and not any(n is r for r in right)
+    ]
     extras = tuple(n for n in named if not any(n is r for r in right))
     stated = [(float(n["probability"]), any(n is r for r in right)) for n in named if n["cause"] != "law"]
     return Scored(result, tuple(hits), tuple(families), extras, tuple(stated))

@@ -13,6 +13,9 @@ WORK_RATIO = 4.0
 """Rate of the mechanics over ``SMOOTH_HZ``, about. Derived: what it folds back has been damped to 1/80."""
 CUTOFF_HZ = 20.0
 """Cut-off of the rows. Chosen: arms move below 5 Hz, and bend from some 10 Hz on."""
+LOAD_CUTOFF_SHARE = 0.35
+"""Of that, for a load that is differentiated twice. Chosen: arms move below 5 Hz, and the load of their links with them;
+noise of the trace falls with the fourth power."""
 CUTOFF_SHARE = 0.15
 """The same over the sampling rate, at most. Chosen."""
 ROWS_RATIO = 2.5
@@ -86,8 +89,8 @@ LEAST_REST_SHARE = 1e-6
 # What is normal of a model.
 
 INERTIA_SHARE = 0.1
-"""Of masses, lengths to centres of mass, and moments of inertia, by which a CAD model is off. Chosen: drawings leave
-out cables, grease and screws."""
+"""Of masses, lengths to centres of mass, moments of inertia, and rotors that it names, by which a model is off. Chosen:
+drawings leave out cables, grease and screws."""
 MOST_INERTIA_SHARE = 1.0
 """Of the same, beyond which a link is not off but another. Chosen: rotors and payloads add more, and are themselves."""
 LEAST_LINK_M = 0.02

@@ -1,5 +1,6 @@
 """Rotors, as the joint feels them, have another inertia than the model says."""
 
+from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause, at_joint
 
 
@@ -11,6 +12,12 @@ class Armature(Cause):
     parameters = ("armature_kgm2",)
     scales = (0.1,)
     separate = "Fast short motions of this joint alone, in a pose where gravity does not load it."
+
+    def normal(self, tree, at):
+        return [rules.INERTIA_SHARE * float(tree.armature[at])]
+
+    def sizes(self, tree, at):
+        return [max(self.normal(tree, at)[0], *self.scales)]
 
     def sentence(self, n):
         more = n.either("armature_kgm2", "more", "less")

@@ -23,7 +23,9 @@ class Elasticity(Cause):
         return f"yields by {n('compliance_rad_per_Nm', 'mrad per N m', 1e3)} behind its encoder"
 
     def columns(self, signals, at, shape):
-        load = low_pass(signals.inverse[:, at], signals.rate_hz, cutoff_hz(signals.log.rate_hz))
+        # Its second derivative is in the trace, and with it the noise of the load's own accelerations.
+        cutoff = rules.LOAD_CUTOFF_SHARE * cutoff_hz(signals.log.rate_hz)
+        load = low_pass(signals.inverse[:, at], signals.rate_hz, cutoff)
         return along(signals, at, -load)[..., None]
 
 
