@@ -255,7 +255,7 @@ LOGS_ONLY = {
 
 INSPECTED = {
     "none.parquet": "none.parquet: there is no such file",
-    "empty.parquet": "empty.parquet: is named .parquet, but does not begin like one; it is damaged or something else",
+    "empty.parquet": "empty.parquet: not a readable Parquet file, or a damaged one (Parquet file size is 0 bytes)",
     "text.parquet": "text.parquet: is named .parquet, but does not begin like one; it is damaged or something else",
     "folder": "folder: is a directory, and neither a rosbag2 bag nor a LeRobot dataset",
     "log.h5": f"log.h5: is of no known format; a log is {LOGS}",
