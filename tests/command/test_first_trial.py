@@ -211,7 +211,11 @@ OUTPUTS = {
     "convert none.csv rec.parquet": f"rec.parquet: {FORCE}",
     "convert log.csv log.csv --force": "log.csv: is an input; write somewhere else",
     "convert bag bag/new.csv --force": "bag/new.csv: lies in the input bag; write somewhere else",
-    "convert none.csv bag --force": "bag: exists; name a new folder for the bag, or a file with a suffix",
+    "convert none.csv bag":
+        "bag: is a bag of an earlier conversion; give --force to replace it, or name a new folder",
+    "convert none.csv paper --force": "paper: exists and is not a bag of an earlier conversion; name a new folder",
+    "convert none.csv bag --force": "none.csv: there is no such file",
+    "convert bag bag --force": "bag: is an input; write somewhere else",
     "convert none.csv rec.parquet/new.csv": f"rec.parquet/new.csv: {INSIDE}",
     "convert none.csv /proc/new": "/proc/new: cannot be written (...)",
     "inspect none.parquet --json log.csv": f"log.csv: {FORCE}",
