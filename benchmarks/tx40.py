@@ -2,7 +2,8 @@
 
     python benchmarks/tx40.py
 
-Needs the published excitation run (``models/tx40/README.md`` says where it is from): set MOCOBOT_TX40_DATA to its file.
+Needs the published excitation run (``models/tx40/README.md`` says where it is from): put it into
+``data/tx40`` or set MOCOBOT_TX40_DATA to its file.
 Torques are low-passed as the rows of the diagnosis are. Everything is fitted to the first two thirds of the log, causes
 and their shapes included, and tried on the last third.
 """
@@ -31,14 +32,14 @@ from mocobot_logs.joints.read import open_joint_log, read_joint_log
 
 VARIABLE = "MOCOBOT_TX40_DATA"
 TOP = Path(__file__).resolve().parents[1]
-BESIDE = TOP.parent / "shared" / "data" / "tx40" / "excitation.parquet"
+FILE = TOP / "data" / "tx40" / "excitation.parquet"
 STANDARD = ("link_mass", "link_com", "link_inertia", "armature", "friction", "torque_offset")
 """Ten inertial numbers, rotor, Coulomb, viscous friction and offset: 14 a joint."""
 
 
 def data() -> Path:
     """The file, or a message and the end of the program."""
-    path = Path(os.environ.get(VARIABLE) or BESIDE)
+    path = Path(os.environ.get(VARIABLE) or FILE)
     if not path.is_file():
         raise SystemExit(f"the TX40's excitation run is needed: set {VARIABLE} to its file ({path} is none)")
     return path

@@ -2,7 +2,8 @@
 
     python benchmarks/xl330.py
 
-Needs the published runs (``models/xl330/README.md`` says where they are from): set MOCOBOT_XL330_DATA to their folder.
+Needs the published runs (``models/xl330/README.md`` says where they are from): put them into
+``data/xl330`` or set MOCOBOT_XL330_DATA to their folder.
 For every gain the runs of the other two are diagnosed; what is named there, and the loop's law, foretell the held-out
 runs from their commands alone. Beside it a motor with the same torque constant and loop, whose Coulomb and viscous
 friction are fitted to the same runs by least squares. Both are stepped alike, dry friction as an impulse.
@@ -27,7 +28,7 @@ from mocobot.serial import read_logs
 
 VARIABLE = "MOCOBOT_XL330_DATA"
 TOP = Path(__file__).resolve().parents[1]
-BESIDE = TOP.parent / "shared" / "data" / "xl330"
+FOLDER = TOP / "data" / "xl330"
 GAINS = (100, 200, 400)
 STEP_S = 5e-4
 
@@ -124,7 +125,7 @@ def plain(rig: SerialRig, start: Servo) -> Servo:
 
 def main() -> None:
     """Print the tables."""
-    folder = Path(os.environ.get(VARIABLE) or BESIDE)
+    folder = Path(os.environ.get(VARIABLE) or FOLDER)
     files = sorted(folder.glob("kp*.csv"))
     if not files:
         raise SystemExit(f"the XL330's runs are needed: set {VARIABLE} to their folder ({folder} has none)")

@@ -3,7 +3,7 @@
     python scenarios/any_robot.py [FOLDER]
 
 FOLDER holds excitation.parquet (models/tx40/README.md says where it is from); without it, MOCOBOT_TX40_DATA or
-../shared/data/tx40 is used. The same five lines do for any robot in MJCF or URDF and any log of its joints.
+data/tx40 is used. The same five lines do for any robot in MJCF or URDF and any log of its joints.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ from pathlib import Path
 from mocobot import serial
 
 ROOT = Path(__file__).resolve().parents[1]
-BESIDE = ROOT.parent / "shared" / "data" / "tx40"
+FOLDER = ROOT / "data" / "tx40"
 
 
 def main() -> None:
     """Read the model, look at the log, and find out what the model gets wrong."""
-    given = sys.argv[1] if len(sys.argv) > 1 else os.environ.get("MOCOBOT_TX40_DATA", BESIDE)
+    given = sys.argv[1] if len(sys.argv) > 1 else os.environ.get("MOCOBOT_TX40_DATA", FOLDER)
     log = Path(given) / "excitation.parquet"
     if not log.is_file():
         raise SystemExit(f"missing: {log}; models/tx40/README.md says where it is published")

@@ -3,7 +3,7 @@
     python scenarios/emps.py [FOLDER]
 
 FOLDER holds DATA_EMPS.mat and DATA_EMPS_PULSES.mat of nonlinearbenchmark.org; without it, MOCOBOT_EMPS_DATA or
-../shared/data/emps is used.
+data/emps is used.
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from pathlib import Path
 
 from mocobot import emps
 
-BESIDE = Path(__file__).resolve().parents[2] / "shared" / "data" / "emps"
+FOLDER = Path(__file__).resolve().parents[1] / "data" / "emps"
 
 
 def main() -> None:
     """Diagnose the first recording; predict the second with it, and say what is different there."""
-    given = sys.argv[1] if len(sys.argv) > 1 else os.environ.get("MOCOBOT_EMPS_DATA", BESIDE)
+    given = sys.argv[1] if len(sys.argv) > 1 else os.environ.get("MOCOBOT_EMPS_DATA", FOLDER)
     paths = [Path(given) / name for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")]
     if missing := [str(path) for path in paths if not path.is_file()]:
         raise SystemExit(f"missing: {', '.join(missing)}; the recordings are on nonlinearbenchmark.org")

@@ -7,12 +7,12 @@ from pathlib import Path
 
 VARIABLE = "MOCOBOT_EMPS_DATA"
 DATA, PULSES = "DATA_EMPS.mat", "DATA_EMPS_PULSES.mat"
-BESIDE = Path(__file__).resolve().parents[3] / "shared" / "data" / "emps"
+FOLDER = Path(__file__).resolve().parents[2] / "data" / "emps"
 
 
 def data_folder() -> Path | None:
-    """The folder with both recordings: from the environment, or ``../shared/data/emps`` beside the repository."""
-    folder = Path(os.environ.get(VARIABLE) or BESIDE)
+    """The folder with both recordings: from the environment, or ``data/emps`` in the repository."""
+    folder = Path(os.environ.get(VARIABLE) or FOLDER)
     return folder if all((folder / name).is_file() for name in (DATA, PULSES)) else None
 
 
@@ -21,7 +21,7 @@ def needed_folder() -> Path:
     folder = data_folder()
     if folder is None:
         raise SystemExit(
-            f"{DATA} and {PULSES} of nonlinearbenchmark.org are needed: set {VARIABLE} to their folder ({BESIDE} has "
+            f"{DATA} and {PULSES} of nonlinearbenchmark.org are needed: set {VARIABLE} to their folder ({FOLDER} has "
             "none)"
         )
     return folder

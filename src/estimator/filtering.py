@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.signal import butter, sosfiltfilt
 
 from estimator.arrays import Array
 from estimator.errors import InputError
@@ -35,12 +34,16 @@ def low_pass(x: ArrayLike, rate_hz: float, cutoff_hz: float) -> Array:
     sections = _sections(float(rate_hz), float(cutoff_hz))
     # The slowest transient dies as exp(-pi cutoff t): six periods of padding leave 1e-8 of it.
     padding = min(len(x) - 1, math.ceil(6.0 * rate_hz / cutoff_hz))
+    from scipy.signal import sosfiltfilt  # takes 0.4 s to load, and checks and simulations filter nothing
+
     return sosfiltfilt(sections, x, axis=0, padlen=padding)
 
 
 @cache
 def _sections(rate_hz: float, cutoff_hz: float) -> Array:
     """The filter's second-order sections; there are few, and a diagnosis filters a thousand times."""
+    from scipy.signal import butter
+
     return np.asarray(butter(BUTTERWORTH_ORDER, cutoff_hz, fs=rate_hz, output="sos"), dtype=np.float64)
 
 

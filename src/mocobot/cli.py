@@ -32,8 +32,6 @@ COMMANDS = {
 }
 """Options by command; ``mocobot.commands`` has a module of each name, whose ``run`` takes them, and ``mocobot.checks``
 another, whose ``check`` refuses what it can before anything is loaded that takes time."""
-UNCHECKED = {"effects"}
-"""Commands with nothing to be refused so early."""
 NOT_GOOD, REFUSED, INTERRUPTED, CLOSED = 1, 2, 130, 141
 """Exit codes; the last two are 128 and the signal that other programs die of."""
 
@@ -94,8 +92,7 @@ def _run(arguments: Sequence[str]) -> None:
             raise
         raise InputError(f"{error.filename}: cannot be written ({error.strerror})") from error  # a completion
     name = next(name for name, kind in COMMANDS.items() if isinstance(options, kind))
-    if name not in UNCHECKED:
-        import_module(f"mocobot.checks.{name}").check(options)
+    import_module(f"mocobot.checks.{name}").check(options)
     _command(name)(options)
 
 

@@ -187,7 +187,11 @@ def _convert(source: LogSource, how: _How, advance: Callable[[int], object] = la
 
 
 def write_converted(
-    recording: Recording, path: Path, advance: Callable[[int], object] = lambda _: None
+    recording: Recording,
+    path: Path,
+    advance: Callable[[int], object] = lambda _: None,
+    *,
+    replace_bag: bool = False,
 ) -> None:
     """Write a recording at the level of its metadata, as what the target's name says.
 
@@ -195,6 +199,7 @@ def write_converted(
         recording: what to write.
         path: target, see ``output_kind``.
         advance: takes the number of samples written since the last call.
+        replace_bag: whether the folder of a bag that was written here may be replaced.
 
     Raises:
         InputError: it cannot be written.
@@ -208,5 +213,6 @@ def write_converted(
         write_npz(recording, path, level)
     else:
         write_bag(
-            recording, path, level=level, storage="sqlite3" if kind == "sqlite3" else "mcap", advance=advance
-        )
+            recording, path, level=level, storage="sqlite3" if kind == "sqlite3" else "mcap", advance=advance,
+            replace_bag=replace_bag,
+        )  # fmt: skip

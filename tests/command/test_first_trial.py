@@ -211,7 +211,11 @@ OUTPUTS = {
     "convert none.csv rec.parquet": f"rec.parquet: {FORCE}",
     "convert log.csv log.csv --force": "log.csv: is an input; write somewhere else",
     "convert bag bag/new.csv --force": "bag/new.csv: lies in the input bag; write somewhere else",
-    "convert none.csv bag --force": "bag: exists; name a new folder for the bag, or a file with a suffix",
+    "convert none.csv bag":
+        "bag: is a bag of an earlier conversion; give --force to replace it, or name a new folder",
+    "convert none.csv paper --force": "paper: exists and is not a bag of an earlier conversion; name a new folder",
+    "convert none.csv bag --force": "none.csv: there is no such file",
+    "convert bag bag --force": "bag: is an input; write somewhere else",
     "convert none.csv rec.parquet/new.csv": f"rec.parquet/new.csv: {INSIDE}",
     "convert none.csv /proc/new": "/proc/new: cannot be written (...)",
     "inspect none.parquet --json log.csv": f"log.csv: {FORCE}",
@@ -255,7 +259,7 @@ LOGS_ONLY = {
 
 INSPECTED = {
     "none.parquet": "none.parquet: there is no such file",
-    "empty.parquet": "empty.parquet: is named .parquet, but does not begin like one; it is damaged or something else",
+    "empty.parquet": "empty.parquet: not a readable Parquet file, or a damaged one (Parquet file size is 0 bytes)",
     "text.parquet": "text.parquet: is named .parquet, but does not begin like one; it is damaged or something else",
     "folder": "folder: is a directory, and neither a rosbag2 bag nor a LeRobot dataset",
     "log.h5": f"log.h5: is of no known format; a log is {LOGS}",

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from estimator.errors import InputError
-from estimator.files import check_place
-from mocobot.files.targets import check_no_input, check_output, check_there, map_file
+from mocobot.files.targets import check_folder, check_no_input, check_output, check_there, map_file
 from mocobot.options import Convert
 from mocobot_logs.output_kind import output_kind
 
@@ -47,9 +46,13 @@ def check_target(options: Convert, out: Path) -> None:
         check_output(out, _inputs(options), force=options.force)
         return
     check_no_input(out, _inputs(options))
-    check_place(out)
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise InputError(f"{out}: exists; name a new folder for the bag, or a file with a suffix")
+    check_folder(out, _inputs(options), _is_bag, "a bag of an earlier conversion", force=options.force)
+
+
+def _is_bag(folder: Path) -> bool:
+    from mocobot_logs.bag.write import is_written_bag  # numpy, which is of no use where there is no folder
+
+    return is_written_bag(folder)
 
 
 def _inputs(options: Convert) -> list[Path]:

@@ -1,7 +1,10 @@
 """What ``mocobot diagnose`` refuses at once."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
+from discrepancy.cause_names import emps, serial, team
+from discrepancy.causes.excluded import excluded_from
 from discrepancy.inference.odds import check_odds
 from estimator.errors import InputError
 from mocobot.files.targets import (
@@ -14,9 +17,12 @@ from mocobot.files.targets import (
 )
 from mocobot.options import Diagnose
 
+CAUSES = {"team": team.NAMES, "emps": emps.NAMES}
+"""Names of causes by rig."""
+
 
 def check(options: Diagnose) -> None:
-    """Everything that can be refused before a recording is read, but for the names of causes.
+    """Everything that can be refused before a recording is read.
 
     Raises:
         InputError: an option or an output that cannot be met, or a missing file.
@@ -37,6 +43,7 @@ def check(options: Diagnose) -> None:
         inputs += calibration_file(options.calibration)
         check_folder(options.out, inputs, _is_diagnosis, "an earlier diagnosis", force=options.force)
     _check_rig(options)
+    _check_excluded(options.exclude, CAUSES[options.rig])
     check_there(options.rec)
 
 
@@ -51,6 +58,7 @@ def _check_joints(options: Diagnose, model: Path) -> None:
         inputs = [*logs, model, *([options.tolerances] if options.tolerances else [])]
         inputs += [Path(options.map)] if options.map is not None else []
         check_folder(options.out, inputs, _is_diagnosis, "an earlier diagnosis", force=options.force)
+    _check_excluded(options.exclude, serial.NAMES)
     check_there([*logs, model])
 
 
@@ -68,6 +76,12 @@ def _check_rig(options: Diagnose) -> None:
             f"{len(options.rec)} recordings are given; the emps rig takes one and cuts it into blocks that validate "
             "each other"
         )
+
+
+def _check_excluded(excluded: Sequence[str], causes: Sequence[str]) -> None:
+    excluded_from(causes, excluded)
+    if set(causes) <= set(excluded):
+        raise InputError("every cause is excluded; nothing is left to look for")
 
 
 def _is_diagnosis(folder: Path) -> bool:

@@ -9,6 +9,7 @@ from mocobot.api.fits import check_fits
 from mocobot.files.targets import check_folder, check_output
 from mocobot.options import Simulate
 from mocobot.options.simulation import Kind
+from mocobot_sim.effect_names import check_effect_name
 from mocobot_sim.scene.model_files import payload_path
 from mocobot_sim.trial.sidecar import truth_path
 
@@ -43,6 +44,8 @@ def check(options: Simulate) -> None:
             raise InputError(f"--{one} and --{other} are both given; {why}")
     if options.payload is not None and given.suffix != ".xml":
         payload_path(options.payload)
+    for text in options.effect:
+        check_effect_name(text.partition(":")[0])
 
 
 def kinds_of(options: Simulate) -> list[str]:

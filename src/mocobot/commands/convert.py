@@ -31,7 +31,7 @@ def run(options: Convert) -> None:
         check_target(options, target)
     for part, target in zip(parts, names, strict=True):
         with bar(len(part.recording.time), "writing", "sample") as advance:
-            write_converted(part.recording, target, advance)
+            write_converted(part.recording, target, advance, replace_bag=options.force)
     if options.json is not None:
         written = list(zip(parts, names, strict=True))
         write_json(options.json, conversion_dict(str(options.log), written, left_out))

@@ -1,7 +1,7 @@
 """``mocobot diagnose``: read recordings, find out what the simulation gets wrong, report and write it."""
 
 import json
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import nullcontext
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -9,14 +9,11 @@ from typing import Any
 
 from discrepancy.causes.tolerances_file import read_tolerances
 from discrepancy.emps import catalogue as emps_catalogue
-from discrepancy.emps import causes as emps_causes
 from discrepancy.emps.diagnosis import diagnose_emps
 from discrepancy.emps.recording.reader import read_emps
 from discrepancy.result.diagnosed import Diagnosed
-from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnosis import against_truth, diagnose_team
 from discrepancy.team.tolerances import default_tolerances
-from estimator.errors import InputError
 from estimator.files import whole_folder
 from estimator.recording.model import Recording
 from mocobot.api.given import Logs, Robots
@@ -33,9 +30,8 @@ from mocobot_sim.trial.truth import truth_path
 
 @dataclass(frozen=True)
 class _Rig:
-    """What can be diagnosed: names of its causes, its default tolerances, and what reads and diagnoses recordings."""
+    """What can be diagnosed: its default tolerances, and what reads and diagnoses recordings."""
 
-    causes: Collection[str]
     tolerances: Callable[[], Mapping[str, Mapping[str, float]]]
     read: Callable[[Sequence[Path], Logs, Robots], Any]
     diagnose: Callable[..., Diagnosed]
@@ -54,7 +50,6 @@ def run(options: Diagnose) -> None:
     rig = RIGS[options.rig]
     inputs = [*options.rec, *([options.tolerances] if options.tolerances else []), *map_file(options.map)]
     inputs += calibration_file(options.calibration)
-    _check(options.exclude, rig.causes)
     logs, robots = Logs(options.map), Robots(options.calibration)
     tolerances = read_tolerances(options.tolerances, rig.tolerances())
     with whole_folder(options.out) if options.out else nullcontext() as folder:
@@ -83,15 +78,6 @@ def run(options: Diagnose) -> None:
         raise NotGood(f"the verdict is {verdict.replace('_', ' ')}")
 
 
-def _check(excluded: Sequence[str], causes: Collection[str]) -> None:
-    """Causes that do not exist, or are all excluded."""
-    for name in excluded:
-        if name not in causes:
-            raise InputError(f"cause {name!r} does not exist; the causes are {', '.join(causes)}")
-    if set(causes) <= set(excluded):
-        raise InputError("every cause is excluded; nothing is left to look for")
-
-
 def _read(paths: Sequence[Path], logs: Logs, robots: Robots) -> list[Recording]:
     recordings = []
     with bar(len(paths), "reading", "file") as advance:
@@ -116,9 +102,8 @@ def _truth(paths: Sequence[Path]) -> dict[str, Any] | None:
 
 
 RIGS = {
-    "team": _Rig(CAUSES, default_tolerances, _read, diagnose_team),
+    "team": _Rig(default_tolerances, _read, diagnose_team),
     "emps": _Rig(
-        emps_causes.CAUSES,
         emps_catalogue.default_tolerances,
         lambda paths, *_: read_emps(paths[0]),
         diagnose_emps,

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import asdict
 from pathlib import Path
 
-from discrepancy.serial.causes import CAUSES
-from estimator.errors import InputError
 from estimator.files import whole_folder
 from mocobot import serial
 from mocobot.files.provenance import provenance
@@ -28,7 +25,6 @@ def run(options: Diagnose, model: Path) -> None:
         InputError: model, map, logs, tolerances or options that cannot be used, or an output that cannot be written.
         NotGood: with ``strict``, the verdict is neither consistent nor explained.
     """
-    _check(options.exclude)
     robot = serial.read_model(model)
     maps = {serial.map_path(robot, log, options.map) for log in (*options.rec, *options.reference)}
     inputs = [model, *sorted(maps), *options.rec, *options.reference]
@@ -60,12 +56,3 @@ def run(options: Diagnose, model: Path) -> None:
     verdict = found.diagnosis.verdict
     if options.strict and verdict not in ("consistent", "explained"):
         raise NotGood(f"the verdict is {verdict.replace('_', ' ')}")
-
-
-def _check(excluded: Sequence[str]) -> None:
-    """Causes that do not exist, or are all excluded."""
-    for name in excluded:
-        if name not in CAUSES:
-            raise InputError(f"cause {name!r} does not exist; the causes are {', '.join(CAUSES)}")
-    if set(CAUSES) <= set(excluded):
-        raise InputError("every cause is excluded; nothing is left to look for")

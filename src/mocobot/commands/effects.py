@@ -1,10 +1,8 @@
 """``mocobot effects``: what can be hidden in a simulated team, from the effects' own classes."""
 
-import difflib
 import shutil
 import textwrap
 
-from estimator.errors import InputError
 from mocobot.options import Effects
 from mocobot_sim.effects.catalogue import EFFECTS
 from mocobot_sim.effects.spec import EXAMPLE, Allowed, allowed, paragraphs
@@ -13,16 +11,7 @@ WIDEST, INDENT = 100, "    "
 
 
 def run(options: Effects) -> None:
-    """Run the command.
-
-    Raises:
-        InputError: there is no such effect.
-    """
-    for name in options.name:
-        if name not in EFFECTS:
-            close = difflib.get_close_matches(name, EFFECTS, n=1)
-            hint = f"did you mean {close[0]!r}?" if close else f"the effects are {', '.join(EFFECTS)}"
-            raise InputError(f"effect {name!r} does not exist; {hint}")
+    """Run the command."""
     width = min(WIDEST, shutil.get_terminal_size((WIDEST, 24)).columns)
     print("\n".join(_lines(name, width, whole=bool(options.name)) for name in options.name or EFFECTS))
     print(textwrap.fill(f"Hide one with mocobot simulate --effect {EXAMPLE} ...", width))

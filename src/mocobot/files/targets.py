@@ -10,6 +10,7 @@ from pathlib import Path
 
 from estimator.errors import InputError
 from estimator.files import check_place, check_target, system_errors
+from mocobot.files.parquet import check_parquet
 
 CALIBRATION = "calibration.json"
 """The file in the folder of ``mocobot calibrate --out``."""
@@ -32,7 +33,7 @@ def check_recordings(recordings: Sequence[Path]) -> None:
 
 
 def check_there(paths: Sequence[Path]) -> None:
-    """Find out that a file or folder to read is missing; what else may be wrong with it, reading tells.
+    """Find out that a file or folder to read is missing, or cut; what else may be wrong with it, reading tells.
 
     Raises:
         InputError: one is.
@@ -44,6 +45,8 @@ def check_there(paths: Sequence[Path]) -> None:
             raise InputError(f"{path}: there is no such file") from None
         except (OSError, ValueError):
             continue
+        if path.is_file():
+            check_parquet(path)
 
 
 def check_no_team(options: object, names: Sequence[str]) -> None:

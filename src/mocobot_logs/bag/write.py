@@ -79,6 +79,7 @@ def write_bag(
     level: Level = "joint",
     storage: Storage = "mcap",
     advance: Callable[[int], object] = lambda _: None,
+    replace_bag: bool = False,
 ) -> None:
     """Write a recording as a ROS 2 bag; at joint level every sample comes back bit by bit, times to the nanosecond.
 
@@ -89,6 +90,7 @@ def write_bag(
         level: "joint" (phi, theta, tau) or "wrist" (h, theta, force).
         storage: "mcap" or "sqlite3".
         advance: takes the number of samples written since the last call.
+        replace_bag: whether a folder that ``is_written_bag`` may be replaced, once the new one is complete.
 
     Raises:
         InputError: the target exists or cannot be written, times are not within [0, 2^31) s, or level or storage is
@@ -98,14 +100,14 @@ def write_bag(
     for value, allowed, what in ((level, get_args(Level), "level"), (storage, get_args(Storage), "storage")):
         if value not in allowed:
             raise InputError(f"{path}: {what} is {value!r:.40}; it must be one of {', '.join(allowed)}")
-    single = _check_target(path, storage)
+    single = _check_target(path, storage, replace_bag)
     stamps = _stamps(recording)
     name = path.stem if single else path.name
     plugin = StoragePlugin[storage.upper()]
     try:
         with (
             whole_file(path) if single else whole_folder(path) as target,
-            TemporaryDirectory(dir=path.parent, prefix=".") as scratch,
+            TemporaryDirectory(dir=path.parent, prefix=".", suffix=".tmp") as scratch,
         ):
             folder = Path(scratch) / name  # a bag's files are named like its folder
             with _Writer(folder, version=_VERSION, storage_plugin=plugin) as bag:
@@ -122,7 +124,18 @@ def write_bag(
         raise InputError(f"{path}: cannot be written ({detail})") from error
 
 
-def _check_target(path: Path, storage: Storage) -> bool:
+def is_written_bag(folder: Path) -> bool:
+    """Whether a folder holds a bag that ``write_bag`` wrote, and nothing else."""
+    names = {path.name for path in folder.iterdir()}
+    stored = sum(Path(name).suffix in SUFFIXES.values() for name in names)
+    try:
+        told = (folder / "metadata.yaml").read_text(encoding="utf-8")
+    except (OSError, ValueError):
+        return False
+    return len(names) == 2 and stored == 1 and METADATA_TOPIC in told
+
+
+def _check_target(path: Path, storage: Storage, replace_bag: bool) -> bool:
     """Whether the target is a single file."""
     suffix = path.suffix.lower()
     single = suffix in SUFFIXES.values()
@@ -133,7 +146,11 @@ def _check_target(path: Path, storage: Storage) -> bool:
             )
         if single and path.is_dir():
             raise InputError(f"{path}: is a folder; name the file to write")
-        if not single and path.exists() and not (path.is_dir() and not any(path.iterdir())):
+        if (
+            not single
+            and path.exists()
+            and not (path.is_dir() and (not any(path.iterdir()) or (replace_bag and is_written_bag(path))))
+        ):
             what = "is a folder that holds something" if path.is_dir() else "is a file"
             raise InputError(f"{path}: {what}; name a new folder for the bag, or a {SUFFIXES[storage]} file")
         check_place(path)

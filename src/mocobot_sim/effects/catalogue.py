@@ -7,43 +7,16 @@ from typing import Any
 
 from estimator.errors import InputError
 from estimator.strict import Fields
+from mocobot_sim.effect_names import NAMES
 from mocobot_sim.effects.base import PLACE, Effect
 from mocobot_sim.scene.applied import Applied
 from mocobot_sim.scene.scene import TeamScene
-
-NAMES = (
-    "phi_zero",
-    "theta_zero",
-    "link_length",
-    "base_tilt",
-    "base_creep",
-    "base_compliance",
-    "grasp_flex",
-    "grasp_play",
-    "sea_bias",
-    "sea_scale",
-    "sea_hardening",
-    "sea_hysteresis",
-    "joint_friction",
-    "gimbal_friction",
-    "torque_skew",
-    "torque_lag",
-    "sensor_lag",
-    "clock_delay",
-    "tether",
-    "payload_tether",
-    "push",
-    "drag",
-    "slosh",
-    "law",
-)
-"""One file of this folder each; the class in ``sea_bias.py`` is ``SeaBias``."""
 
 EFFECTS: dict[str, type[Effect]] = {
     name: getattr(import_module(f"mocobot_sim.effects.{name}"), name.title().replace("_", ""))
     for name in NAMES
 }
-"""Every effect's class by the name of its cause."""
+"""Every effect's class by the name of its cause; that in ``sea_bias.py`` is ``SeaBias``."""
 
 
 def make_effect(

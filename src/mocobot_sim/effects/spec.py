@@ -1,11 +1,11 @@
 """Effects as one word of a command line, and what such a word may say."""
 
-import difflib
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
 from estimator.errors import InputError
+from mocobot_sim.effect_names import check_effect_name
 from mocobot_sim.effects.base import JOINTS, PLACE, Effect
 from mocobot_sim.effects.catalogue import EFFECTS, make_effect
 
@@ -74,10 +74,7 @@ def parse_effect(text: str) -> Effect:
         InputError: no such effect, or a number that is unknown, missing, no number, or out of its range.
     """
     cause, colon, rest = text.partition(":")
-    if cause not in EFFECTS:
-        close = difflib.get_close_matches(cause, EFFECTS, n=1)
-        hint = f"did you mean {close[0]!r}?" if close else f"the effects are {', '.join(EFFECTS)}"
-        raise InputError(f"effect {cause!r} does not exist; {hint}")
+    check_effect_name(cause)
     known = allowed(EFFECTS[cause])
     names = {short: each for each in known for short in (each.short, each.name)}
     values: dict[str, float | str] = {}

@@ -3,6 +3,7 @@
 import dataclasses
 import io
 import json
+import os
 import resource
 import signal
 import sqlite3
@@ -20,7 +21,7 @@ from estimator.arm.delta import forward_kinematics
 from estimator.errors import InputError
 from estimator.recording.model import Recording
 from mocobot_logs.bag.read import METADATA_TOPIC, open_bag
-from mocobot_logs.bag.write import write_bag
+from mocobot_logs.bag.write import is_written_bag, write_bag
 from mocobot_logs.log import CHANNELS, REF, collect
 from mocobot_logs.map.files import builtin_map
 from mocobot_logs.resample.log import resample
@@ -218,6 +219,60 @@ def test_targets_that_cannot_be_written(tmp_path):
     refused(tmp_path, "level is 'hand'; it must be one of joint, wrist", tmp_path / "a", level="hand")
     refused(tmp_path, "cannot be written", tmp_path / ("n" * 300))
     refused(tmp_path, "cannot be written", tmp_path / "a\0b")
+
+
+def killed_after(samples, recording, path, **options):
+    """Write a bag in a process that kills itself once so many samples are written."""
+    child = os.fork()
+    if child == 0:
+        done = []
+
+        def advance(count):
+            done.append(count)
+            if sum(done) >= samples:
+                os.kill(os.getpid(), signal.SIGKILL)
+
+        write_bag(recording, path, advance=advance, **options)
+        os._exit(0)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+
+
+@pytest.mark.parametrize("storage", STORAGES)
+@pytest.mark.parametrize("single", [True, False])
+def test_a_killed_run_leaves_nothing_at_its_place(tmp_path, storage, single):
+    recording = small_recording(rows=200)
+    path = tmp_path / ("lab" + (SUFFIX[storage] if single else ""))
+    for samples in (1, 200):
+        assert killed_after(samples, recording, path, storage=storage) == -signal.SIGKILL
+        left = [entry.name for entry in tmp_path.iterdir()]
+        assert left
+        assert all(name.startswith(".") and name.endswith(".tmp") for name in left), left
+    write_bag(recording, path, storage=storage)
+    assert collect(open_bag(path)).robots == 3
+
+
+def test_an_earlier_bag_is_replaced_only_if_asked_and_only_once_the_new_one_is_complete(tmp_path):
+    path, old, new = tmp_path / "lab", small_recording(rows=20), small_recording(rows=60)
+    write_bag(old, path)
+    refused(tmp_path, "is a folder that holds something; name a new folder", path)
+    before = {entry.name: entry.read_bytes() for entry in path.iterdir()}
+    assert killed_after(1, new, path, replace_bag=True) == -signal.SIGKILL
+    assert {entry.name: entry.read_bytes() for entry in path.iterdir()} == before
+    write_bag(new, path, storage="sqlite3", replace_bag=True)
+    assert sorted(entry.name for entry in path.iterdir()) == ["lab.db3", "metadata.yaml"]
+    assert [len(stream.stamp_ns) for stream in collect(open_bag(path)).streams] == [60] * 3
+
+
+def test_other_peoples_bags_are_not_replaced(tmp_path):
+    ours, theirs, more = (tmp_path / name for name in ("ours", "theirs", "more"))
+    for path in (ours, theirs, more):
+        write_bag(small_recording(rows=20), path)
+    told = (theirs / "metadata.yaml").read_text()
+    (theirs / "metadata.yaml").write_text(told.replace(METADATA_TOPIC, "/robot/description"))
+    (more / "thesis").write_text("mine")
+    assert [is_written_bag(path) for path in (ours, theirs, more)] == [True, False, False]
+    for path in (theirs, more):
+        refused(tmp_path, "is a folder that holds something", path, replace_bag=True)
 
 
 def test_recordings_that_do_not_fit(tmp_path):

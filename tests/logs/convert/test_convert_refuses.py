@@ -266,7 +266,7 @@ def test_a_log_is_never_overwritten(tmp_path: Path, log: Path, refused: Callable
     ):
         message = refused(source, target, *options)
         assert "; write somewhere else" in message
-    assert "exists; name a new folder" in refused(inside, folder)
+    assert "which would be lost; name another folder" in refused(inside, folder)
 
 
 @pytest.mark.parametrize(
@@ -280,8 +280,8 @@ def test_a_log_is_never_overwritten(tmp_path: Path, log: Path, refused: Callable
         ("folder.mcap", "is a folder; name the file to write"),
         ("log.parquet/rec.csv", "log.parquet is a file)"),
         ("x" * 300 + ".csv", "cannot be written"),
-        ("file", "exists; name a new folder for the bag"),
-        ("full", "exists; name a new folder for the bag"),
+        ("file", "is a file; name a folder to write"),
+        ("full", "exists and is not a bag of an earlier conversion; name a new folder"),
     ],
 )
 def test_targets_that_cannot_be(

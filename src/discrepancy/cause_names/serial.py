@@ -1,0 +1,31 @@
+"""Names of a tree's causes, each that of its file in ``discrepancy.serial.causes``."""
+
+NAMES = (
+    "friction",
+    "asymmetric_coulomb",
+    "asymmetric_viscous",
+    "stribeck",
+    "sublinear_friction",
+    "load_friction",
+    "back_emf",
+    "coupled_drive",
+    "armature",
+    "torque_offset",
+    "torque_scale",
+    "torque_delay",
+    "joint_zero",
+    "ripple",
+    "spring",
+    "counterbalance",
+    "elasticity",
+    "backlash",
+    "payload",
+    "link_mass",
+    "link_com",
+    "link_inertia",
+    "link_length",
+    "gravity_direction",
+    "gravity_compensation",
+    "push",
+)
+"""In the order of the documentation."""

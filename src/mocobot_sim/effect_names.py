@@ -1,0 +1,45 @@
+"""Names of the effects: to refuse a wrong one takes neither MuJoCo nor the effects themselves."""
+
+import difflib
+
+from estimator.errors import InputError
+
+NAMES = (
+    "phi_zero",
+    "theta_zero",
+    "link_length",
+    "base_tilt",
+    "base_creep",
+    "base_compliance",
+    "grasp_flex",
+    "grasp_play",
+    "sea_bias",
+    "sea_scale",
+    "sea_hardening",
+    "sea_hysteresis",
+    "joint_friction",
+    "gimbal_friction",
+    "torque_skew",
+    "torque_lag",
+    "sensor_lag",
+    "clock_delay",
+    "tether",
+    "payload_tether",
+    "push",
+    "drag",
+    "slosh",
+    "law",
+)
+"""One file of ``mocobot_sim.effects`` each, in the order in which they are listed."""
+
+
+def check_effect_name(name: str) -> None:
+    """Find out that there is no such effect.
+
+    Raises:
+        InputError: there is none.
+    """
+    if name not in NAMES:
+        close = difflib.get_close_matches(name, NAMES, n=1)
+        hint = f"did you mean {close[0]!r}?" if close else f"the effects are {', '.join(NAMES)}"
+        raise InputError(f"effect {name!r} does not exist; {hint}")
