@@ -29,7 +29,8 @@ RATE_HZ, TIMESTEP_S, SECONDS = 500.0, 5e-4, 60.0
 BANDWIDTH_PER_S = 15.0
 """Of the controller, critically damped."""
 
-INERTIA_SHARE, ZERO_RAD, LENGTH_M, SCALE_SHARE, DELAY_S, LEVEL_RAD = 0.1, 2e-3, 1e-3, 0.02, 5e-4, 5e-3
+INERTIA_SHARE, ROTOR_SHARE, SCALE_SHARE = 0.1, 0.03, 0.02
+ZERO_RAD, LENGTH_M, DELAY_S, LEVEL_RAD = 2e-3, 1e-3, 5e-4, 5e-3
 """A healthy arm: standard deviations of what its model has wrong, as ``docs/serial/method.md`` says."""
 
 
@@ -105,7 +106,7 @@ def healthy(rng: np.random.Generator, times: float = 1.0) -> Healthy:
     tilt = times * LEVEL_RAD * rng.standard_normal(2)
     spec.option.gravity = 9.81 * np.array([tilt[0], tilt[1], -np.sqrt(1.0 - tilt @ tilt)])
     for joint in spec.joints:
-        joint.armature *= max(1.0 + times * INERTIA_SHARE * rng.standard_normal(), 0.3)
+        joint.armature *= max(1.0 + times * ROTOR_SHARE * rng.standard_normal(), 0.3)
         joint.solref_friction, joint.solimp_friction = [0.002, 1.0], [0.99, 0.999, 0.001, 0.5, 2.0]
     zero, scale, delay = (size * times * rng.standard_normal(7) for size in (ZERO_RAD, SCALE_SHARE, DELAY_S))
     return Healthy(spec, zero, 1.0 + scale, delay)

@@ -164,17 +164,18 @@ def misses(results: Iterable[Item]) -> str:
             lines.append(f"{r['seed']} {r['kind']}: {r['error'].splitlines()[-1]}")
             continue
         one = score(r)
-        if not one.whole:
-            hidden = "; ".join(f"{e['name']}={e['cause']}/{e['joint']} x{e['factor']:.1f} ({e['size']:.3g}){'' if h else ' NOT FOUND'}"
-                               for e, h in zip(r["truth"]["effects"], one.hits, strict=True))  # fmt: skip
-            named = "; ".join(
-                f"{n['cause']}/{n.get('joint')} {100 * n['probability']:.0f} %"
-                for n in r["verdict"]["causes"]
-            )
-            left = r["verdict"]["residual"]["chi2_per_n"]
-            lines.append(
-                f"{r['seed']} {r['kind']}: {hidden or 'nothing'} | {r['verdict']['verdict']}: {named or 'nothing'} | chi2/n {left:.2f}, {r['cpu_s']:.0f} s"
-            )
+        if one.whole:
+            continue
+        hidden = [
+            f"{e['name']} = {e['cause']}/{e['joint']} x{e['factor']:.1f} ({e['size']:.3g}){'' if hit else ' not found'}"
+            for e, hit in zip(r["truth"]["effects"], one.hits, strict=True)
+        ]
+        verdict = r["verdict"]
+        named = [f"{n['cause']}/{n.get('joint')} {100 * n['probability']:.0f} %" for n in verdict["causes"]]
+        lines.append(
+            f"{r['seed']} {r['kind']}: {'; '.join(hidden) or 'nothing'} | {verdict['verdict']}: "
+            f"{'; '.join(named) or 'nothing'} | chi2/n {verdict['residual']['chi2_per_n']:.2f}, {r['cpu_s']:.0f} s"
+        )
     return "\n".join(lines)
 
 

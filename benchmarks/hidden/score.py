@@ -86,8 +86,9 @@ def _score(item: Item | None, effect: Item, truth: Item) -> Score:
     )
 
 
-def _family(item: Item) -> str:
-    return CAUSES[item["cause"]].family
+def _family(item: Item) -> str | None:
+    """Of a cause; a law has none."""
+    return CAUSES[item["cause"]].family if item["cause"] in CAUSES else None
 
 
 def _same_place(item: Item, effect: Item, truth: Item) -> bool:

@@ -11,11 +11,11 @@ import pytest
 
 from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.serial.diagnosis import diagnose_serial
-from discrepancy.serial.model import SerialModel
+from discrepancy.serial.model import SerialModel, load_model
 from discrepancy.serial.rig import SerialRig
 from estimator.errors import InputError
 from mocobot_sim.serial.extended import load_effects, step
-from serial_made import a_little_off, nominal, nothing, simulated, spec
+from serial_made import ARM, a_little_off, nominal, nominal_file, nothing, simulated, spec
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +59,25 @@ def test_friction_is_found_at_its_joint(model: SerialModel) -> None:
     for name, truth in (("coulomb_Nm", 0.5), ("viscous_Nms_per_rad", 0.3)):
         assert numbers(found)[name]["value"] == pytest.approx(truth, abs=0.01)
     assert "joint 3 (elbow)" in str(found).lower()
+
+
+def test_friction_that_the_model_names_is_no_news(tmp_path: Path) -> None:
+    """Neither where joints turn round, nor in the reading of a torque that is off within its tolerance."""
+    rubs = ARM.replace("armature=", 'frictionloss="0.15" damping="0.2" armature=')
+    hidden = a_little_off(spec(rubs), np.random.default_rng(107))
+    for joint in hidden.joints:
+        joint.solref_friction, joint.solimp_friction = [0.002, 1.0], [0.99, 0.999, 0.001, 0.5, 2.0]
+    scale = np.array([1.03, 0.98, 1.04, 0.97])
+    log = simulated(hidden.compile(), 7, read=lambda q, torque: (q, torque * scale))
+    found = diagnose_serial(load_model(nominal_file(tmp_path, rubs)), [log])
+    assert not named(found)
+    assert found.diagnosis.verdict == "consistent"
+
+
+def test_rotors_that_the_model_names_are_off_as_its_masses_are(model: SerialModel) -> None:
+    rig = SerialRig.of(model, [simulated(real(100).compile(), 0)])
+    rotors = [c for c in rig.candidates() if c.cause == "armature"]
+    assert [c.parameters[0].tolerance for c in rotors] == pytest.approx([6e-3, 7.5e-3, 3.6e-3, 9e-4])
 
 
 def test_rotor_is_found_at_its_joint(model: SerialModel) -> None:
