@@ -14,7 +14,7 @@ WORK_RATIO = 4.0
 CUTOFF_HZ = 20.0
 """Cut-off of the rows. Chosen: arms move below 5 Hz, and bend from some 10 Hz on."""
 LOAD_CUTOFF_SHARE = 0.35
-"""Of that, for a load that is differentiated twice. Chosen: arms move below 5 Hz, and the load of their links with them;
+"""Of that, for a load that is differentiated twice. Chosen: arms move below 5 Hz, and so does the load of their links;
 noise of the trace falls with the fourth power."""
 CUTOFF_SHARE = 0.15
 """The same over the sampling rate, at most. Chosen."""

@@ -38,7 +38,7 @@ class Tally:
         self.gaps = self.filled = 0
         self.longest_gap_s = self.jitter_max_s = 0.0
         self._where, self._period_ns, self._max_gap_s = where, grid.period_ns, max_gap_s
-        self._intervals, self._squares = 0, 0.0
+        self._intervals, self._squares, self._span_ns = 0, 0.0, 0
 
     @property
     def jitter_rms_s(self) -> float:
@@ -68,6 +68,7 @@ class Tally:
             )
         jitter_s = (interval - periods * self._period_ns) * NS
         self._intervals += len(interval)
+        self._span_ns += int(np.sum(interval))
         self.filled += int(np.sum(periods - 1))
         self.gaps += int(np.sum(periods > 1))
         self.longest_gap_s = max(
@@ -82,11 +83,13 @@ class Tally:
         Raises:
             InputError: too many are missing, or crowd.
         """
-        expected = rows + self.filled
-        if self.filled > MOST_MISSING * expected:
+        # Uneven stamps leave intervals that are long, and as many that are short; samples that are lost leave fewer.
+        missing = min(self.filled, round(self._span_ns / self._period_ns) + 1 - rows)
+        expected = rows + missing
+        if missing > MOST_MISSING * expected:
             raise InputError(
-                f"{self._where}: {self.filled} of {expected} samples are missing "
-                f"({100 * self.filled / expected:.3g} %); at most {100 * MOST_MISSING:g} % may be "
+                f"{self._where}: {missing} of {expected} samples are missing "
+                f"({100 * missing / expected:.3g} %); at most {100 * MOST_MISSING:g} % may be "
                 "(convert --crop keeps a part of the log)"
             )
         if merged > MOST_MISSING * rows:

@@ -98,6 +98,14 @@ def test_a_third_of_the_samples_missing():
     assert "at most 10 % may be" in message
 
 
+def test_uneven_stamps_are_no_loss():
+    """125 Hz, a third of the period of jitter: one interval in nine is long, and as many are short."""
+    time = np.sort(np.arange(6000) / 125.0 + 2.4e-3 * np.random.default_rng(2).standard_normal(6000))
+    uneven = stream(time - time[0], tones(time, [1.0]))
+    report = resample(ArrayLog([uneven]), 100.0).reports[0]
+    assert report.filled > 660  # by intervals, more than a tenth
+
+
 def test_a_rate_that_changes():
     """100 Hz first, then 1 kHz: its own filter would not hold for the second part."""
     time = np.concatenate(
