@@ -57,7 +57,9 @@ def build(spec: mujoco.MjSpec, effects: Sequence[Effect], step_s: float) -> Buil
     model.opt.integrator, model.opt.timestep = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST), step_s
     model.dof_solref[:], model.dof_solimp[:] = SOLREF, SOLIMP
     stepped = [e for e, said in zip(effects, inside, strict=True) if not said and steps(e)]
-    left_out = [k for k, (e, said) in enumerate(zip(effects, inside, strict=True)) if not said and not steps(e)]
+    left_out = [
+        k for k, (e, said) in enumerate(zip(effects, inside, strict=True)) if not said and not steps(e)
+    ]
     return Built(model, tuple(stepped), tuple(left_out))
 
 

@@ -10,8 +10,8 @@ from mocobot_sim.serial.effects import DRY, RobotEffect
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 SOLREF, SOLIMP = (0.002, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0)
-"""Of dry friction. With MuJoCo's defaults it grows with the speed up to about loss / (100 / s inertia), 0.2 rad/s for 20 N m
-on 1 kg m^2; with these up to a tenth of that, for steps of up to 1 ms."""
+"""Of dry friction. With MuJoCo's defaults it grows with the speed up to about loss / (100 / s inertia), 0.2 rad/s for
+20 N m on 1 kg m^2; with these up to a tenth of that, for steps of up to 1 ms."""
 
 
 def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:

@@ -15,7 +15,7 @@ from mocobot_sim.serial.extended import step
 Drive = Callable[[float, Array, Array], Array]
 """Torques at the joints (J,) by time [s], positions and velocities (J,)."""
 MOST_SPEED = 1e4
-"""Beyond which a run is not followed [rad/s or m/s]: no joint is a hundredth as fast, and MuJoCo's numbers still are some."""
+"""Beyond which a run is not followed [rad/s or m/s]: no joint is a hundredth as fast, and MuJoCo still has numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,8 +24,8 @@ class Start:
 
     Attributes:
         time: [s].
-        q, dq, ddq: positions, velocities and accelerations, shape (J,) each; the latter are what friction by load
-            begins with.
+        q, dq, ddq: positions, velocities and accelerations, shape (J,) each; with the latter the integration is
+            centred, and friction by load begins.
     """
 
     time: float
@@ -48,7 +48,9 @@ def rollout(built: Built, start: Start, drive: Drive, samples: int, every: int) 
     """
     model = built.model
     data, effects = mujoco.MjData(model), built.running()
-    data.time, data.qpos[:], data.qvel[:], data.qacc[:] = start.time, start.q, start.dq, start.ddq
+    data.time, data.qpos[:], data.qacc[:] = start.time, start.q, start.ddq
+    # MuJoCo's positions go on with the velocity after a step: from half a step before, errors are of second order.
+    data.qvel[:] = start.dq - 0.5 * model.opt.timestep * start.ddq
     out = np.empty((samples + 1, model.nq))
     out[0] = start.q
     for k in range(1, samples + 1):

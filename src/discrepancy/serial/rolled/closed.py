@@ -15,8 +15,8 @@ from discrepancy.serial.rolled.fitted import Fitted, by_the_others, nominal, ste
 from discrepancy.serial.rolled.free import bounds, compared
 from discrepancy.serial.rolled.readings import LoggedTorques, Readings
 from discrepancy.serial.rolled.starts import usable
-from discrepancy.serial.servo.commanded import Commanded, Servo, servo_of
 from discrepancy.serial.rows.signals import Signals
+from discrepancy.serial.servo.commanded import Commanded, Servo, servo_of
 from discrepancy.serial.servo.loop import LoopLaw, loop_laws
 from estimator.arrays import Array
 from estimator.errors import InputError
@@ -31,14 +31,14 @@ class LoopRun:
         name: of the block.
         seconds: how much of it.
         motion: standard deviation of the measured positions [rad or m], shape (J,).
-        before, after: rms of simulated minus measured positions, shape (J,); None where the run diverged, and after
-            where nothing is named.
+        before, after: rms of simulated minus measured positions, shape (J,), NaN of a joint that diverged; after is
+            None where nothing is named.
     """
 
     name: str
     seconds: float
     motion: Array
-    before: Array | None
+    before: Array
     after: Array | None
 
 
@@ -122,7 +122,7 @@ def closed_loop(rig: SerialRig, explanation: Explanation) -> ClosedLoop | str:
             try:
                 after = _rms(s, piece, servos, by_the_others(rig, explanation, trial, step_s), every, limit)
             except InputError:
-                after = None
+                after = np.full(len(names), np.nan)
         seconds = (piece.stop - piece.start - 1) / s.rate_hz
         runs.append(LoopRun(rig.trials[trial], seconds, np.std(s.q[piece], axis=0), before, after))
     return ClosedLoop(joints, tuple(runs)) if runs else why
@@ -154,14 +154,12 @@ def _known(s: Signals, servos: Sequence[Servo]) -> NDArray[np.bool_]:
     return here & usable(s) if len(at) < s.q.shape[1] else here
 
 
-def _rms(
-    s: Signals, piece: slice, servos: Sequence[Servo], robot: Fitted, every: int, limit: Array
-) -> Array | None:
+def _rms(s: Signals, piece: slice, servos: Sequence[Servo], robot: Fitted, every: int, limit: Array) -> Array:
     first = piece.start
     start = Start(float(s.time[first]), s.q[first], s.dq[first], s.ddq[first])
     drive = LoopDrive.of(s.log, servos, robot.readings)
     error = compared(start, robot, drive, s.q[piece], every, limit)
-    return np.sqrt(np.mean(error**2, axis=0)) if np.isfinite(error).all() else None
+    return np.sqrt(np.mean(error**2, axis=0))
 
 
 def longest(good: NDArray[np.bool_], block: slice) -> slice:

@@ -83,12 +83,16 @@ def by_the_others(rig: SerialRig, explanation: Explanation, trial: int, step_s: 
     lasting = [item for item in explanation.found if item.candidate.transient is None]
     own = [item.candidate.transient for item in explanation.found if item.candidate.transient is not None]
     # Events of the other blocks are there when those are fitted.
-    used = [i.index for i in explanation.found if i.candidate.transient is None or not i.candidate.acts_in(trial)]
+    used = [
+        i.index for i in explanation.found if i.candidate.transient is None or not i.candidate.acts_in(trial)
+    ]
     fit = Fit.of(problem, used, others)
     told = [replace(item, values=_values(fit, item)) for item in lasting]
     done = extended(rig, told, step_s)
     events = tuple(event for event in own if event.trial == trial)
-    names = dict.fromkeys([*done.left_out, *(i.candidate.label for i in explanation.found if i.candidate.transient)])
+    names = dict.fromkeys(
+        [*done.left_out, *(i.candidate.label for i in explanation.found if i.candidate.transient)]
+    )
     return replace(done, left_out=tuple(names), events=events)
 
 

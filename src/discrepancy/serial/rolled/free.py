@@ -26,23 +26,40 @@ class Horizon:
     Attributes:
         seconds: how far.
         before, after: simulated minus measured with the given and with the extended model [rad or m], shape (S, J); NaN
-            where a rollout diverged. After is None where nothing is named.
+            where a joint diverged. After is None where nothing is named.
     """
 
     seconds: float
     before: Array
     after: Array | None
 
-    def diverged(self, errors: Array) -> int:
-        """How many rollouts diverged."""
-        return int(np.sum(np.isnan(errors).any(axis=1)))
+    def removed(self) -> Array:
+        """Share of the rms error that is gone, by joint, over the starts at which it diverged in neither, shape (J,).
 
-    def rms(self, errors: Array) -> Array | None:
-        """Root mean square by joint over the starts of which no rollout diverged, shape (J,); None without any."""
-        bad = np.isnan(self.before).any(axis=1)
-        if self.after is not None:
-            bad |= np.isnan(self.after).any(axis=1)
-        return None if bad.all() else np.sqrt(np.mean(errors[~bad] ** 2, axis=0))
+        NaN where those are too few, or nothing is named.
+        """
+        if self.after is None:
+            return np.full(self.before.shape[1], np.nan)
+        both = np.isfinite(self.before) & np.isfinite(self.after)
+        before, after = (rms(np.where(both, errors, np.nan)) for errors in (self.before, self.after))
+        return 1.0 - after / np.where(before > 0, before, np.nan)
+
+
+def diverged(errors: Array) -> Array:
+    """How often every joint diverged, shape (J,)."""
+    return np.isnan(errors).sum(axis=0)
+
+
+def rms(errors: Array) -> Array:
+    """Root mean square by joint over the starts at which it did not diverge, shape (J,).
+
+    NaN where it diverged at more than ``MOST_DIVERGED`` of them.
+    """
+    good = np.isfinite(errors)
+    count = good.sum(axis=0)
+    count = np.where(count >= (1.0 - rules.MOST_DIVERGED) * len(errors), count, 0)
+    square = np.sum(np.where(good, errors, 0.0) ** 2, axis=0)
+    return np.sqrt(square / np.where(count, count, np.nan))
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +112,9 @@ def free_rollouts(rig: SerialRig, explanation: Explanation) -> FreeRollouts:
             reach = [h for h, n in ahead.items() if n <= start.reach]
             at = np.array([ahead[h] for h in reach])
             before, after = (
-                _errors(s, which, start.sample, at, every, limit) if which else np.full((len(at), len(limit)), np.nan)
+                _errors(s, which, start.sample, at, every, limit)
+                if which
+                else np.full((len(at), len(limit)), np.nan)
                 for which in (given, found)
             )
             for h, a, b in zip(reach, before, after, strict=True):
@@ -124,9 +143,14 @@ def _errors(s: Signals, robot: Fitted, first: int, at: Array, every: int, limit:
 
 
 def compared(
-    start: Start, robot: Fitted, drive: Callable[[float, Array, Array], Array], measured: Array, every: int, limit: Array
+    start: Start,
+    robot: Fitted,
+    drive: Callable[[float, Array, Array], Array],
+    measured: Array,
+    every: int,
+    limit: Array,
 ) -> Array:
-    """Simulated minus measured positions, shape (n, J); NaN from where a joint is off by more than it may.
+    """Simulated minus measured positions, shape (n, J); NaN of a joint from where it is off by more than it may.
 
     Args:
         start: where the robot is.
@@ -139,7 +163,5 @@ def compared(
     there = rollout(robot.built, start, drive, len(measured) - 1, every)
     error = np.full(measured.shape, np.nan)
     error[: len(there)] = there - measured[: len(there)]
-    off = ~(np.abs(error) <= limit).all(axis=1)
-    if off.any():
-        error[int(np.argmax(off)) :] = np.nan
+    error[np.maximum.accumulate(~(np.abs(error) <= limit), axis=0)] = np.nan
     return error

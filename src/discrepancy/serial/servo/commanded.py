@@ -38,7 +38,7 @@ class Servo:
 def servo_of(
     log: JointLog, j: int, motors: Sequence[Motor], laws: Sequence[LoopLaw], name: str
 ) -> Servo | str:
-    """The loop of one joint by the map's gains or, where these are a firmware's, by what logs have; or why there is none.
+    """The loop of a joint by the map's gains or, where these are a firmware's, by what logs have; or why there is none.
 
     Args:
         log: with the commands.
