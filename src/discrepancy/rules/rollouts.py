@@ -10,7 +10,7 @@ DIVERGED_RAD = 3.141592653589793
 """How far off a joint that turns may be. Derived: from half a turn on its angle says nothing of where the link is.
 A joint that slides may be off by the extent of the model, or by its own travel in the log if that is more."""
 MOST_DIVERGED = 0.5
-"""Share of the starts at which a joint may diverge for its error over the others to be told. Chosen: those that are left
+"""Share of the starts at which a joint may diverge for its error over the others to be told. Chosen: those left
 are the easy ones."""
 EDGE_PERIODS = 2.5
 """Usable samples before a start and after an end, in periods of the smoothing. Derived: as long as its filter
