@@ -48,7 +48,8 @@ def rolled(*, named: bool = True) -> dict[str, Any]:
                 {"name": "two", "seconds": 6.0, "motion": [0.5, 0.1], "before": [None, 0.002],
                  "after": [0.02, 0.001] if named else None},
             ],
-            "before": [0.03, 0.002], "after": [0.02, 0.001] if named else None, "removed": [0.33, 0.5] if named else None,
+            "before": [0.03, 0.002], "after": [0.02, 0.001] if named else None,
+            "removed": [0.33, 0.5] if named else None,
         },
     }  # fmt: skip
 

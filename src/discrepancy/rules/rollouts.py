@@ -4,6 +4,8 @@ HORIZONS_S = (0.1, 0.2, 0.5)
 """How far ahead a robot is rolled out. Chosen: from where friction tells to where an arm has turned round."""
 MOST_STARTS = 60
 """Of rollouts in all blocks together. Chosen: root mean squares are known to a tenth then, and it takes seconds."""
+MOST_LOOP_S = 100.0
+"""Of closed loops in all blocks together, each as long as the others. Chosen: they take seconds, too."""
 LONGEST_STEP_S = 1e-3
 """Of MuJoCo's integration. Chosen: a twentieth of the period of what the rows' low-pass leaves."""
 DIVERGED_RAD = 3.141592653589793

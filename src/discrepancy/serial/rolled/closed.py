@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy.engine.explanation import Explanation
+from discrepancy.rules import rollouts as rules
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
 from discrepancy.serial.rolled.fitted import Fitted, by_the_others, nominal, steps_per
@@ -111,6 +112,8 @@ def closed_loop(rig: SerialRig, explanation: Explanation) -> ClosedLoop | str:
             why = next(servo for servo in each if isinstance(servo, str))
             continue
         piece = longest(_known(s, servos), part.blocks[k])
+        longest_run = int(rules.MOST_LOOP_S / len(rig.trials) * s.rate_hz)
+        piece = slice(piece.start, min(piece.stop, piece.start + longest_run))
         if piece.stop - piece.start < 2:
             why = f"{rig.trials[trial]}: its commands are not known"
             continue

@@ -95,10 +95,16 @@ def free_rollouts(rig: SerialRig, explanation: Explanation) -> FreeRollouts:
     left_out: dict[str, None] = {}
     refused: list[str] = []
     total = sum((b.stop - b.start) / part.signals.rate_hz for part in rig.parts for b in part.blocks)
-    limit = bounds(rig)
+    limit, passed = bounds(rig), 0.0
     for trial, (part, k) in enumerate(rig.block_of):
         s = part.signals
         every, ahead = steps_per(1.0 / s.rate_hz), _ahead(s.rate_hz)
+        apart = max(1, round(total / rules.MOST_STARTS * s.rate_hz))
+        first = -round(passed * s.rate_hz) % apart  # as if the blocks were one
+        passed += (part.blocks[k].stop - part.blocks[k].start) / s.rate_hz
+        block = slice(part.blocks[k].start + first, part.blocks[k].stop)
+        if block.start >= block.stop:
+            continue
         step_s = 1.0 / s.rate_hz / every
         given, found = nominal(rig, step_s), None
         try:
@@ -107,8 +113,7 @@ def free_rollouts(rig: SerialRig, explanation: Explanation) -> FreeRollouts:
         except InputError as error:
             refused.append(f"{rig.trials[trial]}: {error}")
         good = without(s, usable(s), [] if found is None else found.events)
-        apart = max(1, round(total / rules.MOST_STARTS * s.rate_hz))
-        for start in starts(part.blocks[k], good, apart, max(ahead.values()), min(ahead.values())):
+        for start in starts(block, good, apart, max(ahead.values()), min(ahead.values())):
             reach = [h for h, n in ahead.items() if n <= start.reach]
             at = np.array([ahead[h] for h in reach])
             before, after = (

@@ -46,7 +46,7 @@ def starts(block: slice, good: NDArray[np.bool_], apart: int, longest: int, leas
     """Starts every so many samples of a block that reach at least some samples and stay inside.
 
     Args:
-        block: samples of the block.
+        block: samples of the block, from the first start on.
         good: samples of the log that can be used.
         apart: samples between starts.
         longest: samples of the longest rollout.
