@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discrepancy.engine.explanation import Explanation
 from discrepancy.rules import rollouts as rules
@@ -115,7 +116,7 @@ def free_rollouts(rig: SerialRig, explanation: Explanation) -> FreeRollouts:
         good = without(s, usable(s), [] if found is None else found.events)
         for start in starts(block, good, apart, max(ahead.values()), min(ahead.values())):
             reach = [h for h, n in ahead.items() if n <= start.reach]
-            at = np.array([ahead[h] for h in reach])
+            at = np.array([ahead[h] for h in reach], dtype=np.intp)
             before, after = (
                 _errors(s, which, start.sample, at, every, limit)
                 if which
@@ -139,7 +140,7 @@ def _horizons(errors: dict[float, list[tuple[Array, Array]]], *, named: bool) ->
             yield Horizon(seconds, before, after if named else None)
 
 
-def _errors(s: Signals, robot: Fitted, first: int, at: Array, every: int, limit: Array) -> Array:
+def _errors(s: Signals, robot: Fitted, first: int, at: NDArray[np.intp], every: int, limit: Array) -> Array:
     """Simulated minus measured positions at some samples after a start, shape (len(at), J); NaN once it diverged."""
     torques = LoggedTorques.of(s.log, robot.readings)
     start = Start(float(s.time[first]), s.q[first], s.dq[first], s.ddq[first])

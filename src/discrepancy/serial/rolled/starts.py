@@ -30,8 +30,10 @@ class Start:
 def usable(signals: Signals) -> NDArray[np.bool_]:
     """Samples whose torques and motion are known at all joints, with all that the smoothing has seen, shape (W,)."""
     margin = math.ceil(rules.EDGE_PERIODS / smoothing_hz(signals.log.rate_hz) * signals.rate_hz)
-    bad = ~signals.usable.all(axis=1)
-    return ~(np.convolve(bad, np.ones(2 * margin + 1), mode="full")[margin : margin + len(bad)] > 0.5)
+    bad = np.logical_not(signals.usable).any(axis=1)
+    return ~(
+        np.convolve(bad, np.ones(2 * margin + 1), mode="full")[margin : margin + len(signals.time)] > 0.5
+    )
 
 
 def without(signals: Signals, good: NDArray[np.bool_], events: Sequence[Transient]) -> NDArray[np.bool_]:
