@@ -6,112 +6,48 @@ Needs the published runs (``models/xl330/README.md`` says where they are from): 
 ``data/xl330`` or set MOCOBOT_XL330_DATA to their folder.
 For every gain the runs of the other two are diagnosed; what is named there, and the loop's law, foretell the held-out
 runs from their commands alone. Beside it a motor with the same torque constant and loop, whose Coulomb and viscous
-friction are fitted to the same runs by least squares. Both are stepped alike, dry friction as an impulse.
+friction are fitted to the same runs by least squares. Both are simulated by MuJoCo as the diagnosis does it.
 """
 
 from __future__ import annotations
 
 import os
 import time
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
+from discrepancy.engine.explanation import Found
 from discrepancy.serial.diagnosis import diagnose_rig
 from discrepancy.serial.laws.rig import LawfulSerialRig
-from discrepancy.serial.model import SerialModel, load_model
+from discrepancy.serial.model import load_model, load_spec
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
-from discrepancy.serial.servo.loop import loop_laws
+from discrepancy.serial.rolled.closed import LoopDrive
+from discrepancy.serial.rolled.fitted import Fitted, extended, steps_per
+from discrepancy.serial.rolled.free import compared
+from discrepancy.serial.rolled.readings import Readings
+from discrepancy.serial.servo.commanded import Servo, servo_of
+from discrepancy.serial.servo.loop import LoopLaw, loop_laws
 from mocobot.serial import read_logs
+from mocobot_sim.serial.built import build
+from mocobot_sim.serial.effects import RobotEffect
+from mocobot_sim.serial.rollout import Start
 
 VARIABLE = "MOCOBOT_XL330_DATA"
 TOP = Path(__file__).resolve().parents[1]
 FOLDER = TOP / "data" / "xl330"
 GAINS = (100, 200, 400)
-STEP_S = 5e-4
 
 
-@dataclass(frozen=True)
-class Servo:
-    """Numbers of a servo: torques in N m at the joint, speeds in rad/s.
-
-    Attributes:
-        per_volt: torque at standstill.
-        per_rad: duty per rad of error and unit of gain.
-        coulomb, viscous, load_share, load: dry friction is coulomb + load_share (|load torque| - load).
-        braking: torque lost to the speed while the drive is on.
-        stribeck, fade: more dry friction near standstill.
-        rotor: inertia beyond the model's.
-        offset: of the torque.
-    """
-
-    per_volt: float
-    per_rad: float
-    coulomb: float = 0.0
-    viscous: float = 0.0
-    load_share: float = 0.0
-    load: float = 0.0
-    braking: float = 0.0
-    stribeck: float = 0.0
-    fade: float = 1.0
-    rotor: float = 0.0
-    offset: float = 0.0
+def named(rig: SerialRig) -> tuple[list[Found], list[str]]:
+    """What a diagnosis names, and its words."""
+    found = list(diagnose_rig(rig, laws="never").causes)
+    return found, [item.candidate.cause for item in found]
 
 
-def simulate(servo: Servo, model: SerialModel, log: JointLog) -> np.ndarray:
-    """Positions under the log's commands [rad], shape (Q,)."""
-    assert log.command is not None
-    assert log.drive.supply_V is not None
-    mass, lever = float(model.model.body_mass[-1]), float(-model.model.body_ipos[-1, 2])
-    inertia = mass * lever**2 + float(model.model.body_inertia[-1, 1]) + servo.rotor
-    weight, gain = mass * 9.81 * lever, float(log.drive.position_gain[0])
-    q, v, a, out = float(log.q[0, 0]), 0.0, 0.0, np.empty(len(log.time))
-    steps = round(log.period_s / STEP_S)
-    dt = log.period_s / steps
-    on = np.ones(len(log.time)) if log.enabled is None else log.enabled.astype(float)
-    for k in range(len(out)):
-        out[k] = q
-        for _ in range(steps):
-            duty = float(np.clip(servo.per_rad * gain * (log.command[k, 0] - q), -1.0, 1.0))
-            drive = on[k] * (servo.per_volt * duty * log.drive.supply_V[k] - servo.braking * v)
-            pull = weight * np.sin(q)
-            dry = servo.coulomb + servo.load_share * (abs(pull + inertia * a) - servo.load)
-            dry = max(dry + servo.stribeck * np.exp(-abs(v) / servo.fade), 0.0)
-            free = v + dt * (drive - on[k] * servo.offset - pull - servo.viscous * v) / inertia
-            new = float(np.sign(free) * max(abs(free) - dt * dry / inertia, 0.0))
-            a, v = 0.5 * a + 0.5 * (new - v) / dt, new
-            q += dt * v
-    return out
-
-
-def named(rig: SerialRig, per_rad: float) -> tuple[Servo, list[str]]:
-    """A servo with what a diagnosis names, and the names."""
-    servo = Servo(rig.motors[0].torque_per_unit, per_rad)
-    labels = []
-    for found in diagnose_rig(rig, laws="never").causes:
-        values = dict(
-            zip([p.name for p in found.candidate.parameters], map(float, found.values), strict=True)
-        )
-        shape = found.candidate.shape
-        known = {
-            "friction": lambda v, s: {
-                "coulomb": v["coulomb_Nm"],
-                "viscous": max(v["viscous_Nms_per_rad"], 0.0),
-            },
-            "load_friction": lambda v, s: {"load_share": v["share"], "load": s["load_Nm"]},
-            "back_emf": lambda v, s: {"braking": v["braking_Nms_per_rad"]},
-            "stribeck": lambda v, s: {"stribeck": v["excess_Nm"], "fade": s["fade_per_s"]},
-            "armature": lambda v, s: {"rotor": v["armature_kgm2"]},
-            "torque_offset": lambda v, s: {"offset": v["offset_Nm"]},
-        }.get(found.candidate.cause)
-        labels.append(found.candidate.cause + ("" if known else " (not stepped)"))
-        servo = servo if known is None else replace(servo, **known(values, shape))
-    return servo, labels
-
-
-def plain(rig: SerialRig, start: Servo) -> Servo:
+def plain(rig: SerialRig) -> list[RobotEffect]:
     """Coulomb and viscous friction by least squares over samples that move."""
     left, right = [], []
     for part in rig.parts:
@@ -120,7 +56,19 @@ def plain(rig: SerialRig, start: Servo) -> Servo:
         left.append(np.column_stack([np.sign(s.dq[at, 0]), s.dq[at, 0]]))
         right.append((s.torque - s.inverse)[at, 0])
     coulomb, viscous = np.linalg.lstsq(np.concatenate(left), np.concatenate(right), rcond=None)[0]
-    return Servo(start.per_volt, start.per_rad, max(float(coulomb), 0.0), max(float(viscous), 0.0))
+    numbers = {"coulomb_Nm": max(float(coulomb), 0.0), "viscous_Nms_per_rad": max(float(viscous), 0.0)}
+    return [RobotEffect("friction", 1, None, numbers)]
+
+
+def share_left(robot: Fitted, rig: SerialRig, laws: Sequence[LoopLaw], log: JointLog) -> float:
+    """Position error (rms) of the simulated loop under a log's commands, over the motion's standard deviation [%]."""
+    servo = servo_of(log, 0, rig.motors, laws, rig.model.joints[0])
+    assert isinstance(servo, Servo), servo
+    drive = LoopDrive.of(log, [servo], robot.readings)
+    every = steps_per(log.period_s)
+    start = Start(0.0, log.q[0], np.zeros(1), np.zeros(1))
+    error = compared(start, robot, drive, log.q, every, np.full(1, np.inf))
+    return 100.0 * float(np.sqrt(np.mean(error**2)) / np.std(log.q[:, 0]))
 
 
 def main() -> None:
@@ -158,14 +106,16 @@ def main() -> None:
         others = [log for log in logs if log.drive.position_gain[0] != gain]
         laws = loop_laws(others)
         rig = LawfulSerialRig.of(model, others)
-        full, labels = named(rig, float(np.mean([law.per_rad / law.gain for law in laws])))
-        bare = plain(rig, full)
+        found, labels = named(rig)
         print(f"gain {gain} from the others: {', '.join(labels)}")
         for log in (log for log in logs if log.drive.position_gain[0] == gain):
-            size = float(np.std(log.q[:, 0]))
-            shares = [100.0 * float(np.sqrt(np.mean((simulate(s, model, log) - log.q[:, 0]) ** 2))) / size
-                      for s in (full, bare)]  # fmt: skip
-            print(f"  {Path(log.name).stem:<28}{shares[0]:8.1f}{shares[1]:8.1f}")
+            step_s = log.period_s / steps_per(log.period_s)
+            robots = [
+                extended(rig, found, step_s),
+                Fitted(build(load_spec(model.path), plain(rig), step_s), Readings.of([], 1)),
+            ]
+            shares = [share_left(robot, rig, laws, log) for robot in robots]
+            print(f"  {Path(log.name).stem:<28}" + "".join(f"{share:8.1f}" for share in shares))
 
 
 if __name__ == "__main__":

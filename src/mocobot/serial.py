@@ -160,6 +160,7 @@ def diagnose(
     exclude: Iterable[str] = (),
     laws: When = "auto",
     odds: float = rules.PRIOR_ODDS,
+    closed_loop: bool = True,
     jobs: int = 1,
     say: Callable[[str], object] = lambda _: None,
 ) -> Diagnosis:
@@ -175,6 +176,7 @@ def diagnose(
         laws: whether to look for laws that the catalogue lacks: ``"auto"`` where something unlisted is left,
             ``"always"`` or ``"never"``; with a reference they are not looked for.
         odds: of any cause being there before the data are seen, at all its places together.
+        closed_loop: whether to roll the model out, without and with what is found.
         jobs: parallel processes.
         say: takes the name of the stage that begins.
 
@@ -192,6 +194,7 @@ def diagnose(
             tuple(exclude),
             laws=laws,
             odds=odds,
+            closed_loop=closed_loop,
             jobs=jobs,
             say=say,
         ),
@@ -201,11 +204,22 @@ def diagnose(
 def diagnosed(
     model: SerialModel, logs: list[JointLog], reference: list[JointLog],
     tolerances: Mapping[str, Mapping[str, float]] | None, exclude: tuple[str, ...],
-    *, laws: When, odds: float, jobs: int, say: Callable[[str], object],
+    *, laws: When, odds: float, closed_loop: bool, jobs: int, say: Callable[[str], object],
 ) -> Any:  # fmt: skip
     """``diagnose_serial``, with the reference where there is one."""
     more: dict[str, Any] = {"reference": reference} if reference else {}
-    return diagnose_serial(model, logs, tolerances, exclude, laws=laws, odds=odds, jobs=jobs, say=say, **more)
+    return diagnose_serial(
+        model,
+        logs,
+        tolerances,
+        exclude,
+        laws=laws,
+        odds=odds,
+        closed_loop=closed_loop,
+        jobs=jobs,
+        say=say,
+        **more,
+    )
 
 
 def serial_tolerances(path: Path | None) -> dict[str, dict[str, float]] | None:

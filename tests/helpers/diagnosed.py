@@ -24,6 +24,7 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     assert set(values) - {"provenance"} == {
         "format", "version", "recordings", "verdict", "causes", "suspected", "scatter", "evidence", "gain",
         "not_simulated", "undecidable", "detection_limits", "residual", "remains", "notes", "places", "prior_odds",
+        "rollouts",
     }  # fmt: skip
     assert (values["format"], values["version"]) == ("mocobot-diagnosis", 2)
     assert values["verdict"] in VERDICTS
@@ -241,6 +242,7 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
             "estimates": {"before": estimate, "after": estimate},
         },
         "not_simulated": None,
+        "rollouts": None,
         "undecidable": [{"what": "this", "why": "of that", "remedy": "a weight"}],
         "detection_limits": [
             _limit("sea_bias", "torque zero of a driven joint", 1, 1, bias_Nm=0.0213),

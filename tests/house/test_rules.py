@@ -9,7 +9,7 @@ import pytest
 from discrepancy import rules
 from source_tree import SRC, module_files
 
-RULES = {"inference": 40, "team": 30, "axis": 40, "serial": 60, "laws": 20}
+RULES = {"inference": 40, "team": 30, "axis": 40, "serial": 60, "laws": 20, "rollouts": 8}
 """Files of ``discrepancy.rules``, and how many statements each has at least."""
 FREE = {
     "discrepancy.emps.recording.axis_log": {"FIRST_GUESS_KG", "LIMIT_V"},  # the nominal axis
@@ -19,6 +19,7 @@ FREE = {
     "discrepancy.result.pictures.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
     "discrepancy.result.sensitivity": {"HALVINGS", "LEARNT"},  # a grid
     "discrepancy.result.text": {"SAID", "WIDTH"},
+    "discrepancy.result.text_rollouts": {"WIDTH"},
     "discrepancy.result.traces_file": {"VERSION"},
 }
 """Formats, layouts and sizes of pictures, by module."""

@@ -34,6 +34,7 @@ class Diagnosed:
         words: of the rig.
         traces: makes the residuals for file and pictures.
         estimates: what the rig estimates ``before`` and ``after``, or None; ``errors`` may lie beside them.
+        rollouts: what rollouts of a serial robot say, plain JSON values, or None.
     """
 
     rig: Rig
@@ -41,10 +42,11 @@ class Diagnosed:
     words: Words
     traces: Callable[[], Sequence[Trace]]
     estimates: Mapping[str, Any] | None = None
+    rollouts: Mapping[str, Any] | None = None
 
     @cached_property
     def _values(self) -> dict[str, Any]:
-        return diagnosis_to_dict(self.diagnosis, self.rig, self.words, self.estimates)
+        return diagnosis_to_dict(self.diagnosis, self.rig, self.words, self.estimates, self.rollouts)
 
     def to_dict(self) -> dict[str, Any]:
         """Strict JSON with units in the keys; see ``discrepancy.result.json`` for the keys."""

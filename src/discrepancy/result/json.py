@@ -48,6 +48,7 @@ gain                null where the closed loop was not simulated and there is no
     estimates       {before, after}, as the rig has them
     errors          {before, after} against the truth, only where it is known
 not_simulated       why there is no closed-loop comparison, or null
+rollouts            of serial robots: measured states let go in simulation, see ``serial.rolled.told``; else null
 undecidable         list of {what, why, remedy}: what no recordings of this rig decide, then what these do not
 detection_limits    list of {cause, kind, robot, joint, parameters: {name: size}}: what would have been noticed nine
                     times in ten; null where these recordings say nothing
@@ -91,7 +92,11 @@ MOST_PLACES = 8
 
 
 def diagnosis_to_dict(
-    diagnosis: Diagnosis, rig: Rig, words: Words, estimates: Mapping[str, Any] | None = None
+    diagnosis: Diagnosis,
+    rig: Rig,
+    words: Words,
+    estimates: Mapping[str, Any] | None = None,
+    rollouts: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """The diagnosis as documented above.
 
@@ -100,6 +105,7 @@ def diagnosis_to_dict(
         rig: what was diagnosed.
         words: of the rig.
         estimates: what the rig estimates ``before`` and ``after``, plain JSON values; ``errors`` may lie beside them.
+        rollouts: what rollouts said, plain JSON values.
     """
     explanation = diagnosis.explanation
     nominal = Fit.of(explanation.nothing.problem.as_whitened, background=False)
@@ -132,6 +138,7 @@ def diagnosis_to_dict(
         "evidence": evidence_list(explanation),
         "gain": gain,
         "not_simulated": diagnosis.not_simulated,
+        "rollouts": rollouts,
         "undecidable": [*rig.undecidable(), *blind_spots(explanation)],
         "detection_limits": detection_limits(explanation),
         "residual": {

@@ -10,6 +10,7 @@ from discrepancy.result.evidence_list import label
 from discrepancy.result.read import kind_of, name_of
 from discrepancy.result.remains import REMEDY, of_scatter, remains, sizes_of
 from discrepancy.result.text_gain import gain_lines
+from discrepancy.result.text_rollouts import rollout_lines
 
 WIDTH = 100
 Values = Mapping[str, Any]
@@ -28,7 +29,7 @@ def format_diagnosis(values: Values) -> str:
     lines = list(_wrapped(_verdict(values), ""))
     for k, cause in enumerate(values["causes"], start=1):
         lines += ["", f"[[Cause {k}: {_heading(cause)} ({cause['cause']})]]", *_cause(cause, further=k > 1)]
-    lines += [*_suspected(values), *_scatter(values), *gain_lines(values)]
+    lines += [*_suspected(values), *_scatter(values), *gain_lines(values), *rollout_lines(values)]
     notes = list(values["notes"])
     if values["not_simulated"] and not values["causes"]:
         notes.append(

@@ -17,6 +17,7 @@ from discrepancy.serial.model import SerialModel
 from discrepancy.serial.paired import PairedRig
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
+from discrepancy.serial.rolled.told import rolled_out
 from discrepancy.serial.servo.loop import loop_laws, sentences
 from discrepancy.serial.traces import traces
 from discrepancy.serial.words import SerialWords
@@ -31,6 +32,7 @@ def diagnose_serial(
     reference: Sequence[JointLog] = (),
     laws: When = "auto",
     odds: float = PRIOR_ODDS,
+    closed_loop: bool = True,
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
 ) -> Diagnosed:
@@ -44,6 +46,7 @@ def diagnose_serial(
         reference: logs of the same robot while it was well: only what has changed since is news then, and tolerances
             do not count, and laws that no catalogue lists are not looked for.
         laws, odds, jobs, say: as of ``diagnose``.
+        closed_loop: whether to roll the model out, freely and under its commands; this changes no verdict.
 
     Raises:
         InputError: a log cannot be used, or a cause to be excluded does not exist.
@@ -51,7 +54,12 @@ def diagnose_serial(
     rig = LawfulSerialRig.of(model, logs, tolerances, excluded, reference)
     found = diagnose_rig(rig, laws=laws, odds=odds, jobs=jobs, say=say)
     judged = PairedRig(rig) if rig.common else rig
-    return Diagnosed(judged, found, SerialWords(), partial(traces, rig, found.explanation))
+    rolled = None
+    if closed_loop:
+        if say:
+            say("simulate")
+        rolled = rolled_out(rig, found.explanation)
+    return Diagnosed(judged, found, SerialWords(), partial(traces, rig, found.explanation), rollouts=rolled)
 
 
 def diagnose_rig(

@@ -44,6 +44,7 @@ def run(options: Diagnose, model: Path) -> None:
                 options.exclude,
                 laws=options.laws,
                 odds=options.odds,
+                closed_loop=options.closed_loop,
                 jobs=options.jobs,
                 say=say,
             )

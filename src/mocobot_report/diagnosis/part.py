@@ -25,6 +25,7 @@ from mocobot_report.diagnosis.evidence import evidence_sections
 from mocobot_report.diagnosis.gain import gain_section
 from mocobot_report.diagnosis.residuals import residual_sections
 from mocobot_report.diagnosis.rest import rest_sections
+from mocobot_report.diagnosis.rollouts import rollout_section
 from mocobot_report.folder import Diagnosed
 from mocobot_report.sources import sources
 from mocobot_view.pictures.shots import axis_shot, diagnosis_shot
@@ -136,6 +137,7 @@ def sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
         *([] if first is None else [first]),
         *doubtful_sections(book, values),
         *([] if (gain := gain_section(book, values, names)) is None else [gain]),
+        *([] if (rolled := rollout_section(book, values)) is None else [rolled]),
         *residual_sections(book, diagnosed, names),
         *evidence_sections(book, diagnosed, names),
         *rest_sections(book, diagnosed),

@@ -38,81 +38,100 @@ class RobotEffect:
         return float(self.parameters[name])
 
 
-def resistance(effect: RobotEffect, q: float, v: float, load: float) -> float:
-    """Torque that an effect takes from its joint's drive, beyond what the model does [N m or N].
+def resistances(effects: list[RobotEffect], q: Array, v: Array) -> Array:
+    """Torques that effects take from their joints' drives beyond what the model does, shape (J,) [N m or N].
 
     Args:
-        effect: one that is a function of its own joint's state.
-        q: joint position [rad or m].
-        v: speed.
-        load: torque that the gear passes on.
-
-    Raises:
-        KeyError: the effect is none of these.
+        effects: any; those of ``SMOOTH`` count.
+        q: joint positions [rad or m], shape (J,).
+        v: speeds, shape (J,).
     """
-    return LAWS[effect.cause](effect, q, v, load)
-
-
-def resistances(effects: list[RobotEffect], q: Array, v: Array, load: Array) -> Array:
-    """The same of all effects, at all joints, shape (J,)."""
     out = np.zeros(len(q))
     for effect in effects:
-        if effect.cause in LAWS and effect.joint is not None:
+        if effect.cause in SMOOTH and effect.joint is not None:
             j = effect.joint - 1
-            out[j] += resistance(effect, float(q[j]), float(v[j]), float(load[j]))
+            out[j] += SMOOTH[effect.cause](effect, float(q[j]), float(v[j]))
     return out
 
 
-def _friction(e: RobotEffect, q: float, v: float, load: float) -> float:
-    return e.number("coulomb") * direction(v) + e.number("viscous") * v
+def dry_levels(effects: list[RobotEffect], v: Array, load: Array) -> Array:
+    """Dry friction beyond the model's at every joint, shape (J,) [N m or N]; it may be less than that.
+
+    Args:
+        effects: any; those of ``DRY`` count.
+        v: speeds, shape (J,).
+        load: torques that the gears pass on, shape (J,).
+    """
+    out = np.zeros(len(v))
+    for effect in effects:
+        if effect.cause in DRY and effect.joint is not None:
+            j = effect.joint - 1
+            out[j] += DRY[effect.cause](effect, float(v[j]), float(load[j]))
+    return out
 
 
-def _asymmetric_coulomb(e: RobotEffect, q: float, v: float, load: float) -> float:
-    return e.number("asymmetry") * abs(direction(v))
+def _coulomb(e: RobotEffect, v: float, load: float) -> float:
+    return e.number("coulomb")
 
 
-def _asymmetric_viscous(e: RobotEffect, q: float, v: float, load: float) -> float:
+def _viscous(e: RobotEffect, q: float, v: float) -> float:
+    return e.number("viscous") * v
+
+
+def _asymmetric_coulomb(e: RobotEffect, v: float, load: float) -> float:
+    return e.number("asymmetry") * direction(v)
+
+
+def _asymmetric_viscous(e: RobotEffect, q: float, v: float) -> float:
     return e.number("asymmetry") * abs(v)
 
 
-def _stribeck(e: RobotEffect, q: float, v: float, load: float) -> float:
-    return e.number("excess") * direction(v) * math.exp(-abs(v) / e.number("fade"))
+def _stribeck(e: RobotEffect, v: float, load: float) -> float:
+    return e.number("excess") * math.exp(-abs(v) / e.number("fade"))
 
 
-def _sublinear(e: RobotEffect, q: float, v: float, load: float) -> float:
+def _sublinear(e: RobotEffect, v: float, load: float) -> float:
     # A power of the speed less its own best straight line between 0 and twice the typical speed: with moments
     # a = 2^(n+1)/(n+1) and b = 2^(n+2)/(n+2), that line is 2 a - 3 b / 2 + (3 b / 2 - 3 a / 2) u.
     n, u = e.number("exponent"), abs(v) / e.number("typical")
     a, b = 2.0 ** (n + 1.0) / (n + 1.0), 2.0 ** (n + 2.0) / (n + 2.0)
-    return e.number("bend") * direction(v) * (u**n - (2.0 * a - 1.5 * b) - (1.5 * b - 1.5 * a) * u)
+    return e.number("bend") * (u**n - (2.0 * a - 1.5 * b) - (1.5 * b - 1.5 * a) * u)
 
 
-def _load_friction(e: RobotEffect, q: float, v: float, load: float) -> float:
-    return e.number("share") * direction(v) * (abs(load) - e.number("load"))
+def _load_friction(e: RobotEffect, v: float, load: float) -> float:
+    return e.number("share") * (abs(load) - e.number("load"))
 
 
-def _ripple(e: RobotEffect, q: float, v: float, load: float) -> float:
+def _ripple(e: RobotEffect, q: float, v: float) -> float:
     angle = e.number("turns") * q
     return e.number("cosine") * math.cos(angle) + e.number("sine") * math.sin(angle)
 
 
-def _counterbalance(e: RobotEffect, q: float, v: float, load: float) -> float:
+def _counterbalance(e: RobotEffect, q: float, v: float) -> float:
     return e.number("cosine") * math.cos(q) + e.number("sine") * math.sin(q)
 
 
-def _spring(e: RobotEffect, q: float, v: float, load: float) -> float:
+def _spring(e: RobotEffect, q: float, v: float) -> float:
     return e.number("stiffness") * (q - e.number("neutral"))
 
 
-LAWS: dict[str, Callable[[RobotEffect, float, float, float], float]] = {
-    "friction": _friction,
-    "asymmetric_coulomb": _asymmetric_coulomb,
+SMOOTH: dict[str, Callable[[RobotEffect, float, float], float]] = {
+    "friction": _viscous,
     "asymmetric_viscous": _asymmetric_viscous,
-    "stribeck": _stribeck,
-    "sublinear_friction": _sublinear,
-    "load_friction": _load_friction,
     "ripple": _ripple,
     "counterbalance": _counterbalance,
     "spring": _spring,
 }
-"""By cause; a slide's ripple counts waves per metre as ``turns`` over 2 pi."""
+"""Torques by position and speed, by cause; a slide's ripple counts waves per metre as ``turns`` over 2 pi."""
+
+DRY: dict[str, Callable[[RobotEffect, float, float], float]] = {
+    "friction": _coulomb,
+    "asymmetric_coulomb": _asymmetric_coulomb,
+    "stribeck": _stribeck,
+    "sublinear_friction": _sublinear,
+    "load_friction": _load_friction,
+}
+"""Dry friction by speed and load, by cause: against the motion, and at rest as much as keeps the joint there."""
+
+LAWS = frozenset({*SMOOTH, *DRY})
+"""Causes that are torques by the state of their own joint."""

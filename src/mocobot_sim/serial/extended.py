@@ -13,7 +13,8 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.strict import Fields, read_json
-from mocobot_sim.serial.effects import LAWS, RobotEffect, resistances
+from mocobot_sim.serial.built import Effect, refused, steps
+from mocobot_sim.serial.effects import DRY, RobotEffect, dry_levels, resistances
 from mocobot_sim.serial.law import ActingLaw, JointLaw
 from mocobot_sim.serial.mjcf import into_mjcf
 from mocobot_sim.serial.state import State
@@ -22,7 +23,8 @@ FORMAT, VERSION = "mocobot-extended-robot", 2
 SCENE, NUMBERS, README = "robot.xml", "effects.json", "README.md"
 KEYS = ("cause", "joint", "partner", "parameters", "law", "in")
 LAW = "law"
-Effect = RobotEffect | JointLaw
+LEAST_LOSS = 1e-12
+"""Dry friction with which MuJoCo makes a row for it [N m or N]."""
 
 
 def write_extended(
@@ -44,11 +46,9 @@ def write_extended(
         spec.compile()
         text = spec.to_xml()
     except (ValueError, RuntimeError) as error:
-        raise InputError(
-            f"MuJoCo refuses the model with the causes in it ({' '.join(str(error).split())})"
-        ) from error
+        raise refused(error) from error
     places = [
-        SCENE if said else NUMBERS if _steps(e) else "none" for e, said in zip(effects, inside, strict=True)
+        SCENE if said else NUMBERS if steps(e) else "none" for e, said in zip(effects, inside, strict=True)
     ]
     try:
         folder.mkdir()
@@ -61,11 +61,6 @@ def write_extended(
         {"format": FORMAT, "version": VERSION, "causes": causes, "recordings": list(recordings)},
     )
     write_text(folder / README, _readme(effects, places))
-
-
-def _steps(effect: Effect) -> bool:
-    """Whether ``step`` simulates an effect: errors of the log it does not."""
-    return effect.acts if isinstance(effect, JointLaw) else effect.cause in LAWS
 
 
 def _entry(effect: Effect) -> dict[str, Any]:
@@ -121,18 +116,39 @@ def step(
         torque: at the joints, shape (J,).
     """
     before = np.array(data.qacc)
-    mujoco.mj_step1(model, data)
+    listed = [effect for effect in effects if isinstance(effect, RobotEffect)]
+    rubbing = [effect for effect in listed if effect.cause in DRY]
+    _with_rows(model, data, rubbing)
     # What the gears pass on: gravity, springs and the bodies' inertia, but nothing that rubs, and no rotors.
     inertia = np.zeros(model.nv)
     mujoco.mj_mulM(model, data, inertia, before)
     load = inertia - model.dof_armature * before + data.qfrc_bias - data.qfrc_spring
-    listed = [effect for effect in effects if isinstance(effect, RobotEffect)]
-    taken = resistances(listed, data.qpos, data.qvel, load)
+    taken = resistances(listed, data.qpos, data.qvel)
     state = State(data.time, model.opt.timestep, data.qpos, data.qvel, before, load, torque)
     for acting in (effect for effect in effects if isinstance(effect, ActingLaw)):
         taken[acting.law.joint - 1] += acting.torque(state)
     data.qfrc_applied[:] = torque - taken
+    _rub(model, data, dry_levels(rubbing, data.qvel, load))
     mujoco.mj_step2(model, data)
+
+
+def _with_rows(model: mujoco.MjModel, data: mujoco.MjData, rubbing: Sequence[RobotEffect]) -> None:
+    """``mj_step1`` with a row of MuJoCo's dry friction for every joint that rubs, of whatever size."""
+    own = sorted({effect.joint - 1 for effect in rubbing if effect.joint is not None})
+    said = model.dof_frictionloss[own]
+    model.dof_frictionloss[own] = np.maximum(said, LEAST_LOSS)
+    mujoco.mj_step1(model, data)
+    model.dof_frictionloss[own] = said
+
+
+def _rub(model: mujoco.MjModel, data: mujoco.MjData, level: Array) -> None:
+    """Dry friction beyond the model's in MuJoCo's own rows: it stops a joint and never drives it."""
+    if level.any():
+        at = np.flatnonzero(data.efc_type == int(mujoco.mjtConstraint.mjCNSTR_FRICTION_DOF))
+        dof = data.efc_id[at]
+        data.efc_frictionloss[at] = np.maximum(model.dof_frictionloss[dof] + level[dof], 0.0)
+        if data.nisland:  # each is solved from a copy
+            data.iefc_frictionloss[:] = data.efc_frictionloss[data.map_iefc2efc]
 
 
 def _readme(effects: Sequence[Effect], places: Sequence[str]) -> str:

@@ -6,9 +6,12 @@ import mujoco
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mocobot_sim.serial.effects import RobotEffect
+from mocobot_sim.serial.effects import DRY, RobotEffect
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
+SOLREF, SOLIMP = (0.002, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0)
+"""Of dry friction. With MuJoCo's defaults it grows with the speed up to about loss / (100 / s inertia), 0.2 rad/s for
+20 N m on 1 kg m^2; with these up to a tenth of that, for steps of up to 1 ms."""
 
 
 def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
@@ -27,6 +30,8 @@ def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
     at = effect.joint - 1
     joint = spec.joint(model.joint(at).name)
     body = spec.body(model.body(model.jnt_bodyid[at]).name)
+    if effect.cause in DRY:
+        joint.solref_friction, joint.solimp_friction = list(SOLREF), list(SOLIMP)
     if effect.cause == "friction":
         coulomb = float(joint.frictionloss) + effect.number("coulomb")
         damping = np.array(joint.damping, dtype=float).reshape(-1)
@@ -74,6 +79,7 @@ def _coupled(spec: mujoco.MjSpec, model: mujoco.MjModel, effect: RobotEffect) ->
     tendon.wrap_joint(model.joint(effect.partner - 1).name, effect.number("ratio"))
     damping = np.array(tendon.damping, dtype=float).reshape(-1)
     damping[0] = values[1]
+    tendon.solref_friction, tendon.solimp_friction = list(SOLREF), list(SOLIMP)
     tendon.frictionloss, tendon.armature = values[0], values[2]
     tendon.damping = damping if damping.size > 1 else values[1]
     return True

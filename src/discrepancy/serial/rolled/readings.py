@@ -1,0 +1,92 @@
+"""Torques that drives really give, by what a log says of them and by causes that are errors of the log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from discrepancy.serial.recording.joint_log import JointLog
+from estimator.arrays import Array
+from mocobot_sim.serial.effects import RobotEffect
+
+KNOWN = ("torque_offset", "torque_scale", "torque_delay", "back_emf")
+"""Causes that make a logged torque another than the joint has."""
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """A logged torque is ``scale`` times the joint's, plus ``offset``, so much late; all shape (J,).
+
+    Attributes:
+        offset: [N m or N].
+        scale: 1 where it is right.
+        delay_s: by which it comes late.
+        braking: torque lost to the speed while the drive is on [N m s/rad or N s/m].
+    """
+
+    offset: Array
+    scale: Array
+    delay_s: Array
+    braking: Array
+
+    @classmethod
+    def of(cls, effects: Sequence[RobotEffect], joints: int) -> Readings:
+        """Of causes in ``KNOWN``, joints counted from 1."""
+        out = cls(np.zeros(joints), np.ones(joints), np.zeros(joints), np.zeros(joints))
+        for effect in effects:
+            assert effect.joint is not None
+            j = effect.joint - 1
+            if effect.cause == "torque_offset":
+                out.offset[j] += effect.number("offset")
+            elif effect.cause == "torque_scale":
+                out.scale[j] += effect.number("scale")
+            elif effect.cause == "torque_delay":
+                out.delay_s[j] += effect.number("delay")
+            else:
+                out.braking[j] += effect.number("braking")
+        return out
+
+    def real(self, told: Array, dq: Array, on: float) -> Array:
+        """Torques at the joints (J,) by those that the log would have, velocities, and whether the drives are on."""
+        return np.asarray((told - self.offset * on) / self.scale - on * self.braking * dq)
+
+
+@dataclass(frozen=True, eq=False)
+class LoggedTorques:
+    """The torques of a log as drives of a simulation, interpolated linearly between samples.
+
+    Attributes:
+        readings: what is wrong with them.
+        time: of the samples, even [s], shape (Q,).
+        torque: shape (Q, J); read where it was known only.
+        on: whether the drives are on, shape (Q,).
+    """
+
+    readings: Readings
+    time: Array
+    torque: Array
+    on: Array
+
+    @classmethod
+    def of(cls, log: JointLog, readings: Readings) -> LoggedTorques:
+        """Of a log with torques."""
+        assert log.torque is not None
+        on = np.ones(len(log.time)) if log.enabled is None else log.enabled.astype(float)
+        torque = log.torque
+        if readings.delay_s.any():  # what was read late was there before
+            torque = torque.copy()
+            for j in np.flatnonzero(readings.delay_s):
+                good = np.isfinite(log.torque[:, j])
+                then = log.time + readings.delay_s[j]
+                torque[:, j] = np.interp(then, log.time[good], log.torque[good, j])
+        return cls(readings, log.time, torque, on)
+
+    def __call__(self, time: float, q: Array, dq: Array) -> Array:
+        """Torques at the joints, shape (J,)."""
+        at = (time - self.time[0]) / (self.time[1] - self.time[0])
+        k = min(max(int(at), 0), len(self.time) - 2)
+        share = min(max(at - k, 0.0), 1.0)
+        told = (1.0 - share) * self.torque[k] + share * self.torque[k + 1]
+        return self.readings.real(told, dq, float(self.on[k]))
