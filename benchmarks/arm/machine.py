@@ -29,7 +29,7 @@ RATE_HZ, TIMESTEP_S, SECONDS = 500.0, 5e-4, 60.0
 BANDWIDTH_PER_S = 15.0
 """Of the controller, critically damped."""
 
-INERTIA_SHARE, ROTOR_SHARE, SCALE_SHARE = 0.1, 0.03, 0.02
+INERTIA_SHARE, JOINT_SHARE, SCALE_SHARE = 0.1, 0.03, 0.02
 ZERO_RAD, LENGTH_M, DELAY_S, LEVEL_RAD = 2e-3, 1e-3, 5e-4, 5e-3
 """A healthy arm: standard deviations of what its model has wrong, as ``docs/serial/method.md`` says."""
 
@@ -106,7 +106,10 @@ def healthy(rng: np.random.Generator, times: float = 1.0) -> Healthy:
     tilt = times * LEVEL_RAD * rng.standard_normal(2)
     spec.option.gravity = 9.81 * np.array([tilt[0], tilt[1], -np.sqrt(1.0 - tilt @ tilt)])
     for joint in spec.joints:
-        joint.armature *= max(1.0 + times * ROTOR_SHARE * rng.standard_normal(), 0.3)
+        share = 1.0 + times * JOINT_SHARE * rng.standard_normal(3)
+        joint.armature *= share[0]
+        joint.frictionloss *= share[1]
+        joint.damping = np.asarray(joint.damping) * share[2]
         joint.solref_friction, joint.solimp_friction = [0.002, 1.0], [0.99, 0.999, 0.001, 0.5, 2.0]
     zero, scale, delay = (size * times * rng.standard_normal(7) for size in (ZERO_RAD, SCALE_SHARE, DELAY_S))
     return Healthy(spec, zero, 1.0 + scale, delay)

@@ -91,9 +91,9 @@ LEAST_REST_SHARE = 1e-6
 INERTIA_SHARE = 0.1
 """Of masses, lengths to centres of mass, and moments of inertia, by which a CAD model is off. Chosen: drawings leave
 out cables, grease and screws."""
-ROTOR_SHARE = 0.03
-"""Of rotors that a model names, by which they are off. Chosen: a turned part, and a ratio that is known; less than what
-sticking at reversals does to one that is fitted (up to 0.02, of a simulated arm without any error)."""
+JOINT_SHARE = 0.03
+"""Of rotors and friction that a model names, by which they are off. Chosen: no two fits of friction agree better, and
+sticking at reversals moves fitted rotors by up to 0.02 (of a simulated arm without any error)."""
 MOST_INERTIA_SHARE = 1.0
 """Of the same, beyond which a link is not off but another. Chosen: rotors and payloads add more, and are themselves."""
 LEAST_LINK_M = 0.02

@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from discrepancy.causes.free_while import free_while
 from discrepancy.rules import serial as rules
 from discrepancy.serial.mechanics.nominal import inverse_torque
+from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rows.reduction import Reduction, blocks
-from discrepancy.serial.rows.signals import Nominal, Signals
+from discrepancy.serial.rows.signals import Signals
 from discrepancy.serial.servo.motor import Motor
 from estimator.arrays import Array
 from estimator.errors import InputError
@@ -77,7 +78,7 @@ def parts_of(
     Raises:
         InputError: a log is too short, or has no torques.
     """
-    nominal = Nominal.of(model.model)
+    tree = Tree.of(model.model)
     inverse = partial(inverse_torque, model.model)
     known = np.ones(len(model.joints), dtype=bool)
     for log in logs:
@@ -89,7 +90,7 @@ def parts_of(
     joints = np.flatnonzero(known)
     if not len(joints):
         raise InputError(f"{logs[0].name}: no joint has torques in every log")
-    signals = [Signals.of(log, nominal, inverse) for log in logs]
+    signals = [Signals.of(log, tree, inverse) for log in logs]
     # One typical speed of a joint for all logs, or shapes would differ between them.
     square = [np.mean(s.dq**2, axis=0) for s in signals]
     typical = np.maximum(np.sqrt(np.mean(square, axis=0)), rules.LEAST_SPEED)

@@ -141,7 +141,7 @@ class SerialRig(SerialRows, Rig):
 
     def candidates(self) -> list[Candidate]:
         """Every cause at every place; pushes come from ``transients``."""
-        tree = self.nominal.tree
+        tree = self.tree
         every = catalogue.candidates(
             tree, self.model.joints, self.hints, self.excluded, self.tolerances, change=bool(self.common)
         )
@@ -150,7 +150,7 @@ class SerialRig(SerialRows, Rig):
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         """Whether such values can be: no negative mass, moments of inertia, compliance or play beyond the errors."""
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-        cause, tree, at = CAUSES[candidate.cause], self.nominal.tree, place_of(candidate)
+        cause, tree, at = CAUSES[candidate.cause], self.tree, place_of(candidate)
         gone = bool(self.common) and cause.reversible and cause.possible(tree, at, -values, se)
         return gone or cause.possible(tree, at, values, se)
 
@@ -166,7 +166,7 @@ class SerialRig(SerialRows, Rig):
         if "push" in self.excluded or self.motors:
             return []
         times = [self.row_times(t) for t in range(self.changed)]
-        return shapes.pushes(self.nominal.tree, self.model.joints, times, remaining[: self.changed])
+        return shapes.pushes(self.tree, self.model.joints, times, remaining[: self.changed])
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a push with its interval moved."""

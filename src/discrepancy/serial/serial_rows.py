@@ -17,9 +17,9 @@ from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.base import Cause, Hints
 from discrepancy.serial.logs import Part
+from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel
 from discrepancy.serial.rows.remainder import Key
-from discrepancy.serial.rows.signals import Nominal
 from discrepancy.serial.servo.motor import Motor
 from estimator.arrays import Array
 
@@ -63,9 +63,9 @@ class SerialRows:
         return [name for part in self.parts for name in part.names]
 
     @property
-    def nominal(self) -> Nominal:
+    def tree(self) -> Tree:
         """The model's numbers."""
-        return self.parts[0].signals.nominal
+        return self.parts[0].signals.tree
 
     @cached_property
     def block_of(self) -> list[tuple[Part, int]]:

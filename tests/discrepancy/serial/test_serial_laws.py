@@ -15,8 +15,9 @@ from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.serial.diagnosis import diagnose_serial
 from discrepancy.serial.laws.places import POSITION, TORQUE
 from discrepancy.serial.laws.rig import LawfulSerialRig
+from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel
-from discrepancy.serial.rows.signals import Nominal, Signals
+from discrepancy.serial.rows.signals import Signals
 from estimator.errors import InputError
 from mocobot_sim.serial.extended import load_effects, step
 from mocobot_sim.serial.law import ActingLaw, JointLaw
@@ -139,7 +140,7 @@ def test_what_an_error_of_a_position_does(model: SerialModel) -> None:
             out[k] = data.qfrc_inverse
         return out
 
-    moved = Signals.of(replace(log, q=q), Nominal.of(model.model), inverse)
+    moved = Signals.of(replace(log, q=q), Tree.of(model.model), inverse)
     change = signals.inverse - moved.inverse
     (place,) = (p for p in rig.bench.places if p.name == POSITION and p.joint == 2)
     at = signals.time[rig.parts[0].blocks[1]]

@@ -14,7 +14,7 @@ class Armature(Cause):
     separate = "Fast short motions of this joint alone, in a pose where gravity does not load it."
 
     def normal(self, tree, at):
-        return [rules.ROTOR_SHARE * float(tree.armature[at])]
+        return [rules.JOINT_SHARE * float(tree.armature[at])]
 
     def sizes(self, tree, at):
         return [max(self.normal(tree, at)[0], *self.scales)]

@@ -18,6 +18,11 @@ class Friction(Cause):
     scales = (1.0, 1.0)
     separate = "Steady motions at several speeds in either direction."
 
+    def normal(self, tree, at):
+        # A model that names but one of them has fitted neither.
+        named = [float(tree.coulomb[at]), float(tree.viscous[at])]
+        return [rules.JOINT_SHARE * x for x in named] if all(named) else [0.0, 0.0]
+
     def sentence(self, n):
         dry, more = n("coulomb_Nm", "N m"), n.either("coulomb_Nm", "more", "less")
         wet, faster = n("viscous_Nms_per_rad", "N m s/rad"), n.either("viscous_Nms_per_rad", "more", "less")

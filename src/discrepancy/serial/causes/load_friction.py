@@ -26,7 +26,7 @@ class LoadFriction(Cause):
 
     def columns(self, signals, at, shape):
         slow = float(signals.slow[at])
-        load = np.abs(signals.inverse[:, at] - signals.nominal.armature[at] * signals.ddq[:, at])
+        load = np.abs(signals.inverse[:, at] - signals.tree.armature[at] * signals.ddq[:, at])
         return at_joint(signals, at, direction(signals, at, slow) * (load - shape["load_Nm"]))
 
     def shapes(self, hints, at):

@@ -98,7 +98,7 @@ class SerialBench(Bench):
             for sign in (1.0, -1.0):
                 moved = [x.copy() for x in state]
                 moved[order][:, joint] += sign * step
-                ends.append(torque_of(s.tree, *moved) + s.nominal.armature * moved[2])
+                ends.append(torque_of(s.tree, *moved) + s.tree.armature * moved[2])
             out.append((ends[0] - ends[1])[:, self._rows.joints] / (2.0 * step))
         return np.stack(out, axis=1)
 

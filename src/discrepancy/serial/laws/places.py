@@ -116,7 +116,7 @@ def signals_of(signals: Signals) -> dict[str, Array]:
         "dq": signals.dq,
         "ddq": signals.ddq,
         "direction": signals.direction(signals.slow),
-        "load": signals.inverse - signals.nominal.armature * signals.ddq,
+        "load": signals.inverse - signals.tree.armature * signals.ddq,
         "torque": signals.torque,
     }
     out = {f"{name}_{j + 1}": x for name, each in values.items() for j, x in enumerate(each.T)}

@@ -28,6 +28,7 @@ class Tree:
         inertia: about the centres of mass, along the bodies' frames, shape (B, 3, 3) [kg m^2].
         gravity: in the frame of the world, shape (3,) [m/s^2].
         armature: inertia of the rotors as the joints feel it, shape (J,).
+        coulomb, viscous: dry friction [N m or N] and damping per rad/s or m/s of every joint, shape (J,).
     """
 
     parent: NDArray[np.intp]
@@ -43,6 +44,8 @@ class Tree:
     inertia: Array
     gravity: Array
     armature: Array
+    coulomb: Array
+    viscous: Array
 
     @classmethod
     def of(cls, model: Any) -> Tree:
@@ -62,6 +65,8 @@ class Tree:
             inertia=own @ (model.body_inertia[:, :, None] * own.swapaxes(1, 2)),
             gravity=np.array(model.opt.gravity),
             armature=np.array(model.dof_armature),
+            coulomb=np.array(model.dof_frictionloss),
+            viscous=np.array(model.dof_damping),
         )
 
     @property

@@ -62,8 +62,8 @@ class SensorNoise:
     def added(self, signals: Signals) -> Signals:
         """The signals with as much noise of the positions once more."""
         moved = (signals.q + self.q, signals.dq + self.dq, signals.ddq + self.ddq)
-        inverse = torque_of(signals.tree, *moved) + signals.nominal.armature * moved[2]
-        before = rigid_torque(signals.motion) + signals.nominal.armature * signals.ddq
+        inverse = torque_of(signals.tree, *moved) + signals.tree.armature * moved[2]
+        before = rigid_torque(signals.motion) + signals.tree.armature * signals.ddq
         # What else the model's torques hold, such as springs, does not feel the noise.
         q, dq, ddq = moved
         return replace(signals, q=q, dq=dq, ddq=ddq, inverse=signals.inverse + inverse - before)

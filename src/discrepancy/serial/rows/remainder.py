@@ -100,7 +100,7 @@ def reversals(
         off = rules.STICKING_SHARE * s.typical
         moved = [replace(s, dq=s.dq + sign * off) for sign in (1.0, -1.0)]
         turned = moved[0].direction(s.slow) - moved[1].direction(s.slow)
-        total = s.nominal.coulomb * turned / np.sqrt(12.0)  # of an even spread
+        total = s.tree.coulomb * turned / np.sqrt(12.0)  # of an even spread
         for c, v in zip(candidates, values, strict=True):
             cause = CAUSES[c.cause]
             if cause.dry:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,34 +18,12 @@ from estimator.filtering import differentiate, low_pass
 
 
 @dataclass(frozen=True, eq=False)
-class Nominal:
-    """What the model says that inverse dynamics leaves out.
-
-    Attributes:
-        tree: its rigid bodies.
-        coulomb, viscous: dry friction [N m or N] and damping per rad/s or m/s of every joint, shape (J,).
-        armature: inertia of the rotors as the joints feel it, shape (J,).
-    """
-
-    tree: Tree
-    coulomb: Array
-    viscous: Array
-    armature: Array
-
-    @classmethod
-    def of(cls, model: Any) -> Nominal:
-        """From a compiled ``mujoco.MjModel``."""
-        friction, viscous = np.array(model.dof_frictionloss), np.array(model.dof_damping)
-        return cls(Tree.of(model), friction, viscous, np.array(model.dof_armature))
-
-
-@dataclass(frozen=True, eq=False)
 class Signals:
     """Of W samples at the rate of the mechanics, J joints.
 
     Attributes:
         log: what they are of.
-        nominal: of the model.
+        tree: the nominal one.
         rate_hz: of the samples.
         time: [s], shape (W,).
         q, dq, ddq: smoothed joint positions and their derivatives, shape (W, J).
@@ -58,7 +35,7 @@ class Signals:
     """
 
     log: JointLog
-    nominal: Nominal
+    tree: Tree
     rate_hz: float
     time: Array
     q: Array
@@ -71,14 +48,12 @@ class Signals:
     enabled: NDArray[np.bool_] | None = None
 
     @classmethod
-    def of(
-        cls, log: JointLog, nominal: Nominal, inverse_torque: Callable[[Array, Array, Array], Array]
-    ) -> Signals:
+    def of(cls, log: JointLog, tree: Tree, inverse_torque: Callable[[Array, Array, Array], Array]) -> Signals:
         """Smooth, differentiate at the full rate, and keep as many samples as the filter leaves.
 
         Args:
             log: what to smooth.
-            nominal: of the model.
+            tree: the nominal one.
             inverse_torque: torques of the model without friction from positions and their derivatives.
         """
         rate = log.rate_hz
@@ -93,14 +68,9 @@ class Signals:
         inverse = inverse_torque(q, dq, ddq)
         typical = np.maximum(np.sqrt(np.mean(dq**2, axis=0)), rules.LEAST_SPEED)
         return cls(
-            log, nominal, rate / step, log.time[here], q, dq, ddq, torque, known[here], inverse, typical,
+            log, tree, rate / step, log.time[here], q, dq, ddq, torque, known[here], inverse, typical,
             None if log.enabled is None else log.enabled[here],
         )  # fmt: skip
-
-    @property
-    def tree(self) -> Tree:
-        """The nominal tree."""
-        return self.nominal.tree
 
     @cached_property
     def motion(self) -> Motion:
@@ -115,8 +85,8 @@ class Signals:
     @property
     def asked(self) -> Array:
         """Torques that the nominal model asks for, its friction included, shape (W, J)."""
-        dry = self.nominal.coulomb * self.direction(self.slow)
-        return self.inverse + dry + self.nominal.viscous * self.dq
+        dry = self.tree.coulomb * self.direction(self.slow)
+        return self.inverse + dry + self.tree.viscous * self.dq
 
     @property
     def slow(self) -> Array:

@@ -10,10 +10,11 @@ import numpy as np
 
 from discrepancy.rules import serial as rules
 from discrepancy.serial.mechanics.nominal import inverse_torque
+from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rows.reduction import cutoff_hz
-from discrepancy.serial.rows.signals import Nominal, Signals
+from discrepancy.serial.rows.signals import Signals
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.filtering import low_pass
@@ -61,9 +62,9 @@ def with_torques(
     unknown = [j for j, name in enumerate(unit) if name]
     if not unknown:
         return tuple(logs), ()
-    nominal, inverse = Nominal.of(model.model), partial(inverse_torque, model.model)
+    tree, inverse = Tree.of(model.model), partial(inverse_torque, model.model)
     signals = [
-        Signals.of(replace(log, torque=own), nominal, inverse) for log, own in zip(logs, raw, strict=True)
+        Signals.of(replace(log, torque=own), tree, inverse) for log, own in zip(logs, raw, strict=True)
     ]
     motors = [_motor(signals, j, unit[j], model.joints[j]) for j in unknown]
     out = []
