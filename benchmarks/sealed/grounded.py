@@ -25,6 +25,22 @@ def of_the_background(item: Item, truth: Item) -> bool:
     return any(_is(item, effect, truth) for effect in truth["background"] if effect["cause"] == item["cause"])
 
 
+def law_of_the_background(item: Item, truth: Item) -> bool:
+    """Whether a stated law is a hysteresis of the spring that the background drew there, larger than any tolerance.
+
+    The catalogue's spring has a hysteresis of its own form; a play of the same torque is what that form leaves.
+    """
+    law, here = item["law"], (item.get("robot"), item.get("joint"))
+    if law["function"] != "play" or law["of"] != f"tau_{here[0]}_{here[1]}":
+        return False
+    most = LARGE * default_tolerances()["sea_hysteresis"]["friction_Nm"]
+    return any(
+        abs(effect["parameters"]["friction_Nm"]) > most
+        for effect in truth["background"]
+        if effect["cause"] == "sea_hysteresis" and (effect["robot"], effect["joint"]) == here
+    )
+
+
 def _is(item: Item, effect: Item, truth: Item) -> bool:
     tolerances = default_tolerances()[effect["cause"]]
     known = {name: value for name, value in effect["parameters"].items() if name in tolerances}

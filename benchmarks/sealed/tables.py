@@ -10,6 +10,7 @@ import numpy as np
 
 from mocobot.campaign.shares import interval, reliability
 from sealed.backgrounds import BACKGROUNDS
+from sealed.grounded import law_of_the_background
 from sealed.score import HEALTHY, Score, Scored, family_of, score
 
 SIZES = ((0.0, 3.0, "2 to 3"), (3.0, 6.0, "3 to 6"), (6.0, np.inf, "6 and more"))
@@ -189,9 +190,11 @@ def _laws(scored: Sequence[Scored]) -> str:
     text = [_markdown("Laws", header, rows)] if rows else []
     others = [one for one in scored if "law_scores" not in one.result]
     if others:
-        false = sum(bool(one.laws) for one in others)
+        false = [[not law_of_the_background(law, one.result["truth"]) for law in one.laws] for one in others]
+        there = sum(bool(each) and not any(each) for each in false)
         text.append(
-            f"A law stated where nothing unlisted was hidden: {_share(false, len(others))} of {len(others)}."
+            f"A law stated where nothing unlisted was hidden: {_share(sum(map(any, false)), len(others))} of "
+            f"{len(others)}, and {there} where only hysteresis of the background was."
         )
     return "\n\n".join(text)
 
