@@ -29,7 +29,11 @@ _BY_FORM: dict[tuple[str, str, str], str] = {
     ("gimbal torque", "linear", "own angle"): "a bundle of cables that acts as a spring",
     ("gimbal torque", "cube", "own angle"): "a bundle of cables that stiffens",
     ("gimbal torque", "play", "own angle"): "a bearing that gives way before it slides (presliding)",
-    ("driven torque", "play", "own angle"): "a gear, or a bearing, that gives way before it slides (presliding)",
+    (
+        "driven torque",
+        "play",
+        "own angle",
+    ): "a gear, or a bearing, that gives way before it slides (presliding)",
     ("driven torque", "above", "own rate"): "a brake in one direction",
     ("driven torque", "below", "own rate"): "a brake in one direction",
     ("base position", "linear", "time"): "a base that creeps",
