@@ -8,6 +8,7 @@ from discrepancy import rules
 from discrepancy.engine.confirm import Alternative, confirm, not_simulated
 from discrepancy.engine.explanation import Explanation, Found, explain
 from discrepancy.engine.gain import Gain, responses
+from discrepancy.engine.lawful import laws_of, responding
 from discrepancy.engine.verdict import Verdict, verdict_of
 from discrepancy.inference.odds import check_odds
 from discrepancy.inference.search import search
@@ -75,7 +76,7 @@ def diagnose(
         InputError: the odds are none.
     """
     searched = search(rig, most, progress=say, odds=check_odds(odds))
-    explanation = explain(searched)
+    explanation = listed = explain(searched)
     located: tuple[Located, ...] = ()
     if laws == "always" or (laws == "auto" and not explanation.clean):
         lawful = with_laws(searched, most, say, always=laws == "always")
@@ -83,11 +84,16 @@ def diagnose(
         explanation = explain(searched)
     rig = searched.rig
     notes: list[str] = []
+    why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"
+    if why_not is None and laws_of(explanation):
+        if say:
+            say("simulate")
+        explanation, spoken = responding(rig, listed, explanation, jobs, simulated)
+        notes += spoken
     if odds != rules.PRIOR_ODDS:
         notes.append(
             f"Every cause was taken to be there with odds of {odds:g} beforehand; otherwise it is {rules.PRIOR_ODDS:g}."
         )
-    why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"
     alternatives = tuple(not_simulated(found) for found in explanation.found)
     gain, contradicted = None, False
     if why_not is None and explanation.found:

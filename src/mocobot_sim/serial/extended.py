@@ -165,7 +165,7 @@ The robot with these causes built in:
 
 {table}
 
-- `{SCENE}`: loads in plain MuJoCo.
+- `{SCENE}`: loads in plain MuJoCo. A payload's inertia is the nearest to the fitted one that a body can have.
 - `{NUMBERS}`: all numbers, those included that MJCF cannot say. What is said to be simulated nowhere is an error of the
   log, such as the scale of a torque, or passed.
 

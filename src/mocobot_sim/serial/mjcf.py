@@ -12,6 +12,8 @@ INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 SOLREF, SOLIMP = (0.002, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0)
 """Of dry friction. With MuJoCo's defaults it grows with the speed up to about loss / (100 / s inertia), 0.2 rad/s for
 20 N m on 1 kg m^2; with these up to a tenth of that, for steps of up to 1 ms."""
+LEAST_MOMENT = 1e-3
+"""Of a payload's largest second moment of mass, the least that it has in any direction. Chosen: a thin sheet's."""
 
 
 def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
@@ -61,9 +63,9 @@ def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
     elif effect.cause == "payload":
         load = body.add_body(name=f"payload_at_{body.name}")
         load.mass, load.ipos = effect.number("mass"), [effect.number(axis) for axis in "xyz"]
-        ball = effect.number("mass") * effect.number("gyration") ** 2 * np.array([1, 1, 1, 0, 0, 0])
-        own = [effect.number(f"inertia_{axes}") for axes in INERTIA]
-        load.fullinertia, load.explicitinertial = ball + own, True
+        ball = effect.number("mass") * effect.number("gyration") ** 2 * np.eye(3)
+        load.fullinertia = _six(real_inertia(ball + _moments(effect)))
+        load.explicitinertial = True
     else:
         return False
     return True
@@ -95,11 +97,33 @@ def _inertial(body: mujoco.MjsBody, model: mujoco.MjModel, index: int, effect: R
     elif effect.cause == "link_com":
         centre = centre + [effect.number(axis) for axis in "xyz"]
     else:
-        xx, yy, zz, xy, xz, yz = (effect.number(f"inertia_{axes}") for axes in INERTIA)
-        inertia = inertia + np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        inertia = inertia + _moments(effect)
     body.mass, body.ipos, body.iquat = mass, centre, [1.0, 0.0, 0.0, 0.0]
-    body.fullinertia = [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
-    body.explicitinertial = True
+    body.fullinertia, body.explicitinertial = _six(inertia), True
+
+
+def _moments(effect: RobotEffect) -> np.ndarray:
+    xx, yy, zz, xy, xz, yz = (effect.number(f"inertia_{axes}") for axes in INERTIA)
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
+def _six(inertia: np.ndarray) -> list[float]:
+    return [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+
+
+def real_inertia(inertia: np.ndarray) -> np.ndarray:
+    """The inertia nearest to a fitted one that a body can have, which MuJoCo asks for.
+
+    A density is nowhere below zero, so second moments of mass are positive semidefinite (P. M. Wensing, S. Kim and
+    J.-J. E. Slotine, "Linear matrix inequalities for physically consistent inertial parameter identification", RA-L
+    2018); those that are not are set to a thousandth of the largest.
+
+    Args:
+        inertia: about the centre of mass [kg m^2], shape (3, 3), symmetric.
+    """
+    size, axes = np.linalg.eigh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
+    second = (axes * np.maximum(size, LEAST_MOMENT * max(size[-1], 0.0))) @ axes.T
+    return np.trace(second) * np.eye(3) - second
 
 
 def _tilted(gravity: np.ndarray, effect: RobotEffect) -> np.ndarray:
