@@ -38,20 +38,24 @@ class RobotEffect:
         return float(self.parameters[name])
 
 
-def resistances(effects: list[RobotEffect], q: Array, v: Array) -> Array:
+def resistances(effects: list[RobotEffect], q: Array, v: Array, damping: Array) -> Array:
     """Torques that effects take from their joints' drives beyond what the model does, shape (J,) [N m or N].
+
+    What rubs never drives: fitted viscous friction that is a little below zero, the model's own with it, is none.
 
     Args:
         effects: any; those of ``SMOOTH`` count.
         q: joint positions [rad or m], shape (J,).
         v: speeds, shape (J,).
+        damping: the model's own [N m s/rad or N s/m], shape (J,).
     """
-    out = np.zeros(len(q))
+    out, rubbing = np.zeros(len(q)), np.zeros(len(q))
     for effect in effects:
         if effect.cause in SMOOTH and effect.joint is not None:
             j = effect.joint - 1
-            out[j] += SMOOTH[effect.cause](effect, float(q[j]), float(v[j]))
-    return out
+            into = rubbing if effect.cause in VISCOUS else out
+            into[j] += SMOOTH[effect.cause](effect, float(q[j]), float(v[j]))
+    return out + np.where((rubbing + damping * v) * v < 0.0, -damping * v, rubbing)
 
 
 def dry_levels(effects: list[RobotEffect], v: Array, load: Array) -> Array:
@@ -132,6 +136,9 @@ DRY: dict[str, Callable[[RobotEffect, float, float], float]] = {
     "load_friction": _load_friction,
 }
 """Dry friction by speed and load, by cause: against the motion, and at rest as much as keeps the joint there."""
+
+VISCOUS = frozenset({"friction", "asymmetric_viscous"})
+"""Of ``SMOOTH``, those that rub."""
 
 LAWS = frozenset({*SMOOTH, *DRY})
 """Causes that are torques by the state of their own joint."""

@@ -123,7 +123,7 @@ def step(
     inertia = np.zeros(model.nv)
     mujoco.mj_mulM(model, data, inertia, before)
     load = inertia - model.dof_armature * before + data.qfrc_bias - data.qfrc_spring
-    taken = resistances(listed, data.qpos, data.qvel)
+    taken = resistances(listed, data.qpos, data.qvel, model.dof_damping)
     state = State(data.time, model.opt.timestep, data.qpos, data.qvel, before, load, torque)
     for acting in (effect for effect in effects if isinstance(effect, ActingLaw)):
         taken[acting.law.joint - 1] += acting.torque(state)

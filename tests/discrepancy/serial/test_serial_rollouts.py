@@ -322,3 +322,18 @@ def test_dry_friction_of_the_stepper_stops_a_joint_and_never_drives_it() -> None
     data.qvel[0] = 0.3
     step(model, data, [less], np.zeros(1))
     assert data.qvel[0] == pytest.approx(0.3, abs=1e-9)
+
+
+@pytest.mark.parametrize("viscous", [-0.2, -0.05])
+def test_viscous_friction_of_the_stepper_never_drives_a_joint(viscous: float) -> None:
+    """What the model has and what it is found to have less: together never below zero."""
+    model = mujoco.MjModel.from_xml_string(TURNTABLE)
+    model.opt.timestep, model.opt.integrator = 1e-3, int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
+    model.dof_damping[:] = 0.1
+    data = mujoco.MjData(model)
+    data.qvel[0] = 1.0
+    for _ in range(1000):
+        step(model, data, [RobotEffect("friction", 1, None, {"coulomb_Nm": 0.0, "viscous_Nms_per_rad": viscous})],
+             np.zeros(1))  # fmt: skip
+    expected = np.exp(-max(0.1 + viscous, 0.0) / INERTIA)
+    assert data.qvel[0] == pytest.approx(expected, rel=1e-3)
