@@ -1,31 +1,22 @@
-"""Any log by its path: what it is shows in its first bytes, or in what its folder holds."""
+"""Any log by its path."""
 
 import shlex
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
 
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
-from estimator.recording.parquet import METADATA_KEY
-from mocobot_logs.faults import detail_of
+from mocobot_logs.formats import Kind, log_kind
 from mocobot_logs.log import LogSource
 from mocobot_logs.map.files import CsvMap, LogMap, builtin_map
 from mocobot_logs.map.parse import MAX_ROBOTS
 from mocobot_logs.table.csv import CsvTable
-from mocobot_logs.table.lerobot import LeRobotTable, dataset_root
+from mocobot_logs.table.lerobot import LeRobotTable
 from mocobot_logs.table.npz import NpzTable
-from mocobot_logs.table.parquet import ParquetTable, opened
+from mocobot_logs.table.parquet import ParquetTable
 from mocobot_logs.table.table import Table, TableSource
-
-Kind = Literal["bag", "csv", "npz", "parquet", "lerobot"]
-TEXT_SUFFIXES = (".csv", ".tsv", ".txt")
-FORMATS = (
-    "a rosbag2 folder, .mcap or .db3, a CSV file (.csv, .tsv, .txt), an .npz archive, a .parquet file or a LeRobot "
-    "dataset"
-)
 
 
 def open_log(path: Path | str, log_map: LogMap | None = None, episode: int | None = None) -> LogSource:
@@ -69,68 +60,6 @@ def draft_suggested(path: Path) -> Iterator[None]:
     except InputError as error:
         said = f"No map was given (--map): `mocobot map {shlex.quote(str(path))}` drafts one"
         raise InputError(f"{error}. {said}") from error
-
-
-def log_kind(path: Path) -> Kind:
-    """What a log is, by its first bytes or by what its folder holds.
-
-    Raises:
-        InputError: there is no such log, or its format is not known.
-    """
-    try:
-        if not path.exists():
-            raise InputError(f"{path}: there is no such file")
-        if path.is_dir():
-            if dataset_root(path) is not None:
-                return "lerobot"
-            if _is_bag(path):
-                return "bag"
-            raise InputError(f"{path}: is a directory, and neither a rosbag2 bag nor a LeRobot dataset")
-        if not path.is_file():
-            raise InputError(f"{path}: is not a regular file; a log is {FORMATS}")
-        with path.open("rb") as file:
-            head = file.read(4)
-    except PermissionError as error:
-        raise InputError(f"{path}: cannot be read (permission denied)") from error
-    except (OSError, ValueError) as error:  # a name too long for the system, or with a NUL in it
-        if isinstance(error, InputError):
-            raise
-        raise InputError(f"{str(path)!r:.80}: not a usable file name ({detail_of(error)})") from error
-    if head == b"PAR1":
-        return "lerobot" if _is_of_a_dataset(path) else "parquet"
-    if head == b"PK\x03\x04" or head == b"PK\x05\x06":
-        return "npz"
-    suffix = path.suffix.lower()
-    if suffix in TEXT_SUFFIXES:
-        return "csv"
-    if _is_bag(path):
-        return "bag"
-    if suffix in (".npz", ".parquet", ".mcap", ".db3"):
-        raise InputError(
-            f"{path}: is named {suffix}, but does not begin like one; it is damaged or something else"
-        )
-    raise InputError(f"{path}: is of no known format; a log is {FORMATS}")
-
-
-def _is_bag(path: Path) -> bool:
-    from mocobot_logs.bag.read import is_bag
-
-    return is_bag(path)
-
-
-def _is_of_a_dataset(path: Path) -> bool:
-    """A data file in a dataset, unless it is a recording that merely lies there."""
-    return dataset_root(path) is not None and not is_recording(path)
-
-
-def is_recording(path: Path) -> bool:
-    """Whether a Parquet file says that it is a recording.
-
-    Raises:
-        InputError: it cannot be read.
-    """
-    with opened(path, str(path)) as file:
-        return METADATA_KEY in (file.schema_arrow.metadata or {})
 
 
 def open_table(path: Path, kind: Kind, options: CsvMap, episode: int | None = None) -> Table:

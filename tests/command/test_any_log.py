@@ -130,7 +130,7 @@ def test_what_is_refused_names_the_users_file(
         (["rec.parquet", "--map", "my.toml"], "map my.toml: all files are recordings, which need none"),
         (["my.csv", "--map", "none.toml"], "map none.toml: there is no such file"),
         (["none.csv"], "none.csv: "),
-        (["my.toml"], "my.toml: is not a recording of mocobot, and mocobot convert does not read its format"),
+        (["my.toml"], "my.toml: is of no known format; a log is a rosbag2 folder, .mcap or .db3, a CSV file"),
     ):
         message = refused(capsys, command, *arguments)
         assert words in message

@@ -229,7 +229,6 @@ OUTPUTS = {
 }  # fmt: skip
 """Outputs that may not be written, or cannot; inputs that are missing show that these are not looked at before."""
 
-UNREAD = f"is not a recording of mocobot, and mocobot convert does not read its format; make it {LOGS}"
 FILES = {
     "none.parquet": "none.parquet: there is no such file",
     "empty.parquet": "empty.parquet: not a readable Parquet file, or a damaged one (Parquet file size is 0 bytes)",
@@ -240,7 +239,7 @@ FILES = {
     "t, q. No map was given (--map): `mocobot map 'my log.txt'` drafts one",
     "table.parquet": "table.parquet: missing column 'omnid1.phi1' for phi1 of robot 1 by map mocobot; the columns "
     "are a. No map was given (--map): `mocobot map table.parquet` drafts one",
-    "log.h5": f"log.h5: {UNREAD}",
+    "log.h5": f"log.h5: is of no known format; a log is {LOGS}",
     "lone.truth.json": "lone.truth.json: is a JSON file, not a recording of mocobot; recordings are .parquet files",
 }
 """Files that are neither recordings nor logs that can be read as they are."""

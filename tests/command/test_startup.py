@@ -40,6 +40,8 @@ NAMES_AND_FILES = {
     "cause of a tree": "diagnose whole.csv --model whole.xml --exclude rust",
     "empty file": "estimate empty.parquet",
     "cut file": "calibrate cut.parquet",
+    "no format": "diagnose whole.mat",
+    "no format of a tree": "map whole.h5 --model whole.xml",
 }
 """Mistakes that names of causes and effects tell, or a few bytes of a file."""
 
@@ -50,7 +52,7 @@ def test_every_command_refuses_something_at_once() -> None:
 
 @pytest.mark.parametrize("name", REFUSED | NAMES_AND_FILES)
 def test_a_refusal_loads_nothing_that_takes_time(name: str, tmp_path: Path) -> None:
-    for file in ("whole.csv", "whole.mat", "whole.xml", "empty.parquet"):
+    for file in ("whole.csv", "whole.mat", "whole.h5", "whole.xml", "empty.parquet"):
         (tmp_path / file).touch()
     (tmp_path / "cut.parquet").write_bytes(b"PAR1" + bytes(100))
     code = (
@@ -65,7 +67,7 @@ def test_a_refusal_loads_nothing_that_takes_time(name: str, tmp_path: Path) -> N
     )
     assert done.returncode == 0, done.stderr
     assert done.stderr.startswith("mocobot: ")
-    assert any(why in done.stderr for why in ("there is no such", "does not exist", "or a damaged one"))
+    assert any(why in done.stderr for why in ("there is no such", "does not exist", "or a damaged one", "no known format", "is a MAT file"))
 
 
 def test_kinds_of_trials_are_those_of_recordings() -> None:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from estimator.errors import InputError
-from mocobot.files.targets import check_folder, check_recordings, check_there, map_file
+from mocobot.files.targets import check_folder, check_formats, check_recordings, check_there, map_file
 from mocobot.options import Calibrate
 
 
@@ -21,6 +21,7 @@ def check(options: Calibrate) -> None:
         inputs = [*files, *([options.prior] if options.prior else []), *map_file(options.map)]
         check_folder(options.out, inputs, _is_calibration, "an earlier calibration", force=options.force)
     check_there(files)
+    check_formats(files)
 
 
 def _is_calibration(folder: Path) -> bool:

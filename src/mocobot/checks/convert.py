@@ -3,7 +3,14 @@
 from pathlib import Path
 
 from estimator.errors import InputError
-from mocobot.files.targets import check_folder, check_no_input, check_output, check_there, map_file
+from mocobot.files.targets import (
+    check_folder,
+    check_formats,
+    check_no_input,
+    check_output,
+    check_there,
+    map_file,
+)
 from mocobot.options import Convert
 from mocobot_logs.output_kind import output_kind
 
@@ -28,6 +35,7 @@ def check(options: Convert) -> None:
         if not low <= value <= high:
             raise InputError(f"{option} is {value:g}; it must be from {low:g} to {high:g}")
     check_there([options.log])
+    check_formats([options.log])
 
 
 def targets(out: Path, count: int) -> list[Path]:

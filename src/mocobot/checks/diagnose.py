@@ -10,6 +10,7 @@ from estimator.errors import InputError
 from mocobot.files.targets import (
     calibration_file,
     check_folder,
+    check_formats,
     check_no_team,
     check_recordings,
     check_there,
@@ -45,6 +46,8 @@ def check(options: Diagnose) -> None:
     _check_rig(options)
     _check_excluded(options.exclude, CAUSES[options.rig])
     check_there(options.rec)
+    if options.rig == "team":
+        check_formats(options.rec)
 
 
 def _check_joints(options: Diagnose, model: Path) -> None:
@@ -60,6 +63,7 @@ def _check_joints(options: Diagnose, model: Path) -> None:
         check_folder(options.out, inputs, _is_diagnosis, "an earlier diagnosis", force=options.force)
     _check_excluded(options.exclude, serial.NAMES)
     check_there([*logs, model])
+    check_formats(logs)
 
 
 def _check_rig(options: Diagnose) -> None:

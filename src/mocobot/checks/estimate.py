@@ -1,7 +1,14 @@
 """What ``mocobot estimate`` refuses at once."""
 
 from estimator.errors import InputError
-from mocobot.files.targets import calibration_file, check_output, check_recordings, check_there, map_file
+from mocobot.files.targets import (
+    calibration_file,
+    check_formats,
+    check_output,
+    check_recordings,
+    check_there,
+    map_file,
+)
 from mocobot.options import Estimate
 
 
@@ -22,3 +29,4 @@ def check(options: Estimate) -> None:
         inputs = [*options.rec, *map_file(options.map), *calibration_file(options.calibration)]
         check_output(options.out, inputs, force=options.force)
     check_there(options.rec)
+    check_formats(options.rec)

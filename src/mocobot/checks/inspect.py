@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from mocobot.files.targets import calibration_file, check_no_team, check_output, check_there
+from mocobot.files.targets import calibration_file, check_formats, check_no_team, check_output, check_there
 from mocobot.options import Inspect
 
 
@@ -19,3 +19,4 @@ def check(options: Inspect) -> None:
     if options.json is not None:
         check_output(options.json, inputs, force=options.force)
     check_there([options.rec, *([options.model] if options.model is not None else [])])
+    check_formats([options.rec])

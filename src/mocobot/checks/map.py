@@ -1,6 +1,6 @@
 """What ``mocobot map`` refuses at once."""
 
-from mocobot.files.targets import check_output, check_there
+from mocobot.files.targets import check_formats, check_output, check_there
 from mocobot.options import Map
 
 
@@ -14,3 +14,4 @@ def check(options: Map) -> None:
     if options.out is not None:
         check_output(options.out, inputs, force=options.force)
     check_there(inputs)
+    check_formats([options.log])

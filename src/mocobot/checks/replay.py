@@ -5,6 +5,7 @@ from pathlib import Path
 from estimator.errors import InputError
 from mocobot.files.targets import (
     calibration_file,
+    check_formats,
     check_no_team,
     check_output,
     check_recordings,
@@ -33,3 +34,4 @@ def check(options: Replay) -> None:
         inputs += [Path(options.map)] if options.map is not None else []
         check_output(options.save, inputs, force=options.force, suffix=".rrd")
     check_there([*options.rec, *([options.model] if options.model is not None else [])])
+    check_formats(options.rec)

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from estimator.errors import InputError
-from mocobot.files.targets import check_folder, check_recordings, check_there, map_file
+from mocobot.files.targets import check_folder, check_formats, check_recordings, check_there, map_file
 from mocobot.options import Watch
 
 VERDICT, PAGE = "verdict.txt", "report.html"
@@ -31,6 +31,7 @@ def check(options: Watch) -> None:
         inputs = [*options.rec, *map_file(options.map)]
         check_folder(options.out, inputs, _is_ours, "an earlier result of watch", force=options.force)
     check_there(options.rec)
+    check_formats(options.rec)
 
 
 def _is_ours(folder: Path) -> bool:

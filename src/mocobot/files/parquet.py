@@ -4,9 +4,8 @@ import os
 from pathlib import Path
 
 from estimator.errors import InputError
+from mocobot_logs.formats import PARQUET as MAGIC
 
-MAGIC = b"PAR1"
-"""First and last bytes of every Parquet file (parquet.apache.org/docs/file-format)."""
 LEAST_BYTES = 12
 """Both, and the length of the footer between them."""
 

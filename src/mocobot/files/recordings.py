@@ -7,7 +7,8 @@ from pathlib import Path
 from estimator.errors import InputError
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
-from mocobot_logs.open_log import FORMATS, is_recording, log_kind
+from mocobot_logs.formats import FORMATS, log_kind
+from mocobot_logs.table.parquet import is_recording
 
 KINDS = {
     "bag": "a ROS 2 bag",

@@ -11,6 +11,7 @@ from pathlib import Path
 from estimator.errors import InputError
 from estimator.files import check_place, check_target, system_errors
 from mocobot.files.parquet import check_parquet
+from mocobot_logs.formats import log_kind
 
 CALIBRATION = "calibration.json"
 """The file in the folder of ``mocobot calibrate --out``."""
@@ -47,6 +48,17 @@ def check_there(paths: Sequence[Path]) -> None:
             continue
         if path.is_file():
             check_parquet(path)
+
+
+def check_formats(paths: Sequence[Path]) -> None:
+    """Find out that a file is no log of any format that is read.
+
+    Raises:
+        InputError: one is not.
+    """
+    for path in paths:
+        if path.is_file() and path.suffix.lower() not in (".json", ".parquet"):  # of those reading tells more
+            log_kind(path)
 
 
 def check_no_team(options: object, names: Sequence[str]) -> None:

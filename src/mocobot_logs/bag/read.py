@@ -23,12 +23,10 @@ from mocobot_logs.bag.join import Clock, agree, make_joiner
 from mocobot_logs.bag.look import Look, choose_map
 from mocobot_logs.bag.messages import Messages, listed_names
 from mocobot_logs.bag.plan import Plan, TopicPlan, make_plan
-from mocobot_logs.bag.storage.files import BagFiles, is_bag
+from mocobot_logs.bag.storage.files import BagFiles
 from mocobot_logs.bag.types import STRING, string_of, type_name
 from mocobot_logs.log import REF, Level, Samples
 from mocobot_logs.map.log_map import LogMap
-
-__all__ = ["METADATA_TOPIC", "BagSource", "is_bag", "open_bag"]
 
 METADATA_TOPIC = "/mocobot/metadata"
 """One std_msgs/msg/String with the metadata of the recording that a bag was written from."""

@@ -6,8 +6,9 @@ from mocobot_logs.draft.candidates import Candidate, of_table
 from mocobot_logs.draft.channels import find_channels
 from mocobot_logs.draft.draft import Draft, put_together
 from mocobot_logs.draft.time import time_lines
+from mocobot_logs.formats import log_kind
 from mocobot_logs.map.log_map import CsvMap
-from mocobot_logs.open_log import log_kind, open_table
+from mocobot_logs.open_log import open_table
 
 
 def draft_of(path: Path, episode: int | None = None) -> Draft:

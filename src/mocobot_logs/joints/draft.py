@@ -15,9 +15,10 @@ from mocobot_logs.draft.candidates import of_table
 from mocobot_logs.draft.robots import Robots
 from mocobot_logs.draft.text import DOUBTFUL, printable
 from mocobot_logs.draft.time import time_lines
+from mocobot_logs.formats import log_kind
 from mocobot_logs.joints.quantities import QUANTITIES, Kind, units_of
 from mocobot_logs.map.log_map import CsvMap
-from mocobot_logs.open_log import log_kind, open_table
+from mocobot_logs.open_log import open_table
 from mocobot_logs.table.table import Table, Wanted
 
 _WORDS: dict[str, set[str]] = {

@@ -20,11 +20,11 @@ import pyarrow.dataset as ds
 from estimator.errors import InputError
 from mocobot_logs.claims import check_claim, read_small
 from mocobot_logs.faults import detail_of, told_in_one_sentence
+from mocobot_logs.formats import DATASET_INFO, dataset_root
 from mocobot_logs.table.parquet import KIND, ParquetTable
 from mocobot_logs.table.stamps import LARGEST_NS
 from mocobot_logs.table.table import Block, Wanted
 
-INFO = Path("meta") / "info.json"
 MAX_INFO_BYTES = 16 << 20
 EPISODE, FRAME, TIMESTAMP = "episode_index", "frame_index", "timestamp"
 NAME_COLUMNS = (EPISODE, "data/chunk_index", "data/file_index")
@@ -37,14 +37,6 @@ _SCAN = ds.ParquetFragmentScanOptions(
 
 Files = Mapping[Path, set[int] | None]
 """Data files, each with its episodes where the dataset says."""
-
-
-def dataset_root(path: Path) -> Path | None:
-    """The dataset that a path is, or whose data file it is; None if it is neither."""
-    for folder in (path, *(path.parents[2:3] if path.is_file() else ())):
-        if (folder / INFO).is_file():
-            return folder
-    return None
 
 
 class LeRobotTable(ParquetTable):
@@ -69,7 +61,7 @@ class LeRobotTable(ParquetTable):
         """
         root = dataset_root(path)
         if root is None:
-            raise InputError(f"{name}: is not a LeRobot dataset, it has no {INFO}")
+            raise InputError(f"{name}: is not a LeRobot dataset, it has no {DATASET_INFO}")
         info = _read_info(root, name)
         files: Files = _data_files(root, info, name) if path.is_dir() else {path: None}
         self._fps = info["fps"]
@@ -109,8 +101,8 @@ class LeRobotTable(ParquetTable):
 
 
 def _read_info(root: Path, name: str) -> dict[str, Any]:
-    where = f"{name}: {INFO}"
-    content = read_small(root / INFO, MAX_INFO_BYTES, where, "dataset's description")
+    where = f"{name}: {DATASET_INFO}"
+    content = read_small(root / DATASET_INFO, MAX_INFO_BYTES, where, "dataset's description")
     try:
         info = json.loads(content)
     except (ValueError, RecursionError) as error:
@@ -156,7 +148,7 @@ def _template(data_path: Any, name: str) -> str:
     """The dataset's own pattern of file names, unless it could lead anywhere else."""
     if not isinstance(data_path, str) or not _DATA_PATH.fullmatch(data_path) or ".." in Path(data_path).parts:
         raise InputError(
-            f"{name}: {INFO}: data_path is {data_path!r:.80}; it must be like "
+            f"{name}: {DATASET_INFO}: data_path is {data_path!r:.80}; it must be like "
             "'data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet'"
         )
     return data_path

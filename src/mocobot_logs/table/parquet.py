@@ -127,6 +127,16 @@ def opened(path: Path, name: str) -> Iterator[pq.ParquetFile]:
         yield file
 
 
+def is_recording(path: Path) -> bool:
+    """Whether a Parquet file says that it is a recording.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    with opened(path, str(path)) as file:
+        return METADATA_KEY in (file.schema_arrow.metadata or {})
+
+
 def numbers(column: pa.Array, shape: tuple[int, ...], where: str) -> NDArray:
     """A column as an array (q, *shape) of whole numbers or floats, NaN where a row is empty.
 

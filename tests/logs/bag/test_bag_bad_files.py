@@ -8,7 +8,8 @@ import zstandard
 import bags
 from bag_refusals import TEAM, refuses
 from bags import raw_mcap, rosbags_bag
-from mocobot_logs.bag.read import is_bag, open_bag
+from mocobot_logs.bag.read import open_bag
+from mocobot_logs.formats import is_bag
 from mocobot_logs.log import collect
 
 

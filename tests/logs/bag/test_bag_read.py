@@ -16,7 +16,8 @@ from rosbags.highlevel import AnyReader
 import bags
 from bags import NO_SUMMARY, OMNID, UNCHUNKED, Team, raw_mcap, rosbags_bag, said
 from estimator.errors import InputError
-from mocobot_logs.bag.read import is_bag, open_bag
+from mocobot_logs.bag.read import open_bag
+from mocobot_logs.formats import is_bag
 from mocobot_logs.log import collect
 
 TEAM = Team.draw()

@@ -17,18 +17,16 @@ from ruamel.yaml import YAML
 
 from estimator.errors import InputError
 from mocobot_logs.bag.messages import BLOCK_BYTES, MESSAGE_BYTES, Messages, Storage, joined, merged
-from mocobot_logs.bag.storage.mcap import MAGIC, McapBag
-from mocobot_logs.bag.storage.sqlite import HEAD, SqliteBag
+from mocobot_logs.bag.storage.mcap import McapBag
+from mocobot_logs.bag.storage.sqlite import SqliteBag
 from mocobot_logs.bag.storage.unpack import UnpackError, unpack_file, unpack_message
 from mocobot_logs.claims import read_small
 from mocobot_logs.faults import detail_of, readable
+from mocobot_logs.formats import BAG_METADATA, MCAP, ROS1, SQLITE, has_bag_suffix
 
 VERSIONS = range(1, 10)
 """Of ``metadata.yaml`` that are read; all that rosbag2 has written so far."""
-METADATA = "metadata.yaml"
-STORAGES = {"mcap": MAGIC, "sqlite3": HEAD}
-SUFFIXES = (".mcap", ".db3", ".mcap.zstd", ".db3.zstd")
-_ROS1 = b"#ROSBAG"
+STORAGES = {"mcap": MCAP, "sqlite3": SQLITE}
 _ZSTD = b"\x28\xb5\x2f\xfd"
 _METADATA_BYTES = 1 << 20
 _DEEPEST = 64
@@ -103,11 +101,11 @@ class BagFiles:
             packed, path = path, self._scratch.path / str(number)
             unpack_file(packed, path, tuple(STORAGES.values()), name)
             head = _head(path)
-        if head.startswith(MAGIC):
+        if head.startswith(MCAP):
             return McapBag(path, name)
-        if head.startswith(HEAD):
+        if head.startswith(SQLITE):
             return SqliteBag(path, name)
-        if head.startswith(_ROS1):
+        if head.startswith(ROS1):
             raise InputError(
                 f"{name}: a bag of ROS 1; `rosbags-convert` makes a ROS 2 bag of it, which can be read"
             )
@@ -115,20 +113,6 @@ class BagFiles:
             "is empty" if not head else "is neither an MCAP nor an SQLite file, as those of a ROS 2 bag are"
         )
         raise InputError(f"{name}: {what}")
-
-
-def is_bag(path: Path) -> bool:
-    """Whether a path is meant as a bag: a folder with a bag's files, or a file that begins or is named like one."""
-    try:
-        if path.is_dir():
-            return (path / METADATA).exists() or any(_has_suffix(entry) for entry in path.iterdir())
-        if not path.is_file():
-            return False
-        with path.open("rb") as file:
-            head = file.read(16)
-        return _has_suffix(path) or head.startswith((MAGIC, HEAD, _ROS1))
-    except (OSError, ValueError):
-        return False
 
 
 def _files_of(path: Path) -> tuple[list[Path], bool]:
@@ -156,27 +140,25 @@ def _unpacked(messages: Messages, where: str) -> Messages:
 def _head(path: Path) -> bytes:
     with readable(str(path)):
         if not path.exists():
-            raise InputError(f"{path}: there is no such file, though the bag's {METADATA} names it")
+            raise InputError(f"{path}: there is no such file, though the bag's {BAG_METADATA} names it")
         if not path.is_file():
             raise InputError(f"{path}: is not a regular file")
         with path.open("rb") as file:
             return file.read(16)
 
 
-def _has_suffix(path: Path) -> bool:
-    return path.name.lower().endswith(SUFFIXES)
-
-
 def _read_metadata(folder: Path) -> tuple[list[str], bool]:
     """Names of the files, and whether every message is compressed by itself."""
-    path = folder / METADATA
+    path = folder / BAG_METADATA
     with readable(str(path)):
         if not path.is_file():
-            found = sorted(entry.name for entry in folder.iterdir() if _has_suffix(entry))
+            found = sorted(entry.name for entry in folder.iterdir() if has_bag_suffix(entry))
             if not found:
-                raise InputError(f"{folder}: is a folder without a bag ({METADATA} and .mcap or .db3 files)")
+                raise InputError(
+                    f"{folder}: is a folder without a bag ({BAG_METADATA} and .mcap or .db3 files)"
+                )
             raise InputError(
-                f"{folder}: has no {METADATA}; `ros2 bag reindex` writes it, or name a single file such as "
+                f"{folder}: has no {BAG_METADATA}; `ros2 bag reindex` writes it, or name a single file such as "
                 f"{folder / found[0]}"
             )
     content = read_small(path, _METADATA_BYTES, str(path), "bag's metadata")

@@ -24,8 +24,8 @@ from estimator.errors import InputError
 from mocobot_logs.bag.messages import BLOCK_BYTES, Messages, Topic, check_sizes, merged
 from mocobot_logs.bag.storage.unpack import CHUNK_BYTES, UnpackError, unpack
 from mocobot_logs.faults import readable
+from mocobot_logs.formats import MCAP as MAGIC
 
-MAGIC = b"\x89MCAP0\r\n"
 DEFINITION_BYTES = 256 << 10
 """Longest definition of a message type that is read [bytes]."""
 _HEAD = struct.Struct("<BQ")  # opcode, length

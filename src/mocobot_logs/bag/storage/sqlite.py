@@ -16,8 +16,8 @@ import numpy as np
 from estimator.errors import InputError
 from mocobot_logs.bag.messages import BLOCK_BYTES, MESSAGE_BYTES, Messages, Topic, joined, merged
 from mocobot_logs.faults import detail_of, readable
+from mocobot_logs.formats import SQLITE as HEAD
 
-HEAD = b"SQLite format 3\0"
 _OPERATIONS = 1_000_000
 """SQLite reports after so many of its operations; a row takes some ten and at least eight bytes of the file."""
 _REQUIRED = {
