@@ -67,7 +67,16 @@ def test_a_refusal_loads_nothing_that_takes_time(name: str, tmp_path: Path) -> N
     )
     assert done.returncode == 0, done.stderr
     assert done.stderr.startswith("mocobot: ")
-    assert any(why in done.stderr for why in ("there is no such", "does not exist", "or a damaged one", "no known format", "is a MAT file"))
+    assert any(
+        why in done.stderr
+        for why in (
+            "there is no such",
+            "does not exist",
+            "or a damaged one",
+            "no known format",
+            "is a MAT file",
+        )
+    )
 
 
 def test_kinds_of_trials_are_those_of_recordings() -> None:
