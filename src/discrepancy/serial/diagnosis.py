@@ -59,7 +59,9 @@ def diagnose_serial(
         if say:
             say("simulate")
         rolled = rolled_out(rig, found.explanation)
-    return Diagnosed(judged, found, SerialWords(), partial(traces, rig, found.explanation), rollouts=rolled)
+    return Diagnosed(
+        judged, found, SerialWords(rig.model), partial(traces, rig, found.explanation), rollouts=rolled
+    )
 
 
 def diagnose_rig(

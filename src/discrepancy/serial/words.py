@@ -10,6 +10,7 @@ from discrepancy.laws.candidate import LawCandidate
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.base import parameter_name
+from discrepancy.serial.model import SerialModel
 
 SHOWN = {
     "N m s/rad": "N s/m",
@@ -35,10 +36,20 @@ class SlideNumbers(Numbers):
 
 
 class SerialWords(Words):
-    """Sentences about the robot."""
+    """Sentences about the robot.
+
+    Args:
+        model: whose joints slide, or turn.
+    """
 
     causes = CAUSES
     units = {"speed": "typical speeds"}  # noqa: RUF012
+
+    def __init__(self, model: SerialModel) -> None:
+        joints = enumerate(zip(model.joints, model.slides, strict=True), start=1)
+        sliding = [(j, name) for j, (name, slides) in joints if slides]
+        self._slides = {f"{name} torque": "N" for _, name in sliding}
+        self._slides |= {f"position of joint {j}": "m" for j, _ in sliding}
 
     def describe(self, candidate: Candidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
         """What a cause does at its place, one sentence with its numbers; standard errors may be NaN."""
@@ -51,6 +62,5 @@ class SerialWords(Words):
 
     def unit(self, name: str) -> str:
         """Unit of a channel, or of a quantity that a misfit may depend on."""
-        if name.startswith("position of joint"):
-            return "rad"
-        return self.units.get(name, "N m")
+        turns = "rad" if name.startswith("position of joint") else "N m"
+        return self._slides.get(name) or self.units.get(name, turns)
