@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from discrepancy.candidate import Candidate
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.place import Place
@@ -80,6 +81,12 @@ class TeamBench(Bench):
 
     def white(self, trial: int, columns: Array) -> Array:
         return self._whitening[trial](columns)
+
+    def beside(self, place: Place, cause: Candidate, *, named: bool) -> bool:
+        """At the same robot, of tolerated ones at the same joint; and whatever is named shows in the payload, too."""
+        if place.robot is None or cause.robot is None:
+            return named
+        return place.robot == cause.robot and (named or cause.joint is None or place.joint == cause.joint)
 
     def twin(self, place: Place) -> Place | None:
         """Another place whose rows are the same, minus these."""
