@@ -61,6 +61,10 @@ class Bench(ABC):
         """Whether what the law of a listed cause leaves, a named or a tolerated one, may show as a law at a place."""
         return False
 
+    def is_form(self, law: LawCandidate, cause: Candidate) -> bool:
+        """Whether a law is what a listed cause would be called if it were listed in another form."""
+        return False
+
     def twin(self, place: Place) -> Place | None:
         """Another place whose rows are the same, minus these, or None."""
         return None

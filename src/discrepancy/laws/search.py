@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.engine.held_out import held_out_gains
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.propose import Proposed, sharpened
@@ -17,11 +18,10 @@ from discrepancy.inference.scan import Scanned
 from discrepancy.inference.search import Rival, Searched, continued, settled
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate, candidate_of
-from discrepancy.laws.forms import Refinement, gain_of, refinement
+from discrepancy.laws.forms import Refinement, form_of_named, gain_of, likely_causes, refinement
 from discrepancy.laws.place import Place
 from discrepancy.laws.what import Judged, judged
 from discrepancy.laws.where import Located, located
-from discrepancy.least_squares.problem import Key
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +64,7 @@ def with_laws(
         if searched.best.free and not turn:
             # Causes that were named may have stood for what nobody lists.
             starts.insert(0, Searched(searched.rig, searched.nothing, searched.nothing, ()))
-        found, forms = [], _Forms(bench, frozenset(cause.key for cause in searched.best.causes), refined)
+        found, forms = [], _Forms(bench, likely_causes(searched.best), refined)
         for start in starts:
             places = located_in(start, bench, say)
             first = first or tuple(places)
@@ -95,12 +95,21 @@ class _Forms:
     """
 
     bench: Bench
-    named: frozenset[Key]
+    named: tuple[Candidate, ...]
     found: list[Refinement]
 
     def refined_by(self, hypothesis: Hypothesis, index: int) -> bool:
         """Whether a law of a hypothesis is such a one."""
-        one = refinement(hypothesis, index, self.bench, self.named)
+        one = refinement(hypothesis, index, self.bench, {cause.key for cause in self.named})
+        if one is not None:
+            self.found.append(one)
+        return one is not None
+
+    def among(self, proposed: Proposed) -> bool:
+        """Whether the likeliest law, or one that the rows cannot tell from it, is a named cause in another form."""
+        top = proposed.scores[0][1]
+        alike = [c for c, score in proposed.scores if top - score < rules.AMBIGUOUS_NATS]
+        one = form_of_named((c for c in alike if isinstance(c, LawCandidate)), self.named, self.bench)
         if one is not None:
             self.found.append(one)
         return one is not None
@@ -141,6 +150,8 @@ def _with_one(
     proposed = _proposals(searched, bench, places, say)
     added = proposed.best
     if added is None or added.score - searched.best.score < rules.NAMED_NATS:
+        return None
+    if forms.among(proposed):
         return None
     say(f"refit {added.causes[-1].label}")
     refitted = exact(searched.rig, added, searched.nothing)
