@@ -65,6 +65,7 @@ class Candidate:
         title: the cause in words (``causes.base.Cause``).
         among: of how many of its kind it is one, where the problem does not list them; 0 where it does.
         form_share: of its trace, in amplitude, by which a real one has another form than its law.
+        form_size: of its first parameter, up to which it is that share; beyond, it grows with the root. 0: never.
     """
 
     cause: str
@@ -78,6 +79,7 @@ class Candidate:
     title: str = ""
     among: int = 0
     form_share: float = 0.0
+    form_size: float = 0.0
 
     def acts_in(self, trial: int) -> bool:
         """Whether it can act in a trial (index from 0)."""

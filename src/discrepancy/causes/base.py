@@ -28,6 +28,7 @@ class Cause(ABC):
         positive: parameters that cannot be negative.
         transient: whether it acts for a while in one trial.
         form_share: of its trace, in amplitude, by which a real one has another form than its law.
+        form_size: of its first parameter, up to which it is that share; beyond, it grows with the root. 0: never.
         where: the part of the machine, of what sits at no robot.
         separate: what experiment would tell it from its look-alikes.
     """
@@ -41,6 +42,7 @@ class Cause(ABC):
     positive: ClassVar[tuple[str, ...]] = ()
     transient: ClassVar[bool] = False
     form_share: ClassVar[float] = 0.0
+    form_size: ClassVar[float] = 0.0
     where: ClassVar[str] = "payload"
     separate: ClassVar[str] = ""
 
@@ -63,7 +65,7 @@ class Cause(ABC):
         )
         return Candidate(
             self.name, self.family, robot, joint, parameters, dict(shape), where=self.where, title=self.title,
-            form_share=self.form_share,
+            form_share=self.form_share, form_size=self.form_size,
         )  # fmt: skip
 
     def event(self, given: Mapping[str, float], when: Transient) -> Candidate:

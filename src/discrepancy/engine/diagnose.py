@@ -8,7 +8,7 @@ from discrepancy import rules
 from discrepancy.engine.confirm import Alternative, confirm, not_simulated
 from discrepancy.engine.explanation import Explanation, Found, explain
 from discrepancy.engine.gain import Gain, responses
-from discrepancy.engine.lawful import laws_of, responding
+from discrepancy.engine.lawful import laws_of, refining, responding
 from discrepancy.engine.verdict import Verdict, verdict_of
 from discrepancy.inference.odds import check_odds
 from discrepancy.inference.search import search
@@ -77,13 +77,14 @@ def diagnose(
     """
     searched = search(rig, most, progress=say, odds=check_odds(odds))
     explanation = listed = explain(searched)
+    notes: list[str] = []
     located: tuple[Located, ...] = ()
     if laws == "always" or (laws == "auto" and not explanation.clean):
         lawful = with_laws(searched, most, say, always=laws == "always")
         searched, located = lawful.searched, lawful.places
         explanation = explain(searched)
+        notes += refining(lawful.refinements, explanation)
     rig = searched.rig
-    notes: list[str] = []
     why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"
     if why_not is None and laws_of(explanation):
         if say:

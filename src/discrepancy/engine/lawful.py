@@ -1,6 +1,6 @@
-"""Laws in the closed loop: what fits the rows, but makes the response to the commands worse, is none of the machine."""
+"""Laws that are not stated after all: forms of what is listed, and what makes the response to the commands worse."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 import numpy as np
 
@@ -9,12 +9,20 @@ from discrepancy.engine.confirm import labels
 from discrepancy.engine.explanation import Explanation, Found
 from discrepancy.engine.gain import mean_chi2, responses
 from discrepancy.laws.candidate import LawCandidate
+from discrepancy.laws.forms import Refinement
 from discrepancy.rig import Rig
 
 
 def laws_of(explanation: Explanation) -> list[Found]:
     """The laws among what is named."""
     return [found for found in explanation.found if isinstance(found.candidate, LawCandidate)]
+
+
+def refining(refinements: Iterable[Refinement], explanation: Explanation) -> list[str]:
+    """A sentence for every law that is a form of what is listed, once, unless it is stated after all."""
+    stated = {found.candidate.key for found in laws_of(explanation)}
+    said = {one.law.key: one.sentence for one in refinements if one.law.key not in stated}
+    return list(said.values())
 
 
 def responding(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.least_squares.problem import Problem
 from estimator.arrays import Array
@@ -44,10 +45,23 @@ def _other_forms(hypothesis: Hypothesis) -> Array:
     problem, coefficients = hypothesis.problem, hypothesis.fit.coefficients
     total = np.zeros(sum(cells.sizes.size for cells in problem.cells))
     for candidate, span in zip(problem.candidates, problem.spans, strict=True):
-        if candidate.form_share:
-            values = candidate.form_share * coefficients[span]
-            total += _power(problem, span, values)
+        share = form_share_of(candidate, coefficients[span])
+        if share:
+            total += _power(problem, span, share * coefficients[span])
     return total
+
+
+def form_share_of(candidate: Candidate, values: Array) -> float:
+    """Share of its trace, in amplitude, by which a cause of some values (in units) has another form than its law.
+
+    What is at rest until the load has changed by so much rests the longer the larger it is; in amplitude the share
+    goes with the root.
+    """
+    if not candidate.form_share or not candidate.form_size:
+        return candidate.form_share
+    size = abs(float(values[0])) * candidate.parameters[0].unit
+    larger = float(np.sqrt(max(size / candidate.form_size, 1.0)))
+    return max(candidate.form_share, min(candidate.form_share * larger, rules.FORM_SHARE_MOST))
 
 
 def _power(problem: Problem, span: slice, values: Array) -> Array:

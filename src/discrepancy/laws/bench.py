@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from discrepancy.candidate import Candidate
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.place import Place
 from discrepancy.laws.term import Term
@@ -55,6 +56,14 @@ class Bench(ABC):
     @abstractmethod
     def white(self, trial: int, columns: Array) -> Array:
         """Whitened columns, shape (n, C, k) -> the same."""
+
+    def beside(self, place: Place, cause: Candidate, *, named: bool) -> bool:
+        """Whether what the law of a listed cause leaves, a named or a tolerated one, may show as a law at a place."""
+        return False
+
+    def is_form(self, law: LawCandidate, cause: Candidate) -> bool:
+        """Whether a law is what a listed cause would be called if it were listed in another form."""
+        return False
 
     def twin(self, place: Place) -> Place | None:
         """Another place whose rows are the same, minus these, or None."""

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.engine.held_out import held_out_gains
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.propose import Proposed, sharpened
@@ -17,10 +18,10 @@ from discrepancy.inference.scan import Scanned
 from discrepancy.inference.search import Rival, Searched, continued, settled
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate, candidate_of
+from discrepancy.laws.forms import Refinement, form_of_named, gain_of, likely_causes, refinement
 from discrepancy.laws.place import Place
 from discrepancy.laws.what import Judged, judged
 from discrepancy.laws.where import Located, located
-from discrepancy.least_squares.fit import Fit
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,10 +31,12 @@ class Lawful:
     Attributes:
         searched: with the laws among its causes.
         places: where the first law was looked for, the likeliest first; empty where none was.
+        refinements: laws that were found and are none of their own.
     """
 
     searched: Searched
     places: tuple[Located, ...]
+    refinements: tuple[Refinement, ...] = ()
 
 
 def with_laws(
@@ -51,24 +54,26 @@ def with_laws(
     bench: Bench | None = searched.rig.bench
     first: tuple[Located, ...] = ()
     rivals: dict[tuple[object, ...], list[Rival]] = {}
-    for _ in range(rules.LAW_MOST if bench is not None else 0):
+    refined: list[Refinement] = []
+    for turn in range(rules.LAW_MOST if bench is not None else 0):
         left = always or unlisted_nats(searched.best) >= rules.UNLISTED_NATS
         if len(searched.best.free) >= most or not left:
             break
         assert bench is not None
         starts = [searched]
-        if searched.best.free and not rivals:
+        if searched.best.free and not turn:
             # Causes that were named may have stood for what nobody lists.
             starts.insert(0, Searched(searched.rig, searched.nothing, searched.nothing, ()))
-        found = []
+        found, forms = [], _Forms(bench, likely_causes(searched.best), refined)
         for start in starts:
             places = located_in(start, bench, say)
             first = first or tuple(places)
-            step = _with_one(start, bench, places, say)
+            step = _with_one(start, bench, places, say, forms)
             if step is not None:
                 enough = min(most, len(step[0].best.free) + rules.LAW_CAUSES)
-                found.append((continued(step[0], enough, say), step[1]))
-                if _suffices(found[-1][0].best, searched.best):
+                now = _of_their_own(continued(step[0], enough, say), forms)
+                found.append((now, step[1]))
+                if _suffices(now.best, searched.best):
                     break
         if not found:
             break
@@ -76,7 +81,50 @@ def with_laws(
         if best.best.score < searched.best.score + rules.NAMED_NATS:
             break
         searched, rivals = best, rivals | more
-    return Lawful(_with_rivals(searched, rivals), first)
+    return Lawful(_with_rivals(searched, rivals), first, tuple(refined))
+
+
+@dataclass(frozen=True)
+class _Forms:
+    """Tells laws that only refine those of listed causes, and keeps them.
+
+    Attributes:
+        bench: of the rig.
+        named: causes that are named without the laws.
+        found: such laws.
+    """
+
+    bench: Bench
+    named: tuple[Candidate, ...]
+    found: list[Refinement]
+
+    def refined_by(self, hypothesis: Hypothesis, index: int) -> bool:
+        """Whether a law of a hypothesis is such a one."""
+        one = refinement(hypothesis, index, self.bench, {cause.key for cause in self.named})
+        if one is not None:
+            self.found.append(one)
+        return one is not None
+
+    def among(self, proposed: Proposed) -> bool:
+        """Whether the likeliest law, or one that the rows cannot tell from it, is a named cause in another form."""
+        top = proposed.scores[0][1]
+        alike = [c for c, score in proposed.scores if top - score < rules.AMBIGUOUS_NATS]
+        one = form_of_named((c for c in alike if isinstance(c, LawCandidate)), self.named, self.bench)
+        if one is not None:
+            self.found.append(one)
+        return one is not None
+
+
+def _of_their_own(searched: Searched, forms: _Forms) -> Searched:
+    """The search without laws that only refine those of the causes that were found beside them."""
+    best = searched.best
+    for index in best.free:
+        if isinstance(best.problem.candidates[index], LawCandidate) and forms.refined_by(best, index):
+            best = best.without(index)
+    if best is searched.best:
+        return searched
+    best, rivals = settled(searched.rig, exact(searched.rig, best, searched.nothing), searched.nothing)
+    return replace(searched, best=best, rivals=tuple(tuple(rivals.get(i, ())) for i in best.free))
 
 
 def _suffices(found: Hypothesis, named: Hypothesis) -> bool:
@@ -95,16 +143,21 @@ def located_in(searched: Searched, bench: Bench, say: Callable[[str], object]) -
 
 
 def _with_one(
-    searched: Searched, bench: Bench, places: Sequence[Located], say: Callable[[str], object]
-) -> tuple[Searched, dict[tuple[object, ...], list[Rival]]] | None:
-    """The search with one law more, and that law's rivals among laws; None where no law pays and helps."""
+    searched: Searched, bench: Bench, places: Sequence[Located], say: Callable[[str], object],
+    forms: _Forms,
+) -> tuple[Searched, dict[tuple[object, ...], list[Rival]]] | None:  # fmt: skip
+    """The search with one law more, and that law's rivals among laws; None where no law of its own pays and helps."""
     proposed = _proposals(searched, bench, places, say)
     added = proposed.best
     if added is None or added.score - searched.best.score < rules.NAMED_NATS:
         return None
+    if forms.among(proposed):
+        return None
     say(f"refit {added.causes[-1].label}")
     refitted = exact(searched.rig, added, searched.nothing)
     if not helps(refitted, refitted.free[-1]):
+        return None
+    if forms.refined_by(refitted, refitted.free[-1]):
         return None
     law = refitted.causes[-1]
     now, rivals = settled(searched.rig, refitted, searched.nothing)
@@ -118,9 +171,7 @@ def helps(hypothesis: Hypothesis, index: int) -> bool:
     folds = held_out_gains(hypothesis.problem, others, index)
     if not folds:
         return False
-    nothing = np.zeros(len(hypothesis.problem.candidates[index].parameters))
-    without = Fit.of(hypothesis.problem, others, fixed=(index, nothing))
-    in_sample = sum(without.held_out(t) - hypothesis.fit.held_out(t) for t in hypothesis.problem.trials)
+    in_sample = gain_of(hypothesis, index)
     better = np.mean(np.array(folds) > 0.0)
     return bool(sum(folds) > rules.LAW_HELD_OUT * in_sample and better > rules.LAW_FOLDS)
 

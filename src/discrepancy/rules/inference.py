@@ -121,6 +121,11 @@ FRICTION_FORM_SHARE = 0.1
 no sign of something unlisted. Chosen: friction of 30 mN m in nine simulated springs leaves as much (ten times the
 tolerance, one set of the tuning pool); with half of it that set is `unexplained`, with twice of it unlisted effects
 show half of what they do."""
+FRICTION_FORM_NM = 0.03
+"""Friction up to which that is its share. Derived: that of the set; beyond, the share grows with the root of the
+friction, since it rests until the load has changed by twice as much."""
+FORM_SHARE_MOST = 0.3
+"""Largest such share. Chosen: more would be no friction as it is listed."""
 LISTED_ODDS = 4.0
 """That a cause is one of the catalogue rather than an unlisted one that looks like it. Chosen."""
 LAW_ERROR_SHARE = 0.02

@@ -31,7 +31,7 @@ class Friction(Cause):
     clipped = ("coulomb_Nm", "viscous_Nms_per_rad")
     shapes = ({"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3})
     positive = ("coulomb_Nm",)
-    form_share = rules.FRICTION_FORM_SHARE
+    form_share, form_size = rules.FRICTION_FORM_SHARE, rules.FRICTION_FORM_NM
     moves: ClassVar[Literal["phi", "theta", "tau"]] = "phi"
     sign: ClassVar[float] = 1.0
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from discrepancy.candidate import Candidate
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.place import Place
@@ -18,6 +19,16 @@ from discrepancy.team.laws.variables import signals_of, variables_of
 from discrepancy.team.linear.signals import with_rates
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
+
+_NUMBERS = {
+    "phi_zero", "theta_zero", "link_length", "base_tilt", "sea_bias", "sea_scale", "clock_delay", "torque_skew"
+}  # fmt: skip
+"""Causes that are numbers of the machine, not laws."""
+_RUBBING = {
+    "joint_friction": (("tau reading", "driven torque"), "phi"),
+    "gimbal_friction": (("gimbal torque",), "theta"),
+}
+"""Places where friction is a torque, and the angle whose motion it follows."""
 
 
 class TeamBench(Bench):
@@ -80,6 +91,28 @@ class TeamBench(Bench):
 
     def white(self, trial: int, columns: Array) -> Array:
         return self._whitening[trial](columns)
+
+    def beside(self, place: Place, cause: Candidate, *, named: bool) -> bool:
+        """At the same robot, of tolerated ones at the same joint; and whatever is named shows in the payload, too.
+
+        Numbers of the geometry and of a linear reading have no form that could be another.
+        """
+        if cause.cause in _NUMBERS:
+            return False
+        if place.robot is None or cause.robot is None:
+            return named
+        return place.robot == cause.robot and (named or cause.joint is None or place.joint == cause.joint)
+
+    def is_form(self, law: LawCandidate, cause: Candidate) -> bool:
+        """Friction of a joint, told by the direction of its motion or by how far it gives way before it slides."""
+        places, angle = _RUBBING.get(cause.cause, ((), ""))
+        here = f"{angle}_{cause.robot}_{cause.joint}", f"{angle}_rate_{cause.robot}_{cause.joint}"
+        forms = {("play", here[0]), ("sign", here[1]), ("linear", here[1])}
+        return (
+            law.at.name in places
+            and law.term.times is None
+            and (law.term.function, law.term.of.name) in forms
+        )
 
     def twin(self, place: Place) -> Place | None:
         """Another place whose rows are the same, minus these."""
