@@ -64,6 +64,7 @@ class Candidate:
         where: the place in words, of what sits at no robot and no joint.
         title: the cause in words (``causes.base.Cause``).
         among: of how many of its kind it is one, where the problem does not list them; 0 where it does.
+        hidden: whether it is never named: it only has its tolerance, as a cause that was left out has.
         form_share: of its trace, in amplitude, by which a real one has another form than its law.
     """
 
@@ -78,6 +79,7 @@ class Candidate:
     title: str = ""
     among: int = 0
     form_share: float = 0.0
+    hidden: bool = False
 
     def acts_in(self, trial: int) -> bool:
         """Whether it can act in a trial (index from 0)."""
