@@ -61,6 +61,10 @@ class Rig(ABC):
     """A machine and its simulation, seen by the diagnosis; what a machine may lack has defaults that say so."""
 
     rigid: ClassVar[tuple[str, ...]] = ()  # causes that are looked for with kinds held, too
+    shaped: ClassVar[
+        tuple[str, ...]
+    ] = ()  # causes that have a tolerance, and a shape without which they may not show
+    curved: ClassVar[bool] = False  # whether exact residuals hold what is within its tolerance, too
     normal: ClassVar[bool] = False  # whether a simulation has what is normal as the other trials have it
 
     @property
@@ -119,6 +123,13 @@ class Rig(ABC):
     def law_share(self, candidate: Candidate) -> float:
         """Amplitude that the law of a cause leaves of its trace where it is there: a standard deviation."""
         return rules.LAW_SHARE
+
+    def other_forms(self, candidate: Candidate, there: Sequence[tuple[Candidate, Array]]) -> list[Array]:
+        """Whitened columns (n, C, k) per trial of what causes that are there leave if their laws have other forms.
+
+        Each of one standard deviation; none where that is no matter for a candidate beside them.
+        """
+        return []
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Causes that act for a while in one trial only, where the whitened residuals (n, C) are worst."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from discrepancy.candidate import Candidate
 from discrepancy.inference.best_shape import nearest_shape
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.imitation import imitated
+from discrepancy.inference.other_forms import beside_other_forms
 from discrepancy.inference.scan import Scanned, scan, score_of, score_with
 from discrepancy.inference.twins import twins
 from discrepancy.least_squares.fit import Fit
@@ -42,12 +43,15 @@ def proposals(rig: Rig, base: Hypothesis, *, events: bool = True, narrow: bool =
         narrow: whether to look with kinds that scatter held within their tolerance, too.
     """
     fit = base.fit
-    ranked = [_in_best_shape(rig, fit, item) for item in _with_kinds_held(base)]
+    scanned = _with_kinds_held(base)
+    loud = {item.candidate.joint for item in scanned if item.score > rules.LOOKED_AT_NATS}
+    ranked = [_in_best_shape(rig, fit, item, loud) for item in scanned]
     ranked += _events(rig, fit) if events else []
     ranked.sort(key=lambda item: -item.score)
     best: Hypothesis | None = None  # each has its own columns: all together would be gigabytes
     scores: dict[tuple[object, ...], tuple[Candidate, float]] = {}
     for new in _hypotheses(rig, base, ranked, narrow=narrow):
+        new = beside_other_forms(rig, new, new.free[-1], base)
         last = new.causes[-1]
         which = (last.key, last.transient)
         if which in scores and scores[which][1] >= new.score:
@@ -74,7 +78,7 @@ def _with_kinds_held(base: Hypothesis) -> list[Scanned]:
     problem, found = base.problem, {item.index: item for item in scan(base.fit)}
     kinds: dict[str, list[int]] = {}
     for index, candidate in enumerate(problem.candidates):
-        if index not in base.free and problem.has_tolerance(index):
+        if index not in base.free and problem.has_tolerance(index) and not candidate.hidden:
             kinds.setdefault(candidate.cause, []).append(index)
     wide = {
         kind
@@ -90,7 +94,7 @@ def _with_kinds_held(base: Hypothesis) -> list[Scanned]:
             for index in (i for one in held for i in kinds[one]):
                 spread[problem.columns_of(index)] = 1.0
             fit = Fit.of(replace(problem, spread=spread), base.free)
-            for index in members:
+            for index in (i for i in members if i in found):
                 score = score_of(fit, index)
                 if score > found[index].score:
                     found[index] = Scanned(index, problem.candidates[index], score)
@@ -108,14 +112,23 @@ def _chosen(ranked: Sequence[Scanned], leaders: int) -> list[Scanned]:
     return chosen[: 2 * leaders]
 
 
-def _in_best_shape(rig: Rig, fit: Fit, item: Scanned) -> Scanned:
-    """An event without a tolerance in the shape that tells most: in another it may not be seen at all."""
-    if item.index is None or fit.problem.has_tolerance(item.index):
+def _in_best_shape(rig: Rig, fit: Fit, item: Scanned, loud: Collection[int | None] = ()) -> Scanned:
+    """An event without a tolerance in the shape that tells most: in another it may not be seen at all.
+
+    So may some that have a tolerance (``Rig.shaped``), at joints at which something shows.
+    """
+    if item.index is None:
         return item
-    best = item
+    best, healthy = item, 0.0
+    if fit.problem.has_tolerance(item.index):
+        if item.candidate.cause not in rig.shaped or item.candidate.joint not in loud:
+            return item
+        fit = Fit.of(fit.problem, fit.free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
+        # What the healthy one explains has its own shape, whatever that of the faulty one.
+        healthy = score_with(fit, item.candidate, rig.columns(item.candidate)) - item.score
     for shape in rig.refinements(item.candidate):
         columns = tuple(rig.columns(shape))
-        score = score_with(fit, shape, columns)
+        score = score_with(fit, shape, columns) - healthy
         if score > best.score:
             best = Scanned(item.index, shape, score, columns)
     return best
@@ -145,7 +158,7 @@ def _with_kinds_narrow(rig: Rig, base: Hypothesis) -> list[Hypothesis]:
     narrow = replace(base.problem, spread=np.where(wide, 1.0, base.problem.spread))
     fit, found = Fit.of(narrow, base.free), []
     for index, candidate in enumerate(narrow.candidates):
-        if index not in base.free and candidate.cause in rig.rigid:
+        if index not in base.free and candidate.cause in rig.rigid and not candidate.hidden:
             item = _in_best_shape(rig, fit, Scanned(index, candidate, score_of(fit, index)))
             if item.score > rules.LOOKED_AT_NATS:
                 found.append(sharpened(rig, base, item, near=True, start=narrow))
@@ -228,6 +241,11 @@ def _with(rig: Rig, problem: Problem, shaped: Candidate, item: Scanned) -> tuple
         return problem.extended(shaped, rig.columns(shaped)), len(problem.candidates)
     if shaped is problem.candidates[item.index]:
         return problem, item.index
+    if problem.has_tolerance(item.index) and shaped.cause in rig.shaped:
+        # What is normal stays as it is, and the fault of another shape comes beside it.
+        parameters = tuple(replace(p, tolerance=0.0) for p in shaped.parameters)
+        shaped = replace(shaped, parameters=parameters)
+        return problem.extended(shaped, rig.columns(shaped)), len(problem.candidates)
     return problem.with_columns(item.index, shaped, rig.columns(shaped)), item.index
 
 
@@ -237,7 +255,10 @@ def _best_shape(rig: Rig, problem: Problem, free: Sequence[int], item: Scanned) 
     if item.index is not None and problem.has_tolerance(item.index):
         # What it would add to a model without it: no need to build the problem anew for every shape.
         fit = Fit.of(problem, free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
-        spike = float(problem.spread[problem.columns_of(item.index)][0])
+        if (
+            item.candidate.cause not in rig.shaped
+        ):  # there, what the healthy one explains is the same for all shapes
+            spike = float(problem.spread[problem.columns_of(item.index)][0])
     start = item.candidate
     if start.transient and start.parameters[0].tolerance:
         spike = 1.0

@@ -12,7 +12,8 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
     """The hypothesis with exact residuals: Gauss-Newton on causes and unknowns until the values have settled.
 
     Unknowns are moved as far as the causes move them. What they share with tolerances stays linear on both sides: moved
-    alone, without the tolerances that make up for it, they would be far from where the data are.
+    alone, without the tolerances that make up for it, they would be far from where the data are. What is within its
+    tolerance is moved along where the rig says so (``Rig.curved``).
 
     Args:
         rig: the rig.
@@ -20,14 +21,19 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         nothing: the hypothesis that nothing is.
     """
     own, trials = rig.local_unknowns, hypothesis.problem.trials
-    start = [nothing.fit.local(t)[:own] for t in trials]
+    begin = [nothing.fit.local(t)[:own] for t in trials]
     linear, last = hypothesis, np.inf
     for _ in range(rules.REFIT_ROUNDS):
         fit = hypothesis.fit
         shared = fit.shared - nothing.fit.shared
-        local = [fit.local(t)[:own] - there for t, there in zip(trials, start, strict=True)]
+        local = [fit.local(t)[:own] - start for t, start in zip(trials, begin, strict=True)]
+        there = [
+            i for i in range(len(fit.problem.candidates)) if i in fit.free or (rig.curved and fit.uses(i))
+        ]
+        moved = [fit.problem.candidates[i] for i in there]
+        active = [(c, fit.part(i)[0] * c.units) for i, c in zip(there, moved, strict=True)]
         try:
-            residual = rig.residual(-shared, [-x for x in local], fit.active)
+            residual = rig.residual(-shared, [-x for x in local], active)
         except InputError:  # no such machine: the linear answer is the better one
             return linear
         # The problem counts total values, so what its columns stand for is added back.
@@ -36,7 +42,7 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
             values = np.zeros(fit.problem.width)
             values[: fit.problem.shared] = shared
             total = total + fit.problem.local[t][..., :own] @ local[t]
-            for i in hypothesis.free:
+            for i in there:
                 values[fit.problem.spans[i]] = fit.part(i)[0]
             back.append(total + fit.problem.raw_times(t, values))
         new = Hypothesis.of(fit.problem.with_residual(back), hypothesis.free, hypothesis.allowed)
@@ -46,10 +52,10 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         step = (
             np.abs(new.fit.solution - fit.solution)[se > 0] / se[se > 0]
         )  # what nothing tells stays where it is
-        moved = float(step.max(initial=0.0))
-        if moved > max(last, 1.0):
+        way = float(step.max(initial=0.0))
+        if way > max(last, 1.0):
             return linear  # steps grow: columns take up whatever a value that runs away leaves
-        hypothesis, last = new, moved
-        if moved < rules.SETTLED_SE:
+        hypothesis, last = new, way
+        if way < rules.SETTLED_SE:
             break
     return hypothesis

@@ -33,9 +33,10 @@ class Scanned:
 
 def scan(fit: Fit) -> list[Scanned]:
     """Every candidate of the problem that is not free, the best first."""
-    found = []
-    for index, candidate in enumerate(fit.problem.candidates):
-        if index in fit.free:
+    found, candidates = [], fit.problem.candidates
+    there = {candidates[i].key for i in fit.free if candidates[i].transient is None}
+    for index, candidate in enumerate(candidates):
+        if index in fit.free or candidate.hidden or (candidate.transient is None and candidate.key in there):
             continue
         found.append(Scanned(index, candidate, score_of(fit, index)))
     return sorted(found, key=lambda item: -item.score)

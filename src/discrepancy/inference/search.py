@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.other_forms import beside_other_forms
 from discrepancy.inference.probability import probability
 from discrepancy.inference.propose import proposals
 from discrepancy.inference.refit import exact
@@ -105,7 +106,7 @@ def _based(rig: Rig, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
         rig = moved
         del nothing, moved  # for the sake of memory
         nothing = _nothing(rig, say)
-    return rig, nothing
+    return rig, exact(rig, nothing, nothing) if rig.curved else nothing
 
 
 def _nothing(rig: Rig, say: Callable[[str], object]) -> Hypothesis:
@@ -121,6 +122,7 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
         changed = False
         for index in best.free:
             less = best.without(index)
+            best = beside_other_forms(rig, best, index, less)
             if best.score - less.score < rules.NAMED_NATS:
                 best, changed = exact(rig, less, nothing), True
                 break

@@ -119,6 +119,10 @@ class Fit:
         span = self.problem.spans[index]
         return np.searchsorted(self.used, np.arange(span.start, span.stop))
 
+    def uses(self, index: int) -> bool:
+        """Whether a candidate is in the model."""
+        return self.problem.spans[index].start in self.used
+
     def part(self, index: int) -> tuple[Array, Array]:
         """Values and covariance of one candidate's parameters, in units; it must be in the model."""
         at = self.at(index)

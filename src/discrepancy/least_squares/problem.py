@@ -200,11 +200,14 @@ class Problem:
         return slice(span.start - self.shared, span.stop - self.shared)
 
     def index_of(self, candidate: Candidate) -> int | None:
-        """Where a candidate of the same cause and place (and interval) is, or None."""
-        for index, other in enumerate(self.candidates):
-            if other.key == candidate.key and other.transient == candidate.transient:
-                return index
-        return None
+        """Where a candidate of the same cause and place (and interval) is, or None; one with its tolerance first."""
+        same = [
+            index
+            for index, other in enumerate(self.candidates)
+            if other.key == candidate.key and other.transient == candidate.transient
+        ]
+        alike = [i for i in same if self.candidates[i].parameters == candidate.parameters]
+        return next(iter([*alike, *same]), None)
 
     def with_residual(self, residuals: Sequence[Array]) -> Problem:
         """The same columns with another residual, shape (n, C) per trial."""

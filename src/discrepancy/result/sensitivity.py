@@ -45,7 +45,7 @@ def _judged(explanation: Explanation) -> Iterator[tuple[Candidate, dict[str, Any
     fit, problem = explanation.fit, explanation.problem
     kinds: dict[str, list[int]] = {}
     for index, candidate in enumerate(problem.candidates):
-        if index not in fit.free and not candidate.transient:
+        if index not in fit.free and not candidate.transient and not candidate.hidden:
             kinds.setdefault(candidate.cause, []).append(index)
     for members in kinds.values():
         told = [_along(*fit.told(index)) for index in members]

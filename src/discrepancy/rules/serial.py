@@ -72,8 +72,14 @@ SLOW_ROUNDINGS = 2.0
 that creeps through the steps of a coarse encoder has no direction."""
 STRIBECK_SHARES = (0.05, 0.1, 0.2)
 """The same, over which low-speed friction may fade. Chosen: slower is how dry friction fades, faster is viscous."""
+STRIBECK_RANGE = (0.02, 0.4)
+"""The same, beyond which it may not. Derived: twice and half the ends of what is tried; what fades over more than the
+typical speed is Coulomb friction by another name, as which it was taken where ``friction`` was left out (38 rad/s)."""
 EXPONENTS = (0.5, 0.3, 0.7)
 """Of the speed in friction that grows more slowly than it. Chosen: between Coulomb (0) and viscous (1)."""
+BRISTLES_RAD = (5e-4, 1e-3, 2e-3, 4e-3)
+"""By which dry friction gives way before it slips, if it does. Chosen: gears and greased bearings bend by a few tenths
+of a mrad to some mrad; friction that bends by 2 mrad was taken for a lack of it near standstill."""
 LEAST_SPEED = 1e-6
 """Typical speed of a joint that does not move [rad/s or m/s]. Chosen: no more than a number to divide by."""
 LEAST_TRAVEL = 1e-3
@@ -164,6 +170,10 @@ Chosen: a seventh of the trace itself; what would take more is no imitation."""
 REDUNDANT = 1e-9
 """Of the largest singular value, below which columns depend on each other. Derived: rounding is 1e-12."""
 
+FORM_SHARE, FORM_DEGREE = 0.1, 6
+"""By which real causes have another form than their law, in each of some ways (``rows.other_forms``), of their trace in
+amplitude; and the degree of polynomials in the position. Chosen: of the forms that were hidden in a simulated arm, a
+harmonic of 15 %, a dress pack that stiffens by 20 % and readings that drift by 20 % must be no second cause."""
 SERIAL_LAW_SHARE = 1.0
 """Standard deviation of what the law of a lasting cause leaves of its trace, in amplitude. Chosen: noise is that of
 the sensors, less than gears leave whatever is named; as much as of the EMPS axis (``discrepancy.rules``)."""

@@ -1,6 +1,7 @@
 """The catalogue as candidates, and what all of it together leaves."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,16 +52,23 @@ def candidates(
     *,
     change: bool = False,
 ) -> list[SerialCandidate]:
-    """Every lasting cause at every place, in its first shape; of what has changed between two days, or is wrong."""
+    """Every lasting cause at every place, in its first shape; of what has changed between two days, or is wrong.
+
+    What is excluded is never named, but stays as far off as is normal: a robot does not know what it may be blamed for.
+    """
     out = []
     for name, cause in CAUSES.items():
-        if name in excluded or cause.transient:
+        if cause.transient:
             continue
         for at in places(cause, tree, hints, change=change):
             given = tolerances.get(name)
             if name == "torque_scale" and given is None and hints.unscaled[at]:
                 given = {"scale": rules.UNKNOWN_SCALE_SHARE}
-            out.append(cause.at(tree, names, at, cause.shapes(hints, at)[0], given))
+            candidate = cause.at(tree, names, at, cause.shapes(hints, at)[0], given)
+            if name not in excluded:
+                out.append(candidate)
+            elif all(p.tolerance > 0 for p in candidate.parameters):
+                out.append(replace(candidate, hidden=True))
     return out
 
 

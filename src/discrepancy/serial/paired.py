@@ -30,6 +30,8 @@ class PairedRig(Rig):
 
     inner: SerialRig
     rigid = SerialRig.rigid
+    shaped = SerialRig.shaped
+    curved = SerialRig.curved
     normal = SerialRig.normal
 
     def blocks_of(self, trial: int) -> list[int]:

@@ -20,6 +20,7 @@ from discrepancy.serial import catalogue, shapes
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
+from discrepancy.serial.forms import forms_beside
 from discrepancy.serial.logs import parts_of
 from discrepancy.serial.model import SerialModel, load_spec
 from discrepancy.serial.prediction import Within, unforetold
@@ -158,6 +159,10 @@ class SerialRig(SerialRows, Rig):
         """A real robot: noise is the sensors', and every law leaves more than that."""
         return LAW_SHARE if candidate.transient else rules.SERIAL_LAW_SHARE
 
+    def other_forms(self, candidate: Candidate, there: Sequence[tuple[Candidate, Array]]) -> list[Array]:
+        """What a joint's causes, and the friction that its model names, leave if their laws have other forms."""
+        return forms_beside(self, candidate, there)
+
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the torques are worst; none where torques are only what duties should give.
 
@@ -173,6 +178,8 @@ class SerialRig(SerialRows, Rig):
         return shapes.others(candidate, self.hints, finer=finer)
 
     rigid = ("payload",)
+    shaped = ("friction",)
+    curved = True
     normal = True
 
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
@@ -192,7 +199,7 @@ class SerialRig(SerialRows, Rig):
     def _unforetold(
         self, trial: int, active: Sequence[tuple[Candidate, Array]], shared: Array
     ) -> dict[str, Array]:
-        taken = {candidate.key for candidate, _ in active}
+        taken = {candidate.key for candidate, _ in active if candidate.parameters[0].tolerance}
         within = [c for c in self._normal if c.key not in taken]
         left = self.physical_residual(active, shared)
         if within:
@@ -254,5 +261,5 @@ class SerialRig(SerialRows, Rig):
 
     def undecidable(self) -> list[dict[str, Any]]:
         """What such logs cannot decide, and what these cannot."""
-        every = self.candidates()
+        every = [c for c in self.candidates() if not c.hidden]
         return [*general(), *look_alikes(every, [self.columns(c) for c in every])]

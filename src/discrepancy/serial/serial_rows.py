@@ -15,11 +15,13 @@ from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rules import serial as rules
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
-from discrepancy.serial.causes.base import Cause, Hints
+from discrepancy.serial.causes.base import Hints
 from discrepancy.serial.logs import Part
 from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel
+from discrepancy.serial.rows.moved import asking
 from discrepancy.serial.rows.remainder import Key
+from discrepancy.serial.rows.signals import Signals
 from discrepancy.serial.servo.motor import Motor
 from estimator.arrays import Array
 
@@ -111,24 +113,41 @@ class SerialRows:
     def physical_residual(
         self, active: Sequence[tuple[Candidate, Array]], shared: Array | None = None
     ) -> list[Array]:
-        """The same in N m or N, rows (n, C) of every block."""
-        out = []
+        """The same in N m or N, rows (n, C) of every block.
+
+        What is a number of the tree or a zero is put there, and all other causes act on that: a tenth of a mass times a
+        tilt is more than the noise.
+        """
+        lasting = [(c, v) for c, v in active if c.transient is None]
+        out, changed = [], {id(part) for part, _ in self.block_of[: self.changed]}
         for part in self.parts:
-            left = part.reduction(part.signals.residual)
+            left = part.reduction(_left(part.signals, lasting if id(part) in changed else []))
             out += [rows[:, self.joints] for rows in left]
         for candidate, values in active:
-            cause = CAUSES[candidate.cause]
-            if type(cause).exact is Cause.exact:  # linear
+            if candidate.transient is not None:
                 taken = [columns @ values for columns in self.physical(candidate)]
-            else:
-                at = place_of(candidate)
-                done = [p.reduction(cause.exact(p.signals, at, values, candidate.shape)) for p in self.parts]
-                taken = [block[:, self.joints] for blocks in done for block in blocks]
-            acts = [t < self.changed and candidate.acts_in(t) for t in range(len(out))]
-            out = [r - x * acting for r, x, acting in zip(out, taken, acts, strict=True)]
+                out = [r - x for r, x in zip(out, taken, strict=True)]
         if shared is not None and shared.size:
             out = [r + columns @ shared for r, columns in zip(out, self.common, strict=True)]
         return out
+
+
+def _left(signals: Signals, active: Sequence[tuple[Candidate, Array]]) -> Array:
+    """Measured torques less those that the model asks for with causes in it, shape (W, J)."""
+    moved, besides = signals, []
+    for candidate, values in active:
+        cause, at = CAUSES[candidate.cause], place_of(candidate)
+        there = cause.applied(moved, at, values)
+        if there is None:
+            besides.append((cause, at, values, candidate.shape))
+        moved = there or moved
+    if moved is not signals:
+        moved = asking(signals, moved)
+    added = sum(
+        (cause.exact(moved, at, values, shape) for cause, at, values, shape in besides),
+        np.zeros_like(signals.torque),
+    )
+    return moved.residual - added
 
 
 def _seen_only(rows: list[Array], units: Array) -> list[Array]:

@@ -85,6 +85,10 @@ class Cause(base.Cause):
         """What the given values add, shape (W, J), where that is not linear in them."""
         return self.columns(signals, at, shape) @ values
 
+    def applied(self, signals: Signals, at: int, values: Array) -> Signals | None:
+        """The signals with its values in the tree and the motion, the torques asked for left alone; None: not there."""
+        return None
+
     def shapes(self, hints: Hints, at: int) -> Sequence[Shape]:
         """Alternatives of what changes the columns themselves; the first is the catalogue's. None: not here."""
         return [{}]

@@ -14,6 +14,8 @@ class CoupledDrive(Cause):
     dry = True
     parameters = ("coulomb_Nm", "viscous_Nms_per_rad", "armature_kgm2")
     scales = (1.0, 1.0, 0.1)
+    positive = parameters
+    reversible = True
     separate = "Motions of one of the two joints alone."
 
     def sentence(self, n):

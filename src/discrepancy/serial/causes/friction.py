@@ -1,5 +1,9 @@
 """Dry and viscous friction, the same in both directions: what every geared joint has."""
 
+import itertools
+
+import numpy as np
+
 from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause, at_joint, direction, slow_shapes
 
@@ -26,10 +30,47 @@ class Friction(Cause):
     def sentence(self, n):
         dry, more = n("coulomb_Nm", "N m"), n.either("coulomb_Nm", "more", "less")
         wet, faster = n("viscous_Nms_per_rad", "N m s/rad"), n.either("viscous_Nms_per_rad", "more", "less")
-        return f"rubs with {dry} {more} than modelled while it moves (Coulomb), and {wet} {faster} (viscous)"
+        soft = (
+            f", after it has given way by {1e3 * n.values['bristle_rad']:.2g} mrad"
+            if "bristle_rad" in n.values
+            else ""
+        )
+        return f"rubs with {dry} {more} than modelled while it moves (Coulomb){soft}, and {wet} {faster} (viscous)"
 
     def columns(self, signals, at, shape):
-        return at_joint(signals, at, direction(signals, at, shape["slow_per_s"]), signals.dq[:, at])
+        if "bristle_rad" in shape:
+            side = bent(signals.q[:, at], shape["bristle_rad"])
+        else:
+            side = direction(signals, at, shape["slow_per_s"])
+        return at_joint(signals, at, side, signals.dq[:, at])
 
     def shapes(self, hints, at):
-        return slow_shapes(hints, at, rules.SLOW_SHARES)
+        rigid = slow_shapes(hints, at, rules.SLOW_SHARES)
+        # Of a joint that slides, nobody knows how far its seals bend.
+        return [*rigid, *({"bristle_rad": b} | rigid[0] for b in rules.BRISTLES_RAD if hints.turns[at])]
+
+    def finer(self, shape):
+        low, high = (edge * rules.BRISTLES_RAD[k] for edge, k in ((0.5, 0), (2.0, -1)))
+        near = (factor * shape["bristle_rad"] for factor in (0.8, 1.25)) if "bristle_rad" in shape else ()
+        return [dict(shape) | {"bristle_rad": b} for b in near if low <= b <= high]
+
+
+def bent(q: np.ndarray, bristle: float) -> np.ndarray:
+    """How far a contact is bent, over how far it bends before it slips, in [-1, 1], shape (W,).
+
+    Dahl, "A solid friction model" (1968): while the way goes on in one direction what is missing falls by the factor e
+    in each length of a bristle. It starts out straight.
+
+    Args:
+        q: way, shape (W,).
+        bristle: its length, in the same unit.
+    """
+    step = np.diff(q, prepend=q[0])
+    turns = np.flatnonzero(np.diff(np.sign(step))) + 1
+    out, last = np.empty_like(q), 0.0
+    for a, b in itertools.pairwise([0, *turns, len(q)]):
+        way = np.cumsum(step[a:b])
+        side = np.sign(way[-1])
+        out[a:b] = side + (last - side) * np.exp(-np.abs(way) / bristle) if side else last
+        last = float(out[b - 1])
+    return out

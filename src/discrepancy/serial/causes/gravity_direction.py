@@ -1,10 +1,12 @@
 """The base is not level."""
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause
 from discrepancy.serial.mechanics.shift import by_acceleration
+from discrepancy.serial.rows.moved import with_tree
 
 
 class GravityDirection(Cause):
@@ -24,6 +26,10 @@ class GravityDirection(Cause):
 
     def shapes(self, hints, at):
         return [{}]
+
+    def applied(self, signals, at, values):
+        way = np.array(horizontal(signals.tree.gravity)).T @ values
+        return with_tree(signals, gravity=Rotation.from_rotvec(-way).apply(signals.tree.gravity))
 
     def columns(self, signals, at, shape):
         # Turning the base by t turns gravity in its frame by -t, to first order; all seems to accelerate by -g.

@@ -1,5 +1,7 @@
 """A joint's zero is not where the model has it."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from discrepancy.rules import serial as rules
@@ -28,6 +30,9 @@ class JointZero(Cause):
 
     def possible(self, tree, at, values, se):
         return abs(values[0]) < (rules.MOST_LENGTH_M if tree.slides[at] else rules.MOST_ZERO_RAD)
+
+    def applied(self, signals, at, values):
+        return replace(signals, q=signals.q + values[0] * (np.arange(signals.q.shape[1]) == at))
 
     def columns(self, signals, at, shape):
         step = rules.STEP_M if signals.tree.slides[at] else rules.STEP_RAD

@@ -5,6 +5,7 @@ import numpy as np
 from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause
 from discrepancy.serial.mechanics.regressor import body_regressor, inertial_parameters
+from discrepancy.serial.rows.moved import with_tree
 
 
 class LinkCom(Cause):
@@ -31,6 +32,11 @@ class LinkCom(Cause):
     def possible(self, tree, at, values, se):
         most = rules.MOST_INERTIA_SHARE * _size(tree, int(tree.joint_body[at]))
         return bool(np.all(np.abs(values) < most + 2.0 * se))
+
+    def applied(self, signals, at, values):
+        tree, b = signals.tree, int(signals.tree.joint_body[at])
+        here = np.arange(len(tree.mass)) == b
+        return with_tree(signals, com=tree.com + here[:, None] * values)
 
     def columns(self, signals, at, shape):
         b = int(signals.tree.joint_body[at])

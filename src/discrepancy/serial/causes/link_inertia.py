@@ -5,6 +5,7 @@ import numpy as np
 from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause
 from discrepancy.serial.mechanics.regressor import body_regressor
+from discrepancy.serial.rows.moved import with_tree
 
 AXES = ("xx", "yy", "zz", "xy", "xz", "yz")
 
@@ -38,6 +39,11 @@ class LinkInertia(Cause):
         # A mass has a density nowhere below zero: the second moments of it, not only the moments of inertia.
         second = 0.5 * np.trace(total) * np.eye(3) - total
         return bool(np.linalg.eigvalsh(second)[0] > -2.0 * np.max(se))
+
+    def applied(self, signals, at, values):
+        tree, b = signals.tree, int(signals.tree.joint_body[at])
+        here = np.arange(len(tree.mass)) == b
+        return with_tree(signals, inertia=tree.inertia + here[:, None, None] * symmetric(values))
 
     def columns(self, signals, at, shape):
         return body_regressor(signals.motion, int(signals.tree.joint_body[at]))[..., 4:]

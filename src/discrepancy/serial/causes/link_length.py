@@ -1,8 +1,11 @@
 """A link is longer or shorter than drawn."""
 
+import numpy as np
+
 from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause
 from discrepancy.serial.mechanics.shift import by_displacement
+from discrepancy.serial.rows.moved import with_tree
 
 
 class LinkLength(Cause):
@@ -21,6 +24,11 @@ class LinkLength(Cause):
 
     def possible(self, tree, at, values, se):
         return bool(max(abs(values)) < rules.MOST_LENGTH_M)
+
+    def applied(self, signals, at, values):
+        tree, b = signals.tree, int(signals.tree.joint_body[at])
+        here = np.arange(len(tree.mass)) == b
+        return with_tree(signals, position=tree.position + here[:, None] * values)
 
     def columns(self, signals, at, shape):
         return by_displacement(signals.motion, int(signals.tree.joint_body[at]))

@@ -1,8 +1,11 @@
 """A link is heavier or lighter than modelled."""
 
+import numpy as np
+
 from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause
 from discrepancy.serial.mechanics.regressor import body_regressor, inertial_parameters
+from discrepancy.serial.rows.moved import with_tree
 
 
 class LinkMass(Cause):
@@ -27,6 +30,12 @@ class LinkMass(Cause):
 
     def possible(self, tree, at, values, se):
         return abs(values[0]) < rules.MOST_INERTIA_SHARE * tree.mass[tree.joint_body[at]] + 2.0 * se[0]
+
+    def applied(self, signals, at, values):
+        tree, b = signals.tree, int(signals.tree.joint_body[at])
+        here = np.arange(len(tree.mass)) == b
+        factor = 1.0 + here * values[0] / tree.mass[b]
+        return with_tree(signals, mass=tree.mass * factor, inertia=tree.inertia * factor[:, None, None])
 
     def columns(self, signals, at, shape):
         tree, b = signals.tree, int(signals.tree.joint_body[at])

@@ -16,6 +16,8 @@ class LoadFriction(Cause):
     dry = True
     parameters = ("share",)
     scales = (0.05,)
+    positive = ("share",)
+    reversible = True
     separate = "The same steady motion under several loads, such as two poses or two payloads."
 
     def sentence(self, n):

@@ -14,6 +14,8 @@ class Stribeck(Cause):
     dry = True
     parameters = ("excess_Nm",)
     scales = (1.0,)
+    positive = parameters
+    reversible = True
     separate = "Steady motions at low speeds."
 
     def sentence(self, n):
@@ -29,7 +31,11 @@ class Stribeck(Cause):
         return at_joint(signals, at, direction(signals, at, slow) * fade)
 
     def shapes(self, hints, at):
-        return [{"fade_per_s": share * float(hints.typical[at])} for share in rules.STRIBECK_SHARES]
+        typical = float(hints.typical[at])
+        return [{"fade_per_s": share * typical, "typical_per_s": typical} for share in rules.STRIBECK_SHARES]
 
     def finer(self, shape):
-        return [{"fade_per_s": factor * shape["fade_per_s"]} for factor in (0.8, 1.25)]
+        typical = shape["typical_per_s"]
+        low, high = (edge * typical for edge in rules.STRIBECK_RANGE)
+        near = (factor * shape["fade_per_s"] for factor in (0.8, 1.25))
+        return [dict(shape) | {"fade_per_s": fade} for fade in near if low <= fade <= high]

@@ -18,6 +18,8 @@ class SublinearFriction(Cause):
     dry = True
     parameters = ("bend_Nm",)
     scales = (1.0,)
+    positive = parameters
+    reversible = True
     separate = "Steady motions at several speeds: friction over speed bends."
 
     def sentence(self, n):

@@ -1,0 +1,75 @@
+"""What real causes leave of the catalogue's laws, as columns of one standard deviation each."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from discrepancy.candidate import Candidate
+from discrepancy.rules import serial as rules
+from discrepancy.serial.candidate import SerialCandidate
+from discrepancy.serial.causes import CAUSES
+from discrepancy.serial.rows.other_forms import other_forms
+from discrepancy.serial.serial_rows import SerialRows, place_of
+from estimator.arrays import Array
+
+
+def forms_beside(
+    rows: SerialRows, candidate: Candidate, there: Sequence[tuple[Candidate, Array]]
+) -> list[Array]:
+    """Whitened columns (n, C, k) per block of what a joint's causes leave if their laws have other forms.
+
+    Friction in all its forms is one thing: what the catalogue has of it may be added up. But friction that the model
+    names may give way before it slips, by as much as it is known.
+
+    Args:
+        rows: of the logs.
+        candidate: which is judged beside them.
+        there: causes with their values.
+    """
+    if candidate.cause not in CAUSES or candidate.transient is not None:
+        return []
+    own = [(c, v) for c, v in there if _at_a_joint(c) and not (_rubs(candidate) and _rubs(c))]
+    soft = _named_friction(rows, candidate)
+    if not own and not soft:
+        return []
+    traces = [[x @ v for x in rows.physical(c)] for c, v in own]
+    sizes = [np.sqrt(np.mean(np.concatenate(trace) ** 2, axis=0)) for trace in traces]
+    out = []
+    for t in range(len(rows.trials)):
+        part, k = rows.block_of[t]
+        columns = [rules.JOINT_SHARE * x[t] for x in soft]
+        for (c, _), trace, size in zip(own, traces, sizes, strict=True):
+            forms = other_forms(part.signals, part.reduction.samples[k], place_of(c), CAUSES[c.cause].family)
+            columns += [rules.FORM_SHARE * trace[t] * m[:, None] for m in forms.times]
+            columns += [rules.FORM_SHARE * size * m[:, None] for m in forms.besides]
+        out.append(rows.whitening[t](np.stack(columns, axis=2)))
+    return out
+
+
+def _at_a_joint(candidate: Candidate) -> bool:
+    lasting = candidate.cause in CAUSES and candidate.transient is None
+    return lasting and isinstance(candidate, SerialCandidate) and candidate.part == "joint"
+
+
+def _rubs(candidate: Candidate) -> bool:
+    cause = CAUSES[candidate.cause]
+    return cause.dry or cause.family in ("friction", "asymmetric_friction")
+
+
+def _named_friction(rows: SerialRows, candidate: Candidate) -> list[list[Array]]:
+    """How the friction that the model names changes if it gives way, by each length of bristles, rows (n, C)."""
+    if not CAUSES[candidate.cause].dry or candidate.joint is None:
+        return []
+    at = place_of(candidate)
+    much = float(rows.tree.coulomb[at])
+    shapes = CAUSES["friction"].shapes(rows.hints, at)
+    if not much or not shapes:
+        return []
+    rigid = CAUSES["friction"].at(rows.tree, rows.model.joints, at, shapes[0])
+    soft = [replace(rigid, shape=dict(s)) for s in shapes if "bristle_rad" in s]
+    first = rows.physical(rigid)
+    return [
+        [much * (x[..., 0] - y[..., 0]) for x, y in zip(rows.physical(other), first, strict=True)]
+        for other in soft
+    ]
