@@ -201,11 +201,8 @@ class Problem:
 
     def index_of(self, candidate: Candidate) -> int | None:
         """Where a candidate of the same cause and place (and interval) is, or None; one with its tolerance first."""
-        same = [
-            index
-            for index, other in enumerate(self.candidates)
-            if other.key == candidate.key and other.transient == candidate.transient
-        ]
+        wanted = candidate.key, candidate.transient
+        same = [i for i, other in enumerate(self.candidates) if (other.key, other.transient) == wanted]
         alike = [i for i in same if self.candidates[i].parameters == candidate.parameters]
         return next(iter([*alike, *same]), None)
 
