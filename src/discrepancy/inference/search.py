@@ -122,20 +122,21 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
         changed = False
         for index in best.free:
             less = best.without(index)
-            best = beside_other_forms(rig, best, index, less)
-            if best.score - less.score < rules.NAMED_NATS:
+            # Its own loss to forms of the others is judged here, but counted once: not theirs to its forms, too.
+            judged = beside_other_forms(rig, best, index, less)
+            if judged.score - less.score < rules.NAMED_NATS:
                 best, changed = exact(rig, less, nothing), True
                 break
             candidate = best.problem.candidates[index]
             # Its own shape may be another beside what was found since.
             others = proposals(rig, less, events=candidate.transient is None, narrow=False)
             rivals[index] = [
-                Rival(other, best.score - score)
+                Rival(other, judged.score - score)
                 for other, score in others.scores
                 if other.key != candidate.key
             ]
-            rivals[index].append(Rival(None, best.score - less.score))
-            if others.best is not None and others.best.score > best.score + rules.EXCHANGED_NATS:
+            rivals[index].append(Rival(None, judged.score - less.score))
+            if others.best is not None and others.best.score > judged.score + rules.EXCHANGED_NATS:
                 other = exact(rig, others.best, nothing)
                 if other.score > best.score:
                     best, changed = other, True
