@@ -52,7 +52,7 @@ def test_a_share_without_a_size_is_the_same_for_all():
 
 
 def hypothesis(size, gain, cause, at, named=True):
-    """A cause of one unit, of chi-square ``size`` squared, and a law of ``gain``, along columns of their own, and noise."""
+    """One unit of a cause of chi-square ``size`` squared and a law of ``gain``, along columns of their own; noise."""
     rng, n = np.random.default_rng(3), 400
     columns = np.linalg.qr(rng.standard_normal((n, 2)))[0]
     x = rng.standard_normal(n) + size * columns[:, 0] + np.sqrt(gain) * columns[:, 1]
