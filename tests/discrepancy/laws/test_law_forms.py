@@ -114,7 +114,9 @@ def test_what_was_named_before_counts_where_it_is_now_a_scatter():
 def test_play_of_its_own_angle_is_friction_that_gives_way_before_it_slides():
     here, there = place("gimbal torque", 3, 3), place("gimbal torque", 2, 2)
     friction = listed("gimbal_friction", 3, 3)
-    own, other = (law(at, "play", joint_variable("theta", at.robot, at.joint)) for at in (here, there))
+    own, other = (
+        law(at, "play", joint_variable("theta", at.robot or 0, at.joint or 0)) for at in (here, there)
+    )
     found = form_of_named([other, own], [friction], BENCH)
     assert found is not None
     assert found.law is own
