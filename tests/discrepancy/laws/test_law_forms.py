@@ -52,7 +52,7 @@ def test_a_share_without_a_size_is_the_same_for_all():
 
 
 def hypothesis(size, gain, cause, at, named=True):
-    """A cause of chi-square ``size`` squared, and a law of ``gain``, along columns of their own, and noise."""
+    """One unit of a cause of chi-square ``size`` squared and a law of ``gain``, along columns of their own; noise."""
     rng, n = np.random.default_rng(3), 400
     columns = np.linalg.qr(rng.standard_normal((n, 2)))[0]
     x = rng.standard_normal(n) + size * columns[:, 0] + np.sqrt(gain) * columns[:, 1]
@@ -114,7 +114,9 @@ def test_what_was_named_before_counts_where_it_is_now_a_scatter():
 def test_play_of_its_own_angle_is_friction_that_gives_way_before_it_slides():
     here, there = place("gimbal torque", 3, 3), place("gimbal torque", 2, 2)
     friction = listed("gimbal_friction", 3, 3)
-    own, other = (law(at, "play", joint_variable("theta", at.robot, at.joint)) for at in (here, there))
+    own, other = (
+        law(at, "play", joint_variable("theta", at.robot or 0, at.joint or 0)) for at in (here, there)
+    )
     found = form_of_named([other, own], [friction], BENCH)
     assert found is not None
     assert found.law is own
