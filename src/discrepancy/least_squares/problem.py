@@ -200,14 +200,11 @@ class Problem:
         return slice(span.start - self.shared, span.stop - self.shared)
 
     def index_of(self, candidate: Candidate) -> int | None:
-        """Where a candidate of the same cause and place (and interval) is, or None; one with its tolerance first."""
-        same = [
-            index
-            for index, other in enumerate(self.candidates)
-            if other.key == candidate.key and other.transient == candidate.transient
-        ]
-        alike = [i for i in same if self.candidates[i].parameters == candidate.parameters]
-        return next(iter([*alike, *same]), None)
+        """Where a candidate of the same cause and place (and interval) is, or None; one of its tolerance first."""
+        all_ = enumerate(self.candidates)
+        same = [(i, c) for i, c in all_ if c.key == candidate.key and c.transient == candidate.transient]
+        same.sort(key=lambda one: one[1].parameters != candidate.parameters)
+        return same[0][0] if same else None
 
     def with_residual(self, residuals: Sequence[Array]) -> Problem:
         """The same columns with another residual, shape (n, C) per trial."""

@@ -47,7 +47,7 @@ class Friction(Cause):
     def shapes(self, hints, at):
         rigid = slow_shapes(hints, at, rules.SLOW_SHARES)
         # Of a joint that slides, nobody knows how far its seals bend.
-        return [*rigid, *({"bristle_rad": b} | rigid[0] for b in rules.BRISTLES_RAD if hints.turns[at])]
+        return [*rigid, *(dict(rigid[0]) | {"bristle_rad": b} for b in rules.BRISTLES_RAD if hints.turns[at])]
 
     def finer(self, shape):
         low, high = (edge * rules.BRISTLES_RAD[k] for edge, k in ((0.5, 0), (2.0, -1)))
