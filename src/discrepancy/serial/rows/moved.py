@@ -1,4 +1,4 @@
-"""Signals of a machine whose numbers are not the model's: what slopes do not tell, as tolerances multiply each other."""
+"""Signals of a machine whose numbers are not the model's: slopes do not tell how tolerances multiply each other."""
 
 from __future__ import annotations
 
