@@ -13,7 +13,7 @@ from discrepancy.inference.best_shape import nearest_shape
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.imitation import imitated
 from discrepancy.inference.other_forms import beside_other_forms
-from discrepancy.inference.scan import Scanned, scan, score_of, score_with
+from discrepancy.inference.scan import Scanned, scan, score_of, score_with, scores_with
 from discrepancy.inference.twins import twins
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
@@ -126,11 +126,10 @@ def _in_best_shape(rig: Rig, fit: Fit, item: Scanned, loud: Collection[int | Non
         fit = Fit.of(fit.problem, fit.free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
         # What the healthy one explains has its own shape, whatever that of the faulty one.
         healthy = score_with(fit, item.candidate, rig.columns(item.candidate)) - item.score
-    for shape in rig.refinements(item.candidate):
-        columns = tuple(rig.columns(shape))
-        score = score_with(fit, shape, columns) - healthy
-        if score > best.score:
-            best = Scanned(item.index, shape, score, columns)
+    each = [(shape, tuple(rig.columns(shape))) for shape in rig.refinements(item.candidate)]
+    for (shape, columns), score in zip(each, scores_with(fit, each), strict=True):
+        if score - healthy > best.score:
+            best = Scanned(item.index, shape, score - healthy, columns)
     return best
 
 
@@ -268,8 +267,8 @@ def _best_shape(rig: Rig, problem: Problem, free: Sequence[int], item: Scanned) 
     best, score = start, score_with(fit, start, rig.columns(start), spike)
     for _ in range(rules.FINER_ROUNDS + 1):
         last = best
-        for shape in shapes:
-            judged = score_with(fit, shape, rig.columns(shape), spike)
+        each = [(shape, rig.columns(shape)) for shape in shapes]
+        for (shape, _), judged in zip(each, scores_with(fit, each, spike), strict=True):
             if judged > score:
                 best, score = shape, judged
         if best is last and best is not start:

@@ -51,8 +51,18 @@ def score_of(fit: Fit, index: int) -> float:
 
 def score_with(fit: Fit, candidate: Candidate, columns: Sequence[Array], spike: float = 0.0) -> float:
     """The same of a candidate that is not in the model, with columns in its own units, shape (n, C, k) per trial."""
-    told = fit.told_by([new * candidate.units for new in columns])
-    return log_bayes_factor(*told, spike) + log_prior_odds(fit.problem, candidate)
+    return scores_with(fit, [(candidate, columns)], spike)[0]
+
+
+def scores_with(
+    fit: Fit, each: Sequence[tuple[Candidate, Sequence[Array]]], spike: float = 0.0
+) -> list[float]:
+    """The same of several candidates, each alone."""
+    told = fit.told_by_each([[new * candidate.units for new in columns] for candidate, columns in each])
+    return [
+        log_bayes_factor(*one, spike) + log_prior_odds(fit.problem, candidate)
+        for (candidate, _), one in zip(each, told, strict=True)
+    ]
 
 
 def log_bayes_factor(information: Array, score: Array, spike: float) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -173,16 +174,33 @@ class Fit:
 
     def told_by(self, columns: Sequence[Array]) -> tuple[Array, Array]:
         """Information about the values of further columns given all in the model, and their score vector."""
-        k = columns[0].shape[2]
-        information, edge = np.zeros((k, k)), np.zeros((self.gram.shape[0], k))
-        for t, new in enumerate(columns):
-            if new.any():  # a transient is in one trial only
-                own = self.problem.spectrum(t, new)
-                weighted = own * self.problem.weights[t]
-                information += gram_of(weighted, own)
-                edge += self.problem.products(t, weighted)
-        cross = edge[self.used].T
-        return information - cross @ self.covariance @ cross.T, edge[-1] - cross @ self.solution
+        return self.told_by_each([columns])[0]
+
+    def told_by_each(self, sets: Sequence[Sequence[Array]]) -> list[tuple[Array, Array]]:
+        """The same of several sets of columns, each alone beside the model; together they take less time."""
+        ends = np.cumsum([0, *(columns[0].shape[2] for columns in sets)])
+        spans = [slice(*pair) for pair in pairwise(ends)]
+        own_grams = [np.zeros((columns[0].shape[2],) * 2) for columns in sets]
+        edge = np.zeros((self.gram.shape[0], ends[-1]))
+        for t in self.problem.trials:
+            here = [
+                k for k, columns in enumerate(sets) if columns[t].any()
+            ]  # a transient is in one trial only
+            if not here:
+                continue
+            own = self.problem.spectrum(t, np.concatenate([sets[k][t] for k in here], axis=2))
+            weighted, at = own * self.problem.weights[t], 0
+            products = self.problem.products(t, weighted)
+            for k in here:
+                its = slice(at, at + len(own_grams[k]))
+                own_grams[k] += gram_of(weighted[..., its], own[..., its])
+                edge[:, spans[k]] += products[:, its]
+                at = its.stop
+        crosses = [edge[self.used, span].T for span in spans]
+        return [
+            (gram - cross @ self.covariance @ cross.T, edge[-1, span] - cross @ self.solution)
+            for gram, cross, span in zip(own_grams, crosses, spans, strict=True)
+        ]
 
     def told(self, index: int) -> tuple[Array, Array]:
         """Information about a candidate given all else in the model, and its score vector."""

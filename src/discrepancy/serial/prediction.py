@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -23,6 +24,17 @@ class Within:
     whitening: Whitening
     local: Array
 
+    @cached_property
+    def seen(self) -> Array:
+        """Whitened columns without what the block's own unknowns can do, shape (n C, k)."""
+        count = self.physical.shape[2]
+        return _without(self.whitening(self.physical).reshape(-1, count), self.local)
+
+    @cached_property
+    def normal(self) -> Array:
+        """Information of the block about the columns' values, shape (k, k)."""
+        return np.asarray(self.seen.T @ self.seen)
+
 
 def unforetold(trial: int, left: Sequence[Array], within: Sequence[Within]) -> Array:
     """Measured minus foretold torques of one block, low-passed as its rows are, shape (n, C).
@@ -38,9 +50,8 @@ def unforetold(trial: int, left: Sequence[Array], within: Sequence[Within]) -> A
     normal, score = np.eye(count), np.zeros(count)
     for t in [k for k in range(len(left)) if k != trial] or [trial]:
         block = within[t]
-        columns = _without(block.whitening(block.physical).reshape(-1, count), block.local)
-        normal += columns.T @ columns
-        score += columns.T @ block.whitening(left[t]).ravel()
+        normal += block.normal
+        score += block.seen.T @ block.whitening(left[t]).ravel()
     return left[trial] - within[trial].physical @ np.linalg.solve(normal, score)
 
 

@@ -28,7 +28,7 @@ from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rows.common import combinations
 from discrepancy.serial.rows.remainder import Key
 from discrepancy.serial.rows.whiten import whiten
-from discrepancy.serial.serial_rows import SerialRows, place_of
+from discrepancy.serial.serial_rows import SerialRows, place_of, shaped_key
 from discrepancy.serial.servo.motor import with_torques
 from discrepancy.serial.undecidable import general, look_alikes
 from estimator.arrays import Array
@@ -68,8 +68,8 @@ class SerialRig(SerialRows, Rig):
         # What differs between the days must not look like noise, so each has its own.
         apart = [group for group in (parts[: len(logs)], parts[len(logs) :]) if group]
         whitened = [whiten(group, joints, every) for group in apart]
-        whitening = tuple(white for done in whitened for white in done[0])
-        spoilt = frozenset[Key]().union(*(done[2] for done in whitened))
+        whitening = tuple(white for done in whitened for white in done.whitening)
+        spoilt = frozenset[Key]().union(*(done.spoilt for done in whitened))
         changed = sum(len(part.blocks) for part in apart[0])
         rig = cls(
             model,
@@ -77,13 +77,17 @@ class SerialRig(SerialRows, Rig):
             joints,
             hints,
             whitening,
-            whitened[0][1],
+            whitened[0].level,
             given,
             left_out,
             spoilt,
             len(whitening),
             (),
             motors,
+            {
+                shaped_key(c): [rows for done in whitened for rows in done.traces[k]]
+                for k, c in enumerate(every)
+            },
         )
         if not reference:
             return rig
@@ -199,17 +203,27 @@ class SerialRig(SerialRows, Rig):
     def _unforetold(
         self, trial: int, active: Sequence[tuple[Candidate, Array]], shared: Array
     ) -> dict[str, Array]:
-        taken = {candidate.key for candidate, _ in active if candidate.parameters[0].tolerance}
-        within = [c for c in self._normal if c.key not in taken]
-        left = self.physical_residual(active, shared)
+        taken = frozenset(candidate.key for candidate, _ in active if candidate.parameters[0].tolerance)
+        left, within = self.physical_residual(active, shared), self._within(taken)
         if within:
+            left[trial] = unforetold(trial, left, within)
+        return {channel.name: left[trial][:, c] for c, channel in enumerate(self.channels)}
+
+    def _within(self, taken: frozenset[Key]) -> Sequence[Within]:
+        """What is normal in every block, less what causes take; only the last asked for is kept: it takes memory."""
+        if taken not in self._kept:
+            within = [c for c in self._normal if c.key not in taken]
             physical = zip(*([x * c.units for x in self.physical(c)] for c in within), strict=True)
-            each = [
+            self._kept.clear()
+            self._kept[taken] = [
                 Within(np.concatenate(columns, axis=2), self.whitening[t], self.local_columns(t))
                 for t, columns in enumerate(physical)
             ]
-            left[trial] = unforetold(trial, left, each)
-        return {channel.name: left[trial][:, c] for c, channel in enumerate(self.channels)}
+        return self._kept[taken]
+
+    @cached_property
+    def _kept(self) -> dict[frozenset[Key], Sequence[Within]]:
+        return {}
 
     @cached_property
     def _normal(self) -> list[Candidate]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -43,6 +43,7 @@ class SerialRows:
         changed: blocks in which causes act; those of a reference come after them.
         common: what may be wrong with the model in all logs, where there is a reference: rows (n, C, s) per block.
         motors: drives that tell no torque, and what they give by what they were given.
+        traces: of causes in some shape (``shaped_key``), as far as they were made already: rows (n, C, k) per block.
     """
 
     model: SerialModel
@@ -57,6 +58,7 @@ class SerialRows:
     changed: int
     common: tuple[Array, ...]
     motors: tuple[Motor, ...] = ()
+    traces: Mapping[Any, list[Array]] = field(default_factory=dict, repr=False)
     _seen: dict[Any, list[Array]] = field(default_factory=dict, repr=False)
 
     @property
@@ -81,11 +83,15 @@ class SerialRows:
 
     def physical(self, candidate: Candidate) -> list[Array]:
         """Columns of one candidate in N m or N, rows (n, C, k) of every block."""
-        cause, at = CAUSES[candidate.cause], place_of(candidate)
-        key = (candidate.key, tuple(sorted(candidate.shape.items())))
+        cause, at, key = CAUSES[candidate.cause], place_of(candidate), shaped_key(candidate)
         if key not in self._seen:
-            done = [part.reduction(cause.columns(part.signals, at, candidate.shape)) for part in self.parts]
-            rows = _seen_only([block[:, self.joints] for blocks in done for block in blocks], candidate.units)
+            rows = self.traces.get(key)
+            if rows is None:
+                done = [
+                    part.reduction(cause.columns(part.signals, at, candidate.shape)) for part in self.parts
+                ]
+                rows = [block[:, self.joints] for blocks in done for block in blocks]
+            rows = _seen_only(rows, candidate.units)
             rows = [block * (t < self.changed and candidate.acts_in(t)) for t, block in enumerate(rows)]
             if candidate.transient:
                 return rows
@@ -105,10 +111,16 @@ class SerialRows:
 
     def local_columns(self, trial: int) -> Array:
         """Whitened columns of the friction that joints may have while they rest, shape (n, C, l)."""
-        part, k = self.block_of[trial]
-        rests = [rest[:, self.joints] for rest in part.rests(k)]
-        none = np.zeros((len(part.reduction.samples[k]), len(self.joints), 0))
-        return self.whitening[trial](np.stack(rests, axis=2)) if rests else none
+        if trial not in self._resting:
+            part, k = self.block_of[trial]
+            rests = [rest[:, self.joints] for rest in part.rests(k)]
+            none = np.zeros((len(part.reduction.samples[k]), len(self.joints), 0))
+            self._resting[trial] = self.whitening[trial](np.stack(rests, axis=2)) if rests else none
+        return self._resting[trial]
+
+    @cached_property
+    def _resting(self) -> dict[int, Array]:
+        return {}
 
     def physical_residual(
         self, active: Sequence[tuple[Candidate, Array]], shared: Array | None = None
@@ -154,6 +166,11 @@ def _seen_only(rows: list[Array], units: Array) -> list[Array]:
     """Columns with nought in place of those that are rounding beside the others, such as a push along the axis."""
     size = units * np.sqrt(np.sum([np.sum(block**2, axis=(0, 1)) for block in rows], axis=0))
     return [block * (size > rules.REDUNDANT * size.max(initial=0.0)) for block in rows]
+
+
+def shaped_key(candidate: Candidate) -> Any:
+    """What tells a candidate's columns from those of others: cause, place and shape."""
+    return candidate.key, tuple(sorted(candidate.shape.items()))
 
 
 def place_of(candidate: Candidate) -> int:

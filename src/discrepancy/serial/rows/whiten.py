@@ -1,6 +1,9 @@
 """Whitening of the rows of all logs, from the logs themselves."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,10 +17,27 @@ from discrepancy.serial.rows.remainder import Key, NoiseInTraces, remainder, rev
 from estimator.arrays import Array
 
 
+@dataclass(frozen=True, eq=False)
+class Whitened:
+    """What logs say of their noise.
+
+    Attributes:
+        whitening: of every block.
+        level: sensors' noise over what all causes leave, shape (C,).
+        spoilt: cause and place of what noise hides.
+        traces: of every cause and block, rows (n, C, k) in N m or N: they take time to make.
+    """
+
+    whitening: tuple[Whitening, ...]
+    level: Array
+    spoilt: frozenset[Key]
+    traces: list[list[Array]]
+
+
 def whiten(
     parts: Sequence[Part], joints: NDArray[np.intp], candidates: Sequence[SerialCandidate]
-) -> tuple[tuple[Whitening, ...], Array, frozenset[Key]]:
-    """Whitening of every block, the sensors' noise over what all causes leave, shape (C,), and what noise hides.
+) -> Whitened:
+    """Whitening of every block, and what comes with it.
 
     Args:
         parts: the logs.
@@ -34,7 +54,7 @@ def whiten(
     torques = [rows[:, joints] for part in parts for rows in part.reduction(part.signals.torque)]
     draws = draws_of(sensors, torques)
     first = Whitening.of(draws, draws.shape[1], rules.AR_ORDER)
-    noisy = NoiseInTraces.of(parts, noises, joints, candidates)
+    noisy = every = NoiseInTraces.of(parts, noises, joints, candidates)
     spoilt = noisy.spoilt(candidates, angles, first)
     clear = [k for k, c in enumerate(candidates) if c.key not in spoilt]
     told, noisy = [candidates[k] for k in clear], noisy.only(clear)
@@ -44,4 +64,4 @@ def whiten(
     uncertain = reversals(parts, joints, told, left.values)
     draws = draws_of(through, torques)
     whitening, level = whitening_of(left.rows, left.freedom, uncertain, draws, torques)
-    return whitening, level, spoilt
+    return Whitened(whitening, level, spoilt, every.traces)
