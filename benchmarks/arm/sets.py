@@ -12,6 +12,7 @@ import numpy as np
 
 from arm import machine
 from arm.forms import CAUSE_OF, MOST, NOWHERE, TYPICAL, Form
+from discrepancy.rules import inference
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
 
@@ -102,7 +103,9 @@ def make(request: ArmSet, folder: Path) -> Made:
     sized, told = [], []
     sizes = request.rng("sizes")
     for k, form in enumerate(request.forms):
-        limit = form.size * np.sqrt(GAIN / _gain(rig, ideal, _with(form, arm, motion)))
+        gain, tolerances = _shown(rig, ideal, _with(form, arm, motion), form)
+        # What is not so far out of its tolerance is no fault.
+        limit = form.size * max(np.sqrt(GAIN / gain), inference.LEAST_SLAB / max(tolerances, 1e-9))
         wanted = request.factor or SIZES[(request.seed + k) % len(SIZES)] * sizes.uniform(0.9, 1.1)
         size = min(wanted * limit, MOST.get(form.name, np.inf))
         sized.append(replace(form, size=float(size)))
@@ -164,8 +167,11 @@ def _asked(model: mujoco.MjModel, motion: machine.Motion, form: Form | None) -> 
     return out
 
 
-def _gain(rig: SerialRig, ideal: JointLog, changed: JointLog) -> float:
-    """Of chi-square, that a form leaves beside everything within its tolerance."""
+def _shown(rig: SerialRig, ideal: JointLog, changed: JointLog, form: Form) -> tuple[float, float]:
+    """What a form leaves of chi-square beside everything within its tolerance, and its size in tolerances.
+
+    The latter is that of its cause's nearest values; infinite where that has no tolerance, or shapes to tell it by.
+    """
     rows = [SerialRig.of(rig.model, [log]).physical_residual([]) for log in (ideal, changed)]
     within = [c for c in rig.candidates() if all(p.tolerance > 0 for p in c.parameters)]
     columns = [rig.columns(c) for c in within]
@@ -184,4 +190,9 @@ def _gain(rig: SerialRig, ideal: JointLog, changed: JointLog) -> float:
         b.append(change)
     X, d = np.concatenate(A), np.concatenate(b)
     x = np.linalg.solve(X.T @ X + np.eye(width), X.T @ d)
-    return float(d @ d - d @ (X @ x))
+    at = np.cumsum([0, *(len(c.parameters) for c in within)])
+    tolerances = np.inf
+    for k, c in enumerate(within):
+        if (c.cause, c.joint) == (form.cause, form.joint) and not rig.refinements(c):
+            tolerances = float(np.abs(np.linalg.lstsq(X[:, at[k] : at[k + 1]], d, rcond=None)[0]).max())
+    return float(d @ d - d @ (X @ x)), tolerances

@@ -8,7 +8,7 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation, Found, explain
-from discrepancy.engine.gain import Gain, mean_chi2, responses
+from discrepancy.engine.gain import Gain, is_worse, mean_chi2, responses
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.probability import probability
 from discrepancy.inference.refit import exact
@@ -101,7 +101,7 @@ def confirm(
     if winner is not None:
         explanation = _exchanged(rig, explanation, problem, winner)
     none = mean_chi2(before)
-    contradicted = best > none * (1.0 + rules.MARGIN_SHARE)
+    contradicted = is_worse(best, none)
     if contradicted:
         loop = (
             f"makes the response to the commands worse (chi2/n {none:.3g} to {best:.3g})"

@@ -7,6 +7,7 @@ import numpy as np
 from joblib import Parallel, delayed
 from scipy.stats import t as student
 
+from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
@@ -135,6 +136,11 @@ def _response(errors: Mapping[str, Array], scales: Mapping[str, tuple[Array, Arr
         nrmse[name] = rms[name] / float(np.sqrt(np.mean(motion**2)))
         squares.append(np.mean((error / noise) ** 2))
     return Response(rms, nrmse, float(np.mean(squares)))
+
+
+def is_worse(chi2_per_n: float, than: float) -> bool:
+    """Whether simulated responses are worse than others; within the noise (1) none is."""
+    return chi2_per_n > max(than, 1.0) * (1.0 + rules.MARGIN_SHARE)
 
 
 def mean_chi2(trials: Sequence[Response | None]) -> float:

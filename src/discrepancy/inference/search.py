@@ -141,6 +141,12 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
                 if other.score > best.score:
                     best, changed = other, True
                     break
+                # Less likely where it is exact; and none of the others was likelier than that one.
+                least = best.score - other.score
+                rivals[index] = [
+                    rival if rival.candidate is None else replace(rival, gap=max(rival.gap, least))
+                    for rival in rivals[index]
+                ]
         if not changed:
             break
     for index in set(best.free) - set(rivals):  # exchanged in the last round

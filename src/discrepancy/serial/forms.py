@@ -59,7 +59,8 @@ def _rubs(candidate: Candidate) -> bool:
 
 def _named_friction(rows: SerialRows, candidate: Candidate) -> list[list[Array]]:
     """How the friction that the model names changes if it gives way, by each length of bristles, rows (n, C)."""
-    if not CAUSES[candidate.cause].dry or candidate.joint is None:
+    # That it gives way is a finding about friction, and no sign of what rubs in another way.
+    if not CAUSES[candidate.cause].dry or candidate.joint is None or candidate.cause == "friction":
         return []
     at = place_of(candidate)
     much = float(rows.tree.coulomb[at])

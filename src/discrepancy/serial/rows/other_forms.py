@@ -27,7 +27,7 @@ class OtherForms:
 
 
 def other_forms(signals: Signals, samples: NDArray[np.intp], at: int, family: str) -> OtherForms:
-    """Ways in which a law at a joint may be another: with position, speed, direction, and as the machine warms up.
+    """Ways in which a law at a joint may be another: with position, speed, direction, load, and the time since start.
 
     Args:
         signals: of the log.
@@ -40,12 +40,14 @@ def other_forms(signals: Signals, samples: NDArray[np.intp], at: int, family: st
     place = (2.0 * q[samples] - low - high) / max(high - low, 1e-12)
     when = 2.0 * (signals.time[samples] - signals.time[0]) / np.ptp(signals.time) - 1.0
     smooth = list(legvander(place, rules.FORM_DEGREE).T)
-    fast = np.abs(v)
+    fast, load = np.abs(v), np.abs(signals.inverse[:, at])
+    load = load[samples] / max(float(np.sqrt(np.mean(load**2))), 1e-12)
     times = [
         *smooth[1:4],
         fast - 1.0,
         np.exp(-fast / rules.STRIBECK_SHARES[1]),
         np.clip(3.0 * v, -1.0, 1.0),
+        load - 1.0,
         when,
     ]
     return OtherForms(times, smooth if family == "position_torque" else [])
