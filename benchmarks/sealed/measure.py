@@ -166,6 +166,10 @@ class Bench:
             if event is None:
                 return None, None
             shape = {name: getattr(effect, name) for name in event.shape if hasattr(effect, name)}
+            if cause == "payload_tether" and hasattr(effect, "point_x_m"):
+                pi = self.rig.linear[0].shared.pi
+                point = [getattr(effect, f"point_{axis}_m") for axis in "xyz"]
+                shape = dict(zip(event.shape, point - pi[1:4] / pi[0], strict=True))
             event = replace(event, shape={**event.shape, **shape})
         columns = np.concatenate([c.reshape(-1, c.shape[2]) * event.units for c in self.rig.columns(event)])
         return None, (

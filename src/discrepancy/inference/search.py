@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.learn import worth_a_spread
 from discrepancy.inference.other_forms import beside_other_forms
 from discrepancy.inference.probability import probability
 from discrepancy.inference.propose import proposals
@@ -75,18 +76,43 @@ def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Se
     doubtful = 0
     while len(best.free) < most and doubtful < rules.DOUBTFUL:
         added = proposals(rig, best).best
-        if added is None or added.score - best.score < rules.NAMED_NATS:
+        if added is None or added.score - best.score < _needed(best, added):
             break
         say(f"refit {added.causes[-1].label}")
         little = added.score - best.score < rules.LITTLE_SHARE * nats_left(best)
         found, beside = settled(rig, exact(rig, added, nothing), nothing)
-        if found.score - best.score < rules.NAMED_NATS:
+        if found.score - best.score < _needed(best, found):
             break  # what pays where all is linear need not do so where it is exact
         best, rivals = found, beside
         last = best.free[-1] if best.free else None
         likely = last is None or _law_holds(rig, best, last)
         doubtful = doubtful + 1 if little and not likely else 0
     return Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free))
+
+
+def _needed(base: Hypothesis, more: Hypothesis) -> float:
+    """By how many nats a hypothesis with one cause more must be likelier.
+
+    A scatter of one kind alone, all others as they should be, is no healthy team either: as soon as one of its places is
+    likelier than that, it is named. Where several kinds scatter, robots are off everywhere, and it has to stand out.
+    """
+    wide = _wide(base, rules.HELD_FACTOR)
+    if len(wide) != 1 or not _wide(base, rules.SCATTER_FACTOR) or not {c.cause for c in more.causes} >= wide:
+        return rules.NAMED_NATS
+    if _wide(more, rules.SCATTER_FACTOR):
+        return rules.NAMED_NATS
+    return max(0.0, rules.NAMED_NATS - worth_a_spread(base.learnt, *wide))
+
+
+def _wide(hypothesis: Hypothesis, factor: float) -> set[str]:
+    """Kinds that scatter by so many tolerances."""
+    problem = hypothesis.problem
+    return {
+        candidate.cause
+        for index, candidate in enumerate(problem.candidates)
+        if index not in hypothesis.free and problem.has_tolerance(index)
+        if problem.spread[problem.columns_of(index)].max() >= factor
+    }
 
 
 def _law_holds(rig: Rig, hypothesis: Hypothesis, index: int) -> bool:
@@ -124,7 +150,7 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
             less = best.without(index)
             # Its own loss to forms of the others is judged here, but counted once: not theirs to its forms, too.
             judged = beside_other_forms(rig, best, index, less)
-            if judged.score - less.score < rules.NAMED_NATS:
+            if judged.score - less.score < _needed(less, judged):
                 best, changed = exact(rig, less, nothing), True
                 break
             candidate = best.problem.candidates[index]

@@ -87,6 +87,9 @@ LENGTH_MOST_M = 0.02
 PULL_SE = 5.0
 """Standard errors that the stiffness of a payload's tether must be. Measured: uncalibrated robots without one leave up
 to 3, with a constant force of 2 N."""
+TETHER_LEVER_M, TETHER_FINER_M, TETHER_STEP_M = 0.4, (0.2, 0.07, 0.025), 0.02
+"""Levers of a tether of the payload at which a search begins, by which it goes on, and over which slopes are taken.
+Chosen: half of a payload, and so fine that a Gauss-Newton step does the rest."""
 SLOSH_LENGTHS_M = (0.04, 1.0)
 """Derived: pendulums of 2.5 to 0.5 Hz; slower and faster ones look like drag or play."""
 SLOSH_MOST_DAMPED = 0.3

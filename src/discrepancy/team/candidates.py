@@ -46,12 +46,14 @@ def other_shapes(candidate: Candidate, *, finer: bool) -> list[Candidate]:
 def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
     """The candidate with each number of its shape that the data determine changed both ways, and by how much."""
     steps = []
-    for name, share in CAUSES[candidate.cause].determined.items():
+    cause = CAUSES[candidate.cause]
+    for name in cause.determined:
         number = candidate.shape[name]
+        step = cause.slope_step(name, number)
         less, more = (
-            replace(candidate, shape={**candidate.shape, name: x * number}) for x in (1 - share, 1 + share)
+            replace(candidate, shape={**candidate.shape, name: x}) for x in (number - step, number + step)
         )
-        steps.append((less, more, 2.0 * share * number))
+        steps.append((less, more, 2.0 * step))
     return steps
 
 

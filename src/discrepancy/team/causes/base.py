@@ -47,7 +47,7 @@ class Cause(base.Cause):
         at: what it can sit at; every robot has its own but for the payload.
         joints: those that it can sit at, from 1.
         shapes: alternatives of what changes the columns themselves; the first is the catalogue's.
-        determined: numbers of the shape that the data determine, with the share by which to change them for slopes.
+        determined: numbers of the shape that the data determine, with what ``slope_step`` makes steps of.
         clipped: the effect's parameters that are zero where the fit has them below.
         by_clocks: whether it shows in the robots' clocks alone, and so not where the motion set them.
     """
@@ -85,6 +85,10 @@ class Cause(base.Cause):
     def finer(self, shape: Shape) -> Sequence[Shape]:
         """Shapes near a chosen one, for a second look."""
         return []
+
+    def slope_step(self, name: str, number: float) -> float:
+        """By how much a number of the shape is changed for slopes: a share of it."""
+        return self.determined[name] * number
 
     def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> list[Array]:
         """Columns (n, C) of what the cause leaves open in one trial, such as the friction of a joint at rest."""
