@@ -93,8 +93,8 @@ def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Se
 def _needed(base: Hypothesis, more: Hypothesis) -> float:
     """By how many nats a hypothesis with one cause more must be likelier.
 
-    A scatter of one kind alone, all others as they should be, is no healthy team either: as soon as one of its places is
-    likelier than that, it is named. Where several kinds scatter, robots are off everywhere, and it has to stand out.
+    A scatter of one kind alone, all others as they should be, is no healthy machine either: as soon as one of its
+    places is likelier than that, it is named. Where several kinds scatter, all is off, and it has to stand out.
     """
     wide = _wide(base, rules.HELD_FACTOR)
     if len(wide) != 1 or not _wide(base, rules.SCATTER_FACTOR) or not {c.cause for c in more.causes} >= wide:

@@ -3,6 +3,8 @@
 Khalil and Dombre, "Modeling, Identification and Control of Robots" (2002), section 12.3.
 """
 
+from functools import cache
+
 import numpy as np
 
 from discrepancy.serial.mechanics.motion import Motion, cross, dot, rigid, times, turned, vectors
@@ -11,11 +13,6 @@ from estimator.arrays import Array
 
 PARAMETERS = ("m", "hx", "hy", "hz", "Ixx", "Iyy", "Izz", "Ixy", "Ixz", "Iyz")
 """Mass [kg], first moments [kg m] and inertia about the origin of the body's frame [kg m^2], along that frame."""
-
-
-_INERTIAS = [np.array([[float({i, j} == {a, b}) for j in range(3)] for i in range(3)])
-             for a, b in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]  # fmt: skip
-"""Of the last six as matrices."""
 
 
 def inertial_parameters(mass: float, com: Array, inertia: Array) -> Array:
@@ -37,7 +34,7 @@ def _body_regressor(motion: Motion, body: int) -> Array:
     w, al = motion.omega[body], motion.alpha[body]
     own = R.swapaxes(1, 2)  # to the body's axes
     wb, alb = turned(own, w), turned(own, al)
-    inner = [turned(R, times(E, alb) + cross(wb, times(E, wb))) for E in _INERTIAS]
+    inner = [turned(R, times(E, alb) + cross(wb, times(E, wb))) for E in _unit_inertias()]
     axes = [R[..., k] for k in range(3)]
     by_axis = [cross(al, e) + cross(w, cross(w, e)) for e in axes]
     by_acceleration = [cross(e, a) for e in axes]
@@ -108,3 +105,10 @@ def force_torque(motion: Motion, body: int, point: Array) -> Array:
         s = motion.axis[j]
         out[:, j] = s if tree.slides[j] else cross(s, at - motion.anchor[j])
     return out
+
+
+@cache
+def _unit_inertias() -> list[Array]:
+    """The last six of the parameters, one unit each, as matrices."""
+    pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    return [np.array([[float({i, j} == {a, b}) for j in range(3)] for i in range(3)]) for a, b in pairs]

@@ -13,8 +13,8 @@ LEVERS = ("lever_x_m", "lever_y_m", "lever_z_m")
 class PayloadTether(Cause):
     """Force k (anchor - point) on a point of the payload, anchor fixed in robot 1's {b}.
 
-    The columns are the force at home and the stiffness; the point, from the centre of mass along the axes of {1}, is the
-    shape.
+    The columns are the force at home and the stiffness; the point is the shape, seen from the centre of mass along the
+    axes of {1}.
     """
 
     title = "tether of the payload"
