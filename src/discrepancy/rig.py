@@ -124,10 +124,12 @@ class Rig(ABC):
         """Amplitude that the law of a cause leaves of its trace where it is there: a standard deviation."""
         return rules.LAW_SHARE
 
-    def other_forms(self, candidate: Candidate, there: Sequence[tuple[Candidate, Array]]) -> list[Array]:
+    def other_forms(
+        self, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]]
+    ) -> list[Array]:
         """Whitened columns (n, C, k) per trial of what causes that are there leave if their laws have other forms.
 
-        Each of one standard deviation; none where that is no matter for a candidate beside them.
+        Each of one standard deviation; none where that is no matter for a candidate of such values beside them.
         """
         return []
 

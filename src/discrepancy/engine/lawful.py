@@ -4,9 +4,10 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.engine.confirm import labels
 from discrepancy.engine.explanation import Explanation, Found
-from discrepancy.engine.gain import is_worse, mean_chi2, responses
+from discrepancy.engine.gain import mean_chi2, responses
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.forms import Refinement
 from discrepancy.rig import Rig
@@ -47,7 +48,7 @@ def responding(
         mean_chi2(responses(rig, each.problem, [each.fit.free], jobs, simulated)[0])
         for each in (listed, lawful)
     )
-    if not np.isfinite(without) or not is_worse(with_, without):
+    if not np.isfinite(without) or with_ <= without * (1.0 + rules.MARGIN_SHARE):
         return lawful, []
     worse = f"(chi2/n {without:.3g} to {with_:.3g})" if np.isfinite(with_) else "(it cannot be simulated)"
     return listed, [

@@ -35,7 +35,7 @@ def beside_other_forms(rig: Rig, hypothesis: Hypothesis, index: int, base: Hypot
     ]
     there = [(problem.candidates[i], fit.part(i)[0] * problem.candidates[i].units) for i in others]
     there += [(base.problem.candidates[i], before.part(i)[0] * base.problem.candidates[i].units) for i in off]
-    forms = rig.other_forms(candidate, there)
+    forms = rig.other_forms(candidate, fit.part(index)[0] * candidate.units, there)
     if not forms:
         return hypothesis
     k = len(candidate.parameters)

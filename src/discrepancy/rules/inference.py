@@ -51,7 +51,8 @@ AMBIGUOUS_NATS = CLOSE_NATS / 4.0
 """Rivals that the rows put closer are simulated; what the closed loop does not part either cannot be told apart.
 Chosen."""
 MARGIN_SHARE = 0.02
-"""Simulations whose chi-square differs by less are equally good; so are all within the noise, at 1 and less. Chosen."""
+"""Simulations whose chi-square differs by less are equally good; so are all within the noise, at 1 and less, except for
+laws, which have to help. Chosen."""
 VISIBLE_CHI2_PER_N = 3.0
 """Of the closed loop, from which something is said of it beside the verdict. Chosen."""
 

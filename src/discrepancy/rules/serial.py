@@ -104,6 +104,9 @@ JOINT_SHARE = 0.03
 sticking at reversals moves fitted rotors by up to 0.02 (of a simulated arm without any error)."""
 MOST_INERTIA_SHARE = 1.0
 """Of the same, beyond which a link is not off but another. Chosen: rotors and payloads add more, and are themselves."""
+RUBS_MORE = 2.0
+"""Tolerances by which dry friction must be off, or its giving way is that of a healthy one. Chosen: where a healthy
+joint and one with the least slab (``LEAST_SLAB``) are about equally likely."""
 LEAST_LINK_M = 0.02
 """Size of a link, at least, of which its centre of mass is off by that share. Chosen."""
 ZERO_RAD, ZERO_M = 2e-3, 5e-4

@@ -15,7 +15,7 @@ from estimator.arrays import Array
 
 
 def forms_beside(
-    rows: SerialRows, candidate: Candidate, there: Sequence[tuple[Candidate, Array]]
+    rows: SerialRows, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]]
 ) -> list[Array]:
     """Whitened columns (n, C, k) per block of what a joint's causes leave if their laws have other forms.
 
@@ -25,12 +25,13 @@ def forms_beside(
     Args:
         rows: of the logs.
         candidate: which is judged beside them.
+        values: of its parameters, in their units.
         there: causes with their values.
     """
     if candidate.cause not in CAUSES or candidate.transient is not None:
         return []
     own = [(c, v) for c, v in there if _at_a_joint(c) and not (_rubs(candidate) and _rubs(c))]
-    soft = _named_friction(rows, candidate)
+    soft = _named_friction(rows, candidate, values)
     if not own and not soft:
         return []
     traces = [[x @ v for x in rows.physical(c)] for c, v in own]
@@ -57,13 +58,15 @@ def _rubs(candidate: Candidate) -> bool:
     return cause.dry or cause.family in ("friction", "asymmetric_friction")
 
 
-def _named_friction(rows: SerialRows, candidate: Candidate) -> list[list[Array]]:
+def _named_friction(rows: SerialRows, candidate: Candidate, values: Array) -> list[list[Array]]:
     """How the friction that the model names changes if it gives way, by each length of bristles, rows (n, C)."""
-    # That it gives way is a finding about friction, and no sign of what rubs in another way.
-    if not CAUSES[candidate.cause].dry or candidate.joint is None or candidate.cause == "friction":
+    if not CAUSES[candidate.cause].dry or candidate.joint is None:
         return []
     at = place_of(candidate)
     much = float(rows.tree.coulomb[at])
+    # Friction that is off by more than a healthy one's may give way itself.
+    if candidate.cause == "friction" and abs(values[0]) > rules.RUBS_MORE * rules.JOINT_SHARE * much:
+        return []
     shapes = CAUSES["friction"].shapes(rows.hints, at)
     if not much or not shapes:
         return []

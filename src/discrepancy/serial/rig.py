@@ -163,9 +163,11 @@ class SerialRig(SerialRows, Rig):
         """A real robot: noise is the sensors', and every law leaves more than that."""
         return LAW_SHARE if candidate.transient else rules.SERIAL_LAW_SHARE
 
-    def other_forms(self, candidate: Candidate, there: Sequence[tuple[Candidate, Array]]) -> list[Array]:
+    def other_forms(
+        self, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]]
+    ) -> list[Array]:
         """What a joint's causes, and the friction that its model names, leave if their laws have other forms."""
-        return forms_beside(self, candidate, there)
+        return forms_beside(self, candidate, values, there)
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the torques are worst; none where torques are only what duties should give.
