@@ -83,3 +83,8 @@ def worst_events(
         worst = worst_intervals(t, time, square, rules.TEAM_PUSH_S, two_sided=False)
         out += [cause.event(tolerances.get(cause.name, {}), when) for cause in causes for when in worst]
     return out
+
+
+def is_adjusted(candidate: Candidate) -> bool:
+    """Whether it is a function of readings, taken without their noise."""
+    return candidate.cause in CAUSES and CAUSES[candidate.cause].adjusted

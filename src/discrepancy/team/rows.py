@@ -16,14 +16,17 @@ from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Channel, Rig, Rows
 from discrepancy.team.candidates import (
     every_candidate,
+    is_adjusted,
     nearby_events,
     other_shapes,
     shape_steps,
     worst_events,
 )
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.channels import channels_of, groups_of
 from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.imitators import wrong_torques
+from discrepancy.team.linear.adjust import noise_of
 from discrepancy.team.linear.elsewhere import HEALTHY, found_at, resting_of
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.origin import origin_of
@@ -142,17 +145,7 @@ class TeamRows(Rig):
 
     @property
     def channels(self) -> Sequence[Channel]:
-        out = []
-        for i in range(2, self.robots + 1):
-            out += [Channel(f"grasp {i} rotation {a}", "kinematic", i, "rad") for a in "xyz"]
-            out += [Channel(f"grasp {i} position {a}", "kinematic", i, "m") for a in "xyz"]
-        out += [Channel(f"force {a}", "balance", None, "N") for a in "xyz"]
-        return out + [Channel(f"moment {a}", "balance", None, "N m") for a in "xyz"]
-
-    @property
-    def _groups(self) -> list[int]:
-        """Every robot's loop is a group of channels, and so are the forces and the moments, shape (C,)."""
-        return [k // 6 for k in range(6 * (self.robots - 1))] + [self.robots - 1] * 3 + [self.robots] * 3
+        return channels_of(self.robots)
 
     def candidates(self) -> list[Candidate]:
         """Every cause of the catalogue at every place; transients come from ``transients``."""
@@ -193,6 +186,21 @@ class TeamRows(Rig):
         cause, beyond = CAUSES[candidate.cause], self.beyond(candidate, values)
         return cause.undo(signals, self.linear[trial], robot, joint, beyond, candidate.shape)
 
+    def _without(
+        self, trial: int, active: Sequence[tuple[Candidate, Array]], noise: Signals | None = None
+    ) -> tuple[Signals, list[tuple[Candidate, Array]]]:
+        """A trial's signals without causes that are errors of them, functions of them without noise; and others."""
+        signals, others = self.linear[trial].signals, []
+        for candidate, values in active:
+            x = noise if noise and is_adjusted(candidate) else None
+            seen = signals.minus(x.phi, x.theta, x.tau) if x else signals
+            true = self._undo(trial, candidate, values, seen)
+            if true is None:
+                others.append((candidate, values))
+            else:
+                signals = signals.minus(seen.phi - true.phi, seen.theta - true.theta, seen.tau - true.tau)
+        return signals, others
+
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         """Whether such values can be: no negative stiffness or friction, no mass that swings outside the payload."""
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
@@ -221,7 +229,7 @@ class TeamRows(Rig):
                 causes,
                 linear.reduction.time,
                 linear.reduction.moving,
-                self._groups,
+                groups_of(self.robots),
             )
 
     def _at_origin(self, candidate: Candidate, columns: Array) -> Array | float:
@@ -242,19 +250,16 @@ class TeamRows(Rig):
             c for c in self.candidates() if origin_of(c, self.origin) is not None and c.key not in there
         ]
         for t, (linear, x) in enumerate(zip(self.linear, local, strict=True)):
-            signals, modelled = linear.signals, np.zeros_like(linear.residual)
-            for candidate, values in active:
-                if not candidate.acts_in(t):
-                    continue
-                corrected = self._undo(t, candidate, values, signals)
-                if corrected is None:
-                    modelled += self._unwhitened(t, candidate) @ self.beyond(candidate, values)
-                else:
-                    signals = corrected
-            residual = exact_residual(
-                signals, linear.shared.moved(shared), linear.bases.moved(x), linear.arms, linear.reduction
-            )
-            left = self.whitening[t](residual - modelled)
+            acting = [(candidate, values) for candidate, values in active if candidate.acts_in(t)]
+            unknowns = linear.shared.moved(shared), linear.bases.moved(x)
+            signals, modelled = self._without(t, acting)
+            if any(is_adjusted(candidate) for candidate, _ in acting):
+                noise = noise_of(signals, *unknowns, linear, self.sensed.signals[t])
+                signals, _ = self._without(t, acting, noise)
+            residual = exact_residual(signals, *unknowns, linear.arms, linear.reduction)
+            for candidate, values in modelled:
+                residual -= self._unwhitened(t, candidate) @ self.beyond(candidate, values)
+            left = self.whitening[t](residual)
             for candidate in others:
                 left += self._at_origin(candidate, self._columns(t, candidate))
             out.append(left)

@@ -10,8 +10,10 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.adjust import SignalNoise, with_adjusted_signals
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.signals import with_rates
-from discrepancy.team.linear.start import noise_rows
+from discrepancy.team.linear.start import Sensed, noise_rows
 from discrepancy.team.linear.trial_linear import by_bases, by_shared
+from discrepancy.team.rig import TeamRig
+from discrepancy.team.tolerances import default_tolerances
 from estimator.rigid_team.residual import balance, grasp_data
 from team_case import DESIGN, exact, residual_of
 
@@ -93,6 +95,28 @@ def test_scales_of_all_are_unbiased(case, noise):
     assert biased[1] or noise is COARSE
     assert np.abs(far(adjusted)).max() < 3.0
     assert np.all(np.abs(np.mean(adjusted, axis=0)) < 0.25 * np.abs(np.mean(raw, axis=0)), where=biased)
+
+
+def test_a_spring_that_is_stiffer_makes_no_noise_louder(case):
+    """Residuals without a strong cause are those of the noise that was read, not of that noise scaled up."""
+    rng, noise = np.random.default_rng(8), noise_of(1.2e-5, 1.2e-5, 0.02)
+    rows, errors = noise_rows(case.linear, noise, rng)
+    moving, scale = case.reduction.moving, 0.4
+    white, told = Whitening.of(rows, moving), SignalNoise.of(rows, errors, moving)
+    read = next(noise.draws(case.signals, rng, 1))
+    tau = case.signals.tau.copy()
+    tau[:, 1, 2] /= 1.0 + scale
+    signals = replace(case.signals, tau=tau).minus(-read.phi, -read.theta, -read.tau)
+    linear = replace(case.linear, signals=signals)
+    sensed = Sensed(noise, (white,), (told,))
+    rig = TeamRig((case.carried.recording,), sensed, (linear,), default_tolerances(), frozenset())
+    (cause,) = (c for c in rig.candidates() if (c.cause, c.robot, c.joint) == ("sea_scale", 2, 3))
+    unmoved = np.zeros(case.linear.by_shared.shape[2]), [np.zeros(case.linear.by_bases.shape[2])]
+    (left,) = rig.residual(*unmoved, [(cause, np.array([scale]))])
+    alone = white(residual_of(case, case.signals.minus(-read.phi, -read.theta, -read.tau)))
+    force, moment = slice(-6, -3), slice(-3, None)
+    for part in (force, moment):
+        assert np.mean(left[:, part] ** 2) == pytest.approx(np.mean(alone[:, part] ** 2), rel=0.02)
 
 
 def test_torques_are_moved_as_little_as_balances_the_wrenches(case):

@@ -50,6 +50,7 @@ class Cause(base.Cause):
         determined: numbers of the shape that the data determine, with what ``slope_step`` makes steps of.
         clipped: the effect's parameters that are zero where the fit has them below.
         by_clocks: whether it shows in the robots' clocks alone, and so not where the motion set them.
+        adjusted: whether it is a function of the readings, which are taken without their noise then.
     """
 
     at: ClassVar[At] = "driven joint"
@@ -58,6 +59,7 @@ class Cause(base.Cause):
     determined: ClassVar[Mapping[str, float]] = {}
     clipped: ClassVar[tuple[str, ...]] = ()
     by_clocks: ClassVar[bool] = False
+    adjusted: ClassVar[bool] = False
 
     @property
     def per(self) -> Literal["joint", "robot", "payload"]:
@@ -140,13 +142,7 @@ class Cause(base.Cause):
 
 
 class ReadingError(Cause):
-    """An error of one robot's readings, linear in the parameters: taken out of the signals, not added to the model.
-
-    Attributes:
-        adjusted: whether its columns are made of filtered and adjusted signals in place of those recorded.
-    """
-
-    adjusted: ClassVar[bool] = False
+    """An error of one robot's readings, linear in the parameters: taken out of the signals, not added to the model."""
 
     @abstractmethod
     def errors(

@@ -16,9 +16,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discrepancy.team.linear.jacobian import by_signals
-from discrepancy.team.linear.trial_linear import TrialLinear, by_bases, by_shared
+from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.signals import Signals
+from discrepancy.team.linear.trial_linear import TrialLinear, by_bases, by_shared, filtered
 from estimator.arrays import Array
-from estimator.rigid_team.residual import balance, grasp_data, pose_error
+from estimator.rigid_team.residual import Bases, Shared, balance, grasp_data, pose_error
+from estimator.rigid_team.slots import PHI, TAU, THETA
+from estimator.signals.grasp_data import GraspData
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,15 +55,8 @@ def _regression(rows: Array, signals: Array) -> Array:
 
 def with_adjusted_signals(linear: TrialLinear, noise: SignalNoise) -> TrialLinear:
     """The trial linear at its signals moved the likeliest way that leaves no residual."""
-    data, shared, bases, arms = linear.data, linear.shared, linear.bases, linear.arms
-    residual = np.concatenate(
-        [pose_error(data.R_bi, data.p_bi, shared, bases), balance(data, shared)[0]], axis=1
-    )
-    held = np.zeros(len(residual), dtype=bool)
-    held[linear.reduction.operator[linear.reduction.moving :].indices] = True
-    s = linear.s.copy()
-    for rows, told in zip((~held, held), noise.told, strict=True):
-        s[rows] -= np.einsum("nsc,qc->qns", told, residual[rows], optimize=True)
+    shared, bases, arms = linear.shared, linear.bases, linear.arms
+    s = linear.s - _noise_in(linear.data, shared, bases, linear.reduction, noise)
     data = grasp_data(s, arms, linear.signals.rate_hz)
     return replace(
         linear,
@@ -69,3 +66,26 @@ def with_adjusted_signals(linear: TrialLinear, noise: SignalNoise) -> TrialLinea
         by_shared=linear.reduction(by_shared(data, shared, bases)),
         by_bases=linear.reduction(by_bases(data, shared, bases)),
     )
+
+
+def noise_of(
+    signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear, noise: SignalNoise
+) -> Signals:
+    """What residuals tell of the noise in signals without any error, angles and torques of shape (Q, N, 3)."""
+    data = grasp_data(filtered(signals), linear.arms, signals.rate_hz)
+    each = _noise_in(data, shared, bases, linear.reduction, noise)
+    phi, theta, tau = (each[..., kind] for kind in (PHI, THETA, TAU))
+    return Signals(signals.time, phi, theta, tau, signals.rate_hz)
+
+
+def _noise_in(
+    data: GraspData, shared: Shared, bases: Bases, reduction: Reduction, noise: SignalNoise
+) -> Array:
+    """Of every sample's signals, shape (Q, N, 21)."""
+    residual = np.concatenate(
+        [pose_error(data.R_bi, data.p_bi, shared, bases), balance(data, shared)[0]], axis=1
+    )
+    held = np.zeros(len(residual), dtype=bool)
+    held[reduction.operator[reduction.moving :].indices] = True
+    moves, holds = (np.einsum("nsc,qc->qns", told, residual, optimize=True) for told in noise.told)
+    return np.where(held[:, None, None], holds, moves)
