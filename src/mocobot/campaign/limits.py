@@ -39,7 +39,8 @@ def sizes_of(fit: Fit, gain: float) -> list[Array]:
         lam, vectors = np.linalg.eigh(fit.told(index)[0])
         keep = lam > rules.LEAST_INFORMATION
         lam, vectors = lam[keep], vectors[:, keep]
-        weight = lam / (1.0 + lam) if fit.problem.has_tolerance(index) else lam
+        within = all(parameter.tolerance > 0 for parameter in candidate.parameters)  # pushes, too
+        weight = lam / (1.0 + lam) if within else lam
         power = vectors**2 @ weight
         size = np.sqrt(gain / np.maximum(power, 1e-300))
         out.append(np.where(power > 0, candidate.units * size, np.inf))
