@@ -4,7 +4,7 @@
 
 Needs the published excitation run (``models/tx40/README.md`` says where it is from): put it into
 ``data/tx40`` or set MOCOBOT_TX40_DATA to its file.
-Torques are low-passed as the rows of the diagnosis are. Everything is fitted to the first two thirds of the log, causes
+Torques are low-passed as the rows of the diagnosis are, and compared while a joint moves: at rest friction is anything. Everything is fitted to the first two thirds of the log, causes
 and their shapes included, and tried on the last third.
 """
 
@@ -77,7 +77,7 @@ def plain(rig: SerialRig, kinds: tuple[str, ...], trials: list[int]) -> np.ndarr
 
 
 def shown(error: np.ndarray, torque: np.ndarray) -> str:
-    """Relative errors per joint in percent."""
+    """Relative errors per joint in percent, both of joints in motion."""
     share = np.sqrt(np.mean(error**2, axis=0) / np.mean(torque**2, axis=0))
     return "".join(f"{100 * x:8.1f}" for x in share)
 
@@ -118,15 +118,16 @@ def main() -> None:
     print("\nTorque left unforetold in the last third, rms over that of the torque [%]")
     last = len(whole.trials) - 1
     part = whole.parts[0]
-    torque = part.reduction(part.signals.torque)[last]
+    torque = whole.in_motion(part.reduction(part.signals.torque)[last], last)
     print(f"  {'':<44}" + "".join(f"{name:>8}" for name in model.joints))
-    print(f"  {'the bare model':<44}" + shown(whole.physical_residual([])[last], torque))
+    bare = whole.in_motion(whole.physical_residual([])[last], last)
+    print(f"  {'the bare model':<44}" + shown(bare, torque))
     for title, kinds in (
         ("plain least squares, 14 numbers a joint", STANDARD),
         ("the same, and the coupled drives", (*STANDARD, "coupled_drive")),
     ):
         began = time.process_time()
-        left = plain(whole, kinds, list(range(last)))
+        left = whole.in_motion(plain(whole, kinds, list(range(last))), last)
         print(f"  {title:<44}{shown(left, torque)}  ({time.process_time() - began:.2f} s)")
     began = time.process_time()
     first = LawfulSerialRig.of(model, [crop(log, 0.0, 2.0 / 3.0)])

@@ -159,7 +159,7 @@ def left(whole: SerialRig, log: JointLog, value: dict[str, float]) -> np.ndarray
     rows = parts[0].reduction(parts[0].signals.residual)[-1][:, joints]
     (coupled,) = (c for c in whole.candidates() if c.cause == "coupled_drive" and c.joint == 6)
     numbers = [value[f"coupled_{name}"] for name in ("coulomb", "viscous", "armature")]
-    return rows - whole.physical(coupled)[-1] @ np.array(numbers)
+    return whole.in_motion(rows - whole.physical(coupled)[-1] @ np.array(numbers), len(whole.trials) - 1)
 
 
 def main() -> None:
@@ -167,7 +167,7 @@ def main() -> None:
     model, log = read()
     whole = SerialRig.of(model, [log])
     last, part = len(whole.trials) - 1, whole.parts[0]
-    torque = part.reduction(part.signals.torque)[last]
+    torque = whole.in_motion(part.reduction(part.signals.torque)[last], last)
     print("Torque left unforetold in the last third, rms over that of the torque [%]")
     for masses in (False, True):
         value, spent, calls = fitted(log, masses=masses)

@@ -198,7 +198,7 @@ class SerialRig(SerialRows, Rig):
     ) -> Callable[[], dict[str, Array] | None]:  # fmt: skip
         """What foretells one block's torques from its motion.
 
-        It returns measured minus foretold torque by joint, low-passed as the rows are, shape (n,) each.
+        It returns measured minus foretold torque by joint in motion, low-passed as the rows are, shape (n,) each.
         """
         return partial(self._unforetold, trial, [(c, v) for c, v in active if c.acts_in(trial)], shared)
 
@@ -209,7 +209,8 @@ class SerialRig(SerialRows, Rig):
         left, within = self.physical_residual(active, shared), self._within(taken)
         if within:
             left[trial] = unforetold(trial, left, within)
-        return {channel.name: left[trial][:, c] for c, channel in enumerate(self.channels)}
+        error = self.in_motion(left[trial], trial)
+        return {channel.name: error[:, c] for c, channel in enumerate(self.channels)}
 
     def _within(self, taken: frozenset[Key]) -> Sequence[Within]:
         """What is normal in every block, less what causes take; only the last asked for is kept: it takes memory."""

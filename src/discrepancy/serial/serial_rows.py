@@ -112,11 +112,24 @@ class SerialRows:
     def local_columns(self, trial: int) -> Array:
         """Whitened columns of the friction that joints may have while they rest, shape (n, C, l)."""
         if trial not in self._resting:
-            part, k = self.block_of[trial]
-            rests = [rest[:, self.joints] for rest in part.rests(k)]
-            none = np.zeros((len(part.reduction.samples[k]), len(self.joints), 0))
-            self._resting[trial] = self.whitening[trial](np.stack(rests, axis=2)) if rests else none
+            self._resting[trial] = self.whitening[trial](self._rests(trial))
         return self._resting[trial]
+
+    def in_motion(self, error: Array, trial: int) -> Array:
+        """An error of a block's torques (n, C) while the joints move, its mean square by joint that of these rows.
+
+        While a joint rests its friction may be anything, so that nobody can foretell its torque.
+        """
+        moves = np.clip(1.0 - self._rests(trial).sum(axis=2), 0.0, 1.0)
+        share = np.mean(moves**2, axis=0)
+        return np.asarray(error * moves / np.sqrt(np.where(share > 0, share, 1.0)))
+
+    def _rests(self, trial: int) -> Array:
+        """Friction that joints may have while they rest, one unit each, rows (n, C, l)."""
+        part, k = self.block_of[trial]
+        rests = [rest[:, self.joints] for rest in part.rests(k)]
+        none = np.zeros((len(part.reduction.samples[k]), len(self.joints), 0))
+        return np.stack(rests, axis=2) if rests else none
 
     @cached_property
     def _resting(self) -> dict[int, Array]:

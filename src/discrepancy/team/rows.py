@@ -26,7 +26,7 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.channels import channels_of, groups_of
 from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.imitators import wrong_torques
-from discrepancy.team.linear.adjust import noise_of
+from discrepancy.team.linear.adjust import as_loud, noise_of
 from discrepancy.team.linear.elsewhere import HEALTHY, found_at, resting_of
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.origin import origin_of
@@ -164,8 +164,7 @@ class TeamRows(Rig):
         linear = self.linear[trial]
         if not candidate.acts_in(trial):
             return np.zeros((*linear.residual.shape, len(candidate.parameters)))
-        cause = CAUSES.get(candidate.cause)
-        shapes = () if cause is None else cause.shapes
+        shapes = CAUSES[candidate.cause].shapes if candidate.cause in CAUSES else ()
         again = candidate.transient is None and len(shapes) > 1 and candidate.shape in shapes
         key = (trial, *candidate.key, *candidate.shape.items())
         if again and key in self.kept:
@@ -257,6 +256,7 @@ class TeamRows(Rig):
                 noise = noise_of(signals, *unknowns, linear, self.sensed.signals[t])
                 signals, _ = self._without(t, acting, noise)
             residual = exact_residual(signals, *unknowns, linear.arms, linear.reduction)
+            residual += as_loud(signals, *unknowns, linear, self.sensed.signals[t])
             for candidate, values in modelled:
                 residual -= self._unwhitened(t, candidate) @ self.beyond(candidate, values)
             left = self.whitening[t](residual)

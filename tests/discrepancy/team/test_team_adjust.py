@@ -97,26 +97,55 @@ def test_scales_of_all_are_unbiased(case, noise):
     assert np.all(np.abs(np.mean(adjusted, axis=0)) < 0.25 * np.abs(np.mean(raw, axis=0)), where=biased)
 
 
+def rig_of(case, noise, rng):
+    """A team whose only noise is this one."""
+    rows, errors = noise_rows(case.linear, noise, rng)
+    moving = case.reduction.moving
+    sensed = Sensed(noise, (Whitening.of(rows, moving),), (SignalNoise.of(rows, errors, moving),))
+    trials = (case.carried.recording,), sensed, (case.linear,)
+    return TeamRig(*trials, default_tolerances(), frozenset())
+
+
+def seen_by(rig, signals):
+    """The team with other readings."""
+    return replace(rig, linear=(replace(rig.linear[0], signals=signals),))
+
+
+def nowhere(case):
+    """Unknowns that stay, shared and local."""
+    return np.zeros(case.linear.by_shared.shape[2]), [np.zeros(case.linear.by_bases.shape[2])]
+
+
+FORCE, MOMENT = slice(-6, -3), slice(-3, None)
+
+
 def test_a_spring_that_is_stiffer_makes_no_noise_louder(case):
     """Residuals without a strong cause are those of the noise that was read, not of that noise scaled up."""
-    rng, noise = np.random.default_rng(8), noise_of(1.2e-5, 1.2e-5, 0.02)
-    rows, errors = noise_rows(case.linear, noise, rng)
-    moving, scale = case.reduction.moving, 0.4
-    white, told = Whitening.of(rows, moving), SignalNoise.of(rows, errors, moving)
-    read = next(noise.draws(case.signals, rng, 1))
+    rng, scale = np.random.default_rng(8), 0.4
+    rig = rig_of(case, FINE, rng)
+    read = next(FINE.draws(case.signals, rng, 1))
     tau = case.signals.tau.copy()
     tau[:, 1, 2] /= 1.0 + scale
     signals = replace(case.signals, tau=tau).minus(-read.phi, -read.theta, -read.tau)
-    linear = replace(case.linear, signals=signals)
-    sensed = Sensed(noise, (white,), (told,))
-    rig = TeamRig((case.carried.recording,), sensed, (linear,), default_tolerances(), frozenset())
     (cause,) = (c for c in rig.candidates() if (c.cause, c.robot, c.joint) == ("sea_scale", 2, 3))
-    unmoved = np.zeros(case.linear.by_shared.shape[2]), [np.zeros(case.linear.by_bases.shape[2])]
-    (left,) = rig.residual(*unmoved, [(cause, np.array([scale]))])
-    alone = white(residual_of(case, case.signals.minus(-read.phi, -read.theta, -read.tau)))
-    force, moment = slice(-6, -3), slice(-3, None)
-    for part in (force, moment):
-        assert np.mean(left[:, part] ** 2) == pytest.approx(np.mean(alone[:, part] ** 2), rel=0.02)
+    (left,) = seen_by(rig, signals).residual(*nowhere(case), [(cause, np.array([scale]))])
+    alone = case.signals.minus(-read.phi, -read.theta, -read.tau)
+    (expected,) = seen_by(rig, alone).residual(*nowhere(case), [])
+    for part in (FORCE, MOMENT):
+        assert np.mean(left[:, part] ** 2) == pytest.approx(np.mean(expected[:, part] ** 2), rel=0.02)
+
+
+def test_a_payload_that_is_heavier_makes_no_noise_louder(case):
+    """Noise of accelerations is in the residual as it is where the whitening was made, whatever the mass."""
+    rng, heavier = np.random.default_rng(9), 1.0
+    rig = rig_of(case, COARSE, rng)
+    read = next(COARSE.draws(case.signals, rng, 1))
+    noisy = seen_by(rig, case.signals.minus(-read.phi, -read.theta, -read.tau))
+    shared, local = nowhere(case)
+    (here,) = (a - b for a, b in zip(*(x.residual(shared, local, []) for x in (noisy, rig)), strict=True))
+    shared[12] = heavier
+    (there,) = (a - b for a, b in zip(*(x.residual(shared, local, []) for x in (noisy, rig)), strict=True))
+    assert np.mean(there[:, FORCE] ** 2) == pytest.approx(np.mean(here[:, FORCE] ** 2), rel=0.02)
 
 
 def test_torques_are_moved_as_little_as_balances_the_wrenches(case):

@@ -78,13 +78,31 @@ def noise_of(
     return Signals(signals.time, phi, theta, tau, signals.rate_hz)
 
 
+def as_loud(signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear, noise: SignalNoise) -> Array:
+    """What has to be added to a residual so that its noise is as loud as where the trial is linear, rows (n, C).
+
+    Noise of accelerations is in the residual as often as there is mass, and that of a spring's reading at the lever of
+    its robot. Elsewhere it would be louder or quieter than its whitening says, and the quieter the likelier.
+    """
+    s = filtered(signals)
+    data = grasp_data(s, linear.arms, signals.rate_hz)
+    each = _noise_in(data, shared, bases, linear.reduction, noise)
+    quiet = grasp_data(s - each, linear.arms, signals.rate_hz)
+    here = _residual(data, shared, bases) - _residual(quiet, shared, bases)
+    there = sum(linear.J(robot, slice(None), each[:, robot]) for robot in range(linear.robots))
+    return linear.reduction(there - here)
+
+
+def _residual(data: GraspData, shared: Shared, bases: Bases) -> Array:
+    """Of every sample, shape (Q, 6 N)."""
+    return np.concatenate([pose_error(data.R_bi, data.p_bi, shared, bases), balance(data, shared)[0]], axis=1)
+
+
 def _noise_in(
     data: GraspData, shared: Shared, bases: Bases, reduction: Reduction, noise: SignalNoise
 ) -> Array:
     """Of every sample's signals, shape (Q, N, 21)."""
-    residual = np.concatenate(
-        [pose_error(data.R_bi, data.p_bi, shared, bases), balance(data, shared)[0]], axis=1
-    )
+    residual = _residual(data, shared, bases)
     held = np.zeros(len(residual), dtype=bool)
     held[reduction.operator[reduction.moving :].indices] = True
     moves, holds = (np.einsum("nsc,qc->qns", told, residual, optimize=True) for told in noise.told)
