@@ -4,8 +4,8 @@
 
 Needs the published excitation run (``models/tx40/README.md`` says where it is from): put it into
 ``data/tx40`` or set MOCOBOT_TX40_DATA to its file.
-Torques are low-passed as the rows of the diagnosis are, and compared while a joint moves: at rest friction is anything. Everything is fitted to the first two thirds of the log, causes
-and their shapes included, and tried on the last third.
+Torques are low-passed as the rows of the diagnosis are, and compared while a joint moves: at rest friction is anything.
+Everything is fitted to the first two thirds of the log, causes and their shapes included, and tried on the last third.
 """
 
 from __future__ import annotations
