@@ -141,7 +141,7 @@ OPTIONS = {
     "convert log.csv new.parquet --drop robot=4:1-2":
         "log.csv: --drop robot=4:1-2: there is no robot 4; robots are counted from 1 to 3",
     "convert log.csv new.parquet --split-at-gaps":
-        "log.csv: no part of it has all robots' samples for 9.5 s without a gap of more than 0.05 s; ...",
+        "log.csv: no part of it has all robots' samples for 9.5 s without a gap of more than 0.08 s; ...",
     "convert log.csv rec.parquet --crop 1:2": f"rec.parquet: {FORCE}",
     "estimate rec.parquet --map mocobot": "map mocobot: all files are recordings, which need none; leave the map out",
     "map": "LOG must be given; see mocobot map --help",

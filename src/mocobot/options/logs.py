@@ -32,7 +32,7 @@ class Convert:
     """Believe the robots' stamps, or take out what their clocks differ by. It is estimated and reported either way."""
     rate: Annotated[float, tyro.conf.arg(metavar="HZ")] = 100.0
     """Rate of the recording [Hz]."""
-    max_gap: Annotated[float, tyro.conf.arg(metavar="S")] = 0.05
+    max_gap: Annotated[float, tyro.conf.arg(metavar="S")] = 0.08
     """Longest time without samples that is filled in [s]."""
     crop: Annotated[str | None, tyro.conf.arg(metavar="FROM:TO")] = None
     """Keep a part of the log only, in seconds from its start: 12:95, 12: or :95."""

@@ -99,7 +99,7 @@ SAMPLES: dict[str, tuple[Callable[[Columns], Columns], list[str]]] = {
     "30 % dropped": (rows(kept_at_random(0.7)), ["samples are missing", "at most 10 %"]),
     "a long gap": (
         rows(np.r_[0:100, 130:400]),
-        ["no samples for 0.31 s", "at most 0.05 s", "--split-at-gaps"],
+        ["no samples for 0.31 s", "at most 0.08 s", "--split-at-gaps"],
     ),
     "time in ms": (change("time", lambda t: 1e3 * t), ["10 s apart", "is the unit of time right?"]),
     "degrees": (

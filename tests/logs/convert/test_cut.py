@@ -200,7 +200,7 @@ REFUSED = {
     "a long drop": (["--drop", "robot=2:20-21"], "robot 2: no samples for 1.02 s"),
     "split, too short": (
         ["--crop", "0:9", "--drop", "robot=1:3-4", "--split-at-gaps"],
-        "for 9.5 s without a gap of more than 0.05 s; the longest goes from 4.01 to 9 s",
+        "for 9.5 s without a gap of more than 0.08 s; the longest goes from 4.01 to 9 s",
     ),
 }
 
