@@ -54,9 +54,11 @@ def tasks(
             for seed in seeds
         ]
     if part == "logs":
-        return [Task(part, _logged("clean", seed, ())) for seed in seeds]
+        return [Task(part, _logged("clean", seed, (), background)) for seed in seeds]
     if part == "hidden-in-logs":  # the causes take turns
-        return [Task(part, _logged("single", seed, (names[seed % len(names)],))) for seed in seeds]
+        return [
+            Task(part, _logged("single", seed, (names[seed % len(names)],), background)) for seed in seeds
+        ]
     if part == "leave-one-out":
         factors = [LEFT_OUT_FACTOR]
     return [
@@ -79,7 +81,7 @@ def _pair(seed: int) -> tuple[str, str]:
     return first, str(rng.choice(others))
 
 
-def _logged(kind: Kind, seed: int, causes: tuple[str, ...]) -> HiddenSet:
+def _logged(kind: Kind, seed: int, causes: tuple[str, ...], background: bool) -> HiddenSet:
     """A set from a logger of its own; payloads and kinds of trials take turns."""
     rng = np.random.default_rng([seed, *b"logger"])
     payload = PAYLOADS[seed % len(PAYLOADS)]
@@ -88,4 +90,6 @@ def _logged(kind: Kind, seed: int, causes: tuple[str, ...]) -> HiddenSet:
     logger = Logger.draw(rng)
     if any(CAUSES[cause].by_clocks for cause in causes):  # the conversion would take it out
         logger = replace(logger, offset_s=0.0, drift=0.0)
-    return HiddenSet(kind, seed, causes, payload=payload, schedule=schedule, logger=logger)
+    return HiddenSet(
+        kind, seed, causes, payload=payload, schedule=schedule, logger=logger, background=background
+    )
