@@ -1,5 +1,6 @@
 """Diagnose logs of one serial robot."""
 
+import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
@@ -82,8 +83,20 @@ def diagnose_rig(
     found = diagnose(judged, most=rules.MOST_CAUSES, laws=laws, odds=odds, jobs=jobs, say=say)
     rows = max(2, round(rules.ERROR_BLOCK_S * rig.row_rate_hz(0)))
     explanation = with_errors(found.explanation, rows)
-    notes = (*(note for part in rig.parts for note in part.signals.log.notes), *found.notes, *_notes(rig))
+    notes = (*notes_of([part.signals.log for part in rig.parts]), *found.notes, *_notes(rig))
     return replace(found, explanation=explanation, notes=notes)
+
+
+def notes_of(logs: Sequence[JointLog]) -> Iterator[str]:
+    """Notes on logs; of those that differ in their numbers only, the first, and how many more there are."""
+    alike: dict[str, list[str]] = {}
+    for log in logs:
+        for note in log.notes:
+            alike.setdefault(re.sub(r"\d[\d.e+-]*", "#", note), []).append(f"{log.name}: {note}")
+    for notes in alike.values():
+        more = len(notes) - 1
+        parts = f"{more} more part{'s' if more > 1 else ''} of the logs"
+        yield notes[0] + (f" So it is, with other numbers, in {parts}." if more else "")
 
 
 def _notes(rig: SerialRig) -> Iterator[str]:
