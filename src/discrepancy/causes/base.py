@@ -30,6 +30,7 @@ class Cause(ABC):
         form_share: of its trace, in amplitude, by which a real one has another form than its law.
         form_size: of its first parameter, up to which it is that share; beyond, it grows with the root. 0: never.
         where: the part of the machine, of what sits at no robot.
+        among: of how many it is one, where its shape says at which of many places it sits; 0 where places are listed.
         separate: what experiment would tell it from its look-alikes.
     """
 
@@ -44,6 +45,7 @@ class Cause(ABC):
     form_share: ClassVar[float] = 0.0
     form_size: ClassVar[float] = 0.0
     where: ClassVar[str] = "payload"
+    among: ClassVar[int] = 0
     separate: ClassVar[str] = ""
 
     def __init_subclass__(cls) -> None:
@@ -65,7 +67,7 @@ class Cause(ABC):
         )
         return Candidate(
             self.name, self.family, robot, joint, parameters, dict(shape), where=self.where, title=self.title,
-            form_share=self.form_share, form_size=self.form_size,
+            among=self.among, form_share=self.form_share, form_size=self.form_size,
         )  # fmt: skip
 
     def event(self, given: Mapping[str, float], when: Transient) -> Candidate:

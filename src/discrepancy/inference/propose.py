@@ -27,13 +27,17 @@ class Proposed:
     Attributes:
         best: the likeliest; the added cause is the last of its ``free``. None where none is possible.
         scores: what is added, in its shape, and how likely that is [nats], the likeliest first.
+        other: the likeliest whose added cause is not the one that is known; None without one.
     """
 
     best: Hypothesis | None
     scores: tuple[tuple[Candidate, float], ...]
+    other: Hypothesis | None = None
 
 
-def proposals(rig: Rig, base: Hypothesis, *, events: bool = True, narrow: bool = True) -> Proposed:
+def proposals(
+    rig: Rig, base: Hypothesis, *, events: bool = True, narrow: bool = True, known: Candidate | None = None
+) -> Proposed:
     """Hypotheses with one cause more.
 
     Args:
@@ -41,6 +45,7 @@ def proposals(rig: Rig, base: Hypothesis, *, events: bool = True, narrow: bool =
         base: what is there already.
         events: whether to look for what acts for a while, too.
         narrow: whether to look with kinds that scatter held within their tolerance, too.
+        known: a cause that others are to be held against.
     """
     fit = base.fit
     scanned = _with_kinds_held(base)
@@ -49,6 +54,7 @@ def proposals(rig: Rig, base: Hypothesis, *, events: bool = True, narrow: bool =
     ranked += _events(rig, fit) if events else []
     ranked.sort(key=lambda item: -item.score)
     best: Hypothesis | None = None  # each has its own columns: all together would be gigabytes
+    other: Hypothesis | None = None
     scores: dict[tuple[object, ...], tuple[Candidate, float]] = {}
     for new in _hypotheses(rig, base, ranked, narrow=narrow):
         new = beside_other_forms(rig, new, new.free[-1], base)
@@ -60,7 +66,9 @@ def proposals(rig: Rig, base: Hypothesis, *, events: bool = True, narrow: bool =
             scores[which] = last, new.score
             if best is None or new.score > best.score:
                 best = new
-    return Proposed(best, tuple(sorted(scores.values(), key=lambda one: -one[1])))
+            if known is not None and last.key != known.key and (other is None or new.score > other.score):
+                other = new
+    return Proposed(best, tuple(sorted(scores.values(), key=lambda one: -one[1])), other)
 
 
 def _hypotheses(

@@ -81,13 +81,26 @@ def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Se
         say(f"refit {added.causes[-1].label}")
         little = added.score - best.score < rules.LITTLE_SHARE * nats_left(best)
         found, beside = settled(rig, exact(rig, added, nothing), nothing)
-        if found.score - best.score < _needed(best, found):
+        if _gained(best, found) < _needed(best, found):
             break  # what pays where all is linear need not do so where it is exact
         best, rivals = found, beside
         last = best.free[-1] if best.free else None
         likely = last is None or _law_holds(rig, best, last)
         doubtful = doubtful + 1 if little and not likely else 0
     return Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free))
+
+
+def _gained(base: Hypothesis, more: Hypothesis) -> float:
+    """By how much a hypothesis with another cause is likelier [nats].
+
+    A kind that scatters explains a fault of its own by straight columns. Where a cause takes the place of such a
+    scatter, both count with the residual at which the cause is exact.
+    """
+    known = {cause.key for cause in base.causes}
+    new = [i for i, cause in zip(more.free, more.causes, strict=True) if cause.key not in known]
+    if len(new) == 1 and _wide(base, rules.HELD_FACTOR) - _wide(more, rules.HELD_FACTOR):
+        return more.score - more.without(new[0]).score
+    return more.score - base.score
 
 
 def _needed(base: Hypothesis, more: Hypothesis) -> float:
@@ -155,7 +168,7 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
                 break
             candidate = best.problem.candidates[index]
             # Its own shape may be another beside what was found since.
-            others = proposals(rig, less, events=candidate.transient is None, narrow=False)
+            others = proposals(rig, less, events=candidate.transient is None, narrow=False, known=candidate)
             rivals[index] = [
                 Rival(other, judged.score - score)
                 for other, score in others.scores
@@ -173,6 +186,12 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
                     rival if rival.candidate is None else replace(rival, gap=max(rival.gap, least))
                     for rival in rivals[index]
                 ]
+            elif others.other is not None and others.other.score > judged.score - rules.EXCHANGED_NATS:
+                # Equally likely by straight columns; exact ones may part them.
+                other = exact(rig, others.other, nothing)
+                if other.score > best.score + rules.EXCHANGED_NATS:
+                    best, changed = other, True
+                    break
         if not changed:
             break
     for index in set(best.free) - set(rivals):  # exchanged in the last round

@@ -438,3 +438,51 @@ def test_a_fault_of_one_of_two_kinds_with_one_trace_is_seen_in_both():
     seen = {c.key: score for c, score in proposals(rig, nothing, events=False).scores}
     assert seen["lag", 2, None] == pytest.approx(seen["late", 2, None], abs=0.5)
     assert seen["late", 2, None] > nothing.score
+
+
+@dataclass
+class BentRig(FakeRig):
+    """One cause leaves something else, in the square of its size, where it is exact."""
+
+    bent: str = ""
+
+    def residual(self, shared, local, active):
+        out = super().residual(shared, local, active)
+        rng = np.random.default_rng(99)
+        for x in out:
+            pattern = rng.standard_normal(x.shape)
+            x += sum(values[0] ** 2 for c, values in active if c.cause == self.bent) * 2e-4 * pattern
+        return out
+
+
+@pytest.mark.parametrize(("wrong", "right"), [("cause 2", "cause 4"), ("cause 4", "cause 2")])
+def test_what_straight_columns_do_not_part_is_parted_where_it_is_exact(wrong, right):
+    rig = BentRig({2: 25.0}, twins={4: (2, 0.0)}, bent=wrong)
+    assert names(found_in(rig).found) == [right]
+
+
+SCATTERED = tuple(cause("clock", robot) for robot in (1, 2, 3)) + CATALOGUE
+
+
+@dataclass
+class ShiftedRig(FakeRig):
+    """Moving by what is there makes every residual a little louder, whatever is there."""
+
+    louder: float = 0.0
+
+    def residual(self, shared, local, active):
+        rng = np.random.default_rng(98)
+        out = super().residual(shared, local, active)
+        return [x + self.louder * (len(active) > 0) * rng.standard_normal(x.shape) for x in out]
+
+
+def test_a_fault_and_a_scatter_count_at_the_same_residual():
+    """One of three places off looks like a scatter; what exact residuals cost both is no evidence for the scatter."""
+    rig = ShiftedRig({0: 10.0}, catalogue=SCATTERED, louder=0.15)
+    base = search(rig).nothing
+    assert base.problem.spread[base.problem.columns_of(0)][0] > rules.SCATTER_FACTOR
+    (found,) = found_in(rig).found
+    assert (found.candidate.cause, found.candidate.robot) == ("clock", 1)
+    # By another residual than the scatter's it would have lost more than it gains.
+    searched = search(rig)
+    assert searched.best.score < searched.nothing.score

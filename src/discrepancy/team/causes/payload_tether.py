@@ -22,6 +22,7 @@ class PayloadTether(Cause):
     parameters = ("force_x_N", "force_y_N", "force_z_N", "stiffness_N_per_m")
     scales = (0.1, 0.1, 0.1, 1.0)
     at = "payload"
+    among = rules.TETHER_POINTS
     shapes = tuple(
         dict(zip(LEVERS, map(float, lever), strict=True))
         for lever in (
