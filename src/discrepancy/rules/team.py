@@ -91,7 +91,7 @@ TETHER_LEVER_M, TETHER_FINER_M, TETHER_STEP_M = 0.4, (0.2, 0.07, 0.025), 0.02
 """Levers of a tether of the payload at which a search begins, by which it goes on, and over which slopes are taken.
 Chosen: half of a payload, and so fine that a Gauss-Newton step does the rest."""
 TETHER_POINTS = 1000
-"""Points of a payload that are told apart. Derived: every 0.1 m of a metre each way, as wide as their standard errors are.
+"""Points of a payload that are told apart. Derived: every 0.1 m of a metre each way; near the limit they err by 0.05 m.
 Without it, a tether of the payload whose point is free would always explain what one at a grasp does."""
 SLOSH_LENGTHS_M = (0.04, 1.0)
 """Derived: pendulums of 2.5 to 0.5 Hz; slower and faster ones look like drag or play."""
