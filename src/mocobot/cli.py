@@ -3,6 +3,7 @@
 import io
 import os
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from typing import Any, NoReturn
@@ -93,6 +94,8 @@ def _run(arguments: Sequence[str]) -> None:
         raise InputError(f"{error.filename}: cannot be written ({error.strerror})") from error  # a completion
     name = next(name for name, kind in COMMANDS.items() if isinstance(options, kind))
     import_module(f"mocobot.checks.{name}").check(options)
+    # joblib stops workers that idle, and starts others: nothing is lost, and nobody can do anything about it.
+    warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
     _command(name)(options)
 
 

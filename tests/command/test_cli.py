@@ -8,6 +8,7 @@ import re
 import subprocess
 import sys
 import tomllib
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 
@@ -232,3 +233,20 @@ def test_a_simulation_shows_how_much_there_is(
         assert float(seconds) == len(pq.read_table(tmp_path / "rec.parquet")) / 100.0
     else:
         assert shown == ""
+
+
+def test_a_pool_that_renews_its_workers_says_nothing(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On a busy machine joblib warns of workers that idled; any other warning is still one."""
+    told = "A worker stopped while some jobs were given to the executor. This can be caused by a too short timeout."
+    monkeypatch.setattr(
+        "mocobot.cli._command", lambda name: lambda options: warnings.warn(told, stacklevel=1)
+    )
+    main(["effects"])
+    assert capsys.readouterr().err == ""
+    monkeypatch.setattr(
+        "mocobot.cli._command", lambda name: lambda options: warnings.warn("odd", stacklevel=1)
+    )
+    with pytest.raises(UserWarning, match="odd"):
+        main(["effects"])
