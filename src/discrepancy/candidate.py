@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -67,7 +66,6 @@ class Candidate:
         among: of how many of its kind it is one, where the problem does not list them; 0 where it does.
         form_share: of its trace, in amplitude, by which a real one has another form than its law.
         form_size: of its first parameter, up to which it is that share; beyond, it grows with the root. 0: never.
-        most_spread: over its tolerance, that all places alike can have.
         hidden: whether it is never named: it only has its tolerance, as a cause that was left out has.
     """
 
@@ -83,7 +81,6 @@ class Candidate:
     among: int = 0
     form_share: float = 0.0
     form_size: float = 0.0
-    most_spread: float = math.inf
     hidden: bool = False
 
     def acts_in(self, trial: int) -> bool:

@@ -104,9 +104,6 @@ JOINT_SHARE = 0.03
 sticking at reversals moves fitted rotors by up to 0.02 (of a simulated arm without any error)."""
 MOST_INERTIA_SHARE = 1.0
 """Of the same, beyond which a link is not off but another. Chosen: rotors and payloads add more, and are themselves."""
-MOST_INERTIA_SPREAD = 0.5 * MOST_INERTIA_SHARE / INERTIA_SHARE
-"""Of that tolerance, by which all links alike may scatter. Derived: two standard deviations are as far off as a link
-can be. Without it inertias scattered by 2.6 times themselves, and hid a rotor that the model does not have."""
 RUBS_MORE = 2.0
 """Tolerances by which dry friction must be off, or its giving way is that of a healthy one. Chosen: where a healthy
 joint and one with the least slab (``LEAST_SLAB``) are about equally likely."""

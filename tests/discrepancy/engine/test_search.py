@@ -106,14 +106,6 @@ def test_a_kind_that_scatters_is_no_fault_of_any():
     assert diagnosis.verdict == "miscalibrated"
 
 
-def test_a_kind_scatters_no_further_than_it_can():
-    """What a scatter of links that no link can have would explain is left to other causes, or to something unlisted."""
-    values = 20.0 * np.random.default_rng(6).standard_normal(9)
-    bounded = tuple(replace(each, most_spread=5.0) for each in NINE)
-    searched = search(FakeRig(dict(enumerate(values)), catalogue=(*bounded, *CATALOGUE)), most=0)
-    assert searched.nothing.problem.spread[searched.nothing.problem.columns_of(0)][0] == 5.0
-
-
 def test_one_fault_in_a_kind_of_nine_is_a_fault():
     explanation = found_in(FakeRig({4: 30.0}, catalogue=(*NINE, *CATALOGUE)))
     (found,) = explanation.found

@@ -1,6 +1,5 @@
 """What every cause of a serial robot offers the diagnosis."""
 
-import math
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -64,7 +63,6 @@ class Cause(base.Cause):
         dry: whether it jumps where a joint turns round.
         built: whether it is how the robot was made, and so the same on two days.
         reversible: whether, between two days, it may as well have gone as come.
-        most_spread: of its sizes, that all places alike can scatter by.
     """
 
     where = "arm"
@@ -72,7 +70,6 @@ class Cause(base.Cause):
     dry: ClassVar[bool] = False
     built: ClassVar[bool] = False
     reversible: ClassVar[bool] = False
-    most_spread: ClassVar[float] = math.inf
 
     @abstractmethod
     def columns(self, signals: Signals, at: int, shape: Shape) -> Array:
@@ -140,12 +137,11 @@ class Cause(base.Cause):
         parameters = tuple(
             Parameter(n, float(t), float(s)) for n, t, s in zip(named, normal, sizes, strict=True)
         )
-        able = [self.most_spread * s / t for t, s in zip(normal, sizes, strict=True) if t > 0.0]
         before = None if self.part != "pair" else partner(tree, at)
         return SerialCandidate(
             self.name, self.family, None, at + 1 if at >= 0 else None, parameters, dict(shape), where=self.where,
             title=self.title, part=self.part, called=names[at] if at >= 0 else "", slide=slide,
-            partner=None if before is None else before + 1, most_spread=min(able, default=math.inf),
+            partner=None if before is None else before + 1,
         )  # fmt: skip
 
 

@@ -15,7 +15,6 @@ class LinkCom(Cause):
     family = "inertia"
     part = "link"
     built = True
-    most_spread = rules.MOST_INERTIA_SPREAD
     parameters = ("x_m", "y_m", "z_m")
     scales = (0.01,) * 3
     separate = "The link balanced on an edge."

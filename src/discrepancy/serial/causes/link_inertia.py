@@ -17,7 +17,6 @@ class LinkInertia(Cause):
     family = "inertia"
     part = "link"
     built = True
-    most_spread = rules.MOST_INERTIA_SPREAD
     parameters = tuple(f"inertia_{axes}_kgm2" for axes in AXES)
     scales = (0.01,) * 6
     separate = "The link swung as a pendulum."

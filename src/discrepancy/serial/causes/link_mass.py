@@ -15,7 +15,6 @@ class LinkMass(Cause):
     family = "inertia"
     part = "link"
     built = True
-    most_spread = rules.MOST_INERTIA_SPREAD
     parameters = ("excess_kg",)
     scales = (1.0,)
     separate = "A scale; or a known weight, if torques may be off in scale."
