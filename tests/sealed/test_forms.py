@@ -229,9 +229,9 @@ def test_play_ends_in_a_soft_contact():
     assert load != 0.0
 
 
-@pytest.mark.parametrize("relaxation", [0.03, 0.15])
-def test_a_viscoelastic_spring_follows_its_load(relaxation):
-    """C F (1 - exp(-t / T)), but for a fortieth."""
+@pytest.mark.parametrize(("relaxation", "off"), [(0.005, 0.07), (0.01, 0.04), (0.03, 0.04), (0.15, 0.04)])
+def test_a_viscoelastic_spring_follows_its_load(relaxation, off):
+    """C F (1 - exp(-t / T)), but for a fortieth, and for what steps of 1 ms leave."""
     compliance, mass, force = 3e-6, 2.0, 50.0
     solref, solimp = viscoelastic_parameters(compliance, relaxation, 1.0 / mass)
     model = mujoco.MjModel.from_xml_string(
@@ -248,7 +248,7 @@ def test_a_viscoelastic_spring_follows_its_load(relaxation):
         way.append(data.qpos[0])
     time = 1e-3 * np.arange(1, len(way) + 1)
     exact = compliance * force * (1.0 - np.exp(-time / relaxation))
-    np.testing.assert_allclose(way, exact, atol=0.04 * compliance * force)
+    np.testing.assert_allclose(way, exact, atol=off * compliance * force)
 
 
 def _modes(scene, names: list[str]) -> np.ndarray:

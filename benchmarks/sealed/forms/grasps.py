@@ -12,13 +12,14 @@ from mocobot_sim.effects.slides import (
     LOOSE_ARMATURE_KG,
     SPRUNG_ARMATURE_KG,
     add_slides,
+    add_springs,
     base_slides,
     grasp_body,
     widened,
 )
 from mocobot_sim.effects.solver import precise
 from mocobot_sim.scene.scene import TeamScene
-from mocobot_sim.scene.soft import SoftRow, spring_parameters
+from mocobot_sim.scene.soft import spring_parameters
 from mocobot_sim.trial.actors import Actor, Stage
 from sealed.forms.base import Form, Place
 from sealed.ground import Ground
@@ -27,15 +28,6 @@ LARGEST_FORCE_N = 400.0
 LARGEST_MOMENT_NM = 60.0
 TURNING_ARMATURE_KGM2 = 0.01
 CONTACT_DAMPING_NS_PER_M = 20.0
-
-
-def _rows(scene: TeamScene, joints: list, label: str, compliance: float, relaxation_s: float) -> TeamScene:
-    rows = []
-    for joint in joints:
-        name = f"{label}_{joint.name}"
-        scene.root.equality.add("joint", name=name, joint1=joint)
-        rows.append(SoftRow(name, compliance=compliance, relaxation_s=relaxation_s))
-    return replace(scene, soft=(*scene.soft, *rows))
 
 
 @dataclass(frozen=True)
@@ -56,7 +48,7 @@ class SlowBaseCompliance(Form):
     def _edit(self, scene: TeamScene) -> TeamScene:
         precise(scene)
         slides = base_slides(scene, self.robot, "slow", armature=SPRUNG_ARMATURE_KG)
-        return _rows(scene, slides, f"slowbase{self.robot}", self.compliance_m_per_N, self.relaxation_s)
+        return add_springs(scene, slides, f"slowbase{self.robot}", self.compliance_m_per_N, self.relaxation_s)
 
 
 @dataclass(frozen=True)
@@ -78,7 +70,9 @@ class SlowGrasp(Form):
     def _edit(self, scene: TeamScene) -> TeamScene:
         precise(scene)
         slides = add_slides(grasp_body(scene, self.robot), "slow", "xyz", armature=SPRUNG_ARMATURE_KG)
-        scene = _rows(scene, slides, f"slowgrasp{self.robot}", self.compliance_m_per_N, self.relaxation_s)
+        scene = add_springs(
+            scene, slides, f"slowgrasp{self.robot}", self.compliance_m_per_N, self.relaxation_s
+        )
         return widened(scene, self.robot, LARGEST_FORCE_N * self.compliance_m_per_N)
 
 
@@ -121,8 +115,8 @@ class TurningGrasp(Form):
             )
             for axis, along in zip("xyz", np.eye(3).tolist(), strict=True)
         ]
-        scene = _rows(scene, slides, f"yield{self.robot}", self.compliance_m_per_N, 0.0)
-        scene = _rows(scene, hinges, f"turn{self.robot}", turn, 0.0)
+        scene = add_springs(scene, slides, f"yield{self.robot}", self.compliance_m_per_N, 0.0)
+        scene = add_springs(scene, hinges, f"turn{self.robot}", turn, 0.0)
         slack = np.array(scene.grasp_slack_rad or (0.0,) * scene.robots)
         slack[self.robot - 1] += LARGEST_MOMENT_NM * turn
         scene = replace(scene, grasp_slack_rad=tuple(slack.tolist()))

@@ -93,6 +93,13 @@ Chosen: half of a payload, and so fine that a Gauss-Newton step does the rest.""
 TETHER_POINTS = 1000
 """Points of a payload that are told apart. Derived: every 0.1 m of a metre each way; near the limit they err by 0.05 m.
 Without it, a tether of the payload whose point is free would always explain what one at a grasp does."""
+RELAXATIONS_S = (0.02, 0.005, 0.06, 0.2)
+"""Of what gives way to a force, tried first. Chosen: at most a factor of four apart, of which a Gauss-Newton step finds
+the rest; the first is that of a base of 60 kg that gives way by 1 to 3 um/N, critically damped."""
+RELAXATION_FINER = (0.5, 0.7, 0.85, 1.2, 1.4, 2.0)
+"""Shares of such a time that are tried next. Chosen."""
+RELAXATION_RANGE_S = (0.001, 0.5)
+"""Derived: a shorter one shifts a motion of 1 Hz by less than 0.6 % of itself; after a longer one, a base creeps."""
 SLOSH_LENGTHS_M = (0.04, 1.0)
 """Derived: pendulums of 2.5 to 0.5 Hz; slower and faster ones look like drag or play."""
 SLOSH_MOST_DAMPED = 0.3

@@ -13,16 +13,18 @@ from mocobot_sim.scene.scene import TeamScene
 class BaseCompliance(Effect):
     """A base on horizontal springs of ``compliance_m_per_N``, the same in x and y [m/N].
 
-    Two slides under the chassis, held by soft ``joint`` equalities (see ``mocobot_sim.scene.soft``), critically damped.
+    Two slides under the chassis, held by soft ``joint`` equalities (see ``mocobot_sim.scene.soft``). They follow the
+    force with a time constant of ``relaxation_s`` [s]; below 5 ms, critically damped, as their mass lets them.
     """
 
-    ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-2)}
+    ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-2), "relaxation_s": (0.0, 10.0)}
     robot: int
     compliance_m_per_N: float
+    relaxation_s: float = 0.0
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         if not self.compliance_m_per_N:
             return scene
         precise(scene)
         slides = base_slides(scene, self.robot, "compliance", armature=SPRUNG_ARMATURE_KG)
-        return add_springs(scene, slides, f"base{self.robot}", self.compliance_m_per_N)
+        return add_springs(scene, slides, f"base{self.robot}", self.compliance_m_per_N, self.relaxation_s)

@@ -27,13 +27,15 @@ def add_slides(body: Any, kind: str, axes: str, **attributes: Any) -> list[Any]:
     ]
 
 
-def add_springs(scene: TeamScene, joints: list[Any], label: str, compliance_m_per_N: float) -> TeamScene:
-    """Hold slides at zero by springs, as soft equality rows named ``{label}_{joint}``."""
+def add_springs(
+    scene: TeamScene, joints: list[Any], label: str, compliance_m_per_N: float, relaxation_s: float
+) -> TeamScene:
+    """Hold slides at zero by springs, as soft equality rows named ``{label}_{joint}``; arguments as of ``SoftRow``."""
     rows = []
     for joint in joints:
         name = f"{label}_{joint.name}"
         scene.root.equality.add("joint", name=name, joint1=joint)
-        rows.append(SoftRow(name, compliance=compliance_m_per_N))
+        rows.append(SoftRow(name, compliance=compliance_m_per_N, relaxation_s=relaxation_s))
     return replace(scene, soft=(*scene.soft, *rows))
 
 

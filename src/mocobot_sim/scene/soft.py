@@ -25,6 +25,8 @@ _STIFFNESS_PER_S2 = 62500.0
 _STIFFEST_PER_S2 = 250000.0
 # A rate that stops a coordinate within one step of 1 ms.
 _DAMPING_PER_S = 1000.0
+# Shortest relaxation: below, the mass that moves would lag as much within steps of 1 ms, and damping is critical.
+_LEAST_RELAXATION_S = 0.005
 
 
 @dataclass(frozen=True)
@@ -34,7 +36,7 @@ class SoftRow:
     Attributes:
         equality: its name in the scene.
         compliance: of the spring [m/N or rad/(N m)], or None.
-        relaxation_s: time constant in which the spring follows its load [s]; zero for a critically damped one.
+        relaxation_s: time constant in which the spring follows its load [s]; a critically damped one below 5 ms.
         damping: of the damper [N s/m or N m s/rad], or None.
     """
 
@@ -63,9 +65,9 @@ def viscoelastic_parameters(
 ) -> tuple[list[float], list[float]]:
     """``solref`` and ``solimp`` of a spring beside a damper (Kelvin and Voigt): damping is relaxation over compliance.
 
-    The mass that moves is made to lag forty times less than the damper does.
+    The mass that moves is made to lag forty times less than the damper does, or as little as steps of 1 ms allow.
     """
-    s = 40.0 / relaxation_s**2
+    s = min(40.0 / relaxation_s, 1.3 * _DAMPING_PER_S) / relaxation_s
     soft = min(max(s * compliance / inverse_inertia, _LEAST), 1.0 - _LEAST)
     s = soft * inverse_inertia / compliance
     return [-s, -s * relaxation_s], _constant_impedance(1.0 - soft)
@@ -91,7 +93,7 @@ def tune(root: mjcf.RootElement, model: mujoco.MjModel, rows: Sequence[SoftRow])
             inverse_inertia = float(model.tendon_invweight0[on])
         else:
             inverse_inertia = float(model.dof_invweight0[model.jnt_dofadr[on]])
-        if row.compliance is not None and row.relaxation_s:
+        if row.compliance is not None and row.relaxation_s >= _LEAST_RELAXATION_S:
             solref, solimp = viscoelastic_parameters(row.compliance, row.relaxation_s, inverse_inertia)
         elif row.compliance is not None:
             solref, solimp = spring_parameters(row.compliance, inverse_inertia)

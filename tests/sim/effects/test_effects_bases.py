@@ -122,10 +122,19 @@ def test_a_yielding_base_gives_way_by_compliance_times_horizontal_force(robot):
 @ROBOT
 @pytest.mark.parametrize("timestep_s", [1e-3, 0.25e-3])
 @pytest.mark.parametrize(
-    ("cause", "size"), [("grasp_flex", 1e-7), ("grasp_flex", 1e-5), ("base_compliance", 1e-5)]
+    ("cause", "size", "relaxation_s"),
+    [
+        ("grasp_flex", 1e-7, 0.0),
+        ("grasp_flex", 1e-5, 0.0),
+        ("grasp_flex", 1e-7, 0.005),
+        ("grasp_flex", 1e-5, 0.03),
+        ("base_compliance", 1e-5, 0.0),
+        ("base_compliance", 1e-7, 0.005),
+    ],
 )
-def test_what_yields_is_stable_and_leaves_the_rods_closed(robot, timestep_s, cause, size):
-    scene = team_with("a", example(cause, robot, compliance_m_per_N=size), timestep_s=timestep_s)
+def test_what_yields_is_stable_and_leaves_the_rods_closed(robot, timestep_s, cause, size, relaxation_s):
+    effect = example(cause, robot, compliance_m_per_N=size, relaxation_s=relaxation_s)
+    scene = team_with("a", effect, timestep_s=timestep_s)
     log = run_trial(scene, random_vias(scene.wrist_home_b, np.random.default_rng(0), 1))
     assert log.rod_error_m < 2e-6
     assert log.weld_error_rad < 1e-6
