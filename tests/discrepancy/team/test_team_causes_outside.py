@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
-from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from discrepancy.team.causes import CAUSES

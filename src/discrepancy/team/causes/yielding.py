@@ -6,6 +6,7 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from discrepancy import rules
+from discrepancy.causes.base import Shape
 from discrepancy.team.causes.base import Cause
 from estimator.arrays import Array
 
@@ -33,7 +34,7 @@ class Yielding(Cause):
         return {"compliance_m_per_N": float(values[0]), **context.shape}
 
 
-def lagging(force: Array, rate_hz: float, shape: dict[str, float]) -> Array:
+def lagging(force: Array, rate_hz: float, shape: Shape) -> Array:
     """A force (Q, 3) behind the lag, linear between samples, at rest before them."""
     filtered = cast(
         "tuple[Array, Array, float]",
