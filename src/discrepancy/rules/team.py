@@ -59,6 +59,9 @@ NOISE_DRAWS = 24
 """From which the rows' covariance is made. Chosen."""
 NOISE_SEED = 20250
 """Of these draws. Chosen: any will do; fixed, so that a verdict can be had again."""
+INERTIA_OFF = 0.3
+"""Share by which the inertia that turns noise into moments may be off. Chosen: then these are off by as much at most;
+with none at all, a healthy log of 12 bits left twice its noise."""
 PHI_FLOOR_RAD, THETA_FLOOR_RAD, TAU_FLOOR_NM = 2.5e-5, 1e-5, 6e-4
 """Of the closed loop. Measured: the integrator at 1 and at 0.25 ms; docs/diagnosis/validation.md, 'Integration'."""
 TEAM_TIMESTEP_S = 1e-3

@@ -11,6 +11,7 @@ from joblib import Parallel, delayed
 from discrepancy import rules
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.team.linear.adjust import SignalNoise, with_adjusted_signals
+from discrepancy.team.linear.inertia import held_inertia, inertia_is_like_held, is_another
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.rest import Resting, Tolerances
@@ -27,7 +28,7 @@ from estimator.rigid_team.start import start_bases
 
 
 def start_shared(estimate: PayloadEstimate) -> Shared:
-    """Unknowns from the estimate.
+    """Unknowns from the estimate; an inertia that it does not tell is that of a mass where it is held.
 
     Raises:
         InputError: grasps, mass or centre of mass are missing.
@@ -39,7 +40,7 @@ def start_shared(estimate: PayloadEstimate) -> Shared:
             f"these recordings do not determine the {missing}, so there is nothing to hold the data against; "
             "add a recording with motion in all axes"
         )
-    inertia = estimate.inertia.inertia if estimate.inertia else np.zeros((3, 3))
+    inertia = estimate.inertia.inertia if estimate.inertia else held_inertia(grasps.p_1i, mass.mass, c)
     about_1 = inertia + mass.mass * (c @ c * np.eye(3) - np.outer(c, c))
     return Shared(grasps, np.concatenate([[mass.mass], mass.mass * c, inertia_parameters(about_1)]))
 
@@ -87,13 +88,13 @@ def linearised_trials(
             raise InputError(f"{recording.name}: too short to diagnose")
     bases = [start_bases(*poses(s.phi[s.keep], s.theta[s.keep], arms), shared) for s in signals]
     run = Parallel(n_jobs=jobs, prefer="processes" if jobs > 1 else "threads")
-    tasks = zip(signals, bases, reductions, strict=True)
-    each = run(delayed(linearise)(s, shared, b, arms, r, full=sensed is None) for s, b, r in tasks)
-    linear = tuple(cast("list[TrialLinear]", each))
+    linear = _linearised(run, signals, shared, bases, arms, reductions, full=sensed is None)
     if sensed is None:
-        left = run(delayed(what_noise_leaves)(t, noise, k, tolerances) for k, t in enumerate(linear))
-        whitening, told = zip(*cast("list[tuple[Whitening, SignalNoise]]", left), strict=True)
-        sensed = Sensed(noise, tuple(whitening), tuple(told))
+        sensed = _sensed(run, linear, noise, tolerances)
+        likely, _ = gauss_newton(linear, sensed.whitening, inertia_is_like_held(shared))
+        if is_another(shared, likely):
+            linear = _linearised(run, signals, likely, bases, arms, reductions, full=True)
+            sensed = _sensed(run, linear, noise, tolerances)
     for _ in range(2):
         shared, bases = gauss_newton(linear, sensed.whitening)
         linear = tuple(
@@ -104,6 +105,28 @@ def linearised_trials(
         )
     pairs = zip(linear, sensed.signals, strict=True)
     return tuple(with_adjusted_signals(*pair) for pair in pairs), sensed
+
+
+def _linearised(
+    run: Parallel,
+    signals: Sequence[Signals],
+    shared: Shared,
+    bases: Sequence[Bases],
+    arms: Arms,
+    reductions: Sequence[Reduction],
+    *,
+    full: bool,
+) -> tuple[TrialLinear, ...]:
+    """Every trial, linearised where the unknowns are said to be."""
+    tasks = zip(signals, bases, reductions, strict=True)
+    each = run(delayed(linearise)(s, shared, b, arms, r, full=full) for s, b, r in tasks)
+    return tuple(cast("list[TrialLinear]", each))
+
+
+def _sensed(run: Parallel, linear: Sequence[TrialLinear], noise: Noise, tolerances: Tolerances) -> Sensed:
+    left = run(delayed(what_noise_leaves)(t, noise, k, tolerances) for k, t in enumerate(linear))
+    whitening, told = zip(*cast("list[tuple[Whitening, SignalNoise]]", left), strict=True)
+    return Sensed(noise, tuple(whitening), tuple(told))
 
 
 def what_noise_leaves(
@@ -124,12 +147,21 @@ def exact_residual(signals: Signals, shared: Shared, bases: Bases, arms: Arms, r
     return reduction(np.concatenate([pose, force], axis=1))
 
 
-def gauss_newton(linear: Sequence[TrialLinear], whitening: Sequence[Whitening]) -> tuple[Shared, list[Bases]]:
-    """One step of all unknowns, with no cause in the model."""
+def gauss_newton(
+    linear: Sequence[TrialLinear], whitening: Sequence[Whitening], known: Array | None = None
+) -> tuple[Shared, list[Bases]]:
+    """One step of all unknowns, with no cause in the model.
+
+    Args:
+        linear, whitening: of every trial.
+        known: information beforehand that each shared unknown stays where it is, shape (6 (N - 1) + 10,).
+    """
     own = linear[0].by_bases.shape[2]
     shared_columns = linear[0].by_shared.shape[2]
     total = shared_columns + own * len(linear)
     gram, right = np.zeros((total, total)), np.zeros(total)
+    if known is not None:
+        gram[np.arange(shared_columns), np.arange(shared_columns)] = known
     for t, (trial, white) in enumerate(zip(linear, whitening, strict=True)):
         at = np.r_[np.arange(shared_columns), shared_columns + own * t + np.arange(own)]
         columns = np.concatenate([white(trial.by_shared), white(trial.by_bases)], axis=2)
