@@ -307,5 +307,7 @@ MOST: dict[str, float] = {
     "eccentric": 0.1, "meshing": 0.3,
 }  # fmt: skip
 """Beyond which it is no effect but a wreck."""
+NOT_FIRST = ("pair", "neighbour", "zero")
+"""At no first joint: there is none before it, and a zero of an upright axis shows in nothing."""
 NOWHERE = ("tilt", "load", "half_sine_push")
 """At no joint."""

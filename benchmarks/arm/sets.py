@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 from arm import machine
-from arm.forms import CAUSE_OF, MOST, NOWHERE, TYPICAL, Form
+from arm.forms import CAUSE_OF, MOST, NOT_FIRST, NOWHERE, TYPICAL, Form
 from discrepancy.rules import inference
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
@@ -68,9 +68,7 @@ class ArmSet:
                 names.append(name)
         out = []
         for i, name in enumerate(names):
-            joint = (
-                None if name in NOWHERE else int(rng.integers(2 if name in ("pair", "neighbour") else 1, 8))
-            )
+            joint = None if name in NOWHERE else int(rng.integers(2 if name in NOT_FIRST else 1, 8))
             out.append(Form(name, CAUSE_OF[name], joint, TYPICAL[name], self.seed + i))
         return tuple(out)
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from discrepancy import rules
 from discrepancy.candidate import Candidate
+from discrepancy.law_doubt import LawDoubt
 from estimator.arrays import Array
 
 Numbers = dict[str, float]
@@ -120,9 +120,9 @@ class Rig(ABC):
         """Whether such values can be: no negative mass, stiffness or friction beyond the errors."""
         return True
 
-    def law_share(self, candidate: Candidate) -> float:
-        """Amplitude that the law of a cause leaves of its trace where it is there: a standard deviation."""
-        return rules.LAW_SHARE
+    def law_doubt(self, candidate: Candidate) -> LawDoubt:
+        """How far the law of a cause may be from that of a real one."""
+        return LawDoubt()
 
     def other_forms(
         self, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]]

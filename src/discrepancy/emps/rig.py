@@ -33,6 +33,7 @@ from discrepancy.emps.recording.signals import Signals
 from discrepancy.emps.reduction import Reduction
 from discrepancy.emps.undecidable import statements
 from discrepancy.engine.explanation import Explanation
+from discrepancy.law_doubt import LawDoubt
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Channel, Rig, Rows
 from estimator.arrays import Array
@@ -159,9 +160,9 @@ class EmpsRig(Rig):
             out = [r - x * candidate.acts_in(t) for t, (r, x) in enumerate(zip(out, taken, strict=True))]
         return out
 
-    def law_share(self, candidate: Candidate) -> float:
+    def law_doubt(self, candidate: Candidate) -> LawDoubt:
         """A real axis: noise is what differs between its cycles, and every law leaves more than that."""
-        return rules.LAW_SHARE if candidate.transient else rules.EMPS_LAW_SHARE
+        return LawDoubt(rules.LAW_SHARE if candidate.transient else rules.EMPS_LAW_SHARE)
 
     def unknowns(self, candidate: Candidate) -> list[Array]:
         """Dry friction at rest, whitened columns (n, 2, k) of every block."""

@@ -121,7 +121,7 @@ def confirm(
     found = tuple(
         replace(
             item,
-            probability=weight * _decided(rig, item, others),
+            probability=weight * _decided(item, others),
             probability_alike=weight * item.probability_alike,
         )
         for item, others in zip(explanation.found, alternatives, strict=True)
@@ -132,10 +132,9 @@ def confirm(
     )
 
 
-def _decided(rig: Rig, found: Found, alternatives: Sequence[Alternative]) -> float:
+def _decided(found: Found, alternatives: Sequence[Alternative]) -> float:
     """The probability of a cause once the closed loop has spoken: a rival that does worse there is no look-alike."""
-    gaps = [*map(decided_gap, alternatives), found.over_nothing]
-    return probability(gaps, found.share_left, rig.law_share(found.candidate))
+    return probability([*map(decided_gap, alternatives)], found.share_left, found.doubt, found.over_nothing)
 
 
 def decided_gap(other: Alternative) -> float:

@@ -16,6 +16,7 @@ from discrepancy.inference.learn import worth_a_spread
 from discrepancy.inference.probability import probability
 from discrepancy.inference.remainder import share_left, unlisted_nats
 from discrepancy.inference.search import Rival, Searched
+from discrepancy.law_doubt import LawDoubt
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
@@ -33,6 +34,7 @@ class Found:
         probability_alike: that it is this or one of the rivals that cannot be told from it.
         over_nothing: by how much it is likelier than nothing in its place [nats].
         share_left: see ``remainder.share_left``.
+        doubt: about its law.
         rivals: what else could be in its place, the likeliest first, and by how much it is less likely [nats].
         values: its parameters, in their own units, shape (k,).
         covariance: of the values and of what is determined of its shape (see ``best_shape``), in their own units.
@@ -47,6 +49,7 @@ class Found:
     probability_alike: float
     over_nothing: float
     share_left: float
+    doubt: LawDoubt
     rivals: tuple[tuple[Candidate, float], ...]
     values: Array
     covariance: Array
@@ -170,14 +173,16 @@ def _found(rig: Rig, best: Hypothesis, index: int, rivals: Sequence[Rival]) -> F
     others = [(rival.candidate, rival.gap) for rival in rivals if rival.candidate is not None]
     # The same event in another interval is no other cause.
     others = [(c, gap) for c, gap in others if c.transient is None or c.cause != candidate.cause]
-    gaps, law = [gap for _, gap in others], rig.law_share(candidate)
+    gaps = [gap for _, gap in others]
+    about = left, rig.law_doubt(candidate), nothing
     return Found(
         index=index,
         candidate=candidate,
-        probability=probability([*gaps, nothing], left, law),
-        probability_alike=probability([*(g for g in gaps if g >= rules.AMBIGUOUS_NATS), nothing], left, law),
+        probability=probability(gaps, *about),
+        probability_alike=probability([g for g in gaps if g >= rules.AMBIGUOUS_NATS], *about),
         over_nothing=float(nothing),
         share_left=left,
+        doubt=rig.law_doubt(candidate),
         rivals=tuple(others),
         **_values(rig, best, index),
         folds=tuple(held_out_gains(best.problem, [i for i in best.free if i != index], index)),

@@ -130,8 +130,8 @@ def _wide(hypothesis: Hypothesis, factor: float) -> set[str]:
 
 def _law_holds(rig: Rig, hypothesis: Hypothesis, index: int) -> bool:
     """Whether a cause is likelier than something unlisted that looks like it."""
-    share = rig.law_share(hypothesis.problem.candidates[index])
-    return probability([], share_left(hypothesis, index), share) >= rules.LEAST_PROBABILITY
+    doubt = rig.law_doubt(hypothesis.problem.candidates[index])
+    return probability([], share_left(hypothesis, index), doubt) >= rules.LEAST_PROBABILITY
 
 
 def _based(rig: Rig, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:

@@ -12,6 +12,7 @@ from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.probability import probability
 from discrepancy.inference.remainder import form_share_of, share_left
+from discrepancy.law_doubt import LawDoubt
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.said.numbers import formula_of
@@ -107,7 +108,7 @@ def refinement(
 
 def is_likely(hypothesis: Hypothesis, index: int) -> bool:
     """Whether a cause is likelier than something unlisted that looks like it: if not, its form excuses nothing."""
-    return probability([], share_left(hypothesis, index), rules.LAW_SHARE) >= rules.LEAST_PROBABILITY
+    return probability([], share_left(hypothesis, index), LawDoubt()) >= rules.LEAST_PROBABILITY
 
 
 def likely_causes(hypothesis: Hypothesis) -> tuple[Candidate, ...]:

@@ -74,6 +74,7 @@ from discrepancy.engine.confirm import Alternative, decided_gap
 from discrepancy.engine.diagnose import Diagnosis
 from discrepancy.engine.explanation import Found
 from discrepancy.engine.gain import Gain, Response
+from discrepancy.inference.probability import parted
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.said.numbers import law_to_dict, physical
 from discrepancy.laws.said.trace import places_to_dict, traces_of
@@ -227,7 +228,8 @@ class _Instead:
     @classmethod
     def of(cls, found: Found, alternatives: Sequence[Alternative]) -> "_Instead":
         """What ``engine.probability`` weighs against a cause: what is so many nats less likely, by so much less."""
-        gaps = np.array([*map(decided_gap, alternatives), found.over_nothing], dtype=float)
+        apart = parted([*map(decided_gap, alternatives)], found.doubt, found.over_nothing)
+        gaps = np.append(apart, found.over_nothing)
         listed = found.probability * np.exp(-np.clip(gaps, -50.0, 700.0))
         rest = 1.0 - found.probability - float(listed.sum())
         return cls(tuple(map(float, listed[:-1])), float(listed[-1]), max(rest, 0.0))

@@ -180,3 +180,9 @@ harmonic of 15 %, a dress pack that stiffens by 20 % and readings that drift by 
 SERIAL_LAW_SHARE = 1.0
 """Standard deviation of what the law of a lasting cause leaves of its trace, in amplitude. Chosen: noise is that of
 the sensors, less than gears leave whatever is named; as much as of the EMPS axis (``discrepancy.rules``)."""
+RIVAL_SHARE = 0.2
+"""The same towards a rival: traces that differ by less leave it open which of the two it is. Chosen: what was hidden in
+a simulated arm in other forms is off by 15 to 25 %."""
+UNSEEN_NATS = 20.0
+"""What something unlisted may leave beside a lasting cause without being seen. Chosen: a third of ``UNLISTED_NATS``,
+since where the cause acts is known."""

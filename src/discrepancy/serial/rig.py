@@ -13,6 +13,7 @@ import numpy as np
 from discrepancy.candidate import Candidate
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.engine.explanation import Explanation, Found
+from discrepancy.law_doubt import LawDoubt
 from discrepancy.rig import Channel, Rig, Rows
 from discrepancy.rules import LAW_SHARE
 from discrepancy.rules import serial as rules
@@ -159,9 +160,10 @@ class SerialRig(SerialRows, Rig):
         gone = bool(self.common) and cause.reversible and cause.possible(tree, at, -values, se)
         return gone or cause.possible(tree, at, values, se)
 
-    def law_share(self, candidate: Candidate) -> float:
-        """A real robot: noise is the sensors', and every law leaves more than that."""
-        return LAW_SHARE if candidate.transient else rules.SERIAL_LAW_SHARE
+    def law_doubt(self, candidate: Candidate) -> LawDoubt:
+        """Any robot: noise is the sensors', every law leaves more than that, and much that is real has none."""
+        share = LAW_SHARE if candidate.transient else rules.SERIAL_LAW_SHARE
+        return LawDoubt(share, rules.RIVAL_SHARE, rules.UNSEEN_NATS)
 
     def other_forms(
         self, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]]

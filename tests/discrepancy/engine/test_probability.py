@@ -2,28 +2,32 @@
 
 import numpy as np
 import pytest
-from scipy.stats import binom, norm
+from scipy.integrate import quad
+from scipy.stats import binom, halfnorm, norm
 
 from discrepancy import rules
 from discrepancy.engine.explanation import explain
-from discrepancy.inference.probability import probability
+from discrepancy.inference.probability import parted, probability
 from discrepancy.inference.search import search
+from discrepancy.law_doubt import LawDoubt
 from fake_rig import FakeRig
+
+DOUBT = LawDoubt(0.2)
 
 
 def test_limits():
-    assert probability([], 0.0, 0.2) == pytest.approx(1.0, abs=1e-5)
-    assert probability([np.inf], 0.0, 0.2) == pytest.approx(1.0, abs=1e-5)
-    assert probability([0.0], 0.0, 0.2) == pytest.approx(0.5, abs=1e-5)
-    assert probability([0.0, 0.0, 0.0], 0.0, 0.2) == pytest.approx(0.25, abs=1e-5)
-    assert probability([-np.inf], 0.0, 0.2) < 1e-20
-    assert probability([], 1.0, 0.2) < 1e-4
+    assert probability([], 0.0, DOUBT) == pytest.approx(1.0, abs=1e-5)
+    assert probability([np.inf], 0.0, DOUBT) == pytest.approx(1.0, abs=1e-5)
+    assert probability([0.0], 0.0, DOUBT) == pytest.approx(0.5, abs=1e-5)
+    assert probability([0.0, 0.0, 0.0], 0.0, DOUBT) == pytest.approx(0.25, abs=1e-5)
+    assert probability([-np.inf], 0.0, DOUBT) < 1e-20
+    assert probability([], 1.0, DOUBT) < 1e-4
 
 
 def test_rivals_divide_it_by_their_likelihoods():
     gaps = np.array([0.3, 2.0, 5.0])
     shares = np.exp(-np.array([0.0, *gaps]))
-    assert probability(gaps, 0.0, 0.2) == pytest.approx(shares[0] / shares.sum(), abs=1e-5)
+    assert probability(gaps, 0.0, DOUBT) == pytest.approx(shares[0] / shares.sum(), abs=1e-5)
 
 
 @pytest.mark.parametrize("share", [0.05, 0.2, 0.4, 0.8])
@@ -32,16 +36,47 @@ def test_law_against_something_unlisted(share, law):
     """Bayes' rule with the density of a half-normal share against one that grows with the share."""
     listed = rules.LISTED_ODDS * 2.0 * norm.pdf(share, scale=law)
     unlisted = 2.0 * share
-    assert probability([], share, law) == pytest.approx(listed / (listed + unlisted), rel=1e-9)
+    assert probability([], share, LawDoubt(law)) == pytest.approx(listed / (listed + unlisted), rel=1e-9)
 
 
 def test_it_falls_with_what_is_left_and_with_nearer_rivals():
-    left = [probability([5.0], share, 0.2) for share in np.linspace(0.01, 1.0, 30)]
+    left = [probability([5.0], share, DOUBT) for share in np.linspace(0.01, 1.0, 30)]
     assert np.all(np.diff(left) < 0)
-    near = [probability([gap], 0.1, 0.2) for gap in np.linspace(-10.0, 10.0, 30)]
+    near = [probability([gap], 0.1, DOUBT) for gap in np.linspace(-10.0, 10.0, 30)]
     assert np.all(np.diff(near) > 0)
-    wide = [probability([5.0], 0.5, law) for law in (0.1, 0.2, 0.4)]
+    wide = [probability([5.0], 0.5, LawDoubt(law)) for law in (0.1, 0.2, 0.4)]
     assert np.all(np.diff(wide) > 0)
+
+
+def test_rivals_that_laws_may_be_off_towards():
+    """Monte Carlo: two traces a distance apart, data on the line between them, laws off along it by a share."""
+    rng = np.random.default_rng(5)
+    worth, share, apart = 60.0, 0.15, 4.0
+    off = share * np.sqrt(2.0 * worth)
+    truth = rng.random(400_000) < 0.5
+    seen = np.where(truth, 0.0, apart) + rng.normal(size=truth.size) * np.sqrt(1.0 + off**2)
+    gap = 0.5 * ((seen - apart) ** 2 - seen**2)  # of laws that are exact
+    doubt = LawDoubt(0.2, share)
+    for low, high in ((-4.0, -2.0), (-1.0, 1.0), (3.0, 5.0), (7.0, 9.0)):
+        there = (gap > low) & (gap < high)
+        stated = probability([0.5 * (low + high)], 0.0, doubt, worth)
+        assert truth[there].mean() == pytest.approx(stated, abs=0.02)
+    np.testing.assert_allclose(parted([3.0], DOUBT, worth), [3.0])
+
+
+@pytest.mark.parametrize("share", [0.0, 0.1, 0.5, 1.0])
+def test_what_something_unlisted_leaves_is_not_seen_of_a_weak_cause(share):
+    """Against numerical integrals of both densities over the shares that look alike; a strong cause shows all."""
+    doubt, worth = LawDoubt(1.0, 0.0, 20.0), 320.0
+    low, high = max(share - 0.25, 0.0), min(share + 0.25, 1.0)
+    listed, unlisted = quad(halfnorm.pdf, low, high)[0], quad(lambda x: 2.0 * x, low, high)[0]
+    odds = rules.LISTED_ODDS * listed / unlisted
+    assert probability([], share, doubt, worth) == pytest.approx(odds / (1.0 + odds), rel=1e-6)
+    weak = [probability([], 0.0, doubt, nats) for nats in (5.0, 20.0, 100.0, 1e4)]
+    assert np.all(np.diff(weak) >= 0.0)
+    assert weak[0] < 0.75
+    assert weak[-1] > 0.95
+    assert probability([], 0.3, doubt, 1e9) == pytest.approx(probability([], 0.3, LawDoubt(1.0)), rel=1e-3)
 
 
 @pytest.mark.slow
