@@ -66,6 +66,7 @@ class Candidate:
         among: of how many of its kind it is one, where the problem does not list them; 0 where it does.
         form_share: of its trace, in amplitude, by which a real one has another form than its law.
         form_size: of its first parameter, up to which it is that share; beyond, it grows with the root. 0: never.
+        most_spread: of its kind over its tolerance that a machine can have.
         hidden: whether it is never named: it only has its tolerance, as a cause that was left out has.
     """
 
@@ -81,6 +82,7 @@ class Candidate:
     among: int = 0
     form_share: float = 0.0
     form_size: float = 0.0
+    most_spread: float = np.inf
     hidden: bool = False
 
     def acts_in(self, trial: int) -> bool:

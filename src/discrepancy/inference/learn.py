@@ -124,7 +124,8 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
         least.append(1.0)
         # One of a kind cannot scatter: it is off or not. Nor may what was left out take what it is not to be named for.
         scatters = len(members) > 1 and not problem.candidates[members[0]].hidden
-        most.append(rules.MOST_SPREAD if scatters else 1.0)
+        can_be = min(problem.candidates[i].most_spread for i in members)
+        most.append(min(rules.MOST_SPREAD, can_be) if scatters else 1.0)
         weight.append(rules.SPREAD_NUMBERS)
         own.append(False)
     for index in free:

@@ -104,6 +104,8 @@ JOINT_SHARE = 0.03
 sticking at reversals moves fitted rotors by up to 0.02 (of a simulated arm without any error)."""
 MOST_INERTIA_SHARE = 1.0
 """Of the same, beyond which a link is not off but another. Chosen: rotors and payloads add more, and are themselves."""
+MOST_SE = 2.0
+"""Spreads of a kind in the most that one of it can be. Derived: of a normal one, nineteen in twenty are within two."""
 RUBS_MORE = 2.0
 """Tolerances by which dry friction must be off, or its giving way is that of a healthy one. Chosen: where a healthy
 joint and one with the least slab (``LEAST_SLAB``) are about equally likely."""

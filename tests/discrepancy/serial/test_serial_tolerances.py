@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.other_forms import beside_other_forms
 from discrepancy.inference.scan import scan
-from discrepancy.inference.search import _nothing
+from discrepancy.inference.search import _nothing, search
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rules import serial as rules
 from discrepancy.serial.causes import CAUSES
@@ -56,6 +57,24 @@ def test_tolerances_together_are_exact(rig: SerialRig) -> None:
     size = [np.sqrt(np.mean(np.concatenate(x) ** 2, axis=0)) for x in (straight, exact)]
     assert np.all(size[1] < 2.0 * noise)
     assert size[0][0] > 5.0 * size[1][0]  # the waist feels gravity only where the base is tilted
+
+
+@pytest.mark.slow
+def test_links_scatter_no_further_than_links_can_be(tmp_path: Path) -> None:
+    """Rotors of a model that has none: links of ten times their inertia would explain them as well."""
+    bare = load_model(nominal_file(tmp_path, re.sub(r' armature="[0-9.]*"', "", ARM)))
+    rig = SerialRig.of(bare, [simulated(spec().compile(), 5, seconds=12.0)])
+    own = spec().compile().body_inertia[1:]  # principal moments, by MuJoCo
+    links = [c for c in rig.candidates() if c.cause == "link_inertia"]
+    twice = [2.0 * c.most_spread * c.parameters[0].tolerance for c in links]
+    np.testing.assert_allclose(twice, rules.MOST_INERTIA_SHARE * own.mean(axis=1), rtol=1e-6)
+    searched = search(rig)
+    rotors = {c.joint for c in searched.best.causes if c.cause == "armature"}
+    assert rotors >= {1, 2, 3}
+    problem = searched.best.problem
+    for index, candidate in enumerate(problem.candidates):
+        if candidate.cause == "link_inertia":
+            assert problem.spread[problem.columns_of(index)].max() <= candidate.most_spread
 
 
 def test_friction_that_gives_way_is_dahls() -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from discrepancy.candidate import Parameter
 from discrepancy.causes import base
 from discrepancy.causes.base import Shape
+from discrepancy.rules import serial as rules
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.rows.signals import Signals
@@ -109,6 +110,10 @@ class Cause(base.Cause):
         """Typical sizes, one a parameter."""
         return self.scales or self.tolerances
 
+    def most(self, tree: Tree, at: int) -> Sequence[float] | None:
+        """Sizes beyond which it is no such thing, one a parameter; None without any."""
+        return None
+
     def possible(self, tree: Tree, at: int, values: Array, se: Array) -> bool:
         """Whether such values can be, beyond two standard errors."""
         return self.never_negative(values, se)
@@ -137,12 +142,19 @@ class Cause(base.Cause):
         parameters = tuple(
             Parameter(n, float(t), float(s)) for n, t, s in zip(named, normal, sizes, strict=True)
         )
+        most = self.most(tree, at)
+        spread = np.inf if most is None or not all(normal) else _spread(most, normal)
         before = None if self.part != "pair" else partner(tree, at)
         return SerialCandidate(
             self.name, self.family, None, at + 1 if at >= 0 else None, parameters, dict(shape), where=self.where,
             title=self.title, part=self.part, called=names[at] if at >= 0 else "", slide=slide,
-            partner=None if before is None else before + 1,
+            partner=None if before is None else before + 1, most_spread=spread,
         )  # fmt: skip
+
+
+def _spread(most: Sequence[float], normal: Sequence[float]) -> float:
+    """Of a kind over its tolerance, if nineteen in twenty of it can be."""
+    return max(1.0, float(np.min(np.divide(most, normal))) / rules.MOST_SE)
 
 
 def parameter_name(name: str, *, slide: bool) -> str:

@@ -29,7 +29,10 @@ class JointZero(Cause):
         return self.normal(tree, at)
 
     def possible(self, tree, at, values, se):
-        return abs(values[0]) < (rules.MOST_LENGTH_M if tree.slides[at] else rules.MOST_ZERO_RAD)
+        return abs(values[0]) < self.most(tree, at)[0]
+
+    def most(self, tree, at):
+        return [rules.MOST_LENGTH_M if tree.slides[at] else rules.MOST_ZERO_RAD]
 
     def applied(self, signals, at, values):
         return replace(signals, q=signals.q + values[0] * (np.arange(signals.q.shape[1]) == at))

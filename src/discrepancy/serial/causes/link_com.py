@@ -29,8 +29,11 @@ class LinkCom(Cause):
     def sizes(self, tree, at):
         return self.normal(tree, at)
 
+    def most(self, tree, at):
+        return [rules.MOST_INERTIA_SHARE * _size(tree, int(tree.joint_body[at]))] * 3
+
     def possible(self, tree, at, values, se):
-        most = rules.MOST_INERTIA_SHARE * _size(tree, int(tree.joint_body[at]))
+        most = self.most(tree, at)[0]
         return bool(np.all(np.abs(values) < most + 2.0 * se))
 
     def applied(self, signals, at, values):

@@ -31,8 +31,11 @@ class LinkInertia(Cause):
     def sizes(self, tree, at):
         return self.normal(tree, at)
 
+    def most(self, tree, at):
+        return [rules.MOST_INERTIA_SHARE * _size(tree, int(tree.joint_body[at]))] * 6
+
     def possible(self, tree, at, values, se):
-        most = rules.MOST_INERTIA_SHARE * _size(tree, int(tree.joint_body[at]))
+        most = self.most(tree, at)[0]
         if np.any(np.abs(values) > most + 2.0 * se):
             return False
         total = tree.inertia[tree.joint_body[at]] + symmetric(values)

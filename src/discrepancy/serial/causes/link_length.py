@@ -23,7 +23,10 @@ class LinkLength(Cause):
         return f"sits off by ({x}, {y}, {z}) in the frame of the link before it"
 
     def possible(self, tree, at, values, se):
-        return bool(max(abs(values)) < rules.MOST_LENGTH_M)
+        return bool(np.all(np.abs(values) < self.most(tree, at)))
+
+    def most(self, tree, at):
+        return [rules.MOST_LENGTH_M] * 3
 
     def applied(self, signals, at, values):
         tree, b = signals.tree, int(signals.tree.joint_body[at])

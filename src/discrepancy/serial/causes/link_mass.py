@@ -29,7 +29,10 @@ class LinkMass(Cause):
         return self.normal(tree, at)
 
     def possible(self, tree, at, values, se):
-        return abs(values[0]) < rules.MOST_INERTIA_SHARE * tree.mass[tree.joint_body[at]] + 2.0 * se[0]
+        return abs(values[0]) < self.most(tree, at)[0] + 2.0 * se[0]
+
+    def most(self, tree, at):
+        return [rules.MOST_INERTIA_SHARE * float(tree.mass[tree.joint_body[at]])]
 
     def applied(self, signals, at, values):
         tree, b = signals.tree, int(signals.tree.joint_body[at])

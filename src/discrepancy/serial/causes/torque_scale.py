@@ -17,7 +17,10 @@ class TorqueScale(Cause):
         return f"the torque reads {n('scale', '%', 100.0)} {n.either('scale', 'too much', 'too little')}"
 
     def possible(self, tree, at, values, se):
-        return abs(values[0]) < rules.MOST_SCALE
+        return abs(values[0]) < self.most(tree, at)[0]
+
+    def most(self, tree, at):
+        return [rules.MOST_SCALE]
 
     def columns(self, signals, at, shape):
         # The model's torque, not the measured one: that would explain itself. What it lacks of friction counts as read.
