@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import cho_solve, cholesky, get_lapack_funcs
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.inference.twins import twins
 from discrepancy.least_squares.problem import Problem
 from estimator.arrays import Array
@@ -105,6 +106,11 @@ def _climbed(parts: _Parts, power: Array, spread: Array, rounds: int) -> tuple[f
     return _step(parts, power, spread)[0], power, spread
 
 
+def widest(kind: Sequence[Candidate]) -> float:
+    """Largest spread over its tolerance that is learnt of a kind."""
+    return min(rules.MOST_SPREAD, *(candidate.most_spread for candidate in kind))
+
+
 def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts]:
     count = problem.shared + len(problem.tolerant)
     group = np.full(count, -2)
@@ -124,8 +130,7 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
         least.append(1.0)
         # One of a kind cannot scatter: it is off or not. Nor may what was left out take what it is not to be named for.
         scatters = len(members) > 1 and not problem.candidates[members[0]].hidden
-        can_be = min(problem.candidates[i].most_spread for i in members)
-        most.append(min(rules.MOST_SPREAD, can_be) if scatters else 1.0)
+        most.append(widest([problem.candidates[i] for i in members]) if scatters else 1.0)
         weight.append(rules.SPREAD_NUMBERS)
         own.append(False)
     for index in free:

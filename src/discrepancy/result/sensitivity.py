@@ -8,6 +8,7 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation
+from discrepancy.inference.learn import widest
 from discrepancy.result.evidence_list import needed_nats
 from estimator.arrays import Array
 
@@ -50,7 +51,10 @@ def _judged(explanation: Explanation) -> Iterator[tuple[Candidate, dict[str, Any
     for members in kinds.values():
         told = [_along(*fit.told(index)) for index in members]
         scatters = problem.has_tolerance(members[0]) and len(members) > 1
-        spreads = LEARNT if scatters else np.ones(1) if problem.has_tolerance(members[0]) else np.zeros(1)
+        spreads = np.ones(1) if problem.has_tolerance(members[0]) else np.zeros(1)
+        if scatters:
+            most_spread = widest([problem.candidates[index] for index in members])
+            spreads = LEARNT[most_spread >= LEARNT]
         healthy = np.array([_log_evidence(z, lam, spreads) for lam, z, _ in told])
         prior = (
             0.5 * rules.SPREAD_NUMBERS * (2.0 * np.log(spreads) + spreads**-2.0 - 1.0) if scatters else 0.0

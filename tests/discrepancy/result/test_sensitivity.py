@@ -15,12 +15,18 @@ from fake_rig import CATALOGUE, FakeRig, cause
 
 SEVERAL = tuple(cause(f"kind {k % 2}", robot=1 + k // 2) for k in range(8))
 
+BOUNDED = tuple(replace(candidate, most_spread=1.0) for candidate in SEVERAL)
+
 
 def explained(rig: FakeRig) -> Explanation:
     return diagnose(rig).explanation
 
 
-@pytest.mark.parametrize("catalogue", [CATALOGUE, SEVERAL], ids=["one of a kind", "four of a kind"])
+@pytest.mark.parametrize(
+    "catalogue",
+    [CATALOGUE, SEVERAL, BOUNDED],
+    ids=["one of a kind", "four of a kind", "four that cannot scatter"],
+)
 def test_cause_of_the_size_of_its_limit_is_named_nine_times_in_ten(catalogue: tuple) -> None:
     """By the engine's own comparison of hypotheses, spreads learnt anew, on data with the fault and no noise."""
     rig = FakeRig({}, seed=2, catalogue=catalogue)
