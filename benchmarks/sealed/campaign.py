@@ -47,6 +47,23 @@ def diagnose_all(
     apart(todo, lambda request: _diagnose(request, out, path, closed_loop=closed_loop, keep=keep), jobs)
 
 
+def simulate_and_diagnose(
+    requests: Sequence[SealedSet], out: Path, label: str, jobs: int, *, closed_loop: bool, keep: bool
+) -> None:
+    """Set by set, so that a campaign that is cut short has verdicts on what it simulated."""
+    path = out / f"{label}.jsonl"
+    failed = {line["key"] for line in store.read(out / "not_simulated.jsonl")}
+    finished = {line["key"] for line in store.read(path)}
+
+    def work(request: SealedSet) -> None:
+        if not store.is_simulated(request, out):
+            _simulate(request, out)
+        if store.is_simulated(request, out):
+            _diagnose(request, out, path, closed_loop=closed_loop, keep=keep)
+
+    apart([r for r in requests if r.key not in failed | finished], work, jobs)
+
+
 def _diagnose(request: SealedSet, out: Path, path: Path, *, closed_loop: bool, keep: bool) -> None:
     result: dict[str, Any] = {"key": request.key, "set": request.to_dict(), "engine": engine(), "error": None}
     excluded = request.names if request.kind == "left-out" else ()

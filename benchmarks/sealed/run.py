@@ -18,7 +18,7 @@ import tyro
 
 from sealed import store
 from sealed.backgrounds import Background
-from sealed.campaign import diagnose_all, simulate_all
+from sealed.campaign import diagnose_all, simulate_all, simulate_and_diagnose
 from sealed.sets import TIMESTEP_S, Kind, SealedSet, plan
 from sealed.tables import misses, tables
 
@@ -97,13 +97,14 @@ def main(options: Options) -> None:
     if options.list:
         print("\n".join(request.key for request in requests))
         return
-    if options.only != "diagnose":
+    if options.only == "simulate":
         simulate_all(requests, options.out, options.jobs)
-    if options.only != "simulate":
-        diagnose_all(
-            requests, options.out, options.label, options.jobs,
-            closed_loop=options.closed_loop, keep=options.keep,
-        )  # fmt: skip
+        return
+    run = diagnose_all if options.only == "diagnose" else simulate_and_diagnose
+    run(
+        requests, options.out, options.label, options.jobs,
+        closed_loop=options.closed_loop, keep=options.keep,
+    )  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from discrepancy.inference.probability import probability
 from discrepancy.inference.propose import proposals
 from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import nats_left, share_left
+from discrepancy.inference.twins import twins
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
 
@@ -107,14 +108,25 @@ def _needed(base: Hypothesis, more: Hypothesis) -> float:
     """By how many nats a hypothesis with one cause more must be likelier.
 
     A scatter of one kind alone, all others as they should be, is no healthy machine either: as soon as one of its
-    places is likelier than that, it is named. Where several kinds scatter, all is off, and it has to stand out.
+    places, or of a kind with the same trace, is likelier than that, it is named. Where several kinds scatter, all is
+    off, and it has to stand out.
     """
-    wide = _wide(base, rules.HELD_FACTOR)
-    if len(wide) != 1 or not _wide(base, rules.SCATTER_FACTOR) or not {c.cause for c in more.causes} >= wide:
+    if not _wide(base, rules.SCATTER_FACTOR):
+        return rules.NAMED_NATS
+    # From three places a spread is known to a half: only one that the data want is one.
+    worth = {kind: worth_a_spread(base.learnt, kind) for kind in _wide(base, rules.HELD_FACTOR)}
+    off = [kind for kind, nats in worth.items() if nats > rules.NAMED_NATS]
+    if len(off) != 1 or not _alike(base.problem, off[0]) & {cause.cause for cause in more.causes}:
         return rules.NAMED_NATS
     if _wide(more, rules.SCATTER_FACTOR):
         return rules.NAMED_NATS
-    return max(0.0, rules.NAMED_NATS - worth_a_spread(base.learnt, *wide))
+    return max(0.0, rules.NAMED_NATS - worth[off[0]])
+
+
+def _alike(problem: Problem, kind: str) -> set[str]:
+    """A kind and those that leave the same trace."""
+    kinds = {c.cause for i, c in enumerate(problem.candidates) if problem.has_tolerance(i)}
+    return {kind}.union(*(pair for pair in twins(problem, kinds) if kind in pair))
 
 
 def _wide(hypothesis: Hypothesis, factor: float) -> set[str]:

@@ -486,3 +486,34 @@ def test_a_fault_and_a_scatter_count_at_the_same_residual():
     # By another residual than the scatter's it would have lost more than it gains.
     searched = search(rig)
     assert searched.best.score < searched.nothing.score
+
+
+LAGS = tuple(cause("lag", robot) for robot in (1, 2, 3))
+
+
+def test_another_kind_that_hardly_scatters_does_not_hide_a_fault():
+    """Three places that happen to be 1.6 tolerances off are no sign of a team that is off everywhere."""
+    rig = FakeRig({0: 17.0, 3: 2.2, 4: -2.2, 5: 2.2}, catalogue=(*SCATTERED[:3], *LAGS, *CATALOGUE))
+    problem = search(rig).nothing.problem
+    assert problem.spread[problem.columns_of(0)][0] > rules.SCATTER_FACTOR
+    assert rules.HELD_FACTOR < problem.spread[problem.columns_of(3)][0] < rules.SCATTER_FACTOR
+    (found,) = found_in(rig).found
+    assert (found.candidate.cause, found.candidate.robot) == ("clock", 1)
+    assert found.over_nothing < rules.NAMED_NATS
+
+
+def test_two_kinds_that_scatter_hide_one_that_hardly_stands_out():
+    rig = FakeRig({0: 17.0, 3: 8.0, 4: -8.0, 5: 8.0}, catalogue=(*SCATTERED[:3], *LAGS, *CATALOGUE))
+    explanation = found_in(rig)
+    assert explanation.found == ()
+    assert {scatter.candidate.cause for scatter in explanation.scatter} == {"clock", "lag"}
+
+
+@pytest.mark.parametrize(("bent", "wanted"), [("clock", "lag"), ("lag", "clock")])
+def test_a_scatter_of_another_kind_with_the_same_trace_does_not_hide_a_fault(bent, wanted):
+    """Which of the two kinds takes the scatter is by chance; which place is at fault, exact residuals tell."""
+    twins = {3: (0, 0.0), 4: (1, 0.0), 5: (2, 0.0)}
+    present = {3 if wanted == "lag" else 0: 17.0}
+    rig = BentRig(present, catalogue=(*SCATTERED[:3], *LAGS, *CATALOGUE), twins=twins, bent=bent)
+    (found,) = found_in(rig).found
+    assert (found.candidate.cause, found.candidate.robot) == (wanted, 1)
