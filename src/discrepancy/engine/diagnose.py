@@ -66,7 +66,8 @@ def diagnose(
         rig: recordings and causes.
         closed_loop: whether to resimulate the recorded commands.
         most: largest number of causes.
-        laws: whether to look for laws that the catalogue lacks: where something unlisted is left, always, or never.
+        laws: whether to look for laws that the catalogue lacks: where something unlisted is left, or a named cause is
+            not sure, always, or never.
         odds: of any cause being there before the data are seen, at all its places together.
         jobs: parallel processes of the simulations.
         say: called with what is being done.
@@ -79,8 +80,9 @@ def diagnose(
     explanation = listed = explain(searched)
     notes: list[str] = []
     located: tuple[Located, ...] = ()
-    if laws == "always" or (laws == "auto" and not explanation.clean):
-        lawful = with_laws(searched, most, say, always=laws == "always")
+    unsure = any(found.probability < rules.LAW_INSTEAD for found in explanation.found)
+    if laws == "always" or (laws == "auto" and (unsure or not explanation.clean)):
+        lawful = with_laws(searched, most, say, always=laws == "always", instead=unsure)
         searched, located = lawful.searched, lawful.places
         explanation = explain(searched)
         notes += refining(lawful.refinements, explanation)

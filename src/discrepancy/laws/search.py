@@ -11,6 +11,7 @@ from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.engine.held_out import held_out_gains
 from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.probability import parted
 from discrepancy.inference.propose import Proposed, sharpened
 from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import unlisted_nats
@@ -40,8 +41,9 @@ class Lawful:
 
 
 def with_laws(
-    searched: Searched, most: int, progress: Callable[[str], object] | None = None, *, always: bool = False
-) -> Lawful:
+    searched: Searched, most: int, progress: Callable[[str], object] | None = None, *, always: bool = False,
+    instead: bool = False,
+) -> Lawful:  # fmt: skip
     """Go on with a search until what is left is noise, or no law helps on trials that it was not fitted to.
 
     Args:
@@ -49,6 +51,7 @@ def with_laws(
         most: largest number of causes, laws among them.
         progress: called with what is being done.
         always: also where what is left is noise.
+        instead: where what is left is noise, one law is tried in place of what was named, not beside it.
     """
     say = progress or (lambda what: None)
     bench: Bench | None = searched.rig.bench
@@ -57,11 +60,12 @@ def with_laws(
     refined: list[Refinement] = []
     for turn in range(rules.LAW_MOST if bench is not None else 0):
         left = always or unlisted_nats(searched.best) >= rules.UNLISTED_NATS
-        if len(searched.best.free) >= most or not left:
+        replacing = bool(searched.best.free) and not turn
+        if not (instead and replacing) and (not left or len(searched.best.free) >= most):
             break
         assert bench is not None
-        starts = [searched]
-        if searched.best.free and not turn:
+        starts = [searched] if left else []
+        if replacing:
             # Causes that were named may have stood for what nobody lists.
             starts.insert(0, Searched(searched.rig, searched.nothing, searched.nothing, ()))
         found, forms = [], _Forms(bench, likely_causes(searched.best), refined)
@@ -70,7 +74,9 @@ def with_laws(
             first = first or tuple(places)
             step = _with_one(start, bench, places, say, forms)
             if step is not None:
-                enough = min(most, len(step[0].best.free) + rules.LAW_CAUSES)
+                # Beside noise it has to stand with all that it does not replace.
+                besides = rules.LAW_CAUSES if left else len(searched.best.free)
+                enough = min(most, len(step[0].best.free) + besides)
                 now = _of_their_own(continued(step[0], enough, say), forms)
                 found.append((now, step[1]))
                 if _suffices(now.best, searched.best):
@@ -79,6 +85,8 @@ def with_laws(
             break
         best, more = max(found, key=lambda one: one[0].best.score)
         if best.best.score < searched.best.score + rules.NAMED_NATS:
+            break
+        if not left and not _replaces(best.best, searched):
             break
         searched, rivals = best, rivals | more
     return Lawful(_with_rivals(searched, rivals), first, tuple(refined))
@@ -134,6 +142,21 @@ def _suffices(found: Hypothesis, named: Hypothesis) -> bool:
         or {cause.key for cause in named.causes} <= {cause.key for cause in found.causes}
     )  # fmt: skip
     return enough and found.score >= named.score + rules.NAMED_NATS
+
+
+def _replaces(found: Hypothesis, searched: Searched) -> bool:
+    """Whether a law takes the place of causes that leave noise: there are fewer, or it is likelier by far.
+
+    No listed law is that of a real machine; what it is off by is no reason to take another (see ``parted``).
+    """
+    named, more = searched.best, len(found.free) - len(searched.best.free)
+    if more > 0 or {cause.key for cause in named.causes} <= {cause.key for cause in found.causes}:
+        return False
+    if more < 0:
+        return True
+    doubt = max((searched.rig.law_doubt(cause) for cause in named.causes), key=lambda one: one.towards_rivals)
+    worth = named.score - searched.nothing.score
+    return bool(parted([found.score - named.score], doubt, worth)[0] >= rules.NAMED_NATS)
 
 
 def located_in(searched: Searched, bench: Bench, say: Callable[[str], object]) -> list[Located]:

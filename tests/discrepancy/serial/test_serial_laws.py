@@ -12,6 +12,7 @@ import pytest
 
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.result.diagnosed import Diagnosed
+from discrepancy.rules import LAW_INSTEAD
 from discrepancy.serial.diagnosis import diagnose_serial
 from discrepancy.serial.laws.places import POSITION, TORQUE
 from discrepancy.serial.laws.rig import LawfulSerialRig
@@ -113,6 +114,27 @@ def test_on_request_a_law_is_weighed_against_causes_that_imitate_it(model: Seria
     law = laws(diagnose_serial(model, [log], laws="always"))[0]
     assert (law.at.name, law.joint, law.term.function) == (TORQUE, 2, "above")
     assert law.term.numbers["knee"] == pytest.approx(0.2, abs=0.02)
+
+
+def crosstalk(q: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The elbow's reading takes in 4 % of the shoulder's."""
+    torque = torque.copy()
+    torque[:, 2] += 0.04 * torque[:, 1]
+    return q, torque
+
+
+@pytest.mark.slow
+def test_a_law_takes_the_place_of_causes_that_are_not_sure(model: SerialModel) -> None:
+    log = simulated(real(9), 9, read=crosstalk)
+    listed = diagnose_serial(model, [log], laws="never")
+    assert listed.diagnosis.causes
+    assert min(found.probability for found in listed.diagnosis.causes) < LAW_INSTEAD
+    (cause,) = diagnose_serial(model, [log]).diagnosis.causes
+    law = cause.candidate
+    assert isinstance(law, LawCandidate)
+    assert (law.at.name, law.joint, law.term.function) == (TORQUE, 3, "linear")
+    assert law.term.variables == ("torque_2",)
+    assert cause.values[0] * law.units[0] == pytest.approx(0.04, rel=0.15)
 
 
 @pytest.mark.slow
