@@ -173,8 +173,8 @@ def diagnose(
         reference: logs of the same robot while it was well: what is wrong with the model there, too, is no news.
         tolerances: TOML file: how far a robot may be off without that being news.
         exclude: causes not to consider.
-        laws: whether to look for laws that the catalogue lacks: ``"auto"`` where something unlisted is left, or a cause is not sure,
-            ``"always"`` or ``"never"``; with a reference they are not looked for.
+        laws: whether to look for laws that the catalogue lacks: ``"auto"`` where something unlisted is left, or
+            a cause is not sure, ``"always"`` or ``"never"``; with a reference they are not looked for.
         odds: of any cause being there before the data are seen, at all its places together.
         closed_loop: whether to roll the model out, without and with what is found.
         jobs: parallel processes.

@@ -108,8 +108,8 @@ def diagnose(
         tolerances: TOML file: how far a healthy robot may be off (docs/diagnosis/guide.md); None for the defaults.
         exclude: causes not to consider.
         closed_loop: whether to run the recorded commands again, without and with what is found.
-        laws: whether to look for laws that the catalogue lacks: ``"auto"`` where something unlisted is left, or a cause is not sure,
-            ``"always"``, or ``"never"``.
+        laws: whether to look for laws that the catalogue lacks: ``"auto"`` where something unlisted is left, or
+            a cause is not sure, ``"always"``, or ``"never"``.
         odds: of any cause being there before the data are seen, at all its places together.
         jobs: parallel processes.
         say: takes the name of the stage that begins.

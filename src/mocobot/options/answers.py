@@ -93,7 +93,7 @@ class Diagnose:
     closed_loop: bool = True
     """Run the recorded commands again, without and with what is found."""
     laws: Literal["auto", "always", "never"] = "auto"
-    """Look for laws that the catalogue lacks: where something unlisted is left or a cause not sure, always, or never."""
+    """Look for laws that the catalogue lacks: where something unlisted is left or a cause is unsure, always, never."""
     odds: float = PRIOR_ODDS
     """Odds of any cause being there before the data are seen; more where a fault is suspected."""
 
