@@ -221,7 +221,8 @@ def _beyond_tolerance(base: Hypothesis, problem: Problem, new: Hypothesis) -> Hy
 def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hypothesis:
     """With what the added cause leaves open, where that is likelier.
 
-    What is open explains some of what healthy ones leave, too; that much is not to the cause's credit.
+    What is open explains some of what healthy ones leave, too; that much is not to the cause's credit. What the cause
+    explains with nothing open stays to it.
     """
     index = new.free[-1]
     shaped = problem.candidates[index]
@@ -239,7 +240,8 @@ def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hy
     if other.score <= new.score:
         return new
     healthy = Hypothesis.of(opened, base.free, base.allowed)
-    return replace(other, allowed={**base.allowed, index: max(0.0, healthy.score - base.score)})
+    allowed = min(max(0.0, healthy.score - base.score), other.score - new.score)
+    return replace(other, allowed={**base.allowed, index: allowed})
 
 
 def _with(rig: Rig, problem: Problem, shaped: Candidate, item: Scanned) -> tuple[Problem, int]:

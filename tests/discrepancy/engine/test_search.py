@@ -384,6 +384,32 @@ def test_what_a_cause_leaves_open_is_integrated_out():
     assert first["nats"] - first["needed"] + rules.NAMED_NATS == pytest.approx(found.over_nothing, rel=0.05)
 
 
+class HoldingRig(OpenRig):
+    """What cause 2 leaves open can all but imitate it, as friction at rest does where a joint hardly moves."""
+
+    def unknowns(self, candidate):
+        opened = super().unknowns(candidate)
+        if candidate.cause != "cause 2":
+            return opened
+        return [np.concatenate([u, c], axis=2) for u, c in zip(opened, self.columns(candidate), strict=True)]
+
+
+def test_what_a_cause_explains_with_nothing_open_stays_to_it():
+    rig = HoldingRig({2: 25.0}, catalogue=SMALL)
+    rng = np.random.default_rng(5)
+    for t, u in enumerate(rig.unknowns(SMALL[2])):
+        x, *own = rig.data[t]
+        rig.data[t] = x + 2.5 * u[..., :60] @ rng.standard_normal(60), *own
+    nothing = search(rig).nothing
+    alone = Hypothesis.of(nothing.problem, [2])
+    best = proposals(rig, nothing).best
+    assert best.free == (2,)
+    assert list(best.problem.opened) == [SMALL[2].key]
+    assert best.fit.chi2 < 0.7 * alone.fit.chi2
+    assert best.score == pytest.approx(alone.score, abs=1e-6)
+    assert alone.score > nothing.score + rules.NAMED_NATS
+
+
 def test_what_is_left_open_at_rest_is_not_charged_where_it_tells_nothing():
     explanation = found_in(OpenRig({2: 25.0, 5: 400.0}, catalogue=SMALL))
     assert names(explanation.found) == ["cause 5", "cause 2"]

@@ -129,3 +129,14 @@ def test_play_of_its_own_angle_is_friction_that_gives_way_before_it_slides():
     assert form_of_named([one_sided, reading], [friction], BENCH) is None
     driven = law(place("tau reading", 1, 3), "sign", joint_variable("phi_rate", 1, 3))
     assert form_of_named([driven], [listed("joint_friction", 1, 3)], BENCH) is not None
+
+
+def test_play_of_the_torque_is_friction_inside_the_spring_in_another_form():
+    friction, at = listed("sea_hysteresis", 1, 3), place("tau reading", 1, 3)
+    own = law(at, "play", joint_variable("tau", 1, 3))
+    found = form_of_named([own], [friction], BENCH)
+    assert found is not None
+    assert found.law is own
+    assert form_of_named([law(at, "play", joint_variable("tau", 1, 2))], [friction], BENCH) is None
+    assert form_of_named([own], [listed("sea_hysteresis", 1, 2)], BENCH) is None
+    assert form_of_named([law(at)], [friction], BENCH) is None  # that is a scale

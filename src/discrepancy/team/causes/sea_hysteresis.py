@@ -1,5 +1,6 @@
 """Dry friction inside a spring."""
 
+from discrepancy import rules
 from discrepancy.team.causes.sliding import Friction
 
 
@@ -17,6 +18,7 @@ class SeaHysteresis(Friction):
     positive = ("friction_Nm",)
     moves = "tau"
     sign = -1.0
+    knots_s = rules.SPRING_REST_KNOTS_S
     separate = (
         "Motion with load reversals at rest separates friction in the spring from friction in the joint."
     )

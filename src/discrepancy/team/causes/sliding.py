@@ -23,6 +23,7 @@ class Friction(Cause):
     Attributes:
         moves: the signal.
         sign: of the torque's reading while that grows.
+        knots_s: between knots of what is open while it holds.
     """
 
     family = "dissipation"
@@ -34,6 +35,7 @@ class Friction(Cause):
     form_share, form_size = rules.FRICTION_FORM_SHARE, rules.FRICTION_FORM_NM
     moves: ClassVar[Literal["phi", "theta", "tau"]] = "phi"
     sign: ClassVar[float] = 1.0
+    knots_s: ClassVar[float] = rules.REST_KNOTS_S
 
     def sentence(self, n):
         return (
@@ -61,7 +63,7 @@ class Friction(Cause):
         """What it does while it holds: any torque that it takes, as it changes with the load."""
         rate_hz = trial.signals.rate_hz
         still = np.abs(self._sliding(trial.signals, robot, joint, shape)[0]) < 1.0
-        rests = free_while(still, rate_hz, rules.REST_KNOTS_S, rules.TEAM_SHORTEST_REST_S)
+        rests = free_while(still, rate_hz, self.knots_s, min(self.knots_s, rules.TEAM_SHORTEST_REST_S))
         return [self.trace(trial, robot, joint, rest) for rest in rests]
 
     def _sliding(self, signals: Signals, robot: int, joint: int, shape: Shape) -> Sequence[Array]:

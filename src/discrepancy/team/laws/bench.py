@@ -27,8 +27,9 @@ _NUMBERS = {
 _RUBBING = {
     "joint_friction": (("tau reading", "driven torque"), "phi"),
     "gimbal_friction": (("gimbal torque",), "theta"),
+    "sea_hysteresis": (("tau reading",), "tau"),
 }
-"""Places where friction is a torque, and the angle whose motion it follows."""
+"""Places where friction is a torque, and the signal whose change it follows."""
 
 
 class TeamBench(Bench):
@@ -104,9 +105,9 @@ class TeamBench(Bench):
         return place.robot == cause.robot and (named or cause.joint is None or place.joint == cause.joint)
 
     def is_form(self, law: LawCandidate, cause: Candidate) -> bool:
-        """Friction of a joint, told by the direction of its motion or by how far it gives way before it slides."""
-        places, angle = _RUBBING.get(cause.cause, ((), ""))
-        here = f"{angle}_{cause.robot}_{cause.joint}", f"{angle}_rate_{cause.robot}_{cause.joint}"
+        """Friction, told by the direction of the motion or by how far it gives way before it slides."""
+        places, signal = _RUBBING.get(cause.cause, ((), ""))
+        here = f"{signal}_{cause.robot}_{cause.joint}", f"{signal}_rate_{cause.robot}_{cause.joint}"
         forms = {("play", here[0]), ("sign", here[1]), ("linear", here[1])}
         return (
             law.at.name in places
