@@ -147,10 +147,13 @@ def _suffices(found: Hypothesis, named: Hypothesis) -> bool:
 def _replaces(found: Hypothesis, searched: Searched) -> bool:
     """Whether a law takes the place of causes that leave noise: there are fewer, or it is likelier by far.
 
-    No listed law is that of a real machine; what it is off by is no reason to take another (see ``parted``).
+    No listed law is that of a real machine; what it is off by is no reason to take another (see ``parted``). Nor does
+    what would pass for noise if nobody named it call for a law.
     """
     named, more = searched.best, len(found.free) - len(searched.best.free)
     if more > 0 or {cause.key for cause in named.causes} <= {cause.key for cause in found.causes}:
+        return False
+    if found.score - searched.nothing.score < rules.UNLISTED_NATS:
         return False
     if more < 0:
         return True

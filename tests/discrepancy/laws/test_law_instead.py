@@ -35,9 +35,17 @@ def test_more_causes_than_before_replace_nothing():
 
 @pytest.mark.parametrize("rivals", [0.0, 0.2])
 def test_one_for_one_only_beyond_the_doubt_in_laws(rivals):
-    """A cause worth 50 nats whose law may be off by 0.2: a rival's lead counts a fifth, 1 / (1 + 2 * 50 * 0.04)."""
-    least = rules.NAMED_NATS * (5.0 if rivals else 1.0)
+    """A cause worth 100 nats whose law may be off by 0.2: a rival's lead counts a ninth, 1 / (1 + 2 * 100 * 0.04)."""
+    least = rules.NAMED_NATS * (9.0 if rivals else 1.0)
     for lead, wanted in ((1.05 * least, True), (0.95 * least, False)):
         assert (
-            _replaces(hypothesis(50.0 + lead, "law"), named("payload", score=50.0, rivals=rivals)) is wanted
+            _replaces(hypothesis(100.0 + lead, "law"), named("payload", score=100.0, rivals=rivals)) is wanted
         )
+
+
+@pytest.mark.parametrize(("score", "wanted"), [(59.0, False), (61.0, True)])
+@pytest.mark.parametrize("causes", [("drive",), ("drive", "ripple")])
+def test_what_would_pass_for_noise_calls_for_no_law(causes, score, wanted):
+    """Less than 60 nats over nothing are no sign of something unlisted, with a law or without."""
+    assert rules.UNLISTED_NATS == 60.0
+    assert _replaces(hypothesis(score, "law"), named(*causes, score=5.0, rivals=0.2)) is wanted

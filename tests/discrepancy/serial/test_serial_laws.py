@@ -10,9 +10,13 @@ import mujoco
 import numpy as np
 import pytest
 
-from discrepancy.laws.candidate import LawCandidate
+from discrepancy.candidate import Parameter
+from discrepancy.laws.candidate import LawCandidate, candidate_of
+from discrepancy.laws.place import Place
+from discrepancy.laws.term import Term
 from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.rules import LAW_INSTEAD
+from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.diagnosis import diagnose_serial
 from discrepancy.serial.laws.places import POSITION, TORQUE
 from discrepancy.serial.laws.rig import LawfulSerialRig
@@ -181,6 +185,40 @@ def test_places_and_signals(model: SerialModel) -> None:
     assert "torque_3" in {v.name for v in elbow.without}
     assert "torque_3" not in {v.name for v in elbow.own}
     assert {"torque_1", "torque_3", "q_2", "direction_4", "load_1"} <= {v.name for v in bench.variables}
+
+
+def named(cause: str, joint: int | None, **more: object) -> SerialCandidate:
+    return SerialCandidate(cause, cause, None, joint, (Parameter("size", 0.0, 1.0),), **more)  # type: ignore[arg-type]
+
+
+def test_laws_that_are_listed_causes_in_another_form(model: SerialModel) -> None:
+    bench = LawfulSerialRig.of(model, [simulated(real(100), 0, seconds=6.0)]).bench
+    signals = {v.name: v for v in bench.variables}
+    torque = {p.joint: p for p in bench.places if p.name == TORQUE}
+    position = {p.joint: p for p in bench.places if p.name == POSITION}
+
+    def law(at: Place, function: str, of: str, **numbers: float) -> LawCandidate:
+        return candidate_of(at, Term(function, signals[of], numbers), 1.0, 100)
+
+    bent, dry = law(torque[3], "cube", "load_3"), law(torque[3], "play", "q_3", half_width=1e-3)
+    assert bench.is_form(bent, named("torque_scale", 3))
+    assert bench.is_form(dry, named("friction", 3))
+    assert not bench.is_form(bent, named("torque_scale", 2))
+    assert not bench.is_form(bent, named("friction", 3))
+    assert not bench.is_form(
+        law(torque[3], "linear", "torque_2"), named("torque_scale", 3)
+    )  # that is cross-talk
+    assert not bench.is_form(law(position[3], "play", "q_3", half_width=1e-3), named("friction", 3))
+    # Beside whatever has a form at that joint, or at the pair that it belongs to, and the whole arm.
+    assert bench.beside(torque[3], named("torque_scale", 3), named=True)
+    assert bench.beside(torque[3], named("coupled_drive", 4, part="pair", partner=3), named=True)
+    assert not bench.beside(torque[2], named("coupled_drive", 4, part="pair", partner=3), named=True)
+    assert bench.beside(torque[2], named("push", None), named=True)
+    assert not bench.beside(torque[2], named("push", None), named=False)
+    assert not bench.beside(
+        torque[3], named("payload", None), named=True
+    )  # a number, which has no other form
+    assert not bench.beside(torque[3], named("link_mass", 3), named=True)
 
 
 STATE = State(

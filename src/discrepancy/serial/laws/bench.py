@@ -4,17 +4,32 @@ from __future__ import annotations
 
 import numpy as np
 
+from discrepancy.candidate import Candidate
 from discrepancy.laws.bench import Bench
+from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.place import Place
 from discrepancy.laws.term import Term
 from discrepancy.laws.variable import Variable
 from discrepancy.rules import serial as rules
+from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.laws.places import TORQUE, places_of, signals_of, told_of, variables_of
 from discrepancy.serial.logs import Part
 from discrepancy.serial.mechanics.regressor import torque_of
 from discrepancy.serial.serial_rows import SerialRows
 from estimator.arrays import Array
 from estimator.filtering import differentiate
+
+_NUMBERS = {
+    "armature", "back_emf", "gravity_compensation", "gravity_direction", "joint_zero", "link_com", "link_inertia",
+    "link_length", "link_mass", "payload",
+}  # fmt: skip
+"""Causes that are numbers of the machine, not laws."""
+_DRY = {("play", "q"), ("sign", "dq"), ("linear", "direction")}
+_BENT = {(function, signal) for function in ("linear", "cube", "beyond") for signal in ("load", "torque")}
+_FORMS = {
+    "friction": _DRY, "stribeck": _DRY, "sublinear_friction": _DRY, "load_friction": _DRY, "torque_scale": _BENT
+}  # fmt: skip
+"""Functions and signals of a joint's own torque that are a listed cause in another form."""
 
 
 class SerialBench(Bench):
@@ -104,3 +119,26 @@ class SerialBench(Bench):
 
     def white(self, trial: int, columns: Array) -> Array:
         return self._rows.whitening[trial](columns)
+
+    def beside(self, place: Place, cause: Candidate, *, named: bool) -> bool:
+        """At the same joint; and what is named of the whole arm shows everywhere.
+
+        Numbers of the machine have no form that could be another.
+        """
+        assert isinstance(cause, SerialCandidate)
+        if cause.cause in _NUMBERS:
+            return False
+        if cause.joint is None:
+            return named
+        return place.joint in (cause.joint, cause.partner)
+
+    def is_form(self, law: LawCandidate, cause: Candidate) -> bool:
+        """Friction told by how far it gives way before it slides; a reading whose scale bends."""
+        term, joint = law.term, cause.joint
+        return (
+            (law.at.name, law.joint) == (TORQUE, joint)
+            and term.times is None
+            and any(
+                (term.function, term.of.name) == (f, f"{s}_{joint}") for f, s in _FORMS.get(cause.cause, ())
+            )
+        )
