@@ -28,7 +28,7 @@ class Scored:
         result: of the campaign.
         hits: for every hidden effect: whether its cause and joint are named, or among what cannot be told from it.
         families: the same of its family.
-        extras: what was named besides; terms of a friction that is there are not.
+        extras: what was named besides; terms of a friction that is there are not, nor the disc of a zero.
         stated: probability and rightness of every named cause.
     """
 
@@ -77,7 +77,9 @@ def score(result: Item) -> Scored:
     right += [
         n for n in named if n["cause"] in RUBS and n["joint"] in rubbing and not any(n is r for r in right)
     ]
-    extras = tuple(n for n in named if not any(n is r for r in right))
+    extras = tuple(
+        n for n in named if not any(n is r for r in right) and not any(_is_its_disc(n, e) for e in effects)
+    )
     stated = [(float(n["probability"]), any(n is r for r in right)) for n in named if n["cause"] != "law"]
     return Scored(result, tuple(hits), tuple(families), extras, tuple(stated))
 
@@ -88,6 +90,17 @@ def _is(named: Item, effect: Item, cause: str) -> bool:
     return any(
         n["cause"] == cause and (cause in ("payload", "push") or n.get("joint") == effect["joint"])
         for n in (named, *alike)
+    )
+
+
+def _is_its_disc(named: Item, effect: Item) -> bool:
+    """A law that says what a hidden zero has besides: its disc is off its axis, by 15 % of the zero once a turn."""
+    law = named.get("law") or {}
+    return (
+        effect["name"] == "zero"
+        and named.get("joint") == effect["joint"]
+        and (law.get("place"), law.get("function")) == ("joint position", "sine")
+        and law["numbers"]["times"] == 1.0
     )
 
 
