@@ -38,16 +38,19 @@ class Transient:
     Attributes:
         trial: index of its trial, from 0.
         start_s, duration_s: its interval on the trial's clock [s].
+        ramp_s: how long it grows at the start and fades at the end [s].
     """
 
     trial: int
     start_s: float
     duration_s: float
+    ramp_s: float = 0.0
 
     @property
     def shape(self) -> dict[str, float]:
         """The interval as the shape of a candidate."""
-        return {"start_s": self.start_s, "duration_s": self.duration_s}
+        ramp = {"ramp_s": self.ramp_s} if self.ramp_s else {}
+        return {"start_s": self.start_s, "duration_s": self.duration_s} | ramp
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ SIZES: dict[str, dict[str, Any]] = {
     "sea_bias": {"bias_Nm": 0.05},
     "sea_scale": {"scale": 0.02},
     "sea_hardening": {"cubic_Nm_per_rad3": 200.0},
-    "sea_hysteresis": {"friction_Nm": 0.05},
+    "sea_hysteresis": {"friction_Nm": 0.05, "presliding_Nm": 0.0},
     "joint_friction": {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.02},
     "gimbal_friction": {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.02},
     "torque_skew": {"delay_s": 0.0015},
@@ -33,7 +33,7 @@ SIZES: dict[str, dict[str, Any]] = {
     },
     "push": {
         "trial": 1, "start_s": 1.0, "duration_s": 0.5, "force_x_N": 3.0, "force_y_N": 0.0, "force_z_N": 1.0,
-        "point_x_m": 0.1, "point_y_m": 0.05, "point_z_m": 0.0,
+        "point_x_m": 0.1, "point_y_m": 0.05, "point_z_m": 0.0, "ramp_s": 0.0,
     },
     "drag": {"coefficient_Ns_per_m": 2.0, "turning_Nms_per_rad": 0.5},
     "slosh": {

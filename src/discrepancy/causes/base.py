@@ -1,6 +1,7 @@
 """What the causes of every rig have in common: names, sizes, words."""
 
 import inspect
+import math
 import re
 from abc import ABC
 from collections.abc import Mapping
@@ -29,6 +30,7 @@ class Cause(ABC):
         transient: whether it acts for a while in one trial.
         form_share: of its trace, in amplitude, by which a real one has another form than its law.
         form_size: of its first parameter, up to which it is that share; beyond, it grows with the root. 0: never.
+        scatters: how far a kind of it can scatter, a standard deviation in the unit of its first parameter.
         where: the part of the machine, of what sits at no robot.
         among: of how many it is one, where its shape says at which of many places it sits; 0 where places are listed.
         separate: what experiment would tell it from its look-alikes.
@@ -44,6 +46,7 @@ class Cause(ABC):
     transient: ClassVar[bool] = False
     form_share: ClassVar[float] = 0.0
     form_size: ClassVar[float] = 0.0
+    scatters: ClassVar[float] = math.inf
     where: ClassVar[str] = "payload"
     among: ClassVar[int] = 0
     separate: ClassVar[str] = ""
@@ -65,9 +68,11 @@ class Cause(ABC):
             Parameter(name, given.get(name, 0.0), scale)
             for name, scale in zip(self.parameters, self.tolerances or self.scales, strict=True)
         )
+        tolerance = parameters[0].tolerance
         return Candidate(
             self.name, self.family, robot, joint, parameters, dict(shape), where=self.where, title=self.title,
             among=self.among, form_share=self.form_share, form_size=self.form_size,
+            most_spread=max(1.0, self.scatters / tolerance) if tolerance else math.inf,
         )  # fmt: skip
 
     def event(self, given: Mapping[str, float], when: Transient) -> Candidate:

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.signal import lfilter, lfilter_zi
 
 from discrepancy import rules
+from discrepancy.causes.play import played
 from estimator.arrays import Array
 
 Numbers = Mapping[str, float]
@@ -70,15 +71,7 @@ def _warming(x: Array, rate_hz: float, numbers: Numbers) -> Array:
 
 def _play(x: Array, rate_hz: float, numbers: Numbers) -> Array:
     """How far a play of a half width stays behind, over that: within [-1, 1]."""
-    return (_played(x, numbers["half_width"]) - x)[:, None] / numbers["half_width"]
-
-
-def _played(x: Array, half_width: float) -> Array:
-    at, out = float(x[0]), []
-    for value in x.tolist():
-        at = min(max(at, value - half_width), value + half_width)
-        out.append(at)
-    return np.array(out)
+    return (played(x, numbers["half_width"]) - x)[:, None] / numbers["half_width"]
 
 
 def _lag(x: Array, rate_hz: float, numbers: Numbers) -> Array:

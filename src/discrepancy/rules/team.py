@@ -84,6 +84,19 @@ REST_KNOTS_S = 0.5
 SPRING_REST_KNOTS_S = 0.1
 """The same inside a spring, which rests while the load turns back, for a tenth of a second to a second. Measured on one
 set (0.23 N m): 6,800 nats with knots every 0.5 s, 10,300 every 0.2 s, 14,100 every 0.1 s."""
+SPRINGS_SCATTER = 0.05
+"""Of stiffnesses, at most. Chosen: `mocobot calibrate` takes 0.02; makers sell springs within a tenth. One of all is
+hardly told from the payload's mass: without a limit, friction and a creep in a team at ten times its tolerances were
+springs that are all 35 to 50 % off, and three tethers that make up for the weight of the arms."""
+TEAM_PUSH_RAMPS = (0.0, 0.15, 0.3, 0.5)
+"""In which a push grows and fades, over its duration, that are tried. Chosen: hands ramp; a half is a triangle."""
+PRESLIDINGS_NM = (0.05, 0.2)
+"""Torque that a spring takes up while the friction inside it gives way before it slips, tried first. Chosen: Bouc-Wen
+springs that yield over 0.3 to 3 mrad at 100 N m/rad."""
+PRESLIDING_RANGE_NM = (0.01, 1.0)
+"""Derived: less is passed within a sample; more is hardly ever turned round."""
+PRESLIDING_FINER = (0.5, 0.7, 0.85, 1.2, 1.4, 2.0)
+"""Shares of such a torque that are tried next. Chosen."""
 PLAY_FORCE_N = 0.4
 """Below which a payload may be anywhere in its play. Chosen."""
 PLAY_KNOTS_S = 0.2

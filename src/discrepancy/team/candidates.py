@@ -7,7 +7,7 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate, Transient
-from discrepancy.causes.intervals import intervals_near, worst_intervals
+from discrepancy.causes.intervals import intervals_near, ramped, worst_intervals
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.reduction import Reduction
 from estimator.arrays import Array
@@ -47,7 +47,7 @@ def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]
     """The candidate with each number of its shape that the data determine changed both ways, and by how much."""
     steps = []
     cause = CAUSES[candidate.cause]
-    for name in cause.determined:
+    for name in (name for name in cause.determined if name in candidate.shape):
         number = candidate.shape[name]
         step = cause.slope_step(name, number)
         less, more = (
@@ -58,8 +58,9 @@ def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]
 
 
 def nearby_events(cause: str, when: Transient, tolerance: Tolerances) -> list[Candidate]:
-    """A transient cause with its interval moved."""
-    return [CAUSES[cause].event(tolerance, near) for near in intervals_near(when, rules.TEAM_SHORTEST_PUSH_S)]
+    """A transient cause with its interval moved, or with other ramps."""
+    near = [*intervals_near(when, rules.TEAM_SHORTEST_PUSH_S), *ramped(when, rules.TEAM_PUSH_RAMPS)]
+    return [CAUSES[cause].event(tolerance, other) for other in near]
 
 
 def worst_events(

@@ -39,6 +39,8 @@ from mocobot_sim.extended.extended import write_extended
 class TeamRig(LawfulRows):
     """Recordings of one payload, linearised around the best unknowns without any cause, and their simulator."""
 
+    shaped = ("sea_hysteresis",)
+
     def effect_parameters(
         self, candidate: Candidate, values: Array, covariance: Array
     ) -> tuple[dict[str, float], dict[str, float]]:

@@ -1,6 +1,7 @@
 """Errors of readings: columns of causes against the full residual of signals spoiled by independent means."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -208,6 +209,36 @@ def test_columns_are_what_the_error_adds(case, name, robot):
                 single[k] = value
                 change = residual_of(case, spoiled(case, name, robot, joint, single)) - case.linear.residual
                 assert_close(column[..., k] * value, change, TOLERANCE.get(name, 0.01))
+
+
+def test_friction_that_gives_way_before_it_slips(case):
+    """A spring and a slider in series, step by step: it bends with the torque, never by more than its limit."""
+    cause, robot, joint, gives, friction = CAUSES["sea_hysteresis"], 1, 2, 0.1, 0.02
+    bent, states = 0.0, []
+    for step in np.diff(case.signals.tau[:, robot, joint], prepend=case.signals.tau[0, robot, joint]):
+        bent = min(max(bent + step / gives, -1.0), 1.0)
+        states.append(bent)
+    assert np.abs(states).max() == 1.0
+    assert np.mean(np.abs(states) < 0.9) > 0.1
+    tau = case.signals.tau.copy()
+    tau[:, robot, joint] -= friction * np.array(states)
+    changed = residual_of(case, replace(case.signals, tau=tau)) - case.linear.residual
+    shape = {"presliding_Nm": gives}
+    assert_close(cause.columns(case.linear, robot, joint, shape) @ [friction], changed, 0.03)
+    physical = cause.physical(np.array([friction]), SimpleNamespace(shape=shape))
+    assert physical == {"friction_Nm": friction, "presliding_Nm": gives}
+
+
+def test_how_far_friction_was_bent_before_is_open_until_it_slips(case):
+    cause, tau = CAUSES["sea_hysteresis"], case.signals.tau[:, 1, 2]
+    gives = 0.45 * np.ptp(tau)
+    (before,) = cause.unknowns(case.linear, 1, 2, {"presliding_Nm": gives})
+    first = case.signals.time[np.flatnonzero(np.abs(tau - tau[0]) > gives)[0]]
+    late = case.linear.reduction.time > first + 0.5
+    assert 0.05 < np.mean(~late) < 0.95
+    assert np.abs(before[late]).max() < 1e-3 * np.abs(before).max()
+    # What slips before the first row leaves nothing open.
+    assert cause.unknowns(case.linear, 1, 2, {"presliding_Nm": 0.01}) == []
 
 
 def test_clocks_late_by_as_much_are_nothing(case):

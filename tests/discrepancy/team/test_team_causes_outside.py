@@ -8,6 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
+from discrepancy.candidate import Transient
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.linear.trial_linear import linearise
@@ -135,6 +136,22 @@ def test_push(case, motion):
     assert (named - COM) @ applied == pytest.approx(0.0, abs=1e-9)
     assert (physical["trial"], physical["start_s"], physical["duration_s"]) == (2, 6.0, 3.0)
     np.testing.assert_allclose([physical[f"force_{a}_N"] for a in "xyz"], applied)
+
+
+@pytest.mark.parametrize("ramp_s", [0.6, 1.5])
+def test_push_with_ramps(case, motion, ramp_s):
+    """A trapezium by its corners; with half its duration a triangle."""
+    time, corners = case.signals.time, [6.0, 6.0 + ramp_s, 9.0 - ramp_s, 9.0]
+    window = np.interp(time, corners, [0.0, 1.0, 1.0, 0.0])[:, None]
+    applied, at = np.array([2.0, -1.0, 3.0]), COM
+    force = applied * window
+    shape = Transient(0, 6.0, 3.0, ramp_s).shape
+    columns = CAUSES["push"].columns(case.linear, 0, 0, shape)
+    moment = np.cross(motion[0] @ at, force)
+    changed = residual_of(case, relieved(case, motion, force, moment)) - case.linear.residual
+    assert_close((columns[..., :3] @ applied)[:, :15], changed[:, :15], 0.02)
+    assert reported(case, "push", np.append(applied, np.cross(at, applied)), shape, 2)["ramp_s"] == ramp_s
+    assert reported(case, "push", np.ones(6), {"start_s": 6.0, "duration_s": 3.0}, 2)["ramp_s"] == 0.0
 
 
 def test_slosh(case, motion):

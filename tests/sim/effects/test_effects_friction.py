@@ -1,5 +1,7 @@
 """Friction against Coulomb's law and closed forms, from MuJoCo's own constraint forces."""
 
+from types import SimpleNamespace
+
 import mujoco
 import numpy as np
 import pytest
@@ -53,6 +55,26 @@ def test_coulomb_friction_of_leg_2_opposes_the_motion_at_its_limit(tmp_path, cau
     sliding = np.abs(velocity) > (0.05 if cause == "joint_friction" else 0.005)
     assert sliding.mean() > 0.3
     np.testing.assert_allclose(force[sliding], -limit * np.sign(velocity[sliding]), rtol=1e-6)
+
+
+def test_a_slider_behind_a_spring(tmp_path):
+    """By hand: 0.2 N m of friction that gives way over 0.1 N m, which is 1 mrad of a spring of 100 N m/rad."""
+    effect = example("sea_hysteresis", friction_Nm=0.2, presliding_Nm=0.1)
+    loop = ClosedLoop(one_robot(tmp_path, effect))
+    assert not loop.model.dof_frictionloss.any()
+    (slider,) = effect.actors(None)
+    angles = iter([0.0, 0.5e-3, 4e-3, 3.5e-3, 2e-3, 2e-3])
+    qpos, dof = int(loop.index.spring_qpos[0, 1]), int(loop.index.spring_dof[0, 1])
+    loop.data.qpos[qpos] = next(angles)
+    slider.start(SimpleNamespace(data=loop.data, index=loop.index))
+    torques = []
+    for angle in angles:
+        loop.data.qpos[qpos], loop.data.qfrc_applied[:] = angle, 0.0
+        slider.act(0)
+        torques.append(loop.data.qfrc_applied[dof])
+        assert np.count_nonzero(loop.data.qfrc_applied) <= 1
+    np.testing.assert_allclose(torques, [-0.1, -0.2, -0.1, 0.2, 0.2], atol=1e-12)
+    assert example("sea_hysteresis").actors(None) == ()
 
 
 def test_joint_friction_acts_on_phi_and_not_on_the_reading(tmp_path):

@@ -165,6 +165,25 @@ def test_a_push_is_carried_by_the_wrists_springs():
     assert np.linalg.norm(log.p_W1[449] - clean.p_W1[449]) < 0.1e-3, "let go"
 
 
+def test_a_push_grows_and_fades():
+    """A trapezium by its corners, and a triangle that never grows to its height."""
+    loop = ClosedLoop(team_with("c"))
+    data, body = loop.data, loop.index.payload_body
+    for ramp, corners, heights in (
+        (0.5, [1.2, 1.7, 2.7, 3.2], [0.0, 1.0, 1.0, 0.0]),
+        (2.0, [1.2, 2.2, 3.2], [0.0, 0.5, 0.0]),
+    ):
+        effect = example("push", **PUSH | {"ramp_s": ramp})
+        for time in (1.1, 1.2, 1.45, 1.9, 2.2, 3.0, 3.3):
+            data.time = time
+            data.xfrc_applied[:] = 0.0
+            effect.act(loop.model, data, body, np.eye(3))
+            share = np.interp(time, corners, heights)
+            np.testing.assert_allclose(
+                data.xfrc_applied[body, :3], share * np.array([2.0, -1.0, 3.0]), atol=1e-9
+            )
+
+
 def test_a_push_is_force_and_moment_about_the_centre_of_mass():
     effect = example("push", **PUSH | {"start_s": 0.4})
     scene = team_with("c", effect)

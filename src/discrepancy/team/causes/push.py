@@ -1,4 +1,4 @@
-"""A push: a constant force on the payload during an interval of one trial."""
+"""A push: a force on the payload during an interval of one trial, constant or with ramps."""
 
 import numpy as np
 
@@ -8,9 +8,11 @@ from estimator.arrays import Array
 
 
 def during(trial: TrialLinear, shape: Shape) -> Array:
-    """1 during the interval of a shape, else 0, shape (Q,)."""
-    time = trial.signals.time
-    return ((time >= shape["start_s"]) & (time < shape["start_s"] + shape["duration_s"])).astype(float)
+    """1 during the interval of a shape but for its ramps, 0 outside, shape (Q,)."""
+    time, start, end = trial.signals.time, shape["start_s"], shape["start_s"] + shape["duration_s"]
+    inside = ((time >= start) & (time < end)).astype(float)
+    ramp = shape.get("ramp_s", 0.0)
+    return inside * np.clip(np.minimum(time - start, end - time) / ramp, 0.0, 1.0) if ramp else inside
 
 
 class Push(Cause):
@@ -32,9 +34,14 @@ class Push(Cause):
     separate = "Another trial: a push does not repeat."
 
     def sentence(self, n):
+        ramp = (
+            f", {n.values['ramp_s']:.2f} s of it to grow and as many to fade"
+            if n.values.get("ramp_s")
+            else ""
+        )
         return (
             f"something pushed the payload in trial {n.values['trial']:.0f} from {n.values['start_s']:.2f} s on for "
-            f"{n.values['duration_s']:.2f} s, with {n.vector('force', 'N')} along a line "
+            f"{n.values['duration_s']:.2f} s{ramp}, with {n.vector('force', 'N')} along a line "
             f"through {n.vector('point', 'm')} in {{1}}"
         )
 
@@ -56,7 +63,7 @@ class Push(Cause):
         point = context.p_1c + lever
         return (
             {"trial": context.trial or 1, "start_s": context.shape["start_s"]}
-            | {"duration_s": context.shape["duration_s"]}
+            | {"duration_s": context.shape["duration_s"], "ramp_s": context.shape.get("ramp_s", 0.0)}
             | {f"force_{axis}_N": float(x) for axis, x in zip("xyz", force, strict=True)}
             | {f"point_{axis}_m": float(x) for axis, x in zip("xyz", point, strict=True)}
         )
