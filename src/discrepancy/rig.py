@@ -64,6 +64,7 @@ class Rig(ABC):
     shaped: ClassVar[
         tuple[str, ...]
     ] = ()  # causes that have a tolerance, and a shape without which they may not show
+    reshaped: ClassVar[tuple[str, ...]] = ()  # the same, where what is healthy would have that shape, too
     curved: ClassVar[bool] = False  # whether exact residuals hold what is within its tolerance, too
     normal: ClassVar[bool] = False  # whether a simulation has what is normal as the other trials have it
 

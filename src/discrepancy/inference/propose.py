@@ -13,7 +13,7 @@ from discrepancy.inference.best_shape import nearest_shape
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.imitation import imitated
 from discrepancy.inference.other_forms import beside_other_forms
-from discrepancy.inference.scan import Scanned, scan, score_of, score_with, scores_with
+from discrepancy.inference.scan import Scanned, events_of, scan, score_of, score_with, scores_with
 from discrepancy.inference.twins import twins
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
@@ -51,7 +51,7 @@ def proposals(
     scanned = _with_kinds_held(base)
     loud = {item.candidate.joint for item in scanned if item.score > rules.LOOKED_AT_NATS}
     ranked = [_in_best_shape(rig, fit, item, loud) for item in scanned]
-    ranked += _events(rig, fit) if events else []
+    ranked += events_of(rig, fit) if events else []
     ranked.sort(key=lambda item: -item.score)
     best: Hypothesis | None = None  # each has its own columns: all together would be gigabytes
     other: Hypothesis | None = None
@@ -76,7 +76,8 @@ def _hypotheses(
 ) -> Iterator[Hypothesis]:
     """One after the other, each with one cause more in its best shape."""
     for item in _chosen(ranked, rules.LEADERS):
-        yield sharpened(rig, base, item, near=item.score > ranked[0].score - rules.CLOSE_NATS)
+        near = item.loud or item.score > ranked[0].score - rules.CLOSE_NATS
+        yield sharpened(rig, base, item, near=near)
     if narrow:
         yield from _with_kinds_narrow(rig, base)
 
@@ -111,7 +112,7 @@ def _with_kinds_held(base: Hypothesis) -> list[Scanned]:
 
 def _chosen(ranked: Sequence[Scanned], leaders: int) -> list[Scanned]:
     """The likeliest of all, and of every other cause that may be there its likeliest place."""
-    likely = [item for item in ranked if item.score > rules.LOOKED_AT_NATS]
+    likely = [item for item in ranked if item.loud or item.score > rules.LOOKED_AT_NATS]
     chosen, kinds = likely[:leaders], {item.candidate.cause for item in likely[:leaders]}
     for item in likely[leaders:]:
         if item.candidate.cause not in kinds:
@@ -127,31 +128,22 @@ def _in_best_shape(rig: Rig, fit: Fit, item: Scanned, loud: Collection[int | Non
     """
     if item.index is None:
         return item
-    best, healthy = item, 0.0
+    best, healthy, spike = item, 0.0, 0.0
     if fit.problem.has_tolerance(item.index):
-        if item.candidate.cause not in rig.shaped or item.candidate.joint not in loud:
+        cause = item.candidate.cause
+        if cause not in (*rig.shaped, *rig.reshaped) or item.candidate.joint not in loud:
             return item
         fit = Fit.of(fit.problem, fit.free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
-        # What the healthy one explains has its own shape, whatever that of the faulty one.
-        healthy = score_with(fit, item.candidate, rig.columns(item.candidate)) - item.score
+        if cause in rig.reshaped:
+            spike = float(fit.problem.spread[fit.problem.columns_of(item.index)][0])
+        else:
+            # What the healthy one explains has its own shape, whatever that of the faulty one.
+            healthy = score_with(fit, item.candidate, rig.columns(item.candidate)) - item.score
     each = [(shape, tuple(rig.columns(shape))) for shape in rig.refinements(item.candidate)]
-    for (shape, columns), score in zip(each, scores_with(fit, each), strict=True):
+    for (shape, columns), score in zip(each, scores_with(fit, each, spike), strict=True):
         if score - healthy > best.score:
             best = Scanned(item.index, shape, score - healthy, columns)
     return best
-
-
-def _events(rig: Rig, fit: Fit) -> list[Scanned]:
-    """What acts for a while, at the intervals where what is left is worst."""
-    there = [fit.problem.candidates[i] for i in fit.free]
-    found = []
-    for candidate in rig.transients([fit.remaining(t) for t in fit.problem.trials]):
-        # What is left of an event that is there is its form, and no other event.
-        if not any(candidate.overlaps(other) for other in there):
-            columns = tuple(rig.columns(candidate))
-            score = score_with(fit, candidate, columns, 1.0 if candidate.parameters[0].tolerance else 0.0)
-            found.append(Scanned(None, candidate, score, columns))
-    return sorted(found, key=lambda item: -item.score)[: rules.WORST_EVENTS]
 
 
 def _with_kinds_narrow(rig: Rig, base: Hypothesis) -> list[Hypothesis]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.inference.prior import log_prior_odds
 from discrepancy.least_squares.fit import Fit
+from discrepancy.rig import Rig
 from estimator.arrays import Array
 
 
@@ -23,12 +24,14 @@ class Scanned:
         candidate: itself, in its shape.
         score: log odds that it is there [nats].
         columns: of an event or a shape that is not the problem's, else None.
+        loud: whether it is looked at closely whatever its score.
     """
 
     index: int | None
     candidate: Candidate
     score: float
     columns: tuple[Array, ...] | None = None
+    loud: bool = False
 
 
 def scan(fit: Fit) -> list[Scanned]:
@@ -63,6 +66,28 @@ def scores_with(
         log_bayes_factor(*one, spike) + log_prior_odds(fit.problem, candidate)
         for (candidate, _), one in zip(each, told, strict=True)
     ]
+
+
+def events_of(rig: Rig, fit: Fit) -> list[Scanned]:
+    """What acts for a while, at the intervals where what is left is worst, the likeliest first.
+
+    Where nothing names an event, a trial's noise has the power of what it leaves, in which its first rough interval may
+    be nothing. So the one that stands out of noise as it should be is looked at in any case.
+    """
+    problem = fit.problem
+    there = [problem.candidates[i] for i in fit.free]
+    calm = problem.with_noise([np.minimum(power, 1.0) for power in problem.power], problem.spread)
+    quiet, found, stands_out = Fit.of(calm, fit.free), [], []
+    for candidate in rig.transients([fit.remaining(t) for t in problem.trials]):
+        # What is left of an event that is there is its form, and no other event.
+        if not any(candidate.overlaps(other) for other in there):
+            columns, spike = tuple(rig.columns(candidate)), 1.0 if candidate.parameters[0].tolerance else 0.0
+            found.append(Scanned(None, candidate, score_with(fit, candidate, columns, spike), columns))
+            stands_out.append(score_with(quiet, candidate, columns, spike))
+    if max(stands_out, default=0.0) > rules.NAMED_NATS:
+        most = int(np.argmax(stands_out))
+        found[most] = replace(found[most], loud=True)
+    return sorted(found, key=lambda item: (not item.loud, -item.score))[: rules.WORST_EVENTS]
 
 
 def log_bayes_factor(information: Array, score: Array, spike: float) -> float:
