@@ -95,6 +95,8 @@ PRESLIDINGS_NM = (0.05, 0.2)
 springs that yield over 0.3 to 3 mrad at 100 N m/rad."""
 PRESLIDING_RANGE_NM = (0.01, 1.0)
 """Derived: less is passed within a sample; more is hardly ever turned round."""
+PRESLIDINGS_RAD, PRESLIDING_RANGE_RAD = (5e-4, 2e-3), (5e-5, 1e-2)
+"""The same of a joint's friction, by its angle. Chosen: bristles of 0.2 to 2 mrad are met; a step of 16 bits is 0.1."""
 PRESLIDING_FINER = (0.5, 0.7, 0.85, 1.2, 1.4, 2.0)
 """Shares of such a torque that are tried next. Chosen."""
 PLAY_FORCE_N = 0.4

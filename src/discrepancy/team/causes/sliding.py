@@ -1,6 +1,6 @@
 """Dry friction while it slides, and when it does not."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -8,6 +8,7 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.causes.base import Shape
 from discrepancy.causes.free_while import free_while
+from discrepancy.causes.play import played
 from discrepancy.team.causes.base import Cause, one_joint, one_robot, stack
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
@@ -18,30 +19,47 @@ from estimator.filtering import differentiate, low_pass
 class Friction(Cause):
     """Friction of what a joint's signal tells the motion of: Coulomb and, unless a cause has one parameter, viscous.
 
-    At rest, below the rate that is its shape, it may have any value up to its limit.
+    At rest, below the rate that is its shape, it may have any value up to its limit. Or it gives way in proportion
+    before it slips, as a slider behind a spring does (Prandtl): it is reversed in full over twice what it gives way by.
 
     Attributes:
         moves: the signal.
         sign: of the torque's reading while that grows.
         knots_s: between knots of what is open while it holds.
+        gives: name of what it gives way by, in units of the signal.
+        gives_range: of that.
     """
 
     family = "dissipation"
     parameters = ("coulomb_Nm", "viscous_Nms_per_rad")
     tolerances = (2e-3, 2e-3)
     clipped = ("coulomb_Nm", "viscous_Nms_per_rad")
-    shapes = ({"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3})
+    shapes = (
+        {"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3}, *({"presliding_rad": x} for x in rules.PRESLIDINGS_RAD)
+    )  # fmt: skip
+    determined: ClassVar[Mapping[str, float]] = {"presliding_rad": 0.1}
     positive = ("coulomb_Nm",)
     form_share, form_size = rules.FRICTION_FORM_SHARE, rules.FRICTION_FORM_NM
     moves: ClassVar[Literal["phi", "theta", "tau"]] = "phi"
     sign: ClassVar[float] = 1.0
     knots_s: ClassVar[float] = rules.REST_KNOTS_S
+    gives: ClassVar[str] = "presliding_rad"
+    gives_range: ClassVar[tuple[float, float]] = rules.PRESLIDING_RANGE_RAD
 
     def sentence(self, n):
+        soft = f", after it has given way by {n(self.gives, 'mrad', 1e3)}" if n.values.get(self.gives) else ""
         return (
-            f"the {self.at} rubs with {n('coulomb_Nm', 'N m')} (Coulomb, while it moves) and "
+            f"the {self.at} rubs with {n('coulomb_Nm', 'N m')} (Coulomb, while it moves{soft}) and "
             f"{n('viscous_Nms_per_rad', 'N m s/rad')} (viscous)"
         )
+
+    def finer(self, shape):
+        least, most = self.gives_range
+        near = (shape[self.gives] * share for share in rules.PRESLIDING_FINER) if self.gives in shape else ()
+        return [{self.gives: x} for x in near if least <= x <= most]
+
+    def physical(self, values, context):
+        return super().physical(values, context) | {self.gives: context.shape.get(self.gives, 0.0)}
 
     def trace(self, trial: TrialLinear, robot: int, joint: int, torque: Array) -> Array:
         """What a torque of friction, shape (Q,), adds to the residual, shape (n, C)."""
@@ -60,15 +78,28 @@ class Friction(Cause):
         return signals.minus(tau=one_robot(one_joint(torque, joint), trial.robots, robot))
 
     def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> list[Array]:
-        """What it does while it holds: any torque that it takes, as it changes with the load."""
-        rate_hz = trial.signals.rate_hz
-        still = np.abs(self._sliding(trial.signals, robot, joint, shape)[0]) < 1.0
+        """What it does while it holds: any torque that it takes, as it changes with the load.
+
+        Where it gives way, how far it had before it slips for the first time.
+        """
+        rate_hz, state = trial.signals.rate_hz, np.abs(self._sliding(trial.signals, robot, joint, shape)[0])
+        if self.gives in shape:
+            before = self.trace(trial, robot, joint, (np.cumsum(state >= 1.0 - 1e-9) == 0).astype(float))
+            return [before] if before.any() else []
+        still = state < 1.0
         rests = free_while(still, rate_hz, self.knots_s, min(self.knots_s, rules.TEAM_SHORTEST_REST_S))
         return [self.trace(trial, robot, joint, rest) for rest in rests]
 
     def _sliding(self, signals: Signals, robot: int, joint: int, shape: Shape) -> Sequence[Array]:
-        """Direction of motion in [-1, 1], which fades to zero at rest, and rate; as many as there are parameters."""
-        (slow,) = shape.values()
+        """Direction of motion in [-1, 1], which fades to zero at rest, and rate; as many as there are parameters.
+
+        Where it gives way, how far it is bent in place of the direction.
+        """
+        (number,) = shape.values()
         x, rate_hz = getattr(signals, self.moves)[:, robot, joint], signals.rate_hz
-        rate = self.sign * differentiate(low_pass(x, rate_hz, rules.TEAM_SMOOTH_HZ), rate_hz)
-        return (np.clip(rate / slow, -1.0, 1.0), rate)[: len(self.parameters)]
+        smooth = low_pass(x, rate_hz, rules.TEAM_SMOOTH_HZ)
+        rate = self.sign * differentiate(smooth, rate_hz)
+        bent = (
+            self.sign * (smooth - played(smooth, number)) / number if self.gives in shape else rate / number
+        )
+        return (np.clip(bent, -1.0, 1.0), rate)[: len(self.parameters)]
