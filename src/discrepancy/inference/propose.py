@@ -128,19 +128,15 @@ def _in_best_shape(rig: Rig, fit: Fit, item: Scanned, loud: Collection[int | Non
     """
     if item.index is None:
         return item
-    best, healthy, spike = item, 0.0, 0.0
+    best, healthy = item, 0.0
     if fit.problem.has_tolerance(item.index):
-        cause = item.candidate.cause
-        if cause not in (*rig.shaped, *rig.reshaped) or item.candidate.joint not in loud:
+        if item.candidate.cause not in (*rig.shaped, *rig.reshaped) or item.candidate.joint not in loud:
             return item
         fit = Fit.of(fit.problem, fit.free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
-        if cause in rig.reshaped:
-            spike = float(fit.problem.spread[fit.problem.columns_of(item.index)][0])
-        else:
-            # What the healthy one explains has its own shape, whatever that of the faulty one.
-            healthy = score_with(fit, item.candidate, rig.columns(item.candidate)) - item.score
+        # What the healthy one explains has its own shape, whatever that of the faulty one.
+        healthy = score_with(fit, item.candidate, rig.columns(item.candidate)) - item.score
     each = [(shape, tuple(rig.columns(shape))) for shape in rig.refinements(item.candidate)]
-    for (shape, columns), score in zip(each, scores_with(fit, each, spike), strict=True):
+    for (shape, columns), score in zip(each, scores_with(fit, each), strict=True):
         if score - healthy > best.score:
             best = Scanned(item.index, shape, score - healthy, columns)
     return best
@@ -255,11 +251,8 @@ def _best_shape(rig: Rig, problem: Problem, free: Sequence[int], item: Scanned) 
     fit, spike = Fit.of(problem, free), 0.0
     if item.index is not None and problem.has_tolerance(item.index):
         # What it would add to a model without it: no need to build the problem anew for every shape.
+        # Held against none at all: a kind that scatters for want of the right shape would hide that in any.
         fit = Fit.of(problem, free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
-        if (
-            item.candidate.cause not in rig.shaped
-        ):  # there, what the healthy one explains is the same for all shapes
-            spike = float(problem.spread[problem.columns_of(item.index)][0])
     start = item.candidate
     if start.transient and start.parameters[0].tolerance:
         spike = 1.0
