@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.place import Place
@@ -21,10 +22,12 @@ class Bench(ABC):
     Attributes:
         places: all of them.
         variables: all signals, time among them.
+        left: share of the trace of a named cause, in amplitude, that its law is expected to leave at most.
     """
 
     places: Sequence[Place]
     variables: Sequence[Variable]
+    left: float = rules.LAW_SHARE
 
     @abstractmethod
     def rate_hz(self, trial: int) -> float:

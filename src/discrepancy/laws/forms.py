@@ -68,7 +68,7 @@ def refinement(
 ) -> Refinement | None:
     """What a law refines, where it explains no more than the laws of listed causes beside it are expected to leave.
 
-    Counted are causes that are named, each with ``LAW_SHARE``, and those within their kind's scatter whose form is
+    Counted are causes that are named, each with the share that the bench has for it, and those within their kind's scatter whose form is
     known to be another (``Candidate.form_share``), where what they leave may show at the law's place.
 
     Args:
@@ -88,7 +88,7 @@ def refinement(
         if not bench.beside(law.at, candidate, named=named):
             continue
         values = coefficients[span]
-        share = max(form_share_of(candidate, values), rules.LAW_SHARE if named else 0.0)
+        share = max(form_share_of(candidate, values), bench.left if named else 0.0)
         trace = float(values @ gram[span, span] @ values)
         if share > 0.0 and trace > 0.0:
             parts.append((share**2 * trace, trace, candidate))

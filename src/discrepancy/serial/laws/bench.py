@@ -41,6 +41,8 @@ class SerialBench(Bench):
         rows: of the logs.
     """
 
+    left = rules.FORM_SHARE
+
     def __init__(self, rows: SerialRows) -> None:
         self._rows = rows
         hints, joints = rows.hints, rows.joints
