@@ -68,8 +68,9 @@ def refinement(
 ) -> Refinement | None:
     """What a law refines, where it explains no more than the laws of listed causes beside it are expected to leave.
 
-    Counted are causes that are named, each with the share that the bench has for it, and those within their kind's scatter whose form is
-    known to be another (``Candidate.form_share``), where what they leave may show at the law's place.
+    Counted are causes that are named, each with the share that the bench has for it, and those within their kind's
+    scatter whose form is known to be another (``Candidate.form_share``), where what they leave may show at the law's
+    place.
 
     Args:
         hypothesis: with the law.

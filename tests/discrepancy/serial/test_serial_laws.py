@@ -202,6 +202,7 @@ def test_laws_that_are_listed_causes_in_another_form(model: SerialModel) -> None
 
     bent, dry = law(torque[3], "cube", "load_3"), law(torque[3], "play", "q_3", half_width=1e-3)
     assert bench.is_form(bent, named("torque_scale", 3))
+    assert bench.is_form(law(torque[3], "spline", "load_3", low=-1.0, step=0.3), named("torque_scale", 3))
     assert bench.is_form(dry, named("friction", 3))
     assert not bench.is_form(bent, named("torque_scale", 2))
     assert not bench.is_form(bent, named("friction", 3))

@@ -25,7 +25,9 @@ _NUMBERS = {
 }  # fmt: skip
 """Causes that are numbers of the machine, not laws."""
 _DRY = {("play", "q"), ("sign", "dq"), ("linear", "direction")}
-_BENT = {(function, signal) for function in ("linear", "cube", "beyond") for signal in ("load", "torque")}
+_BENT = {
+    (function, signal) for function in ("linear", "cube", "beyond", "spline") for signal in ("load", "torque")
+}
 _FORMS = {
     "friction": _DRY, "stribeck": _DRY, "sublinear_friction": _DRY, "load_friction": _DRY, "torque_scale": _BENT
 }  # fmt: skip
