@@ -56,7 +56,15 @@ def proposals(
     best: Hypothesis | None = None  # each has its own columns: all together would be gigabytes
     other: Hypothesis | None = None
     scores: dict[tuple[object, ...], tuple[Candidate, float]] = {}
-    for new in _hypotheses(rig, base, ranked, narrow=narrow):
+    rough: Scanned | None = None  # of the best, as long as its shape is
+    offered = _hypotheses(rig, base, ranked, narrow=narrow)
+    while True:
+        item, new = next(offered, (None, None))
+        if new is None:
+            if rough is None or not rig.refinements(rough.candidate):
+                break
+            # Kinds that scatter are scanned as if they did not: where robots are off everywhere nothing else is near.
+            new, rough = sharpened(rig, base, rough, near=True), None
         new = beside_other_forms(rig, new, new.free[-1], base)
         last = new.causes[-1]
         which = (last.key, last.transient)
@@ -65,7 +73,7 @@ def proposals(
         if new.possible(rig, new.free[-1]) and not imitated(rig, base, last):
             scores[which] = last, new.score
             if best is None or new.score > best.score:
-                best = new
+                best, rough = new, item
             if known is not None and last.key != known.key and (other is None or new.score > other.score):
                 other = new
     return Proposed(best, tuple(sorted(scores.values(), key=lambda one: -one[1])), other)
@@ -73,13 +81,13 @@ def proposals(
 
 def _hypotheses(
     rig: Rig, base: Hypothesis, ranked: Sequence[Scanned], *, narrow: bool
-) -> Iterator[Hypothesis]:
-    """One after the other, each with one cause more in its best shape."""
+) -> Iterator[tuple[Scanned | None, Hypothesis]]:
+    """One after the other, each with one cause more, and its item where its shape has not been sharpened."""
     for item in _chosen(ranked, rules.LEADERS):
         near = item.loud or item.score > ranked[0].score - rules.CLOSE_NATS
-        yield sharpened(rig, base, item, near=near)
+        yield None if near else item, sharpened(rig, base, item, near=near)
     if narrow:
-        yield from _with_kinds_narrow(rig, base)
+        yield from ((None, new) for new in _with_kinds_narrow(rig, base))
 
 
 def _with_kinds_held(base: Hypothesis) -> list[Scanned]:
