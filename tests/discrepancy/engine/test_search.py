@@ -149,6 +149,30 @@ def test_event_is_found_in_a_shape_that_is_not_the_catalogues():
     assert unseen < rules.NAMED_NATS  # the scan alone would not have
 
 
+class HalfSeenRig(FakeRig):
+    """The last cause has a tolerance; in the catalogue's shape half of its trace is that of something else."""
+
+    def columns(self, candidate):
+        columns = super().columns(candidate)
+        if candidate.cause != "bent" or candidate.shape:
+            return columns
+        return [c + np.roll(c, 31, axis=0) for c in columns]
+
+    def refinements(self, candidate, *, finer=False):
+        return [] if finer or candidate.cause != "bent" else [replace(candidate, shape={"right": 1.0})]
+
+
+def test_the_likeliest_is_in_its_best_shape_however_far_others_scatter():
+    """Held within their tolerance, nine places that scatter by 100 of them are worth thousands of nats each."""
+    rng = np.random.default_rng(6)
+    values = dict(enumerate(100.0 * rng.standard_normal(9))) | {9: 30.0}
+    rig = HalfSeenRig(values, catalogue=(*NINE, cause("bent", tolerance=1.0)), seed=5)
+    found = found_in(rig).found
+    assert names(found) == ["bent"]
+    assert found[0].candidate.shape == {"right": 1.0}
+    assert found[0].values[0] == pytest.approx(30.0, abs=3.0)
+
+
 def test_misfit_of_unknown_origin_is_unexplained():
     diagnosis = diagnose(FakeRig({}, foreign=3.0), closed_loop=False)
     assert diagnosis.verdict == "unexplained"
