@@ -1,6 +1,7 @@
 """A quantity that may have any value for a while."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,15 +16,26 @@ def free_while(
 
     Intervals shorter than ``shortest_s`` have none.
     """
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int))).reshape(-1, 2)
     out = []
+    for at, units in pieces_while(where, rate_hz, knots_s, shortest_s):
+        for unit in units.T:
+            column = np.zeros(len(where))
+            column[at] = unit
+            out.append(column)
+    return out
+
+
+def pieces_while(
+    where: NDArray[np.bool_], rate_hz: float, knots_s: float, shortest_s: float = 0.0
+) -> Iterator[tuple[slice, Array]]:
+    """The same, interval by interval: its s samples, and its k columns there, shape (s, k)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int))).reshape(-1, 2)
     for start, stop in edges:
         if stop - start < shortest_s * rate_hz:
             continue
         pieces = math.ceil((stop - start) / rate_hz / knots_s)
-        knots = np.linspace(start, stop - 1, pieces + 1)
-        for unit in np.eye(pieces + 1):
-            column = np.zeros(len(where))
-            column[start:stop] = np.interp(np.arange(start, stop), knots, unit)
-            out.append(column)
-    return out
+        knots, here = np.linspace(start, stop - 1, pieces + 1), np.arange(start, stop)
+        yield (
+            slice(start, stop),
+            np.stack([np.interp(here, knots, unit) for unit in np.eye(pieces + 1)], axis=1),
+        )

@@ -41,7 +41,9 @@ class _Parts:
     """The columns that are in a hypothesis.
 
     Attributes:
-        grams: Gram matrices of every cell that has numbers, the residual last, shape (K, (used + 1)^2).
+        grams: upper triangles of the Gram matrices of every cell that has numbers, the residual last, shape (K, half)
+            with half = m (m + 1) / 2 and m = used + 1.
+        upper: rows and columns of these, shape (half,) each.
         sizes: numbers in every cell, shape (K,).
         group: of every used column: -1 for shared unknowns, else the number of its spread.
         least, most: spread that a group has at least and at most, shape (groups,).
@@ -51,6 +53,7 @@ class _Parts:
     """
 
     grams: Array
+    upper: tuple[Indices, Indices]
     sizes: Array
     group: Indices
     least: Array
@@ -146,14 +149,16 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
     used = np.flatnonzero(group > -2)
     both = np.append(used, count)
     sizes = [c.sizes[c.sizes > 0] for c in problem.cells]
-    grams = np.empty((sum(map(len, sizes)), len(both), len(both)))
+    upper = np.triu_indices(len(both))
+    at = both[upper[0]] * (count + 1) + both[upper[1]]
     pairs = zip(problem.cell_grams, problem.cells, strict=True)
     filled = (gram[cell] for gram, c in pairs for cell in np.flatnonzero(c.sizes))
+    grams = np.empty((sum(map(len, sizes)), len(at)))
     for one, gram in zip(grams, filled, strict=True):
-        np.take(gram[both], both, axis=1, out=one, mode="clip")
+        np.take(gram, at, out=one, mode="clip")
     parts = _Parts(
-        grams.reshape(len(grams), -1), np.concatenate(sizes).astype(float), group[used], np.array(least),
-        np.array(most), np.array(weight), np.array(own, dtype=bool), groups,
+        grams, upper, np.concatenate(sizes).astype(float), group[used], np.array(least), np.array(most),
+        np.array(weight), np.array(own, dtype=bool), groups,
     )  # fmt: skip
     return names, parts
 
@@ -161,7 +166,9 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
 def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Array]:
     """Log evidence with its priors at given powers and spreads, and the next ones."""
     count = len(parts.group) + 1
-    gram = ((1.0 / power) @ parts.grams).reshape(count, count)
+    gram = np.zeros((count, count))
+    gram[parts.upper] = (1.0 / power) @ parts.grams
+    gram += np.triu(gram, 1).T
     H, b, c = gram[:-1, :-1], gram[:-1, -1], gram[-1, -1]
     shared = parts.group < 0
     with np.errstate(divide="ignore"):
@@ -186,7 +193,8 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
     x = np.append(-solution, 1.0)
     both = np.zeros((2, count, count))
     both[0], both[1, :-1, :-1] = np.outer(x, x), covariance
-    left, spent = (parts.grams @ both.reshape(2, -1).T).T
+    both *= 2.0 - np.eye(count)  # what is below the diagonal counts, too
+    left, spent = (parts.grams @ both[:, *parts.upper].T).T
     spent = spent / power
     power_next = (left + rules.POWER_NUMBERS) / (np.maximum(parts.sizes - spent, 1.0) + rules.POWER_NUMBERS)
     # Next spreads: squares over the numbers that the data determine.

@@ -225,14 +225,12 @@ def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hy
     unknowns = rig.unknowns(shaped)
     if not any(u.shape[2] for u in unknowns):
         return new
-    size = abs(float(new.fit.part(index)[0][0] * shaped.units[0]))
     start = problem.with_noise(new.problem.power, new.problem.spread)
-    # Its size is found with them, and is theirs.
-    first = start.with_unknowns(shaped.key, unknowns, max(size, shaped.parameters[0].tolerance))
-    size = abs(float(Hypothesis.of(first, new.free, base.allowed).fit.part(index)[0][0] * shaped.units[0]))
-    del first  # for the sake of memory
-    opened = start.with_unknowns(shaped.key, unknowns, max(size, shaped.parameters[0].tolerance))
-    other = Hypothesis.of(opened, new.free, base.allowed)
+    along, opened, other = start.along(unknowns), start, new
+    for _ in range(2):  # its size is found with them, and is theirs
+        size = abs(float(other.fit.part(index)[0][0] * shaped.units[0]))
+        opened = start.with_open(shaped.key, along, max(size, shaped.parameters[0].tolerance))
+        other = Hypothesis.of(opened, new.free, base.allowed)
     if other.score <= new.score:
         return new
     healthy = Hypothesis.of(opened, base.free, base.allowed)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dct, idct
 
 from discrepancy import rules
+from discrepancy.least_squares.gram import flat_gram
 from estimator.arrays import Array
 
 
@@ -68,9 +71,14 @@ class Cells:
 
     def grams(self, a: Array, b: Array) -> Array:
         """a^T b over the numbers of every cell, shapes (n, C, k), (n, C, l) -> (K, k, l)."""
-        a, b, index = a.reshape(-1, a.shape[2]), b.reshape(-1, b.shape[2]), self.index.ravel()
-        out = np.zeros((len(self.sizes), a.shape[1], b.shape[1]))
-        for cell in np.flatnonzero(self.sizes):
-            at = index == cell
-            out[cell] = a[at].T @ b[at]
-        return out
+        same, count = a is b, self.index.size
+        a = np.take(a.reshape(count, a.shape[2]), self._by_cell, axis=0)
+        b = a if same else np.take(b.reshape(count, b.shape[2]), self._by_cell, axis=0)
+        spans = [slice(*pair) for pair in pairwise([0, *np.cumsum(self.sizes)])]
+        pairs = ((a[at], b[at]) for at in spans)
+        return np.array([flat_gram(one, one if same else other) for one, other in pairs])
+
+    @cached_property
+    def _by_cell(self) -> NDArray[np.intp]:
+        """The numbers in the order of their cells."""
+        return np.argsort(self.index.ravel(), kind="stable")

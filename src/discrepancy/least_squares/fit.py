@@ -154,7 +154,7 @@ class Fit:
         own = self.problem.local[trial]
         left = self.problem.raw_times(trial, np.append(-self.coefficients, 1.0))
         # What causes leave open has unit size: so many rows more.
-        opened = [each[trial].columns for each in self.problem.opened.values()]
+        opened = [each[trial].scaled for each in self.problem.opened.values()]
         columns = np.concatenate([own, *opened], axis=2).reshape(left.size, -1)
         more = np.eye(columns.shape[1])[own.shape[2] :]
         right = np.append(left.ravel(), np.zeros(len(more)))

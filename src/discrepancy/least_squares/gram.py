@@ -11,12 +11,17 @@ from estimator.arrays import Array
 def gram_of(a: Array, b: Array) -> Array:
     """a^T b over rows and channels, in double precision, shapes (n, C, k), (n, C, l) -> (k, l)."""
     count = a.shape[0] * a.shape[1]
-    a, b = a.reshape(count, a.shape[2]), b.reshape(count, b.shape[2])
-    if a.dtype == np.float64:
+    return flat_gram(a.reshape(count, a.shape[2]), b.reshape(count, b.shape[2]))
+
+
+def flat_gram(a: Array, b: Array) -> Array:
+    """The same of shapes (n, k), (n, l)."""
+    if a.dtype == b.dtype == np.float64:
         return a.T @ b
     out = np.zeros((a.shape[1], b.shape[1]))
-    for part in _parts(count):
-        out += a[part].astype(np.float64).T @ b[part]
+    for part in _parts(len(a)):
+        wide = a[part].astype(np.float64)
+        out += wide.T @ (wide if a is b else b[part])
     return out
 
 

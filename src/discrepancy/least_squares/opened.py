@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -19,16 +20,16 @@ class Opened:
     again. With U = Q diag(s) V^T that is y - Q diag(f) Q^T y, f = 1 - 1 / sqrt(1 + size^2 s^2).
 
     Attributes:
-        columns: of the unknowns in units of their size, as they were given, shape (n, C, k).
+        columns: of the unknowns, as they were given, shape (n, C, k).
         basis: Q, of the rows that ``of`` was given as ``left``: here in the cells' transform, shape (n, C, r).
-        shrink: f, shape (r,).
-        price: log sqrt det of the covariance [nats].
+        stretch: s, shape (r,).
+        size: standard deviation of the unknowns.
     """
 
     columns: Array
     basis: Array
-    shrink: Array
-    price: float
+    stretch: Array
+    size: float
 
     @classmethod
     def of(cls, columns: Array, size: float, left: Array | None = None) -> Opened:
@@ -39,16 +40,30 @@ class Opened:
             size: standard deviation of their values.
             left: what other unknowns leave of these columns, where there are such; the same shape.
         """
-        given = size * columns
-        scaled = given if left is None else size * left
-        if not np.any(scaled):
-            return cls(given, np.zeros((*columns.shape[:2], 0)), np.zeros(0), 0.0)
-        flat = scaled.reshape(-1, scaled.shape[2])
-        u, s, _ = np.linalg.svd(flat, full_matrices=False)
-        keep = s > 1e-6 * max(s[0], 1.0)
-        variance = 1.0 + s[keep] ** 2
-        basis = np.ascontiguousarray(u[:, keep]).reshape(*columns.shape[:2], -1)
-        return cls(given, basis, 1.0 - variance**-0.5, 0.5 * float(np.sum(np.log(variance))))
+        rows = columns if left is None else left
+        if not np.any(rows):
+            return cls(columns, np.zeros((*columns.shape[:2], 0)), np.zeros(0), size)
+        flat = rows.reshape(-1, rows.shape[2])
+        # Of the small triangle alone: of all rows it takes six times as long.
+        _, s, Vt = np.linalg.svd(np.linalg.qr(flat, mode="r"), full_matrices=False)
+        keep = s > 1e-6 * s[0]
+        basis = flat @ (Vt[keep].T / s[keep])
+        return cls(columns, basis.reshape(*columns.shape[:2], -1), s[keep], size)
+
+    @property
+    def scaled(self) -> Array:
+        """Columns of unknowns whose standard deviation is 1."""
+        return self.size * self.columns
+
+    @cached_property
+    def shrink(self) -> Array:
+        """f, shape (r,)."""
+        return 1.0 - (1.0 + (self.size * self.stretch) ** 2) ** -0.5
+
+    @property
+    def price(self) -> float:
+        """Log sqrt det of the covariance [nats]."""
+        return 0.5 * float(np.sum(np.log1p((self.size * self.stretch) ** 2)))
 
     def single(self) -> Opened:
         """The same in single precision."""
@@ -56,15 +71,38 @@ class Opened:
 
     def along(self, x: Array) -> Array:
         """How much of columns lies along the unknowns, and is taken out, shape (n, C, l) -> (r, l)."""
-        if not len(self.shrink):
+        if not len(self.stretch):
             return np.zeros((0, x.shape[2]))
         return self.shrink[:, None] * gram_of(self.basis, x)
 
     def __call__(self, x: Array) -> Array:
         """Rows that are white with these unknowns integrated out, shape (n, C, l) -> the same."""
-        if not len(self.shrink) or not x.size:
+        if not len(self.stretch) or not x.size:
             return x
         return np.asarray(x - added_up(self.basis, self.along(x)))
+
+
+@dataclass(frozen=True, eq=False)
+class Along:
+    """A trial's columns along unknowns, by cell of its noise: made once, for unknowns of whatever size.
+
+    Attributes:
+        opened: the unknowns, of any size.
+        edge: products of their basis with all columns over every cell, shape (K, r, columns).
+        inside: of their basis with itself, shape (K, r, r).
+    """
+
+    opened: Opened
+    edge: Array
+    inside: Array
+
+    def of_size(self, size: float) -> tuple[Opened, Array, Array]:
+        """The unknowns of a size, what lies along them (r, columns), what Gram matrices lose (K, columns, columns)."""
+        opened = replace(self.opened, size=size)
+        # All cells together: the transform is orthonormal.
+        shares = opened.shrink[:, None] * self.edge.sum(axis=0)
+        cross = shares.T @ (self.edge - 0.5 * (self.inside @ shares))
+        return opened, shares, cross + np.swapaxes(cross, 1, 2)
 
 
 def through(opened: Sequence[Opened], x: Array) -> Array:

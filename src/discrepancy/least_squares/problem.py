@@ -14,7 +14,7 @@ from discrepancy.candidate import Candidate
 from discrepancy.least_squares.cells import Cells
 from discrepancy.least_squares.columns import Columns, held
 from discrepancy.least_squares.gram import added_up, gram_of, orthonormal, project
-from discrepancy.least_squares.opened import Opened, through
+from discrepancy.least_squares.opened import Along, Opened, through
 from discrepancy.rig import Rows
 from estimator.arrays import Array
 
@@ -146,8 +146,9 @@ class Problem:
     @cached_property
     def grams(self) -> Array:
         """Gram matrices of every trial, every cell over its power, shape (trials, columns, columns)."""
-        pairs = zip(self.power, self.cell_grams, strict=True)
-        return np.array([np.tensordot(1.0 / power, grams, 1) for power, grams in pairs])
+        return np.array(
+            [np.tensordot(1.0 / p, g, 1) for p, g in zip(self.power, self.cell_grams, strict=True)]
+        )
 
     @cached_property
     def weights(self) -> list[Array]:
@@ -176,8 +177,7 @@ class Problem:
 
     def weighted(self, trial: int) -> Array:
         """The same as a fit weighs them: every cell of the noise over its power, shape (n, C, columns)."""
-        weighted = self.spectra_of(trial, slice(None)) * np.sqrt(self.weights[trial])
-        return self.cells[trial].series(weighted)
+        return self.cells[trial].series(self.spectra_of(trial, slice(None)) * np.sqrt(self.weights[trial]))
 
     def without_own(self, trial: int, x: Array) -> Array:
         """Rows without what the trial's own unknowns, and those that causes leave open, can explain, (n, C, k)."""
@@ -241,27 +241,30 @@ class Problem:
             shares={key: tuple(each) for key, each in shares.items()},
         )  # fmt: skip
 
+    def along(self, unknowns: Sequence[Array]) -> tuple[Along, ...]:
+        """All columns along what may be left open, columns (n, C, k) per trial, of whatever size."""
+        own = [Opened.of(u, 1.0, self.spectrum(t, u)) for t, u in enumerate(unknowns)]
+        own = [one.single() if x.is_single else one for one, x in zip(own, self.columns, strict=True)]
+        return tuple(
+            Along(one, np.swapaxes(self._grams(t, one.basis), 1, 2), cells.grams(one.basis, one.basis))
+            for t, (one, cells) in enumerate(zip(own, self.cells, strict=True))
+        )
+
+    def with_open(self, key: Key, along: Sequence[Along], size: float) -> Problem:
+        """The problem with what a cause leaves open, whose values scatter by ``size``."""
+        if key in self.opened or not any(len(one.opened.stretch) for one in along):
+            return self
+        opened, shares, lost = zip(*(one.of_size(size) for one in along), strict=True)
+        return replace(
+            self, cell_grams=tuple(gram - less for gram, less in zip(self.cell_grams, lost, strict=True)),
+            opened={**self.opened, key: opened}, shares={**self.shares, key: shares},
+        )  # fmt: skip
+
     def with_unknowns(self, key: Key, unknowns: Sequence[Array], size: float) -> Problem:
-        """The problem with what a cause leaves open: columns (n, C, k) per trial, values that scatter by ``size``."""
+        """The same from its columns, shape (n, C, k) per trial."""
         if key in self.opened or not any(u.shape[2] for u in unknowns):
             return self
-        own = [Opened.of(u, size, self.spectrum(t, u)) for t, u in enumerate(unknowns)]
-        own = [one.single() if x.is_single else one for one, x in zip(own, self.columns, strict=True)]
-        shares, grams = [], []
-        for t, (one, cells, gram) in enumerate(zip(own, self.cells, self.cell_grams, strict=True)):
-            if not len(one.shrink):
-                shares.append(np.zeros((0, self.width)))
-                grams.append(gram)
-                continue
-            shares.append(one.shrink[:, None] * self.products(t, one.basis).T)  # the transform is orthonormal
-            edge = np.swapaxes(self._grams(t, one.basis), 1, 2)
-            inside = cells.grams(one.basis, one.basis) @ shares[t]
-            cross = np.einsum("ji,kjl->kil", shares[t], edge - 0.5 * inside, optimize=True)
-            grams.append(gram - cross - np.swapaxes(cross, 1, 2))
-        return replace(
-            self, cell_grams=tuple(grams), opened={**self.opened, key: tuple(own)},
-            shares={**self.shares, key: tuple(shares)},
-        )  # fmt: skip
+        return self.with_open(key, self.along(unknowns), size)
 
     def without_unknowns(self, keep: Collection[Key]) -> Problem:
         """The problem without what causes other than those to keep leave open."""
@@ -271,7 +274,7 @@ class Problem:
         again = replace(self, cell_grams=grams, opened={}, shares={})
         for key, own in self.opened.items():
             if key in keep:
-                again = again.with_unknowns(key, [one.columns for one in own], 1.0)
+                again = again.with_unknowns(key, [one.columns for one in own], own[0].size)
         return again
 
     @property

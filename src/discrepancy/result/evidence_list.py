@@ -66,8 +66,7 @@ def _with_shapes(explanation: Explanation) -> tuple[Problem, dict[int, Problem]]
     for index, candidate in zip(at, best.causes, strict=True):
         own = best.problem.opened.get(candidate.key)
         left_open = [one.columns for one in own] if own else []
-        # What it leaves open has unit size already.
-        out[index] = problem.with_unknowns(candidate.key, left_open, 1.0)
+        out[index] = problem.with_unknowns(candidate.key, left_open, own[0].size if own else 0.0)
     return problem, out
 
 

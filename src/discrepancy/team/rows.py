@@ -29,7 +29,7 @@ from discrepancy.team.imitators import wrong_torques
 from discrepancy.team.linear.adjust import as_loud, noise_of
 from discrepancy.team.linear.elsewhere import HEALTHY, found_at, resting_of
 from discrepancy.team.linear.noise import Noise
-from discrepancy.team.linear.origin import origin_of
+from discrepancy.team.linear.origin import beyond, origin_of
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, start_shared
 from discrepancy.team.linear.trial_linear import TrialLinear
@@ -182,8 +182,8 @@ class TeamRows(Rig):
     def _undo(self, trial: int, candidate: Candidate, values: Array, signals: Signals) -> Signals | None:
         """A trial's signals as they would be without a cause, or None where it is not an error of the signals."""
         robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-        cause, beyond = CAUSES[candidate.cause], self.beyond(candidate, values)
-        return cause.undo(signals, self.linear[trial], robot, joint, beyond, candidate.shape)
+        own = self.beyond(candidate, values)
+        return CAUSES[candidate.cause].undo(signals, self.linear[trial], robot, joint, own, candidate.shape)
 
     def _without(
         self, trial: int, active: Sequence[tuple[Candidate, Array]], noise: Signals | None = None
@@ -206,20 +206,18 @@ class TeamRows(Rig):
         return CAUSES[candidate.cause].possible(values, se, candidate.shape)
 
     def unknowns(self, candidate: Candidate) -> list[Array]:
-        out = []
         robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-        for linear, white in zip(self.linear, self.whitening, strict=True):
-            columns = CAUSES[candidate.cause].unknowns(linear, robot, joint, candidate.shape)
-            empty = np.zeros((*linear.residual.shape, 0))
-            out.append(white(np.stack(columns, axis=-1)) if columns else empty)
-        return out
+        of = CAUSES[candidate.cause].unknowns
+        pairs = zip(self.linear, self.whitening, strict=True)
+        return [white(of(linear, robot, joint, candidate.shape)) for linear, white in pairs]
 
     def rows(self, candidates: Sequence[Candidate]) -> Iterator[Rows]:
         for t, linear in enumerate(self.linear):
             causes = [self._columns(t, candidate) for candidate in candidates]
             residual = self.whitening[t](linear.residual)
             for candidate, columns in zip(candidates, causes, strict=True):
-                residual += self._at_origin(candidate, columns)
+                there = origin_of(candidate, self.origin)
+                residual += 0.0 if there is None else columns @ there
             yield Rows(
                 self.recordings[t].name,
                 residual,
@@ -231,23 +229,27 @@ class TeamRows(Rig):
                 groups_of(self.robots),
             )
 
-    def _at_origin(self, candidate: Candidate, columns: Array) -> Array | float:
-        """What the robots, as they were found, take out of the residual: values are counted from the design."""
-        origin = origin_of(candidate, self.origin)
-        return 0.0 if origin is None else columns @ origin
+    def _at_origin(self, trial: int, candidate: Candidate) -> Array | float:
+        """What the robots, as they were found, have of it: out of the residual, for values count from the design."""
+        there = origin_of(candidate, self.origin)
+        return 0.0 if there is None else self._columns(trial, candidate) @ there
+
+    def _all_at_origin(self, trial: int) -> Array:
+        """The same of all candidates, shape (n, C)."""
+        key = (trial, "origin")
+        if key not in self.kept:
+            self.kept[key] = np.zeros(self.linear[trial].residual.shape)
+            self.kept[key] += sum(self._at_origin(trial, c) for c in self.candidates())
+        return self.kept[key]
 
     def beyond(self, candidate: Candidate, values: Array) -> Array:
         """Values beyond what the robots, as they were found, have already."""
-        origin = origin_of(candidate, self.origin)
-        return values if origin is None else values - origin
+        return beyond(candidate, values, self.origin)
 
     def residual(
         self, shared: Array, local: Sequence[Array], active: Sequence[tuple[Candidate, Array]]
     ) -> list[Array]:
-        out, there = [], [candidate.key for candidate, _ in active]
-        others = [
-            c for c in self.candidates() if origin_of(c, self.origin) is not None and c.key not in there
-        ]
+        out, there = [], {candidate.key for candidate, _ in active}
         for t, (linear, x) in enumerate(zip(self.linear, local, strict=True)):
             acting = [(candidate, values) for candidate, values in active if candidate.acts_in(t)]
             unknowns = linear.shared.moved(shared), linear.bases.moved(x)
@@ -259,10 +261,8 @@ class TeamRows(Rig):
             residual += as_loud(signals, *unknowns, linear, self.sensed.signals[t])
             for candidate, values in modelled:
                 residual -= self._unwhitened(t, candidate) @ self.beyond(candidate, values)
-            left = self.whitening[t](residual)
-            for candidate in others:
-                left += self._at_origin(candidate, self._columns(t, candidate))
-            out.append(left)
+            left = self.whitening[t](residual) + self._all_at_origin(t)
+            out.append(left - sum(self._at_origin(t, c) for c in self.candidates() if c.key in there))
         return out
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:

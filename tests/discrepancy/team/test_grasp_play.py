@@ -30,7 +30,7 @@ def test_travel_between_the_ends_is_left_open(robot):
     changed = residual_of(case, replace(case.signals, phi=phi)) - case.linear.residual
     poses = changed[:, :12]
     column = cause.columns(case.linear, robot, 0, shape)[:, :12, 0]
-    unknowns = np.stack(cause.unknowns(case.linear, robot, 0, shape), axis=-1)[:, :12]
+    unknowns = cause.unknowns(case.linear, robot, 0, shape)[:, :12]
     closed = poses - PLAY_M * column
     flat = unknowns.reshape(closed.size, -1)
     values = np.linalg.lstsq(flat, closed.ravel(), rcond=None)[0]
@@ -45,4 +45,4 @@ def test_nothing_is_open_where_the_force_is_large():
     wrench = case.linear.data.wrench.copy()
     wrench[:, 1, 3:] = 5.0
     pressed = replace(case.linear, data=replace(case.linear.data, wrench=wrench))
-    assert CAUSES["grasp_play"].unknowns(pressed, 1, 0, {"force_N": FORCE_N}) == []
+    assert CAUSES["grasp_play"].unknowns(pressed, 1, 0, {"force_N": FORCE_N}).shape[2] == 0

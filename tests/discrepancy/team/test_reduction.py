@@ -156,3 +156,20 @@ def test_short_recording(duration):
 def test_recording_without_anything_left():
     with pytest.raises(InputError, match="too few"):
         Reduction.of(signals(4.0, holds=()))
+
+
+def test_values_that_are_there_for_a_while_are_columns_of_their_rows(trial, reduction):
+    """The same as whole columns of samples; those that show in no row are left out."""
+    rng, samples = np.random.default_rng(5), len(trial.time)
+    direction = rng.standard_normal((samples, 2))
+    spans = [slice(0, 1), slice(300, 420), slice(410, 411), slice(samples - 200, samples)]
+    pieces = [(at, rng.standard_normal((at.stop - at.start, 3))) for at in spans]
+    whole = np.zeros((samples, 2, 3 * len(spans)))
+    for k, (at, values) in enumerate(pieces):
+        whole[at, :, 3 * k : 3 * k + 3] = direction[at, :, None] * values[:, None]
+    expected = reduction(whole)
+    shown = expected.any(axis=(0, 1))
+    assert not shown[0]  # before the first row
+    assert shown.sum() >= 9
+    np.testing.assert_allclose(reduction.of_pieces(direction, pieces), expected[..., shown], atol=1e-12)
+    assert reduction.of_pieces(direction, []).shape == (len(reduction.time), 2, 0)

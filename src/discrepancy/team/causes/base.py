@@ -92,9 +92,9 @@ class Cause(base.Cause):
         """By how much a number of the shape is changed for slopes: a share of it."""
         return self.determined[name] * number
 
-    def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> list[Array]:
-        """Columns (n, C) of what the cause leaves open in one trial, such as the friction of a joint at rest."""
-        return []
+    def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Array:
+        """Columns (n, C, k) of what the cause leaves open in one trial, such as the friction of a joint at rest."""
+        return np.zeros((*trial.residual.shape, 0))
 
     def possible(self, values: Array, se: Array, shape: Shape) -> bool:
         """Whether such values (standard errors ``se``) can be: nothing negative beyond two standard errors."""

@@ -20,9 +20,8 @@ class GimbalFriction(Friction):
     separate = "Which robot's gimbal rubs shows only with one robot released at a time."
     undo = Cause.undo  # no sensor reads it
 
-    def trace(self, trial, robot, joint, torque):
+    def direction(self, trial, robot, joint):
         """The payload is turned by less than the balance believes: an outside moment against the axis."""
         axes_T = np.swapaxes(rate_matrix(trial.s[:, robot, THETA]), -1, -2)
-        moment = np.linalg.solve(axes_T, np.tile(np.eye(3)[joint][:, None], (len(torque), 1, 1)))[..., 0]
-        moment = moment @ trial.shared.grasps.R_1i[robot].T
-        return trial.of_wrench(np.zeros_like(moment), -moment * torque[:, None])
+        moment = np.linalg.inv(axes_T)[..., joint] @ trial.shared.grasps.R_1i[robot].T
+        return np.concatenate([np.zeros((len(moment), trial.channels - 3)), moment], axis=1)

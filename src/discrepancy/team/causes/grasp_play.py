@@ -40,8 +40,8 @@ class GraspPlay(Cause):
                 some = np.stack(places[first : first + 16], axis=-1)
                 moved = trial.of_pose(robot, None, along * some[:, None])
                 # Not before the first row or after the last.
-                columns += [column for column in np.moveaxis(moved, -1, 0) if column.any()]
-        return columns
+                columns.append(moved[..., moved.any(axis=(0, 1))])
+        return np.concatenate([np.zeros((*trial.residual.shape, 0)), *columns], axis=2)
 
 
 def _moved(trial, robot, offset):

@@ -7,13 +7,14 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.causes.base import Shape
-from discrepancy.causes.free_while import free_while
+from discrepancy.causes.free_while import pieces_while
 from discrepancy.causes.play import played
-from discrepancy.team.causes.base import Cause, one_joint, one_robot, stack
+from discrepancy.team.causes.base import Cause, one_joint, one_robot
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
+from estimator.rigid_team.slots import TAU
 
 
 class Friction(Cause):
@@ -61,13 +62,13 @@ class Friction(Cause):
     def physical(self, values, context):
         return super().physical(values, context) | {self.gives: context.shape.get(self.gives, 0.0)}
 
-    def trace(self, trial: TrialLinear, robot: int, joint: int, torque: Array) -> Array:
-        """What a torque of friction, shape (Q,), adds to the residual, shape (n, C)."""
-        return trial.of_signals(robot, tau=one_joint(torque, joint))
+    def direction(self, trial: TrialLinear, robot: int, joint: int) -> Array:
+        """What a torque of 1 N m adds to the residual's samples, shape (Q, C)."""
+        return trial.J(robot, TAU, np.eye(3)[joint])
 
     def columns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Array:
-        states = self._sliding(trial.signals, robot, joint, shape)
-        return stack([self.trace(trial, robot, joint, state) for state in states])
+        states = np.stack(self._sliding(trial.signals, robot, joint, shape), axis=-1)
+        return trial.reduction(self.direction(trial, robot, joint)[..., None] * states[:, None])
 
     def undo(
         self, signals: Signals, trial: TrialLinear, robot: int, joint: int, values: Array, shape: Shape
@@ -77,18 +78,20 @@ class Friction(Cause):
             torque += value * state
         return signals.minus(tau=one_robot(one_joint(torque, joint), trial.robots, robot))
 
-    def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> list[Array]:
+    def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Array:
         """What it does while it holds: any torque that it takes, as it changes with the load.
 
         Where it gives way, how far it had before it slips for the first time.
         """
         rate_hz, state = trial.signals.rate_hz, np.abs(self._sliding(trial.signals, robot, joint, shape)[0])
         if self.gives in shape:
-            before = self.trace(trial, robot, joint, (np.cumsum(state >= 1.0 - 1e-9) == 0).astype(float))
-            return [before] if before.any() else []
-        still = state < 1.0
-        rests = free_while(still, rate_hz, self.knots_s, min(self.knots_s, rules.TEAM_SHORTEST_REST_S))
-        return [self.trace(trial, robot, joint, rest) for rest in rests]
+            slips = np.flatnonzero(state >= 1.0 - 1e-9)
+            before = slice(0, slips[0] if len(slips) else len(state))
+            rests = [(before, np.ones((before.stop, 1)))] if before.stop else []
+        else:
+            shortest_s = min(self.knots_s, rules.TEAM_SHORTEST_REST_S)
+            rests = pieces_while(state < 1.0, rate_hz, self.knots_s, shortest_s)
+        return trial.reduction.of_pieces(self.direction(trial, robot, joint), rests)
 
     def _sliding(self, signals: Signals, robot: int, joint: int, shape: Shape) -> Sequence[Array]:
         """Direction of motion in [-1, 1], which fades to zero at rest, and rate; as many as there are parameters.

@@ -40,3 +40,9 @@ def origin_of(candidate: Candidate, origin: ArmUnit | None) -> Array | None:
     """
     place = places_of(candidate)
     return None if origin is None or place is None else np.asarray(origin.x[place], dtype=np.float64)
+
+
+def beyond(candidate: Candidate, values: Array, origin: ArmUnit | None) -> Array:
+    """Values of a candidate beyond what the robots, as they were found, have already."""
+    there = origin_of(candidate, origin)
+    return values if there is None else values - there

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import csc_array, csr_array
 
 from discrepancy import rules
 from discrepancy.team.linear.signals import Signals
@@ -40,6 +42,29 @@ class Reduction:
         """Reduce samples, shape (Q, ...) -> (n, ...)."""
         rows = self.operator @ x.reshape(len(x), int(np.prod(x.shape[1:])))
         return rows.reshape(len(self.time), *x.shape[1:])
+
+    def of_pieces(self, direction: Array, pieces: Iterable[tuple[slice, Array]]) -> Array:
+        """Rows of values that are there for a while each, as many columns as show in any, shape (n, C, columns).
+
+        Args:
+            direction: what a value of 1 is in the samples, shape (Q, C).
+            pieces: samples of an interval, and k columns of values there, shape (s, k).
+        """
+        parts = [np.zeros((len(self.time), direction.shape[1], 0))]
+        for at, values in pieces:
+            block = self._by_sample[:, at]
+            rows, here = np.unique(block.indices, return_inverse=True)
+            weights = np.zeros((len(rows), values.shape[0]))
+            weights[here, np.repeat(np.arange(values.shape[0]), np.diff(block.indptr))] = block.data
+            samples = direction[at, :, None] * values[:, None]
+            part = np.zeros((len(self.time), *samples.shape[1:]))
+            part[rows] = (weights @ samples.reshape(len(samples), -1)).reshape(-1, *samples.shape[1:])
+            parts.append(part[..., part.any(axis=(0, 1))])
+        return np.concatenate(parts, axis=2)
+
+    @cached_property
+    def _by_sample(self) -> csc_array:
+        return csc_array(self.operator)
 
     @classmethod
     def of(cls, signals: Signals) -> Reduction:
