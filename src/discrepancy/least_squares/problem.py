@@ -164,8 +164,7 @@ class Problem:
     @property
     def as_whitened(self) -> Problem:
         """With noise of unit power and tolerances as given."""
-        power = tuple(np.ones_like(p) for p in self.power)
-        return replace(self, power=power, spread=np.ones_like(self.spread))
+        return self.with_noise([np.ones_like(p) for p in self.power], np.ones_like(self.spread))
 
     def with_noise(self, power: Sequence[Array], spread: Array) -> Problem:
         """With noise of other powers, and other spreads."""
@@ -285,10 +284,8 @@ class Problem:
     def extended(self, candidate: Candidate, columns: Sequence[Array]) -> Problem:
         """The problem with one candidate more."""
         start, count = self.shared + len(self.tolerant), len(candidate.parameters)
-        # Before the residual.
-        wider = self._with(
-            start, [c * candidate.units for c in columns], (*self.candidates, candidate), count
-        )
+        parts = [c * candidate.units for c in columns]
+        wider = self._with(start, parts, (*self.candidates, candidate), count)  # before the residual
         return replace(
             wider,
             spans=(*self.spans, slice(start, start + count)),
