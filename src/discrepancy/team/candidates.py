@@ -86,6 +86,11 @@ def worst_events(
     return out
 
 
+def indices(candidate: Candidate) -> tuple[int, int]:
+    """Its robot and joint, from 0 (0 where it has none)."""
+    return (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
+
+
 def is_adjusted(candidate: Candidate) -> bool:
     """Whether it is a function of readings, taken without their noise."""
     return candidate.cause in CAUSES and CAUSES[candidate.cause].adjusted

@@ -16,6 +16,7 @@ from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Channel, Rig, Rows
 from discrepancy.team.candidates import (
     every_candidate,
+    indices,
     is_adjusted,
     nearby_events,
     other_shapes,
@@ -30,8 +31,9 @@ from discrepancy.team.linear.adjust import as_loud, noise_of
 from discrepancy.team.linear.elsewhere import HEALTHY, found_at, resting_of
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.origin import beyond, origin_of
+from discrepancy.team.linear.rest import limits_of
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, start_shared
+from discrepancy.team.linear.start import Sensed, exact_residual, linearised_trials, sensed_in, start_shared
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
@@ -97,10 +99,7 @@ class TeamRows(Rig):
         jobs: int,
         sensed: Sensed | None = None,
     ) -> Self:
-        limits = {
-            cause: {name: resting[cause] * value for name, value in tolerances.get(cause, {}).items()}
-            for cause in resting
-        }
+        limits = limits_of(tolerances, resting)
         linear, known = linearised_trials(recordings, shared, limits, jobs, sensed)
         return cls(tuple(recordings), known, linear, tolerances, excluded, origin, resting, jobs)
 
@@ -122,8 +121,12 @@ class TeamRows(Rig):
             return None
         resting = resting_of(nothing)
         same = all(0.5 < resting[kind] / self.resting[kind] < 2.0 for kind in resting)
-        if there.curvature < rules.STRAIGHT_CHI2_PER_N and same:
-            return None
+        if there.curvature < rules.STRAIGHT_CHI2_PER_N:
+            if same:
+                return None
+            limits = limits_of(self.tolerances, resting)
+            louder = sensed_in(self.linear, self.noise, limits, self.jobs)  # robots and unknowns stay
+            return replace(self, sensed=louder, resting=resting, kept={})
         moved = [replace(r, metadata=replace(r.metadata, units=there.units)) for r in self.recordings]
         sensed, resting = (self.sensed, self.resting) if same else (None, resting)
         return self._at(
@@ -176,14 +179,12 @@ class TeamRows(Rig):
 
     def _unwhitened(self, trial: int, candidate: Candidate) -> Array:
         """What one unit of each parameter adds to a trial's residual, shape (n, C, k)."""
-        robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-        return CAUSES[candidate.cause].columns(self.linear[trial], robot, joint, candidate.shape)
+        return CAUSES[candidate.cause].columns(self.linear[trial], *indices(candidate), candidate.shape)
 
     def _undo(self, trial: int, candidate: Candidate, values: Array, signals: Signals) -> Signals | None:
         """A trial's signals as they would be without a cause, or None where it is not an error of the signals."""
-        robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
-        own = self.beyond(candidate, values)
-        return CAUSES[candidate.cause].undo(signals, self.linear[trial], robot, joint, own, candidate.shape)
+        place, own = indices(candidate), self.beyond(candidate, values)
+        return CAUSES[candidate.cause].undo(signals, self.linear[trial], *place, own, candidate.shape)
 
     def _without(
         self, trial: int, active: Sequence[tuple[Candidate, Array]], noise: Signals | None = None
@@ -206,10 +207,9 @@ class TeamRows(Rig):
         return CAUSES[candidate.cause].possible(values, se, candidate.shape)
 
     def unknowns(self, candidate: Candidate) -> list[Array]:
-        robot, joint = (candidate.robot or 1) - 1, (candidate.joint or 1) - 1
         of = CAUSES[candidate.cause].unknowns
         pairs = zip(self.linear, self.whitening, strict=True)
-        return [white(of(linear, robot, joint, candidate.shape)) for linear, white in pairs]
+        return [white(of(linear, *indices(candidate), candidate.shape)) for linear, white in pairs]
 
     def rows(self, candidates: Sequence[Candidate]) -> Iterator[Rows]:
         for t, linear in enumerate(self.linear):

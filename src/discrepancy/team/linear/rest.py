@@ -19,6 +19,14 @@ from estimator.rigid_team.slots import TAU, THETA
 Tolerances = Mapping[str, Mapping[str, float]]
 
 
+def limits_of(tolerances: Tolerances, resting: Mapping[str, float]) -> Tolerances:
+    """Tolerances of the kinds that leave something open at rest, as many times as wide as each of them scatters."""
+    return {
+        cause: {name: factor * value for name, value in tolerances.get(cause, {}).items()}
+        for cause, factor in resting.items()
+    }
+
+
 class Resting:
     """Draws of what joints hold while they rest: friction takes any torque up to its limit, another at every rest.
 

@@ -87,14 +87,14 @@ def linearised_trials(
         if len(reduction.time) < 4:
             raise InputError(f"{recording.name}: too short to diagnose")
     bases = [start_bases(*poses(s.phi[s.keep], s.theta[s.keep], arms), shared) for s in signals]
-    run = Parallel(n_jobs=jobs, prefer="processes" if jobs > 1 else "threads")
+    run = _processes(jobs)
     linear = _linearised(run, signals, shared, bases, arms, reductions, full=sensed is None)
     if sensed is None:
-        sensed = _sensed(run, linear, noise, tolerances)
+        sensed = sensed_in(linear, noise, tolerances, jobs)
         likely, _ = gauss_newton(linear, sensed.whitening, inertia_is_like_held(shared))
         if is_another(shared, likely):
             linear = _linearised(run, signals, likely, bases, arms, reductions, full=True)
-            sensed = _sensed(run, linear, noise, tolerances)
+            sensed = sensed_in(linear, noise, tolerances, jobs)
     for _ in range(2):
         shared, bases = gauss_newton(linear, sensed.whitening)
         linear = tuple(
@@ -105,6 +105,10 @@ def linearised_trials(
         )
     pairs = zip(linear, sensed.signals, strict=True)
     return tuple(with_adjusted_signals(*pair) for pair in pairs), sensed
+
+
+def _processes(jobs: int) -> Parallel:
+    return Parallel(n_jobs=jobs, prefer="processes" if jobs > 1 else "threads")
 
 
 def _linearised(
@@ -123,7 +127,9 @@ def _linearised(
     return tuple(cast("list[TrialLinear]", each))
 
 
-def _sensed(run: Parallel, linear: Sequence[TrialLinear], noise: Noise, tolerances: Tolerances) -> Sensed:
+def sensed_in(linear: Sequence[TrialLinear], noise: Noise, tolerances: Tolerances, jobs: int = 1) -> Sensed:
+    """What noise and friction at rest leave in the rows of linearised trials."""
+    run = _processes(jobs)
     left = run(delayed(what_noise_leaves)(t, noise, k, tolerances) for k, t in enumerate(linear))
     whitening, told = zip(*cast("list[tuple[Whitening, SignalNoise]]", left), strict=True)
     return Sensed(noise, tuple(whitening), tuple(told))
