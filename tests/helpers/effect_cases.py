@@ -14,7 +14,9 @@ SIZES: dict[str, dict[str, Any]] = {
     "base_tilt": {"roll_rad": 0.01, "pitch_rad": -0.02},
     "base_creep": {"x_mps": 1e-6, "y_mps": -2e-6},
     "base_compliance": {"compliance_m_per_N": 1e-6, "relaxation_s": 0.05},
-    "grasp_flex": {"compliance_m_per_N": 1e-6, "relaxation_s": 0.0},
+    "grasp_flex": {
+        "compliance_m_per_N": 1e-6, "relaxation_s": 0.0, "turning_rad_per_N": 0.0, "offset_m": 0.0,
+    },
     "grasp_play": {"play_m": 1e-4},
     "sea_bias": {"bias_Nm": 0.05},
     "sea_scale": {"scale": 0.02},

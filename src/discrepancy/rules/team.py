@@ -121,6 +121,11 @@ RELAXATION_FINER = (0.5, 0.7, 0.85, 1.2, 1.4, 2.0)
 """Shares of such a time that are tried next. Chosen."""
 RELAXATION_RANGE_S = (0.001, 0.5)
 """Derived: a shorter one shifts a motion of 1 Hz by less than 0.6 % of itself; after a longer one, a base creeps."""
+GRASP_TURNS_M = (0.05, -0.05)
+"""From the gimbal's centre to the point about which a grasp turns, along its axis, tried first. Chosen: a flange's
+thickness or a gripper's, on either side; what is along it is found by Gauss-Newton."""
+GRASP_TURNS_FINER, GRASP_TURNS_RANGE_M = (0.5, 0.7, 1.4, 2.0), (0.01, 0.3)
+"""Shares of that tried next, and its range. Derived: nearer, nothing turns; farther, it is no part of the grasp."""
 SLOSH_LENGTHS_M = (0.04, 1.0)
 """Derived: pendulums of 2.5 to 0.5 Hz; slower and faster ones look like drag or play."""
 SLOSH_MOST_DAMPED = 0.3

@@ -39,7 +39,7 @@ from mocobot_sim.extended.extended import write_extended
 class TeamRig(LawfulRows):
     """Recordings of one payload, linearised around the best unknowns without any cause, and their simulator."""
 
-    reshaped = ("sea_hysteresis",)
+    reshaped = ("sea_hysteresis", "grasp_flex")
 
     def effect_parameters(
         self, candidate: Candidate, values: Array, covariance: Array

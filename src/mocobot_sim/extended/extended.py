@@ -30,7 +30,7 @@ MASSES = ("proximal_mass_ratio", "rod_mass_ratio", "wrist_mass_ratio")
 INITIAL = ("phi_rad", "theta_rad")
 KEYS = (
     "format", "version", "robots", "effects", "wrist_home_b_m", "theta_home_rad", "grasps", "mounts", "initial",
-    "as_built", "sensors", "grasp_slack_m", "extra",
+    "as_built", "sensors", "grasp_slack_m", "grasp_slack_rad", "extra",
 )  # fmt: skip
 
 
@@ -66,6 +66,7 @@ def write_extended(scene: TeamScene, effects: Sequence[Effect], folder: Path, ex
         "as_built": [unit.to_dict() for unit in scene.units],
         "sensors": {name: list(scene.sensors.of(name, scene.robots)) for name in SENSORS},
         "grasp_slack_m": list(scene.grasp_slack_m or (0.0,) * scene.robots),
+        "grasp_slack_rad": list(scene.grasp_slack_rad or (0.0,) * scene.robots),
         "extra": extra,
     }
     try:
@@ -108,7 +109,7 @@ def load_extended(folder: Path) -> TeamScene:
             f"{where}: format and version are {values.get('format')!r:.60} and {values.get('version')!r:.60}; "
             f"this program reads {FORMAT!r} {VERSION}"
         )
-    read = Fields(values, KEYS, where)
+    read = _fields(values, where)
     robots = read.whole("robots")
     effects = tuple(_effects(read.list("effects"), where))
     assets = {
@@ -127,6 +128,7 @@ def load_extended(folder: Path) -> TeamScene:
         initial=_initial(read, robots),
         sensors=_sensors(read, robots),
         grasp_slack_m=tuple(read.array("grasp_slack_m", (robots,)).tolist()),
+        grasp_slack_rad=tuple(read.array("grasp_slack_rad", (robots,)).tolist()),
         effects=effects,
         xml=_read(folder / SCENE),
         assets=assets,
@@ -143,7 +145,15 @@ def extra_of(folder: Path) -> dict[str, Any]:
         InputError: it cannot be read.
     """
     path = Path(folder) / NUMBERS
-    return Fields(parse_json(_read(path), str(path)), KEYS, str(path)).object("extra")
+    return _fields(parse_json(_read(path), str(path)), str(path)).object("extra")
+
+
+def _fields(values: dict[str, Any], where: str) -> Fields:
+    """The numbers; models written before grasps could turn have no ``grasp_slack_rad``."""
+    slack_m = values.get("grasp_slack_m")
+    if isinstance(slack_m, list):
+        values = {"grasp_slack_rad": [0.0] * len(slack_m), **values}
+    return Fields(values, KEYS, where)
 
 
 def _read(path: Path) -> str:

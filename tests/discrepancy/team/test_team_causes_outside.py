@@ -1,6 +1,7 @@
 """Causes outside the sensors, put into an exact recording by hand: wrenches on the payload, displaced frames."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from discrepancy.candidate import Transient
+from discrepancy.team.candidates import other_shapes, shape_steps
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.linear.trial_linear import linearise
@@ -287,7 +289,45 @@ def test_grasp_flex(case, robot, relaxation_s):
     c = 2e-6
     signals = adapted(case, robot, c * following(case, force_of(case, robot)[1], relaxation_s))
     column = CAUSES["grasp_flex"].columns(case.linear, robot, 0, {"relaxation_s": relaxation_s})
-    check_pose(case, signals, column, [c], 0.02)
+    check_pose(case, signals, column, [c, 0.0], 0.02)
+
+
+@pytest.mark.parametrize(("robot", "offset_m"), [(0, 0.06), (1, 0.06), (2, -0.04)])
+def test_a_grasp_that_turns(case, robot, offset_m):
+    """By turning times the moment of its force about a point beside the gimbal, which reads the flange's attitude."""
+    turning, relaxation_s = 5e-4, 0.02
+    force = turning * following(case, force_of(case, robot)[1], relaxation_s)
+    R = Rotation.from_euler("ZYX", case.signals.theta[:, robot])
+    arm = R.apply([0.0, 0.0, -offset_m])  # from the point to where the force acts
+    turned = Rotation.from_rotvec(-np.cross(arm, force))  # of the payload against the flange
+    signals = adapted(case, robot, arm - turned.apply(arm))
+    theta = signals.theta.copy()
+    theta[:, robot] = (turned.inv() * R).as_euler("ZYX")
+    changed = residual_of(case, replace(signals, theta=theta)) - case.linear.residual
+    shape = {"relaxation_s": relaxation_s, "offset_m": offset_m}
+    column = CAUSES["grasp_flex"].columns(case.linear, robot, 0, shape) @ [0.0, turning * abs(offset_m)]
+    assert np.abs(changed[:, :12]).max() > 1e-4
+    assert_close(column[:, :12], changed[:, :12], 0.02)
+    assert_close(column[:, 12:], changed[:, 12:], 0.1)
+
+
+def test_a_grasp_without_a_point_to_turn_about_does_not_turn(case):
+    cause = CAUSES["grasp_flex"]
+    healthy = cause.candidate({"compliance_m_per_N": 1e-7, "turning_rad_per_N": 1e-6}, cause.shapes[0], 2)
+    columns = cause.columns(case.linear, 1, 0, healthy.shape)
+    assert columns[..., 0].any()
+    assert not columns[..., 1].any()
+    assert cause.physical(np.array([2e-6, 4e-5]), SimpleNamespace(shape=healthy.shape)) == {
+        "compliance_m_per_N": 2e-6, "turning_rad_per_N": 0.0, "relaxation_s": 0.02,
+    }  # fmt: skip
+    turning = next(c for c in other_shapes(healthy, finer=False) if c.shape.get("offset_m", 0.0) < 0.0)
+    assert cause.physical(np.array([2e-6, 4e-5]), SimpleNamespace(shape=turning.shape)) == {
+        "compliance_m_per_N": 2e-6, "turning_rad_per_N": 4e-5, "relaxation_s": 0.02, "offset_m": -0.05,
+    }  # fmt: skip
+    # Steps and finer shapes stay on their side of the gimbal.
+    assert all(less.shape["offset_m"] < 0.0 for less, _, size in shape_steps(turning) if size > 0.0)
+    finer = sorted({c.shape["offset_m"] for c in other_shapes(turning, finer=True)})
+    assert finer == pytest.approx([-0.1, -0.07, -0.05, -0.035, -0.025])
 
 
 @pytest.mark.parametrize("robot", [0, 1])

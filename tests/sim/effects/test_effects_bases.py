@@ -107,6 +107,26 @@ def test_a_flexible_grasp_gives_way_by_compliance_times_force(robot, compliance)
 
 
 @ROBOT
+@pytest.mark.parametrize("offset_m", [0.06, -0.03])
+def test_a_grasp_turns_by_the_moment_of_its_force(robot, offset_m):
+    """About its point, by turning times the force across its axis; nothing turns about the gimbal's centre."""
+    turning = 1e-4
+    effect = example("grasp_flex", robot, turning_rad_per_N=turning, offset_m=offset_m)
+    loop = ClosedLoop(team_with("a", effect))
+    prefix = "omnid1/payload/" if robot == 1 else f"omnid{robot}/"
+    at = [int(loop.model.joint(f"{prefix}flex_about_{axis}").qposadr[0]) for axis in "xyz"]
+    _held(loop, robot)
+    R = loop.data.site_xmat[loop.index.payload_site[robot - 1]].reshape(3, 3)
+    force = R.T @ loop.forces_on_payload()[robot - 1]
+    # What the payload puts on the grasp, over the point's distance.
+    moment = -np.cross([0.0, 0.0, -np.sign(offset_m)], force)
+    assert np.abs(moment).max() > 3.0
+    np.testing.assert_allclose(loop.data.qpos[at], turning * moment, rtol=0.03, atol=1e-5)
+    same = team_with("a", example("grasp_flex", robot, turning_rad_per_N=turning))
+    assert ClosedLoop(same).model.nq == ClosedLoop(team_with("a", example("grasp_flex", robot))).model.nq
+
+
+@ROBOT
 def test_a_yielding_base_gives_way_by_compliance_times_horizontal_force(robot):
     """The floor's force on the base is all that acts on the robot sideways: payload's reaction, at rest."""
     compliance = 1e-5

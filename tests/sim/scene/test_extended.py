@@ -51,11 +51,24 @@ def test_it_runs_like_the_scene_it_came_from(folder):
     assert loaded.effects == tuple(effects)
     assert loaded.pushes == scene.pushes
     assert loaded.grasp_slack_m == scene.grasp_slack_m
+    assert loaded.grasp_slack_rad == (0.0,) * scene.robots
     trajectory = random_vias(scene.wrist_home_b, np.random.default_rng(0), 1)
     one, two = (predicted(run_trial(team, trajectory)) for team in (scene, loaded))
     for channel in ("phi", "theta", "tau"):
         np.testing.assert_allclose(getattr(two, channel), getattr(one, channel), rtol=0, atol=1e-12)
     assert extra_of(folder) == {"note": "seen", "evidence": [1.0, 2.0]}
+
+
+def test_a_grasp_that_turns_is_kept_and_older_models_have_none(tmp_path):
+    scene = team_with("a", example("grasp_flex", 2, turning_rad_per_N=1e-5, offset_m=0.05))
+    write_extended(scene, scene.effects, tmp_path / "new", {})
+    assert load_extended(tmp_path / "new").grasp_slack_rad == scene.grasp_slack_rad
+    assert scene.grasp_slack_rad[1] > 0.0
+    numbers = tmp_path / "new" / "extended.json"
+    values = json.loads(numbers.read_text(encoding="utf-8"))
+    del values["grasp_slack_rad"]
+    numbers.write_text(json.dumps(values), encoding="utf-8")
+    assert load_extended(tmp_path / "new").grasp_slack_rad == (0.0, 0.0, 0.0)
 
 
 def test_plain_mujoco_loads_it(folder):

@@ -90,7 +90,7 @@ class Cause(base.Cause):
 
     def slope_step(self, name: str, number: float) -> float:
         """By how much a number of the shape is changed for slopes: a share of it."""
-        return self.determined[name] * number
+        return self.determined[name] * abs(number)
 
     def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Array:
         """Columns (n, C, k) of what the cause leaves open in one trial, such as the friction of a joint at rest."""
