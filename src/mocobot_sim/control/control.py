@@ -15,9 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
 from estimator.arm.design import OmnidDesign
@@ -26,7 +25,11 @@ from estimator.errors import InputError
 from estimator.strict import is_number
 from mocobot_sim.scene.as_built import AsBuilt, units_of
 from mocobot_sim.scene.sensor_effects import SensorEffects
-from mocobot_sim.scene.team_index import TeamIndex
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from mocobot_sim.scene.team_index import TeamIndex
 
 
 @dataclass(frozen=True)

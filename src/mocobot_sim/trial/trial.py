@@ -95,7 +95,9 @@ def run_trial(
                     reader.read(tick, seen)
             controller.update(ref[tick], ref_dot[tick])
             for push in pushes:
-                push.act(model, data, index.payload_body, R_Wb1)
+                if push.acts(data.time):
+                    mujoco.mj_kinematics(model, data)
+                    push.act(data, index.payload_body, R_Wb1)
             if tick == sample * ticks:
                 # A step first evaluates forces and frames at the state it starts from: one instant for all.
                 log.before_step(sample)
