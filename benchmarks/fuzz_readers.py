@@ -1,4 +1,4 @@
-"""Damage real logs of every format and read them: each must be read, or refused in one sentence.
+"""Damage real logs of every format, and what else commands read: each must be read, or refused in one sentence.
 
 Reading happens in a process of its own, so that a crash in a library counts as a fault and not as the end.
 """
@@ -17,6 +17,7 @@ from pathlib import Path
 
 import tyro
 
+from fuzzing.of_commands import KINDS
 from fuzzing.originals import FORMATS, write_original
 from fuzzing.trial import LONGEST_S, Outcome, check_original, try_damaged
 from mocobot.progress import bar
@@ -31,7 +32,7 @@ class Options:
     Attributes:
         runs: damaged logs, spread over the formats.
         seed: of the first one.
-        formats: which; all if none is given.
+        formats: which, of logs and of what else is read; all logs if none is given.
         show: print so many of the refusals of each format, too.
         kept: file that outcomes are added to; what is in it is not done again, and counts.
     """
@@ -103,6 +104,10 @@ def run(kind: str, seeds: Sequence[int]) -> Iterator[Outcome]:
         process = context.Process(target=_work, args=(kind, batch, theirs), daemon=True)
         process.start()
         theirs.close()
+        try:
+            ours.recv()
+        except EOFError:
+            raise SystemExit(f"a good file of kind {kind!r} is not read") from None
         done = 0
         try:
             while ours.poll(None if done else LONGEST_S + 60):
@@ -120,9 +125,14 @@ def run(kind: str, seeds: Sequence[int]) -> Iterator[Outcome]:
 
 def _work(kind: str, seeds: list[int], results: Connection) -> None:
     with tempfile.TemporaryDirectory() as folder:
-        log, file = write_original(kind, Path(folder))
+        if kind in KINDS:
+            log = file = Path(folder) / KINDS[kind].name
+            KINDS[kind].write(file)
+        else:
+            log, file = write_original(kind, Path(folder))
         content = file.read_bytes()
         check_original(kind, log)
+        results.send("read")
         for seed in seeds:
             results.send(try_damaged(kind, log, file, content, seed))
     results.close()

@@ -4,8 +4,9 @@
     python benchmarks/soak.py --faults           a full disk and a read-only one (tmpfs, which needs root), two at once
     python benchmarks/soak.py --tables           what there is
 
-Every command is run once undisturbed; whatever else it leaves behind must be nothing or the same bytes. So the sources
-must stay as they are meanwhile, the commit included, which provenance names.
+Every command is run once undisturbed; whatever else it leaves behind must be nothing or the same bytes. A command that
+goes on where it was interrupted may leave some of its files, and what it goes on with in ``partial``; the next run must
+go on without being forced. The sources must stay as they are meanwhile, the commit included, which provenance names.
 """
 
 from __future__ import annotations
@@ -47,10 +48,12 @@ class Case:
     Attributes:
         words: its arguments; ``{}`` stands for where it writes.
         same: whether it writes the same bytes every time.
+        resumes: whether the next run goes on with what an interrupted one has done.
     """
 
     words: str
     same: bool = True
+    resumes: bool = False
 
 
 CASES = {
@@ -68,8 +71,12 @@ CASES = {
     "replay": Case("replay rec.parquet --save {}/out.rrd", same=False),  # an id of the recording is drawn
     "watch": Case("watch rec.parquet static.parquet --out {}/out --jobs 1"),
     "diagnose": Case("diagnose rec.parquet static.parquet --no-closed-loop --jobs 1 --out {}/out"),
+    "paper": Case("paper --payload b --preset nominal --trials 2 --jobs 1 --out {}/out", resumes=True),
 }
-QUICK = tuple(name for name in CASES if name not in ("watch", "diagnose"))
+SLOW = ("watch", "diagnose", "paper")
+QUICK = tuple(name for name in CASES if name not in SLOW)
+PARTIAL = "out/partial/"
+"""What an interrupted run leaves for the next one."""
 
 
 @dataclass(frozen=True)
@@ -118,7 +125,12 @@ def left(where: Path) -> tuple[dict[str, str], int]:
 
 
 def whole(found: dict[str, str], reference: dict[str, str], case: Case) -> bool:
-    """Whether nothing is there but what belongs there: single files each whole, a folder with all that is in it."""
+    """Whether nothing is there but what belongs there: single files each whole, a folder with all that is in it.
+
+    Of a command that resumes some files will do.
+    """
+    if case.resumes:
+        return found.items() <= reference.items()
     top = {name.split("/")[0] for name in found}
     expected = {name: digest for name, digest in reference.items() if name.split("/")[0] in top}
     return found == expected if case.same else set(found) == set(expected)
@@ -171,11 +183,14 @@ def kill(name: str, inputs: Path, reference: dict[str, str], lasts_s: float, sha
         process.kill()
         ended(process)
         found, temporary = left(where)
-        code, said = ended(start(case, inputs, where, "--force"))
+        parts = [found.pop(name) for name in list(found) if name.startswith(PARTIAL)]
+        goes_on = case.resumes and (parts or not found)
+        code, said = ended(start(case, inputs, where, *(() if goes_on else ("--force",))))
         again, _ = left(where)
-        good = code == 0 and bool(again) and whole(again, reference, case)
+        good = code == 0 and set(again) == set(reference) and whole(again, reference, case)
         return {
-            "case": name, "share": share, "killed": alive, "files": len(found), "temporary": temporary,
+            "case": name, "share": share, "killed": alive, "files": len(found), "parts": len(parts),
+            "temporary": temporary,
             "whole": whole(found, reference, case), "again": good, "said": said[-300:] if code else "",
         }  # fmt: skip
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from estimator.errors import InputError
 from fuzzing.damage import damaged
+from fuzzing.of_commands import KINDS
 from mocobot_logs.log import collect
 from mocobot_logs.map.files import read_map
 from mocobot_logs.open_log import open_log
@@ -64,7 +65,7 @@ def try_damaged(kind: str, log: Path, file: Path, content: bytes, seed: int) -> 
     """Damage a file of a log, read the log, and put the file back.
 
     Args:
-        kind: one of ``originals.FORMATS``.
+        kind: one of ``originals.FORMATS`` or ``of_commands.KINDS``.
         log: the log as a user would name it.
         file: the file in it to damage.
         content: what the file holds when it is good.
@@ -90,7 +91,9 @@ def try_damaged(kind: str, log: Path, file: Path, content: bytes, seed: int) -> 
 
 def _read(kind: str, log: Path) -> tuple[Literal["read", "refused", "raised", "untidy"], str]:
     try:
-        if kind == "map":
+        if kind in KINDS:
+            KINDS[kind].read(log)
+        elif kind == "map":
             read_map(log)
         else:
             collect(open_log(log))

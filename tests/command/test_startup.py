@@ -44,6 +44,16 @@ NAMES_AND_FILES = {
     "no format of a tree": "map whole.h5 --model whole.xml",
 }
 """Mistakes that names of causes and effects tell, or a few bytes of a file."""
+NUMBERS = {
+    "joint_friction:robot=0,joint=1,coulomb=1": "it must be a whole number of at least 1",
+    "joint_friction:robot=2,joint=4,coulomb=0.05": "it must be 1, 2 or 3",
+    "joint_friction:robot=2,joint=1,coulomb=-1": "it must be a finite number of at least 0",
+    "base_tilt:robot=1,roll=1": "it must be a finite number of at least -0.2 and at most 0.2",
+    "slosh:mass=1,length=0.1": "damping_ratio must be given",
+    "push:trial=1,start=soon": "it must be",
+    "law:target=tau_2_1,function=linear,of=pi,amplitude=1": "of is 'pi'; it must be one of",
+}
+"""Mistakes in the numbers of an effect."""
 
 
 def test_every_command_refuses_something_at_once() -> None:
@@ -77,6 +87,34 @@ def test_a_refusal_loads_nothing_that_takes_time(name: str, tmp_path: Path) -> N
             "is a MAT file",
         )
     )
+
+
+@pytest.mark.parametrize("text", NUMBERS)
+def test_an_effects_numbers_are_refused_without_the_simulator(text: str, tmp_path: Path) -> None:
+    code = (
+        "import sys, mocobot.cli\n"
+        f"try: mocobot.cli.main(['simulate', '--effect', {text!r}, '--out', 'new.parquet'])\n"
+        "except SystemExit as stop: assert stop.code == 2, stop.code\n"
+        "else: raise AssertionError('not refused')\n"
+        f"slow = {SLOW - {'numpy'}!r} & set(sys.modules)\n"
+        "assert not slow, slow\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert NUMBERS[text] in done.stderr
+
+
+def test_effects_are_known_without_the_simulator() -> None:
+    code = (
+        "import sys, mocobot_sim.effects.spec as spec\n"
+        "assert len(spec.EFFECTS) == 24 and all(spec.allowed(kind) for kind in spec.EFFECTS.values())\n"
+        f"slow = {SLOW - {'numpy'}!r} & set(sys.modules)\n"
+        "assert not slow, slow\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_kinds_of_trials_are_those_of_recordings() -> None:

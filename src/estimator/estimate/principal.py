@@ -11,9 +11,9 @@ from scipy.spatial.transform import Rotation
 from estimator import so3
 from estimator.arrays import Array
 from estimator.estimate.uncertainty import standard_errors
-
-ORDER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-"""Entries (row, column) of the six inertia parameters of equation (20): xx, xy, xz, yy, yz, zz."""
+from estimator.inertia import ORDER as ORDER
+from estimator.inertia import inertia_matrix as inertia_matrix
+from estimator.inertia import inertia_parameters as inertia_parameters
 
 AXES_SE_LIMIT_RAD = np.deg2rad(20)
 """Principal axes less certain than this are not reported."""
@@ -69,17 +69,6 @@ class PrincipalInertia:
             None if axes is None else Rotation.from_rotvec(axes, degrees=True).as_matrix(),
             None if covariance is None else np.array(covariance),
         )
-
-
-def inertia_matrix(parameters: Array) -> Array:
-    """Symmetric matrix of the six parameters of (20), shape (6,) -> (3, 3)."""
-    xx, xy, xz, yy, yz, zz = parameters
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def inertia_parameters(inertia: Array) -> Array:
-    """The six parameters of (20) of a symmetric matrix, shape (3, 3) -> (6,)."""
-    return np.array([inertia[k] for k in ORDER])
 
 
 def project_positive(inertia: Array) -> tuple[Array, bool]:

@@ -30,8 +30,12 @@ def check(options: Paper) -> None:
 
 
 def _is_interrupted(folder: Path) -> bool:
-    """Whether a folder holds parts of a run and nothing else; which run's, the command finds out."""
-    return folder.is_dir() and [path.name for path in folder.iterdir()] == [PARTIAL]
+    """Whether a folder holds parts of a run, and beside them nothing or its results, which are written at the end.
+
+    Which run's, the command finds out.
+    """
+    names = {path.name for path in folder.iterdir()} if folder.is_dir() else set()
+    return names == {PARTIAL} or names >= {PARTIAL, SCORES}
 
 
 def _is_paper(folder: Path) -> bool:

@@ -19,7 +19,7 @@ OURS = re.compile(rf"trial\d+_({'|'.join(KINDS)})\.(parquet|truth\.json)")
 
 
 def check(options: Simulate) -> None:
-    """Everything that can be refused before a team is built, but for the effects' numbers.
+    """Everything that can be refused before a team is built, the effects' numbers among it.
 
     Raises:
         InputError: an option or an output that cannot be met.
@@ -46,6 +46,11 @@ def check(options: Simulate) -> None:
         payload_path(options.payload)
     for text in options.effect:
         check_effect_name(text.partition(":")[0])
+    if options.effect:
+        from mocobot_sim.effects.spec import parse_effect  # numpy, and a file for each effect
+
+        for text in options.effect:
+            parse_effect(text)
 
 
 def kinds_of(options: Simulate) -> list[str]:

@@ -15,9 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import mujoco
 import numpy as np
 
 from estimator.arm.design import OmnidDesign
@@ -26,7 +25,14 @@ from estimator.errors import InputError
 from estimator.strict import is_number
 from mocobot_sim.scene.as_built import AsBuilt, units_of
 from mocobot_sim.scene.sensor_effects import SensorEffects
-from mocobot_sim.scene.team_index import TeamIndex
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from mocobot_sim.scene.team_index import TeamIndex
+
+TAKE_UP_TICKS = 15
+"""Place among the controller's constants that is set when a load is given."""
 
 
 @dataclass(frozen=True)
@@ -86,6 +92,8 @@ class TeamController:
         as_built: sensor zeros of every unit; empty for robots as designed.
         sensors: timing faults; only the torque's lag reaches the controller.
         feed_forward: F_ff of every robot in its {b} [N], shape (N, 3), held from the start; None to take it up.
+        commands: wrist positions [m] and their rates [m/s] in every robot's {b} of one tick per row, shape
+            (T, 2, N, 3), for ``tick``; None where ``update`` is given them.
         sensed: filled with what the sensors see, (phi, theta, torque) of one tick per row, shape (T, N, 3, 3).
         qpos: what the sensors see in place of ``data.qpos``, kept up to date by whoever gives it; shape (nq,).
 
@@ -102,18 +110,19 @@ class TeamController:
         as_built: Sequence[AsBuilt] = (),
         sensors: SensorEffects | None = None,
         feed_forward: Array | None = None,
+        commands: Array | None = None,
         sensed: Array | None = None,
         qpos: Array | None = None,
     ) -> None:
         units = units_of(as_built, index.robots)
         phi_zero = np.array([unit.phi_zero_rad for unit in units])
-        self._qpos, self._ctrl = data.qpos if qpos is None else qpos, data.ctrl
         # (N, 4, leg or gimbal axis)
-        self._address = np.stack(
-            [index.motor_qpos, index.spring_qpos, index.actuator, index.gimbal_qpos], axis=1
-        )
-        self._offset = np.stack([home_phi(design) + phi_zero, [unit.tau_zero_Nm for unit in units]], axis=1)
-        self._constants = (
+        address = np.stack([index.motor_qpos, index.spring_qpos, index.actuator, index.gimbal_qpos], axis=1)
+        lag = (sensors or SensorEffects()).of("torque_lag_s", index.robots)
+        filters = np.array([lag_filter(time_constant, 1.0 / gains.rate_hz) for time_constant in lag])
+        # zeros of phi and of tau, and the lag's filter
+        own = np.stack([home_phi(design) + phi_zero, [unit.tau_zero_Nm for unit in units], filters], axis=1)
+        constants = (
             design.base_radius_m - design.platform_radius_m,
             design.proximal_length_m,
             design.rod_length_m,
@@ -134,20 +143,22 @@ class TeamController:
             1.0 / (1.0 + gains.rate_filter_s * gains.rate_hz),
             1.0 / (gains.take_up_time_constant_s * gains.rate_hz),
             gains.motor_torque_limit_Nm,
+            home_phi(design),
+            # ticks that take the load up
+            round(gains.take_up_s * gains.rate_hz) if feed_forward is None else 0,
         )
+        self._constants = np.array(constants)
         # phi, tau, their filtered rates, F_ff, torque before and after the sensor's lag
         self._state = np.zeros((index.robots, 7, 3))
-        self._given = feed_forward is not None
         if feed_forward is not None:
             if np.shape(feed_forward) != (index.robots, 3) or not np.isfinite(feed_forward).all():
                 raise InputError(f"feed-forward is not {index.robots} x 3 finite forces; it must be, in N")
             self._state[:, 4] = feed_forward
-        lag = (sensors or SensorEffects()).of("torque_lag_s", index.robots)
-        self._lag = np.array([lag_filter(time_constant, 1.0 / gains.rate_hz) for time_constant in lag])
-        self._home = home_phi(design)
-        self._sensed = np.empty((1, index.robots, 3, 3)) if sensed is None else sensed
-        self._keep = sensed is not None
-        self._take_up_ticks = round(gains.take_up_s * gains.rate_hz)
+        self._commands = np.zeros((1, 2, index.robots, 3)) if commands is None else commands
+        self._arrays = (
+            data.qpos if qpos is None else qpos, data.ctrl, address, own, self._constants, self._state,
+            self._commands, np.empty((1, index.robots, 3, 3)) if sensed is None else sensed,
+        )  # fmt: skip
         self._tick = 0
         from mocobot_sim.control.kernel import update_team  # numba takes half a second to load
 
@@ -162,7 +173,7 @@ class TeamController:
     def feed_forward(self, force: Array) -> None:
         """Set F_ff, and take up no load from now on."""
         self._state[:, 4] = force
-        self._given = True
+        self._constants[TAKE_UP_TICKS] = 0
 
     def update(self, ref: Array, ref_dot: Array) -> None:
         """One control tick: read ``qpos``, write ``ctrl``.
@@ -171,12 +182,12 @@ class TeamController:
             ref: commanded wrist positions in every robot's {b} [m], shape (N, 3).
             ref_dot: their rates [m/s], shape (N, 3).
         """
-        phase = 1 if self._tick < self._take_up_ticks and not self._given else 2
-        self._update(
-            self._qpos, self._ctrl, self._address, self._offset, self._constants, self._state,
-            ref, ref_dot, self._tick == 0, phase == 1, self._lag, self._home,
-            self._sensed[self._tick if self._keep else 0],
-        )  # fmt: skip
+        self._commands[self._tick % len(self._commands)] = ref, ref_dot
+        self.tick()
+
+    def tick(self) -> None:
+        """One control tick by the commands that are there: read ``qpos``, write ``ctrl``."""
+        self._update(*self._arrays, self._tick)
         self._tick += 1
 
 

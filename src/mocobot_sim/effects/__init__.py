@@ -1,4 +1,8 @@
-"""Physical effects that can be hidden in a simulated team, one file per cause; ``catalogue`` lists them."""
+"""Physical effects that can be hidden in a simulated team, one file per cause; ``catalogue`` lists them.
+
+What they are, take and allow is known without MuJoCo: an effect edits the scene that it is given, and loads nothing
+of what made it. So a wrong number is refused at once.
+"""
 
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.catalogue import (

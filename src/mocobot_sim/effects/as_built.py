@@ -1,12 +1,17 @@
 """Change one robot's as-built unit, and the simulated robot with it."""
 
+from __future__ import annotations
+
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mocobot_sim.scene.as_built import AsBuilt
-from mocobot_sim.scene.models import omnid_design
-from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.scene.design import omnid_design
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 
 def add_to_unit(scene: TeamScene, robot: int, joint: int, **additions: float) -> TeamScene:

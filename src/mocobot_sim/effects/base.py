@@ -1,17 +1,21 @@
 """What all effects have in common: checked numbers, a place, and how they are put into a scene."""
 
+from __future__ import annotations
+
 import math
 import re
 import sys
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from estimator.arrays import Array
 from estimator.errors import InputError
-from mocobot_sim.scene.scene import TeamScene
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 PLACE = ("robot", "joint")
 JOINTS = 3

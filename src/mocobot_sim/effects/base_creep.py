@@ -1,12 +1,16 @@
 """A base that creeps over the floor."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.slides import base_slides
 from mocobot_sim.effects.solver import precise
-from mocobot_sim.scene.scene import TeamScene
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 # So heavy that the arm's forces move it by less than 1e-9 m/s, and at its velocity within some 10 ms.
 ARMATURE_KG = 1e9

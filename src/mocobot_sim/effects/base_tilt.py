@@ -1,16 +1,21 @@
 """A base that does not stand level."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from estimator.arrays import Array
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.slides import level_slides
-from mocobot_sim.scene.models import base_height_m
-from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.scene.design import base_height_m
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
+
+    from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,8 @@ class BaseTilt(Effect):
     @property
     def tilt(self) -> Rotation:
         """From the level axes to the tilted ones."""
+        from scipy.spatial.transform import Rotation
+
         return Rotation.from_rotvec([self.roll_rad, self.pitch_rad, 0.0])
 
     def base_shift(self) -> Array:

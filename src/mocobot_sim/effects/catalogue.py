@@ -1,16 +1,20 @@
 """All causes by name, and effects as plain data."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from estimator.errors import InputError
 from estimator.strict import Fields
 from mocobot_sim.effect_names import NAMES
 from mocobot_sim.effects.base import PLACE, Effect
 from mocobot_sim.scene.applied import Applied
-from mocobot_sim.scene.scene import TeamScene
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 EFFECTS: dict[str, type[Effect]] = {
     name: getattr(import_module(f"mocobot_sim.effects.{name}"), name.title().replace("_", ""))

@@ -1,12 +1,14 @@
 """Something that resists the payload's motion."""
 
-from dataclasses import dataclass
-from typing import ClassVar
+from __future__ import annotations
 
-import mujoco
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 from mocobot_sim.effects.base import Effect
-from mocobot_sim.scene.scene import TeamScene
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)
@@ -25,8 +27,8 @@ class Drag(Effect):
     def _edit(self, scene: TeamScene) -> TeamScene:
         if not (self.coefficient_Ns_per_m or self.turning_Nms_per_rad):
             return scene
-        model, root = scene.compile(), scene.root
-        com = model.body_ipos[mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, "omnid1/payload/payload")]
+        root = scene.root
+        com = scene.compile().body("omnid1/payload/payload").ipos
         payload = root.find("body", "omnid1/payload/payload")
         site = payload.add("site", name="drag", pos=com.tolist(), group=4, size=[0.006])
         still = root.worldbody.add("site", name="drag", group=4, size=[0.006])

@@ -1,17 +1,20 @@
 """Friction of a gimbal joint."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.friction import STICK
 from mocobot_sim.effects.slider import Slider
 from mocobot_sim.effects.solver import precise
-from mocobot_sim.scene.scene import TeamScene
-from mocobot_sim.scene.soft import SoftRow
-from mocobot_sim.scene.team_index import GIMBAL_AXES
+from mocobot_sim.scene.design import GIMBAL_AXES
 from mocobot_sim.trial.actors import Actor, Reader
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)
@@ -64,5 +67,5 @@ class GimbalFriction(Effect):
         if self.viscous_Nms_per_rad:
             name = f"damping{self.robot}_gimbal_{axis}"
             scene.root.equality.add("joint", name=name, joint1=joint)
-            scene = replace(scene, soft=(*scene.soft, SoftRow(name, damping=self.viscous_Nms_per_rad)))
+            scene = scene.damped(name, self.viscous_Nms_per_rad)
         return scene

@@ -1,14 +1,18 @@
 """A grasp that flexes."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass, replace
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.slides import AXES, SPRUNG_ARMATURE_KG, add_slides, add_springs, grasp_body, widened
 from mocobot_sim.effects.solver import precise
-from mocobot_sim.scene.scene import TeamScene
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 # More than any grasp carries: how far a sound grasp may give way.
 LARGEST_FORCE_N = 400.0

@@ -1,12 +1,17 @@
 """A loose grasp."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.slides import LOOSE_ARMATURE_KG, add_slides, grasp_body, widened
 from mocobot_sim.effects.solver import precise
-from mocobot_sim.scene.scene import STIFF, TeamScene
+from mocobot_sim.solver_settings import STIFF
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 # Stiffer than a weld, so that an impact goes less deep: the shortest time constant at 1 ms.
 IMPACT = [0.002, 1.0]

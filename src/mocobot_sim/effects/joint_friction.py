@@ -1,16 +1,19 @@
 """Friction of a driven joint."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
 
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.friction import STICK
 from mocobot_sim.effects.slider import Slider
 from mocobot_sim.effects.solver import precise
-from mocobot_sim.scene.scene import TeamScene
-from mocobot_sim.scene.soft import SoftRow
 from mocobot_sim.trial.actors import Actor, Reader
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)
@@ -56,5 +59,5 @@ class JointFriction(Effect):
             tendon.set_attributes(frictionloss=self.coulomb_Nm, **STICK)
         if self.viscous_Nms_per_rad:
             root.equality.add("tendon", name=name, tendon1=tendon)
-            scene = replace(scene, soft=(*scene.soft, SoftRow(name, damping=self.viscous_Nms_per_rad)))
+            scene = scene.damped(name, self.viscous_Nms_per_rad)
         return scene

@@ -1,15 +1,20 @@
 """A formula at a place: what nobody has listed."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING
 
 from estimator.errors import InputError
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.laws import signals, targets
 from mocobot_sim.laws.functions import FUNCTIONS, Inside, Step, check_numbers
-from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.actors import Actor, Reader
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)

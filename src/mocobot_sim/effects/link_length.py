@@ -1,15 +1,18 @@
 """Links and base radius of another length than designed."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from mocobot_sim.effects.as_built import add_to_unit
 from mocobot_sim.effects.base import Effect
-from mocobot_sim.scene.as_built import AsBuilt
-from mocobot_sim.scene.omnid import deviate_geometry
-from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.scene.as_built import AsBuilt, deviate_geometry
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,18 @@
 """Somebody pushes the payload."""
 
-from dataclasses import dataclass
-from typing import ClassVar
+from __future__ import annotations
 
-import mujoco
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
 import numpy as np
 
 from mocobot_sim.effects.base import Effect
-from mocobot_sim.scene.scene import TeamScene
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)
@@ -35,19 +40,20 @@ class Push(Effect):
     def _edit(self, scene: TeamScene) -> TeamScene:
         return scene
 
-    def act(self, model: mujoco.MjModel, data: mujoco.MjData, body: int, R_Wb1: np.ndarray) -> None:
-        """Add the force to ``data.xfrc_applied`` of the payload's body if ``data.time`` is in the interval.
+    def acts(self, time: float) -> bool:
+        """Whether a time [s] is in the interval."""
+        return self.start_s <= time + 1e-9 < self.start_s + self.duration_s
+
+    def act(self, data: mujoco.MjData, body: int, R_Wb1: np.ndarray) -> None:
+        """Add the force to ``data.xfrc_applied`` of the payload's body.
 
         Args:
-            model, data: the trial's; kinematics are brought up to date.
+            data: the trial's, with kinematics of this instant.
             body: the payload's body id.
             R_Wb1: axes of robot 1's {b} in the world, shape (3, 3).
         """
-        if not self.start_s <= data.time + 1e-9 < self.start_s + self.duration_s:
-            return
         since, left = data.time - self.start_s, self.start_s + self.duration_s - data.time
         grown = max(0.0, min(1.0, since / self.ramp_s, left / self.ramp_s)) if self.ramp_s else 1.0
-        mujoco.mj_kinematics(model, data)
         force = grown * (R_Wb1 @ [self.force_x_N, self.force_y_N, self.force_z_N])
         arm = data.xmat[body].reshape(3, 3) @ [self.point_x_m, self.point_y_m, self.point_z_m]
         data.xfrc_applied[body, :3] += force

@@ -1,16 +1,20 @@
 """A spring with friction inside."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.friction import STICK
 from mocobot_sim.effects.slider import Slider
 from mocobot_sim.effects.solver import precise
-from mocobot_sim.scene.models import omnid_design
-from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.scene.design import omnid_design
 from mocobot_sim.trial.actors import Actor, Reader
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)

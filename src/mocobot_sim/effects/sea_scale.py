@@ -1,11 +1,15 @@
 """Spring of another stiffness than designed."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from mocobot_sim.effects.as_built import add_to_unit, linear_stiffness, set_linear_stiffness
 from mocobot_sim.effects.base import Effect
-from mocobot_sim.scene.scene import TeamScene
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)

@@ -1,15 +1,19 @@
 """A single torque sensor that follows late."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from estimator.arrays import Array
 from mocobot_sim.control.control import lag_filter
 from mocobot_sim.effects.base import Effect
-from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.actors import Actor, Reader
 from mocobot_sim.trial.readings import Misreading, RobotReadings
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)

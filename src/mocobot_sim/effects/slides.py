@@ -1,13 +1,14 @@
 """Three slides, and where they go: between a flange and its grasp, or under a base."""
 
+from __future__ import annotations
+
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from mocobot_sim.scene.scene import TeamScene
-from mocobot_sim.scene.soft import SoftRow
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 AXES = {"x": [1.0, 0.0, 0.0], "y": [0.0, 1.0, 0.0], "z": [0.0, 0.0, 1.0]}
 # Taken from the flange, so that the gimbal's mass and inertia stay what they are.
@@ -31,12 +32,11 @@ def add_springs(
     scene: TeamScene, joints: list[Any], label: str, compliance_m_per_N: float, relaxation_s: float
 ) -> TeamScene:
     """Hold slides at zero by springs, as soft equality rows named ``{label}_{joint}``; arguments as of ``SoftRow``."""
-    rows = []
     for joint in joints:
         name = f"{label}_{joint.name}"
         scene.root.equality.add("joint", name=name, joint1=joint)
-        rows.append(SoftRow(name, compliance=compliance_m_per_N, relaxation_s=relaxation_s))
-    return replace(scene, soft=(*scene.soft, *rows))
+        scene = scene.sprung(name, compliance_m_per_N, relaxation_s)
+    return scene
 
 
 def grasp_body(scene: TeamScene, robot: int) -> Any:
@@ -79,6 +79,8 @@ def base_slides(scene: TeamScene, robot: int, kind: str, **attributes: Any) -> l
 def level_slides(chassis: Any) -> None:
     """Turn the slides under a chassis so that they stay horizontal when it is tilted."""
     if chassis.quat is not None:
+        from scipy.spatial.transform import Rotation
+
         level = Rotation.from_quat(chassis.quat, scalar_first=True).inv()
         for slide in chassis.joint:
             slide.axis = level.apply(AXES[slide.name[-1]])

@@ -1,15 +1,19 @@
 """Liquid, or anything that swings, in the payload."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from estimator.arrays import Array
-from estimator.estimate.principal import inertia_parameters
+from estimator.inertia import inertia_parameters
 from mocobot_sim.effects.base import Effect
-from mocobot_sim.scene.models import omnid_design
-from mocobot_sim.scene.scene import TeamScene
+from mocobot_sim.scene.design import omnid_design
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)

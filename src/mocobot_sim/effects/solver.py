@@ -1,6 +1,12 @@
 """A stricter stopping rule for MuJoCo's constraint solver."""
 
-from mocobot_sim.scene.scene import TeamScene
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
+
 
 DEFAULT = 1e-8
 WITH_KINKS = 1e-12

@@ -1,9 +1,13 @@
 """A straight spring between something and the room."""
 
-from typing import Any
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
 
 from estimator.arrays import Array
-from mocobot_sim.scene.scene import TeamScene
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 SITE_M, WIDTH_M = 0.006, 0.002
 """Sizes of what is drawn of it."""

@@ -1,10 +1,15 @@
 """Encoder zero of a gimbal joint."""
 
+from __future__ import annotations
+
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from mocobot_sim.effects.as_built import add_to_unit
 from mocobot_sim.effects.base import Effect
-from mocobot_sim.scene.scene import TeamScene
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 
 @dataclass(frozen=True)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-import mujoco
 import numpy as np
 
 from mocobot_sim.control.control import home_phi
-from mocobot_sim.scene.models import base_height_m, omnid_design
+from mocobot_sim.scene.design import base_height_m, omnid_design
 from mocobot_sim.trial.actors import Stage
 
 JOINT = re.compile(
@@ -45,6 +44,8 @@ class PayloadMotion:
     """
 
     def __init__(self, stage: Stage) -> None:
+        import mujoco  # only where a trial runs: what a law may name is known without
+
         self._model, self._data, self._body = stage.model, stage.data, stage.index.payload_body
         mount = stage.model.body_parentid[stage.model.body("omnid1/chassis").id]
         mujoco.mj_kinematics(stage.model, stage.data)

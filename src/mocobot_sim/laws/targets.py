@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,9 +14,11 @@ from mocobot_sim.effects.slides import add_slides, grasp_body, level_slides, wid
 from mocobot_sim.effects.solver import precise
 from mocobot_sim.laws.functions import Step
 from mocobot_sim.laws.signals import Signals, is_signal, robot_of
-from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.actors import Stage
 from mocobot_sim.trial.readings import RobotReadings
+
+if TYPE_CHECKING:
+    from mocobot_sim.scene.scene import TeamScene
 
 READING = re.compile(r"(phi|theta|tau)_([1-9][0-9]*)_([123])")
 JOINT = re.compile(r"(driven|gimbal)_torque_([1-9][0-9]*)_([123])")

@@ -1,9 +1,13 @@
 """What a scene has to know of the effects in it: what they are, for the record, and which of them push."""
 
-from typing import ClassVar, Protocol, runtime_checkable
+from __future__ import annotations
 
-import mujoco
+from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
+
 import numpy as np
+
+if TYPE_CHECKING:
+    import mujoco
 
 
 class Applied(Protocol):
@@ -31,11 +35,15 @@ class Pushing(Protocol):
         """Which trial, from 1."""
         ...
 
-    def act(self, model: mujoco.MjModel, data: mujoco.MjData, body: int, R_Wb1: np.ndarray) -> None:
-        """Add to ``data.xfrc_applied`` of the payload's body, if it acts at ``data.time``.
+    def acts(self, time: float) -> bool:
+        """Whether it acts at a time [s]."""
+        ...
+
+    def act(self, data: mujoco.MjData, body: int, R_Wb1: np.ndarray) -> None:
+        """Add to ``data.xfrc_applied`` of the payload's body.
 
         Args:
-            model, data: the trial's.
+            data: the trial's, with kinematics of this instant.
             body: the payload's body id.
             R_Wb1: axes of robot 1's {b} in the world, shape (3, 3).
         """

@@ -1,13 +1,23 @@
 """How one real unit differs from its design: geometry, springs, sensor zeros and masses."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.errors import InputError
+from mocobot_sim.scene.design import omnid_design
+
+if TYPE_CHECKING:
+    from estimator.arm.unit import ArmUnit
+    from mocobot_sim.scene.pymjcf import mjcf
+
+WRIST_BODIES = ("platform", "yoke", "ring", "flange")
+"""What translates with the wrist."""
 
 
 def _zeros() -> Array:
@@ -71,7 +81,7 @@ def units_as_built(units: ArmUnit) -> tuple[AsBuilt, ...]:
             rod_mass_ratio=one.of("rod_mass_ratio"),
             wrist_mass_ratio=float(one.of("wrist_mass_ratio")[0]),
         )
-        for one in (ArmUnit(units.design, x) for x in units.x)
+        for one in (replace(units, x=x) for x in units.x)
     )
 
 
@@ -124,3 +134,43 @@ def _with_masses(unit: AsBuilt, ratios: Array) -> AsBuilt:
         rod_mass_ratio=ratios[3:6],
         wrist_mass_ratio=float(ratios[6]),
     )
+
+
+def deviate(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
+    """Move one unit's geometry, springs and masses off their design values."""
+    deviate_geometry(omnid, unit)
+    _deviate_masses(omnid, unit)
+    for k in range(3):
+        spring = omnid.find("joint", f"spring{k + 1}")
+        spring.stiffness = omnid_design().sea_stiffness_Nm_per_rad * (1.0 + unit.stiffness_ratio[k])
+
+
+def deviate_geometry(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
+    """Move one unit's geometry by what ``unit`` says, on top of what it is."""
+    for k in range(3):
+        azimuth = 2.0 * np.pi * k / 3.0
+        u = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+        proximal = omnid.find("body", f"proximal{k + 1}")
+        proximal.pos = proximal.pos + unit.base_radius_m[k] * u
+        rod = omnid.find("body", f"rod{k + 1}")
+        rod.pos = rod.pos + np.array([unit.proximal_length_m[k], 0.0, 0.0])
+        tip = omnid.find("site", f"rod{k + 1}_tip")
+        if unit.rod_length_m[k]:  # a longer rod has its mass along all of it
+            grown = 1.0 + unit.rod_length_m[k] / tip.pos[0]
+            rod.inertial.pos = rod.inertial.pos * grown
+            rod.inertial.diaginertia = rod.inertial.diaginertia * np.array([1.0, grown**2, grown**2])
+        tip.pos = tip.pos + np.array([unit.rod_length_m[k], 0.0, 0.0])
+        platform = omnid.find("site", f"platform{k + 1}")
+        platform.pos = platform.pos + unit.platform_radius_m[k] * u
+
+
+def _deviate_masses(omnid: mjcf.RootElement, unit: AsBuilt) -> None:
+    """Scale mass and inertia of the arm's bodies together, as denser or thicker parts would."""
+    ratios = {f"proximal{k + 1}": unit.proximal_mass_ratio[k] for k in range(3)}
+    ratios |= {f"rod{k + 1}": unit.rod_mass_ratio[k] for k in range(3)}
+    ratios |= dict.fromkeys(WRIST_BODIES, unit.wrist_mass_ratio)
+    for body, ratio in ratios.items():
+        if ratio:  # a design's own numbers keep their bits
+            inertial = omnid.find("body", body).inertial
+            inertial.mass = inertial.mass * (1.0 + ratio)
+            inertial.diaginertia = inertial.diaginertia * (1.0 + ratio)

@@ -7,9 +7,9 @@ from numpy.typing import ArrayLike
 from scipy.spatial.transform import RigidTransform
 
 from estimator.errors import InputError
-from mocobot_sim.scene.as_built import AsBuilt, units_of
+from mocobot_sim.scene.as_built import AsBuilt, deviate, units_of
 from mocobot_sim.scene.models import models_dir, omnid_design
-from mocobot_sim.scene.omnid import deviate, load_omnid, park, stand
+from mocobot_sim.scene.omnid import load_omnid, park, stand
 from mocobot_sim.scene.pymjcf import mjcf
 from mocobot_sim.scene.scene import TIMESTEP_S, TeamScene
 

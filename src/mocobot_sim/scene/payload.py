@@ -31,9 +31,9 @@ def load_payload(payload: str | Path) -> mjcf.RootElement:
     try:
         root = mjcf.from_path(str(path))
     except (OSError, ValueError, AttributeError, KeyError, SyntaxError) as error:
-        raise InputError(
-            f"{path}: not a readable MJCF ({getattr(error, 'strerror', None) or error})"
-        ) from error
+        said = " ".join(str(getattr(error, "strerror", None) or error).split())
+        quoted = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in said)  # of a damaged file
+        raise InputError(f"{path}: not a readable MJCF ({quoted})") from error
     if root.compiler.angle != "radian":
         # The composed scene has one compiler setting for all parts; degrees here would be read as radians.
         raise InputError(f'{path}: compiler angle is {root.compiler.angle or "degree"}; it must be "radian"')

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import mujoco
@@ -15,16 +15,16 @@ from estimator.errors import InputError
 from mocobot_sim.base.design import base_design
 from mocobot_sim.base.rollers import release, rough_floor
 from mocobot_sim.scene.applied import Applied, Pushing
-from mocobot_sim.scene.as_built import AsBuilt, units_of
+from mocobot_sim.scene.as_built import AsBuilt, deviate, units_of
 from mocobot_sim.scene.models import base_height_m, models_dir, omnid_design
-from mocobot_sim.scene.omnid import deviate, load_omnid, park, stand
+from mocobot_sim.scene.omnid import load_omnid, park, stand
 from mocobot_sim.scene.payload import grasp_frames, load_payload
 from mocobot_sim.scene.pymjcf import mjcf
 from mocobot_sim.scene.sensor_effects import SensorEffects
 from mocobot_sim.scene.soft import SoftRow, tune
+from mocobot_sim.solver_settings import STIFF
 
 TIMESTEP_S = 0.001
-STIFF = {"solref": [0.004, 1.0], "solimp": [0.9999, 0.9999, 0.001, 0.5, 2.0]}
 
 
 @dataclass(frozen=True)
@@ -95,6 +95,17 @@ class TeamScene:
             return mujoco.MjModel.from_xml_string(self.to_xml(), assets)
         except ValueError as error:
             raise InputError(f"MuJoCo cannot compile the team ({' '.join(str(error).split())})") from error
+
+    def sprung(self, equality: str, compliance: float, relaxation_s: float) -> TeamScene:
+        """The scene with an ``equality`` of its tree as a spring; arguments as of ``SoftRow``."""
+        return self._with(SoftRow(equality, compliance=compliance, relaxation_s=relaxation_s))
+
+    def damped(self, equality: str, damping: float) -> TeamScene:
+        """The scene with an ``equality`` of its tree as a damper; arguments as of ``SoftRow``."""
+        return self._with(SoftRow(equality, damping=damping))
+
+    def _with(self, row: SoftRow) -> TeamScene:
+        return replace(self, soft=(*self.soft, row))
 
     def tuned(self) -> TeamScene:
         """The scene with every soft row set for the inertias that it has now, in place."""

@@ -10,9 +10,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from mocobot_sim.scene.design import GIMBAL_AXES
+
 Index = NDArray[np.intp]
 
-GIMBAL_AXES = ("z", "y", "x")
 JOINTS = {
     "motor": ("motor1", "motor2", "motor3"),
     "spring": ("spring1", "spring2", "spring3"),

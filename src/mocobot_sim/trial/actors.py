@@ -1,14 +1,18 @@
 """What else acts in a trial, besides the robots' arms: bases that drive, a person's hand, effects that MJCF lacks."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol, runtime_checkable
-
-import mujoco
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from estimator.arrays import Array
 from mocobot_sim.control.control import TeamController
-from mocobot_sim.scene.team_index import TeamIndex
+
+if TYPE_CHECKING:
+    import mujoco
+
+    from mocobot_sim.scene.team_index import TeamIndex
 
 
 @dataclass(frozen=True)

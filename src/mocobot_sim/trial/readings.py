@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from estimator.arrays import Array
-from mocobot_sim.scene.models import omnid_design
+from mocobot_sim.scene.design import omnid_design
 from mocobot_sim.trial.actors import Stage
 
 

@@ -42,6 +42,10 @@ class Rows:
             for name in ("rod{}_tip", "platform{}")
         )
         self.sites = np.concatenate([index.grasp_site, index.payload_site, *(end.ravel() for end in ends)])
+        self.welded = self.sites[: 2 * robots]
+        # Views of MuJoCo's memory, which stays where it is: to ask for them takes as long as to copy them.
+        self._state, self._spring = data.qpos, data.qfrc_spring
+        self._xpos, self._xmat = data.site_xpos, data.site_xmat
         self.qpos = np.empty((samples, model.nq))
         self.spring_force = np.empty((samples, model.nv))
         self.site_xpos = np.empty((samples, len(self.sites), 3))
@@ -49,13 +53,14 @@ class Rows:
 
     def before_step(self, sample: int) -> None:
         """Keep the state that a step starts from."""
-        self.qpos[sample] = self.data.qpos
+        self.qpos[sample] = self._state
 
     def after_step(self, sample: int) -> None:
         """Keep the forces and frames that the step evaluated at that state."""
-        self.spring_force[sample] = self.data.qfrc_spring
-        self.site_xpos[sample] = self.data.site_xpos[self.sites]
-        self.site_xmat[sample] = self.data.site_xmat[self.sites[: 2 * self.index.robots]]
+        self.spring_force[sample] = self._spring
+        # "clip" changes no index, and lets numpy write where it shall.
+        self._xpos.take(self.sites, 0, self.site_xpos[sample], "clip")
+        self._xmat.take(self.welded, 0, self.site_xmat[sample], "clip")
 
     def phi(self, rows: slice, design: OmnidDesign) -> Array:
         """Driven angles [rad], shape (rows, N, 3)."""

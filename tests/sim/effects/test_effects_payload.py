@@ -177,7 +177,9 @@ def test_a_push_grows_and_fades():
         for time in (1.1, 1.2, 1.45, 1.9, 2.2, 3.0, 3.3):
             data.time = time
             data.xfrc_applied[:] = 0.0
-            effect.act(loop.model, data, body, np.eye(3))
+            if effect.acts(time):
+                mujoco.mj_kinematics(loop.model, data)
+                effect.act(data, body, np.eye(3))
             share = np.interp(time, corners, heights)
             np.testing.assert_allclose(
                 data.xfrc_applied[body, :3], share * np.array([2.0, -1.0, 3.0]), atol=1e-9
@@ -196,7 +198,9 @@ def test_a_push_is_force_and_moment_about_the_centre_of_mass():
         loop.controller.update(ref[tick], rate[tick])
         mujoco.mj_step(loop.model, loop.data)
         loop.data.xfrc_applied[:] = 0
-        effect.act(loop.model, loop.data, body, R_Wb1)
+        if effect.acts(loop.data.time):
+            mujoco.mj_kinematics(loop.model, loop.data)
+            effect.act(loop.data, body, R_Wb1)
         assert np.any(loop.data.xfrc_applied != 0) == (loop.data.time > 0.3995)
     mujoco.mj_kinematics(loop.model, loop.data)
     force = R_Wb1 @ [2.0, -1.0, 3.0]

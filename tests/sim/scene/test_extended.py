@@ -64,7 +64,7 @@ def test_a_grasp_that_turns_is_kept_and_older_models_have_none(tmp_path):
     write_extended(scene, scene.effects, tmp_path / "new", {})
     assert load_extended(tmp_path / "new").grasp_slack_rad == scene.grasp_slack_rad
     assert scene.grasp_slack_rad[1] > 0.0
-    numbers = tmp_path / "new" / "extended.json"
+    numbers = tmp_path / "new" / "effects.json"
     values = json.loads(numbers.read_text(encoding="utf-8"))
     del values["grasp_slack_rad"]
     numbers.write_text(json.dumps(values), encoding="utf-8")

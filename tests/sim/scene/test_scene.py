@@ -222,6 +222,9 @@ LOAD = f'<body name="payload">{INERTIAL}{GRASP1}'
 BAD = {
     "not xml": ("hello", "bad.xml: not a readable MJCF"),
     "empty": ("", "bad.xml: not a readable MJCF"),
+    "no text": ("<mujoco>\0</mujoco>", "bad.xml: not a readable MJCF .*line 1"),
+    "two lines": ("<mujoco><!-- one\ntwo -- three --></mujoco>", "bad.xml: not a readable MJCF .* one two"),
+    "unprintable": ("<mujoco><!-- \x7f -- three --></mujoco>", r"bad.xml: not a readable MJCF .*\\x7f"),
     "not mjcf": ("<robot/>", "bad.xml: not a readable MJCF"),
     "attribute": (_payload('<body name="payload" mood="1"/>'), "bad.xml: not a readable MJCF .*mood"),
     "degree": (_payload("", '<compiler angle="degree"/>'), 'compiler angle is degree; it must be "radian"'),
@@ -306,7 +309,7 @@ def test_bad_payload_is_refused_in_one_sentence(tmp_path, case):
     with pytest.raises(InputError, match=sentence) as caught:
         build_team(_write(tmp_path, text))
     assert "bad.xml" in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert str(caught.value).isprintable()
 
 
 def test_a_team_that_does_not_compile_is_refused_in_one_sentence(tmp_path):

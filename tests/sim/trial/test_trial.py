@@ -287,17 +287,17 @@ def test_a_collapsing_arm_fails_the_trial(teams):
 @pytest.mark.parametrize("channel", ["qpos", "qvel", "ctrl"])
 def test_nan_fails_the_trial(team_a, monkeypatch, tmp_path, channel):
     monkeypatch.chdir(tmp_path)  # MuJoCo writes its warnings to a file in the working directory
-    update = trial_module.TeamController.update
+    tick = trial_module.TeamController.tick
 
-    def spoil(self, *args):
-        update(self, *args)
+    def spoil(self):
+        tick(self)
         if self._tick == 700:
             getattr(spoiled["data"], channel)[5] = np.nan
 
     spoiled = {}
     make = mujoco.MjData
     monkeypatch.setattr(trial_module.mujoco, "MjData", lambda model: spoiled.setdefault("data", make(model)))
-    monkeypatch.setattr(trial_module.TeamController, "update", spoil)
+    monkeypatch.setattr(trial_module.TeamController, "tick", spoil)
     with pytest.raises(TrialError, match=r"MuJoCo warned mjWARN_BAD.* before t = 0\.99 s"):
         run_trial(team_a, _still(team_a))
 
