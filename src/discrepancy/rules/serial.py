@@ -16,6 +16,10 @@ CUTOFF_HZ = 20.0
 LOAD_CUTOFF_SHARE = 0.35
 """Of that, for a load that is differentiated twice. Chosen: arms move below 5 Hz, and so does the load of their links;
 noise of the trace falls with the fourth power."""
+SERVO_CUTOFF_HZ = 10.0
+"""The same where torques follow from duties. Chosen: a servo moves below 3 Hz, and faster than this its duty tells how
+the gear sticks and slips, which no cause describes. Measured with 20 Hz on an XL330: springs and delays, or a ripple,
+were named from two of three pairs of its gains; with 10, from all, friction, friction by load and back-EMF alone."""
 CUTOFF_SHARE = 0.15
 """The same over the sampling rate, at most. Chosen."""
 ROWS_RATIO = 2.5
@@ -128,6 +132,9 @@ MOST_SCALE = 0.5
 
 # Servos.
 
+SUPPLY_HZ = 1.0
+"""Cut-off of a supply's reading. Chosen: batteries and their cables sag in seconds; faster is how a bus rings that is
+switched, met by chance (an XL330's reads 5.7 to 9.2 V, with a mean at any duty of 7.0 to 7.4 V)."""
 LEAST_DRIVEN_SHARE = 0.1
 """Of the square of what a drive was given, that the model's torque must account for. Chosen: of a joint that only rubs,
 nobody can tell what a volt is worth."""
