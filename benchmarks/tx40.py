@@ -92,6 +92,37 @@ def frictions(model: SerialModel, log: JointLog, causes: list[Candidate]) -> dic
     return {c.joint: v for c, v in fit.active if c.cause == "friction" and c.joint is not None}
 
 
+def drift(rig: SerialRig, active: list[tuple[Candidate, np.ndarray]]) -> dict[int, np.ndarray]:
+    """Share by which a joint's friction grows over the log, with its standard error, shape (2,), by joint.
+
+    What all causes leave of its torque in motion is fitted by more Coulomb and viscous friction and by a share of both
+    together that grows evenly with time. Errors are those of half seconds.
+    """
+    left = np.concatenate(rig.physical_residual(active))
+    time = np.concatenate([rig.row_times(t) for t in range(len(rig.trials))])
+    moves = np.concatenate([_moves(rig, t) for t in range(len(rig.trials))])
+    out = {}
+    for cause, values in active:
+        if cause.cause == "friction" and cause.joint is not None:
+            j = cause.joint - 1
+            here = moves[:, j] > 0.98
+            columns = np.concatenate(rig.physical(cause))[here, j, :]
+            when = (time[here] - time.mean()) / np.ptp(time)
+            A = np.column_stack([columns, columns @ values * when])
+            normal = np.linalg.inv(A.T @ A)
+            found = normal @ (A.T @ left[here, j])
+            rest, half = left[here, j] - A @ found, (time[here] / rules.ERROR_BLOCK_S).astype(int)
+            scores = np.array([A[half == k].T @ rest[half == k] for k in np.unique(half)])
+            out[cause.joint] = np.array([found[2], np.sqrt((normal @ scores.T @ scores @ normal)[2, 2])])
+    return out
+
+
+def _moves(rig: SerialRig, trial: int) -> np.ndarray:
+    """How much of every row of a block joints are in motion, shape (n, J); 1 is all of it."""
+    share = rig.in_motion(np.ones((len(rig.row_times(trial)), len(rig.joints))), trial)
+    return share / share.max(axis=0)
+
+
 def main() -> None:
     """Print the tables."""
     model, log = read()
@@ -115,6 +146,9 @@ def main() -> None:
         print(
             f"  joint {joint}: {c1:7.3f} {c2:7.3f} ({apart[0]:4.1f} %) {v1:8.3f} {v2:8.3f} ({apart[1]:4.1f} %)"
         )
+    print("\nChange of friction over the log [%]")
+    for joint, (share, se) in drift(whole, [(i.candidate, i.values) for i in explanation.found]).items():
+        print(f"  joint {joint}: {100 * share:+.1f} +- {100 * se:.1f}")
     print("\nTorque left unforetold in the last third, rms over that of the torque [%]")
     last = len(whole.trials) - 1
     part = whole.parts[0]

@@ -16,6 +16,10 @@ CUTOFF_HZ = 20.0
 LOAD_CUTOFF_SHARE = 0.35
 """Of that, for a load that is differentiated twice. Chosen: arms move below 5 Hz, and so does the load of their links;
 noise of the trace falls with the fourth power."""
+SERVO_CUTOFF_HZ = 10.0
+"""The same where torques follow from duties. Chosen: a servo moves below 3 Hz, and faster than this its duty tells how
+the gear sticks and slips, which no cause describes. Measured with 20 Hz on an XL330: springs and delays, or a ripple,
+were named from two of three pairs of its gains; with 10, from all, friction, friction by load and back-EMF alone."""
 CUTOFF_SHARE = 0.15
 """The same over the sampling rate, at most. Chosen."""
 ROWS_RATIO = 2.5
@@ -72,9 +76,14 @@ SLOW_ROUNDINGS = 2.0
 that creeps through the steps of a coarse encoder has no direction."""
 STRIBECK_SHARES = (0.05, 0.1, 0.2)
 """The same, over which low-speed friction may fade. Chosen: slower is how dry friction fades, faster is viscous."""
-STRIBECK_RANGE = (0.02, 0.4)
-"""The same, beyond which it may not. Derived: twice and half the ends of what is tried; what fades over more than the
-typical speed is Coulomb friction by another name, as which it was taken where ``friction`` was left out (38 rad/s)."""
+STRIBECK_RANGE = (0.02, 0.1)
+"""The same, beyond which it may not. Derived: half of the least that is tried; and of what fades over more than the
+latter a straight line over the speed, Coulomb and viscous friction, explains about half (0.39 of the square over a
+TX40's speeds; 0.82 over 0.4). Measured with 0.4 there: such a peak of 11.8 N m and a bend of 49 N m, both of one curve,
+left joint 2 with 1.2 N m of Coulomb friction in one half of the log and 3.8 in the other."""
+STRIBECK_PER_S = 0.1
+"""Speed over which it may fade in any case [rad/s or m/s]. Chosen: where lubrication sets in depends on the contact,
+not on how fast a joint was moved; slow logs must not hide it."""
 EXPONENTS = (0.5, 0.3, 0.7)
 """Of the speed in friction that grows more slowly than it. Chosen: between Coulomb (0) and viscous (1)."""
 BRISTLES_RAD = (5e-4, 1e-3, 2e-3, 4e-3)
@@ -128,6 +137,9 @@ MOST_SCALE = 0.5
 
 # Servos.
 
+SUPPLY_HZ = 1.0
+"""Cut-off of a supply's reading. Chosen: batteries and their cables sag in seconds; faster is how a bus rings that is
+switched, met by chance (an XL330's reads 5.7 to 9.2 V, with a mean at any duty of 7.0 to 7.4 V)."""
 LEAST_DRIVEN_SHARE = 0.1
 """Of the square of what a drive was given, that the model's torque must account for. Chosen: of a joint that only rubs,
 nobody can tell what a volt is worth."""

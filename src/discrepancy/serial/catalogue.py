@@ -83,10 +83,10 @@ def hints_of(parts: Sequence[Signals], logs: Sequence[JointLog], motors: Sequenc
     load = np.sqrt(np.mean(np.concatenate([s.inverse for s in parts]) ** 2, axis=0))
     q = np.concatenate([s.q for s in parts])
     tree = parts[0].tree
-    turns = []
+    turns, cutoff = [], min(s.cutoff_hz for s in parts)
     for j in range(q.shape[1]):
         each = {n * g for n in rules.RIPPLE_TURNS for g in {1.0, abs(float(logs[0].drive.gear[j]))}}
-        turns.append([] if tree.slides[j] else [t for t in sorted(each) if _passes(t, typical[j], logs)])
+        turns.append([] if tree.slides[j] else [t for t in sorted(each) if _passes(t, typical[j], cutoff)])
     return Hints(
         typical,
         np.max([s.slow for s in parts], axis=0),
@@ -104,9 +104,8 @@ def _alike(tree: Tree, one: int, other: int) -> bool:
     return bool(tree.slides[one] == tree.slides[other])
 
 
-def _passes(turns: float, typical: float, logs: Sequence[JointLog]) -> bool:
+def _passes(turns: float, typical: float, cutoff: float) -> bool:
     """Whether a ripple of so many periods a turn is slow enough for the rows; one a turn is a counterbalance."""
-    cutoff = min(rules.CUTOFF_HZ, rules.CUTOFF_SHARE * min(log.rate_hz for log in logs))
     return turns > 1.0 and turns * typical / (2.0 * np.pi) < rules.MOST_RIPPLE_HZ * cutoff
 
 

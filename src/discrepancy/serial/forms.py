@@ -32,7 +32,8 @@ def forms_beside(
         return []
     own = [(c, v) for c, v in there if _at_a_joint(c) and not (_rubs(candidate) and _rubs(c))]
     soft = _named_friction(rows, candidate, values)
-    if not own and not soft:
+    driven = [] if _rubs(candidate) else [motor.joint for motor in rows.motors]
+    if not own and not soft and not driven:
         return []
     traces = [[x @ v for x in rows.physical(c)] for c, v in own]
     sizes = [np.sqrt(np.mean(np.concatenate(trace) ** 2, axis=0)) for trace in traces]
@@ -44,8 +45,19 @@ def forms_beside(
             forms = other_forms(part.signals, part.reduction.samples[k], place_of(c), CAUSES[c.cause].family)
             columns += [rules.FORM_SHARE * trace[t] * m[:, None] for m in forms.times]
             columns += [rules.FORM_SHARE * size * m[:, None] for m in forms.besides]
+        columns += [column for j in driven for column in _worth(rows, t, j)]
         out.append(rows.whitening[t](np.stack(columns, axis=2)))
     return out
+
+
+def _worth(rows: SerialRows, trial: int, j: int) -> list[Array]:
+    """What a volt or an ampere of a drive is worth may be another here than there, rows (n, C) of one block."""
+    part, k = rows.block_of[trial]
+    torque = np.zeros_like(part.signals.torque)
+    torque[:, j] = part.signals.torque[:, j]
+    trace = part.reduction(torque)[k][:, rows.joints]
+    forms = other_forms(part.signals, part.reduction.samples[k], j, "")
+    return [rules.UNKNOWN_SCALE_SHARE * trace * m[:, None] for m in forms.times]
 
 
 def _at_a_joint(candidate: Candidate) -> bool:

@@ -19,7 +19,7 @@ from discrepancy.serial.model import SerialModel
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rows.reduction import Reduction, blocks
 from discrepancy.serial.rows.signals import Signals
-from discrepancy.serial.servo.motor import Motor
+from discrepancy.serial.servo.motor import Motor, driven_by_voltage
 from estimator.arrays import Array
 from estimator.errors import InputError
 
@@ -97,6 +97,8 @@ def parts_of(
     # While a servo sticks its duty goes with its error, which is no load: friction at rest is whatever it gives.
     knots = np.full(len(model.joints), rules.REST_KNOTS_S)
     knots[[motor.joint for motor in motors]] = rules.SERVO_KNOTS_S
+    if driven_by_voltage(motors, len(model.joints)).any():
+        signals = [replace(s, cutoff_hz=min(s.cutoff_hz, rules.SERVO_CUTOFF_HZ)) for s in signals]
     parts = [_part(replace(s, typical=typical), joints, len(logs), knots) for s in signals]
     return tuple(parts), joints
 

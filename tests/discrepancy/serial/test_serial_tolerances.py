@@ -19,6 +19,7 @@ from discrepancy.least_squares.problem import Problem
 from discrepancy.rules import serial as rules
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.friction import bent
+from discrepancy.serial.causes.stribeck import slowest_fading
 from discrepancy.serial.model import load_model
 from discrepancy.serial.rig import SerialRig
 from serial_made import ARM, nominal, nominal_file, simulated, spec
@@ -115,8 +116,22 @@ def test_what_no_contact_can_do(rig: SerialRig, cause: str, values: list[float])
 
 
 def test_fading_over_all_speeds_is_no_stribeck_friction() -> None:
-    shape = {"fade_per_s": 0.35, "typical_per_s": 1.0}
-    assert [s["fade_per_s"] for s in CAUSES["stribeck"].finer(shape)] == pytest.approx([0.28])
+    near = [{"fade_per_s": fade, "typical_per_s": 2.0} for fade in (0.17, 0.1)]
+    fades = [[s["fade_per_s"] for s in CAUSES["stribeck"].finer(shape)] for shape in near]
+    np.testing.assert_allclose(fades[0], [0.136])
+    np.testing.assert_allclose(fades[1], [0.08, 0.125])
+    # A joint that hardly moved may rub like that over all of its speeds.
+    slow = CAUSES["stribeck"].finer({"fade_per_s": 0.05, "typical_per_s": 0.1})
+    assert [s["fade_per_s"] for s in slow] == pytest.approx([0.04, 0.0625])
+
+
+def test_most_of_a_peak_is_no_straight_line() -> None:
+    """Over evenly spread speeds the longest peak is less than half Coulomb and viscous friction."""
+    speed = np.linspace(0.0, 2.0, 4001)
+    line = np.column_stack([np.ones_like(speed), speed])
+    peak = np.exp(-speed / slowest_fading(1.0))
+    left = peak - line @ np.linalg.lstsq(line, peak, rcond=None)[0]
+    assert np.sum(left**2) > 0.5 * np.sum(peak**2)
 
 
 def test_what_another_form_explains_is_no_credit(rig: SerialRig) -> None:

@@ -5,7 +5,6 @@ import numpy as np
 from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause
 from discrepancy.serial.causes.elasticity import along
-from discrepancy.serial.rows.reduction import cutoff_hz
 from estimator.filtering import low_pass
 
 
@@ -23,7 +22,7 @@ class Backlash(Cause):
         return f"has {n('play_rad', 'mrad', 1e3)} of play between motor and link"
 
     def columns(self, signals, at, shape):
-        cutoff = cutoff_hz(signals.log.rate_hz)
+        cutoff = signals.cutoff_hz
         load = low_pass(signals.inverse[:, at], signals.rate_hz, cutoff)
         soft = rules.SOFT_LOAD_SHARE * max(float(np.sqrt(np.mean(load**2))), 1e-12)
         side = low_pass(np.tanh(load / soft), signals.rate_hz, cutoff)

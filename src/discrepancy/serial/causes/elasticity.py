@@ -5,7 +5,6 @@ import numpy as np
 from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause
 from discrepancy.serial.mechanics.regressor import rigid_torque, torque_of
-from discrepancy.serial.rows.reduction import cutoff_hz
 from estimator.filtering import differentiate, low_pass
 
 
@@ -24,7 +23,7 @@ class Elasticity(Cause):
 
     def columns(self, signals, at, shape):
         # Its second derivative is in the trace, and with it the noise of the load's own accelerations.
-        cutoff = rules.LOAD_CUTOFF_SHARE * cutoff_hz(signals.log.rate_hz)
+        cutoff = rules.LOAD_CUTOFF_SHARE * signals.cutoff_hz
         load = low_pass(signals.inverse[:, at], signals.rate_hz, cutoff)
         return along(signals, at, -load)[..., None]
 

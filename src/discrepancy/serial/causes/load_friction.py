@@ -3,6 +3,7 @@
 import numpy as np
 
 from discrepancy.serial.causes.base import Cause, at_joint, direction
+from estimator.filtering import low_pass
 
 
 class LoadFriction(Cause):
@@ -28,7 +29,9 @@ class LoadFriction(Cause):
 
     def columns(self, signals, at, shape):
         slow = float(signals.slow[at])
-        load = np.abs(signals.inverse[:, at] - signals.tree.armature[at] * signals.ddq[:, at])
+        # Noise of the accelerations has no sign, and would be a load where there is none.
+        load = signals.inverse[:, at] - signals.tree.armature[at] * signals.ddq[:, at]
+        load = np.abs(low_pass(load, signals.rate_hz, signals.cutoff_hz))
         return at_joint(signals, at, direction(signals, at, slow) * (load - shape["load_Nm"]))
 
     def shapes(self, hints, at):

@@ -32,10 +32,25 @@ class Stribeck(Cause):
 
     def shapes(self, hints, at):
         typical = float(hints.typical[at])
-        return [{"fade_per_s": share * typical, "typical_per_s": typical} for share in rules.STRIBECK_SHARES]
+        fades = (share * typical for share in rules.STRIBECK_SHARES)
+        return [
+            {"fade_per_s": fade, "typical_per_s": typical}
+            for fade in fades
+            if fade <= slowest_fading(typical)
+        ]
 
     def finer(self, shape):
         typical = shape["typical_per_s"]
-        low, high = (edge * typical for edge in rules.STRIBECK_RANGE)
+        low, high = rules.STRIBECK_RANGE[0] * typical, slowest_fading(typical)
         near = (factor * shape["fade_per_s"] for factor in (0.8, 1.25))
         return [dict(shape) | {"fade_per_s": fade} for fade in near if low <= fade <= high]
+
+
+def slowest_fading(typical: float) -> float:
+    """Speed over which such friction may fade at most; what goes on to higher ones is Coulomb friction [rad/s or m/s].
+
+    Args:
+        typical: speed of the joint while it moves.
+    """
+    # Rounding must not cost the last of the shares.
+    return max(rules.STRIBECK_RANGE[1] * typical, rules.STRIBECK_PER_S) * (1.0 + 1e-9)

@@ -19,7 +19,7 @@ from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rules import serial as rules
 from discrepancy.serial.mechanics.regressor import rigid_torque, torque_of
 from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.rows.reduction import Reduction, cutoff_hz
+from discrepancy.serial.rows.reduction import Reduction
 from discrepancy.serial.rows.signals import Signals, smoothing_hz, work_step
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
@@ -40,13 +40,13 @@ class SensorNoise:
     ddq: Array
 
     @classmethod
-    def of(cls, log: JointLog, rng: np.random.Generator) -> SensorNoise:
+    def of(cls, signals: Signals, rng: np.random.Generator) -> SensorNoise:
         """As loud as the log is where nothing moves; rounding counts as white."""
-        rate = log.rate_hz
+        log, rate = signals.log, signals.log.rate_hz
         torque = np.nan_to_num(log.torque) if log.torque is not None else np.zeros_like(log.q)
         # A log that was resampled has been low-passed from a fifth of its rate on.
         top = rules.FILTERED_BAND if log.resampled else rules.TOP_BAND
-        low, high = (share * cutoff_hz(rate) for share in rules.NOISE_BAND)
+        low, high = (share * signals.cutoff_hz for share in rules.NOISE_BAND)
         torque_density = _density(torque, rate, min(low, top[0] * rate), min(high, top[1] * rate))
         rounding = log.position_step**2 / 12.0 / (rate / 2.0)
         angle_density = np.maximum(_density(log.q, rate, top[0] * rate, top[1] * rate), rounding)

@@ -33,7 +33,7 @@ class Reduction:
     @classmethod
     def of(cls, signals: Signals, blocks: list[slice], channels: NDArray[np.intp]) -> Reduction:
         """Rows of blocks; one is left out where the filter would see an unusable sample of a channel's joint."""
-        cutoff = cutoff_hz(signals.log.rate_hz)
+        cutoff = signals.cutoff_hz
         kernel = _kernel(signals.rate_hz, cutoff)
         half = len(kernel) // 2
         step = max(1, round(signals.rate_hz / (rules.ROWS_RATIO * cutoff)))
@@ -61,11 +61,6 @@ class Reduction:
         """The map from the samples of one block, which are all that its rows see, to its rows."""
         starts = np.cumsum([0, *(len(s) for s in self.samples)])
         return self.filter[starts[block] : starts[block + 1], samples]
-
-
-def cutoff_hz(rate_hz: float) -> float:
-    """Cut-off of the rows of a log of some rate."""
-    return min(rules.CUTOFF_HZ, rules.CUTOFF_SHARE * rate_hz)
 
 
 def _kernel(rate_hz: float, cutoff: float) -> Array:

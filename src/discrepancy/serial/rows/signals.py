@@ -31,6 +31,7 @@ class Signals:
         usable: samples and joints whose torque and motion are what they seem, shape (W, J).
         inverse: torques that the nominal model asks for without friction, shape (W, J).
         typical: speed of every joint while it moves, over all logs (root mean square), shape (J,).
+        cutoff_hz: of the rows.
         enabled: whether the drives are on, shape (W,); None where the log does not say.
     """
 
@@ -45,6 +46,7 @@ class Signals:
     usable: NDArray[np.bool_]
     inverse: Array
     typical: Array
+    cutoff_hz: float
     enabled: NDArray[np.bool_] | None = None
 
     @classmethod
@@ -68,7 +70,7 @@ class Signals:
         inverse = inverse_torque(q, dq, ddq)
         typical = np.maximum(np.sqrt(np.mean(dq**2, axis=0)), rules.LEAST_SPEED)
         return cls(
-            log, tree, rate / step, log.time[here], q, dq, ddq, torque, known[here], inverse, typical,
+            log, tree, rate / step, log.time[here], q, dq, ddq, torque, known[here], inverse, typical, cutoff_hz(rate),
             None if log.enabled is None else log.enabled[here],
         )  # fmt: skip
 
@@ -104,6 +106,11 @@ class Signals:
 def smoothing_hz(rate_hz: float) -> float:
     """Cut-off of the first filter."""
     return min(rules.SMOOTH_HZ, rules.SMOOTH_SHARE * rate_hz)
+
+
+def cutoff_hz(rate_hz: float) -> float:
+    """Cut-off of the rows of a log of some rate, whose drives tell their torques."""
+    return min(rules.CUTOFF_HZ, rules.CUTOFF_SHARE * rate_hz)
 
 
 def work_step(rate_hz: float) -> int:

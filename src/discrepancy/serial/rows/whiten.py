@@ -45,7 +45,7 @@ def whiten(
         candidates: every lasting cause at every place.
     """
     rng = np.random.default_rng(rules.NOISE_SEED)
-    noises = [SensorNoise.of(part.signals.log, rng) for part in parts]
+    noises = [SensorNoise.of(part.signals, rng) for part in parts]
     angles, sensors = [], []
     for part, noise in zip(parts, noises, strict=True):
         own = [rows[:, joints] for rows in noise.of_angles(part.signals, part.reduction)]

@@ -13,8 +13,8 @@ from discrepancy.serial.mechanics.nominal import inverse_torque
 from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel
 from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.rows.reduction import cutoff_hz
 from discrepancy.serial.rows.signals import Signals
+from discrepancy.serial.servo.supply import supply_of
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.filtering import low_pass
@@ -104,7 +104,7 @@ def _raw(logs: Sequence[JointLog], joints: int) -> tuple[list[Array], list[str]]
         own = np.full(log.q.shape, np.nan) if log.torque is None else log.torque.copy()
         for j, name in enumerate(unit):
             if name in ("V", "full duty") and log.drive.duty is not None:
-                supply = log.drive.supply_V if name == "V" else None
+                supply = supply_of(log) if name == "V" else None
                 own[:, j] = log.drive.duty[:, j] * (1.0 if supply is None else supply)
         raw.append(own)
     return raw, unit
@@ -119,17 +119,19 @@ def _motor(signals: Sequence[Signals], j: int, unit: str, name: str) -> Motor:
     for s in signals:
         side, load, speed = np.clip(s.dq[:, j] / s.slow[j], -1.0, 1.0), s.inverse[:, j], s.dq[:, j]
         on = np.ones(len(speed)) if s.enabled is None else s.enabled
+        cutoff = rules.MOTOR_SHARE * s.cutoff_hz
+        # Noise has no sign, and would be a load where there is none.
+        passed = np.abs(low_pass(load, s.rate_hz, cutoff))
         each = [
             load,
             side,
-            np.abs(load) * side,
+            passed * side,
             speed,
             on * speed,
             s.ddq[:, j],
             np.ones(len(speed)),
             s.torque[:, j],
         ]
-        cutoff = rules.MOTOR_SHARE * cutoff_hz(s.log.rate_hz)
         smooth = low_pass(np.column_stack(each), s.rate_hz, cutoff)
         moves = (s.usable[:, j] & (np.abs(speed) > s.slow[j])).astype(float)
         at = low_pass(moves[:, None], s.rate_hz, cutoff)[:, 0] > rules.MOVES_THROUGHOUT

@@ -1,0 +1,95 @@
+"""What a servo's volts are: a supply that rings where it is read, rows for duties, and what a volt may be worth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discrepancy.rules import serial as rules
+from discrepancy.serial.causes import CAUSES
+from discrepancy.serial.forms import forms_beside
+from discrepancy.serial.model import SerialModel
+from discrepancy.serial.recording.joint_log import JointLog
+from discrepancy.serial.rig import SerialRig
+from discrepancy.serial.servo.motor import with_torques
+from discrepancy.serial.servo.supply import supply_of
+from test_serial_servo import VOLTS, logs, model  # noqa: F401 (fixtures)
+
+
+def ringing(log: JointLog, seed: int = 0) -> JointLog:
+    """Readings of a bus at any instant of the drive's period: a volt less, as it is, or a volt more."""
+    raw = VOLTS + np.random.default_rng(seed).choice([-1.0, 0.0, 1.0], len(log.time))
+    return replace(log, drive=replace(log.drive, supply_V=raw))
+
+
+def test_a_supply_that_rings_is_read_as_its_mean(logs: list[JointLog]) -> None:  # noqa: F811
+    seen = supply_of(ringing(logs[0]))
+    assert seen is not None
+    # White readings of variance 2/3 V^2 at 200 Hz through about 1 Hz of bandwidth.
+    assert np.std(seen - VOLTS) < 0.15
+    slow = VOLTS - 0.5 * np.sin(2.0 * np.pi * 0.1 * logs[0].time)  # a battery sags
+    sagging = supply_of(replace(logs[0], drive=replace(logs[0].drive, supply_V=slow)))
+    assert sagging is not None
+    np.testing.assert_allclose(sagging, slow, atol=0.1)
+    np.testing.assert_allclose(sagging[400:-400], slow[400:-400], atol=0.01)
+
+
+def test_a_supply_that_is_not_known_stays_unknown(logs: list[JointLog]) -> None:  # noqa: F811
+    raw = np.full(len(logs[0].time), VOLTS)
+    raw[100:110] = np.nan
+    seen = supply_of(replace(logs[0], drive=replace(logs[0].drive, supply_V=raw)))
+    assert seen is not None
+    np.testing.assert_array_equal(np.isnan(seen), np.isnan(raw))
+    np.testing.assert_allclose(seen[~np.isnan(raw)], VOLTS)
+    assert supply_of(replace(logs[0], drive=replace(logs[0].drive, supply_V=None))) is None
+
+
+def test_torques_do_not_ring_with_the_supply(model: SerialModel, logs: list[JointLog]) -> None:  # noqa: F811
+    (quiet,), (steady,) = with_torques(model, logs[:1])
+    (rung,), (motor,) = with_torques(model, [ringing(logs[0])])
+    assert motor.torque_per_unit == pytest.approx(steady.torque_per_unit, rel=0.02)
+    assert quiet.torque is not None
+    assert rung.torque is not None
+    assert np.std(rung.torque - quiet.torque) < 0.03 * np.std(quiet.torque)
+
+
+def test_rows_of_duties_are_slower(model: SerialModel, logs: list[JointLog]) -> None:  # noqa: F811
+    by_duty = SerialRig.of(model, logs[:2]).parts[0]
+    told, _ = with_torques(model, logs[:2])
+    by_torque = SerialRig.of(
+        model, [replace(log, drive=replace(log.drive, duty=None)) for log in told]
+    ).parts[0]
+    assert by_duty.signals.cutoff_hz == rules.SERVO_CUTOFF_HZ
+    assert by_torque.signals.cutoff_hz == rules.CUTOFF_HZ
+    rows = [len(part.reduction.samples[0]) for part in (by_duty, by_torque)]
+    assert rows[0] < 0.6 * rows[1]
+
+
+def test_a_volt_may_be_worth_another_torque_elsewhere(model: SerialModel, logs: list[JointLog]) -> None:  # noqa: F811
+    rig = SerialRig.of(model, logs[:2])
+    (spring,) = (c for c in rig.candidates() if c.cause == "spring")
+    beside = forms_beside(rig, spring, np.array([0.1]), [])
+    # A torque that falls by a twentieth of itself where the joint is far out is one of these forms.
+    part, k = rig.block_of[0]
+    torque = part.signals.torque
+    far = np.abs(part.signals.q) / np.abs(part.signals.q).max()
+    trace = rig.whitening[0](part.reduction(0.05 * torque * far**2)[k][:, rig.joints]).ravel()
+    basis = beside[0].reshape(-1, beside[0].shape[2])
+    left = trace - basis @ np.linalg.lstsq(basis, trace, rcond=None)[0]
+    assert np.sum(left**2) < 0.05 * np.sum(trace**2)
+    (friction,) = (c for c in rig.candidates() if c.cause == "load_friction")
+    assert not forms_beside(rig, friction, np.array([0.1]), [])
+
+
+def test_noise_is_no_load(model: SerialModel, logs: list[JointLog]) -> None:  # noqa: F811
+    """Without a load friction by load is none, however loud the accelerations are beyond what the rows keep."""
+    s = SerialRig.of(model, logs[:2]).parts[0].signals
+    noise = np.random.default_rng(1).standard_normal(s.q.shape)
+    moving = replace(s, dq=np.full(s.q.shape, 2.0 * s.slow), ddq=np.zeros(s.q.shape), inverse=noise)
+    trace = CAUSES["load_friction"].columns(moving, 0, {"load_Nm": 0.0})
+    # Half-normal, of as much of the white noise as passes two passes of third order: the integral of 1 / (1 + x^6)^2 is
+    # (5/6) (pi/6) / sin(pi/6) = 0.873.
+    passes = np.sqrt(0.873 * s.cutoff_hz / (s.rate_hz / 2.0))
+    assert trace.mean() == pytest.approx(passes * np.sqrt(2.0 / np.pi), rel=0.1)
