@@ -12,6 +12,7 @@ from scipy.io import savemat
 from discrepancy.emps.recording.axis_log import AxisLog
 from discrepancy.emps.recording.preflight import checked, stuck
 from discrepancy.emps.recording.reader import read_emps
+from discrepancy.emps.recording.whole import is_whole
 from emps_made import GAIN, KP, KV, as_mat, reference, written
 from estimator.errors import InputError
 
@@ -96,6 +97,30 @@ def test_a_cut_off_file_is_refused(tmp_path: Path, share: float) -> None:
     path = written(tmp_path, axis())
     path.write_bytes(path.read_bytes()[: int(share * path.stat().st_size)])
     assert refused(path)
+
+
+@pytest.mark.parametrize("compressed", [False, True])
+@pytest.mark.parametrize("bytes_left", [129, 200, 400, 4000])
+def test_a_file_cut_off_inside_a_variable_does_not_reach_the_parser(
+    tmp_path: Path, bytes_left: int, compressed: bool
+) -> None:
+    """On some such files scipy's crashes, the whole interpreter with it."""
+    whole = tmp_path / "whole.mat"
+    made = axis()
+    savemat(whole, {"t": made.time, "qm": made.position, "gtau": GAIN}, do_compression=compressed)
+    assert is_whole(whole)
+    cut = tmp_path / "cut.mat"
+    cut.write_bytes(whole.read_bytes()[:bytes_left])
+    assert not is_whole(cut)
+    assert "is cut off" in refused(cut)
+
+
+def test_other_formats_are_left_to_the_parser(tmp_path: Path) -> None:
+    old = tmp_path / "old.mat"
+    savemat(old, {"t": np.arange(3.0)}, format="4")
+    assert is_whole(old)
+    (tmp_path / "short.mat").write_bytes(b"MATLAB")
+    assert is_whole(tmp_path / "short.mat")
 
 
 def test_a_missing_file_is_refused(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from scipy.io.matlab import MatReadError
 
 from discrepancy.emps.recording.axis_log import AxisLog
 from discrepancy.emps.recording.sampling import on_grid
+from discrepancy.emps.recording.whole import is_whole
 from estimator.arrays import Array
 from estimator.errors import InputError
 
@@ -30,8 +31,14 @@ def read_emps(path: Path) -> AxisLog:
         InputError: the file cannot be read or is no such recording.
     """
     try:
+        if not is_whole(path):
+            raise InputError(
+                f"{path}: is cut off: what its last variable should have goes beyond the end of the file"
+            )
         with path.open("rb") as file:
             found = loadmat(file, variable_names=[*SERIES, *NUMBERS])
+    except InputError:
+        raise
     except NotImplementedError as error:
         raise InputError(f"{path}: is a MATLAB 7.3 file; save it with -v7 instead") from error
     except OSError as error:

@@ -1,0 +1,34 @@
+"""Whether a MATLAB file is whole: scipy's reader crashes the interpreter on some that are cut off."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+HEADER_BYTES, TAG_BYTES = 128, 8
+
+
+def is_whole(path: Path) -> bool:
+    """Whether every element of a file's top level ends within it, as far as its header says that it has such.
+
+    Level 5 MAT-files ("MAT-File Format", The MathWorks, 2024, "MAT-File Structure") are a header of 128 bytes, which
+    ends with version and byte order, and elements: type and number of bytes, then so many bytes. A file of another
+    format is left to its reader.
+
+    Raises:
+        OSError: it cannot be read.
+    """
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        header = file.read(HEADER_BYTES)
+        order = {b"IM": "<", b"MI": ">"}.get(header[126:])
+        if order is None or struct.unpack(f"{order}H", header[124:126]) != (0x0100,):
+            return True
+        at = HEADER_BYTES
+        while at < size:
+            file.seek(at)
+            tag = file.read(TAG_BYTES)
+            if len(tag) < TAG_BYTES:
+                return False
+            at += TAG_BYTES + struct.unpack(f"{order}II", tag)[1]
+    return at == size
