@@ -7,7 +7,9 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.team.causes.base import stack
 from discrepancy.team.causes.yielding import Yielding, lagging
+from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.gimbal import rate_matrix
+from estimator.arrays import Array
 from estimator.rigid_team.slots import THETA
 
 
@@ -55,22 +57,26 @@ class GraspFlex(Yielding):
         return [*({**shape, **time} for time in times), *near]
 
     def columns(self, trial, robot, joint, shape):
-        R_bi, R_1 = trial.data.R_bi[:, robot], trial.bases.R[robot].T
-        force = np.einsum("qij,qj->qi", R_bi, trial.data.wrench[:, robot, 3:])
-        force = lagging(force, trial.signals.rate_hz, shape)
-        gives = trial.of_pose(robot, None, -force @ R_1)
+        R_bi, to_b1 = trial.data.R_bi[:, robot], trial.bases.R[robot]
+        # Its springs turn with it, and so does what lags in them.
+        force = lagging(trial.data.wrench[:, robot, 3:], trial.signals.rate_hz, shape)
+        gives = _moved(trial, robot, to_b1 @ R_bi, -force)
         turns = np.zeros_like(gives)
         if "offset_m" in shape:
-            axis, offset_m = R_bi[..., 2], shape["offset_m"]
-            across = force - np.sum(force * axis, axis=1, keepdims=True) * axis
-            turned = np.sign(offset_m) * np.cross(axis, force)  # of the payload, in {b}
+            offset_m = shape["offset_m"]
+            across = force * [1.0, 1.0, 0.0]
+            turned = np.sign(offset_m) * np.cross([0.0, 0.0, 1.0], force)  # of the payload
             # The gimbal reads its own side of the grasp, which has not turned.
-            in_i = np.swapaxes(R_bi, -1, -2) @ turned[..., None]
-            angles = np.linalg.solve(rate_matrix(trial.s[:, robot, THETA]), in_i)[..., 0]
-            turns = trial.of_pose(robot, None, -abs(offset_m) * across @ R_1)
+            angles = np.linalg.solve(rate_matrix(trial.s[:, robot, THETA]), turned[..., None])[..., 0]
+            turns = _moved(trial, robot, to_b1 @ R_bi, -abs(offset_m) * across)
             turns += trial.of_signals(robot, theta=-angles)
         return stack([gives, turns])
 
     def physical(self, values, context):
         turning = float(values[1]) if "offset_m" in context.shape else 0.0
         return super().physical(values, context) | {"turning_rad_per_N": turning}
+
+
+def _moved(trial: TrialLinear, robot: int, R_b1i: Array, by: Array) -> Array:
+    """Rows of a grasp that is displaced along the axes of {i}, shape (Q, 3)."""
+    return trial.of_pose(robot, None, np.einsum("qij,qj->qi", R_b1i, by))
