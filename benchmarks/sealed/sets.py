@@ -141,7 +141,8 @@ def _in_turn(pool: Sequence[str], seed: int) -> list[str]:
 
 
 def _size(name: str, background: Background, rng: np.random.Generator) -> float:
-    low, high = SIZES[0], min(SIZES[1], largest(name, background))
+    high = min(SIZES[1], largest(name, background))
+    low = min(SIZES[0], high)  # one that was asked for by name may run with less only
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 

@@ -49,6 +49,13 @@ def test_plans_keep_to_what_can_be_hidden():
                 assert factor <= largest(name, request.background)
 
 
+def test_what_is_asked_for_by_name_is_as_large_as_a_trial_runs_with():
+    """Where that is less than what is drawn otherwise."""
+    most = largest("turning_grasp", "x10")
+    assert most < 2.0
+    assert plan("forms", 0, "x10", None, "turning_grasp").factors == (pytest.approx(most),)
+
+
 def test_limits_follow_the_background():
     """A zero is limited by its tolerance, a slosh by noise alone."""
     assert [limit_over_nominal("phi_zero", b) for b in BACKGROUNDS] == pytest.approx(
