@@ -81,7 +81,7 @@ class Cause(ABC):
 
     def never_negative(self, values: Array, se: Array) -> bool:
         """Whether nothing that must be positive is negative beyond two standard errors."""
-        return all(values[k] > -2.0 * se[k] for k, n in enumerate(self.parameters) if n in self.positive)
+        return all(values[k] >= -2.0 * se[k] for k, n in enumerate(self.parameters) if n in self.positive)
 
     def place(self, candidate: Candidate) -> str:
         """Where it is, as a sentence begins."""

@@ -92,6 +92,10 @@ class Bench(ABC):
 
     def moved(self, trial: int, directions: Array, errors: Array) -> Array:
         """What errors (Q, k) in each of a place's directions add to the residual, shape (n, C, k components)."""
-        at_rows = self.at_rows(trial, errors, rates=directions.shape[2] == 3)
-        columns = np.einsum("narc,nrk->ncka", directions, at_rows, optimize=True)
-        return np.asarray(columns.reshape(*columns.shape[:2], -1))
+        return along(directions, self.at_rows(trial, errors, rates=directions.shape[2] == 3))
+
+
+def along(directions: Array, at_rows: Array) -> Array:
+    """What errors at the rows (n, 1 or 3, k) in each of a place's directions add, shape (n, C, k components)."""
+    columns = np.einsum("narc,nrk->ncka", directions, at_rows, optimize=True)
+    return np.asarray(columns.reshape(*columns.shape[:2], -1))

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from discrepancy import rules
-from discrepancy.laws.bench import Bench
+from discrepancy.laws.bench import Bench, along
 from discrepancy.laws.place import Place
 from discrepancy.laws.told import Beside
 from discrepancy.least_squares.fit import Fit
@@ -40,19 +40,36 @@ def located(
     fit: Fit, bench: Bench, places: Sequence[Place], progress: Callable[[Place], object] = lambda _: None
 ) -> list[Located]:
     """Every place with its error signal, the likeliest first."""
-    beside, out = Beside(fit), []
+    beside, bumps, out = Beside(fit), _Bumps(bench), []
     for place in places:
         progress(place)
-        out.append(_located(beside, fit, bench, place))
+        out.append(_located(beside, fit, bumps, place))
     return sorted(out, key=lambda one: -one.nats)
 
 
-def _located(beside: Beside, fit: Fit, bench: Bench, place: Place) -> Located:
-    step = rules.LAW_KNOTS_S if len(place.axes) == 1 else rules.LAW_VECTOR_KNOTS_S
+class _Bumps:
+    """Smooth bumps around knots at the rows, which are the same at every place."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.bench = bench
+        self._made: dict[tuple[int, float, bool], tuple[Array, Array]] = {}
+
+    def of(self, trial: int, step_s: float, *, rates: bool) -> tuple[Array, Array]:
+        """Times of the knots [s], and the bumps (and their rates and accelerations) at the rows, (n, 1 or 3, knots)."""
+        key = trial, step_s, rates
+        if key not in self._made:
+            at, hats = _hats(self.bench.length(trial), self.bench.rate_hz(trial), step_s)
+            self._made[key] = at, self.bench.at_rows(trial, hats, rates=rates)
+        return self._made[key]
+
+
+def _located(beside: Beside, fit: Fit, bumps: _Bumps, place: Place) -> Located:
+    step, bench = rules.LAW_KNOTS_S if len(place.axes) == 1 else rules.LAW_VECTOR_KNOTS_S, bumps.bench
     knots, information, edges, scores = [], [], [], []
     for trial in fit.problem.trials:
-        at, hats = _hats(bench.length(trial), bench.rate_hz(trial), step)
-        columns = bench.moved(trial, bench.directions(trial, place), hats)
+        directions = bench.directions(trial, place)
+        at, at_rows = bumps.of(trial, step, rates=directions.shape[2] == 3)
+        columns = along(directions, at_rows)
         rows = beside.rows(trial, bench.white(trial, columns))
         edge, score = beside.edges(trial, rows)
         knots.append(at)

@@ -59,7 +59,9 @@ def project(x: Array, off: Array) -> Array:
 
 def flat_inverse(H: Array) -> Array:
     """Inverse of a symmetric matrix (k, k), unit scales removed; directions that it leaves flat get nought."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(H), 1e-300))
+    diagonal = np.diag(H)
+    # What is nothing at all has no scale: rounding in its place would be made huge.
+    scale = np.where(diagonal > 1e-300, 1.0 / np.sqrt(np.maximum(diagonal, 1e-300)), 0.0)
     values, vectors = np.linalg.eigh(H * np.outer(scale, scale))
     inverse = np.where(values > 1e-11 * values[-1:], 1.0 / np.maximum(values, 1e-300), 0.0)
     return np.asarray((vectors * inverse) @ vectors.T * np.outer(scale, scale))

@@ -11,6 +11,7 @@ from mocobot_sim.effects.catalogue import EFFECTS, make_effect
 
 UNITS = {
     "Nm": "N m",
+    "rad_per_N": "rad/N",
     "Nms_per_rad": "N m s/rad",
     "Nm_per_rad3": "N m/rad^3",
     "rad": "rad",

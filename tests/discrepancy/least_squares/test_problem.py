@@ -5,6 +5,7 @@ import pytest
 
 from discrepancy.candidate import Transient
 from discrepancy.least_squares.fit import Fit
+from discrepancy.least_squares.gram import flat_inverse
 from discrepancy.least_squares.problem import Problem
 from linear_problem import CANDIDATES, brute, candidate, noise_covariance, random_rows, with_residuals
 
@@ -244,3 +245,18 @@ def test_what_the_unknowns_can_do_tells_nothing(rows):
         information, score = fit.told(index)
         np.testing.assert_allclose(information, 0.0, atol=1e-8)
         np.testing.assert_allclose(score, 0.0, atol=1e-8)
+
+
+def test_a_column_of_nothing_stays_nothing(rng):
+    """Rounding in its place is not made huge: nor by a value, nor by a covariance."""
+    for size in (3, 40):
+        root = rng.standard_normal((size, size))
+        H = root @ root.T
+        H[1], H[:, 1] = 0.0, 0.0
+        inverse = flat_inverse(H)
+        others = np.delete(np.arange(size), 1)
+        assert not inverse[1].any()
+        assert not inverse[:, 1].any()
+        np.testing.assert_allclose(
+            inverse[np.ix_(others, others)] @ H[np.ix_(others, others)], np.eye(size - 1), atol=1e-6
+        )

@@ -73,8 +73,8 @@ class GraspFlex(Yielding):
         return stack([gives, turns])
 
     def physical(self, values, context):
-        turning = float(values[1]) if "offset_m" in context.shape else 0.0
-        return super().physical(values, context) | {"turning_rad_per_N": turning}
+        turns = {"turning_rad_per_N": float(values[1])} if "offset_m" in context.shape else {}
+        return super().physical(values, context) | turns
 
 
 def _moved(trial: TrialLinear, robot: int, R_b1i: Array, by: Array) -> Array:
