@@ -17,8 +17,8 @@ from estimator.arm.gimbal import rotation
 from estimator.arm.unit import AT, ArmUnit
 from estimator.calibrate.equations.level import corrected
 from estimator.rigid_team.residual import robot_data
-from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread
-from mocobot_sim.scene.omnid import deviate, load_omnid, park
+from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread, deviate
+from mocobot_sim.scene.omnid import load_omnid, park
 from mujoco_arm import Arm, random_motion
 from omnid_design import DESIGN
 

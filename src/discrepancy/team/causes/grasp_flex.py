@@ -73,8 +73,9 @@ class GraspFlex(Yielding):
         return stack([gives, turns])
 
     def physical(self, values, context):
-        turns = {"turning_rad_per_N": float(values[1])} if "offset_m" in context.shape else {}
-        return super().physical(values, context) | turns
+        offset_m = context.shape.get("offset_m", 0.0)
+        turning = float(values[1]) if offset_m else 0.0
+        return super().physical(values, context) | {"turning_rad_per_N": turning, "offset_m": offset_m}
 
 
 def _moved(trial: TrialLinear, robot: int, R_b1i: Array, by: Array) -> Array:
