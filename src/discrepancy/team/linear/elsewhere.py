@@ -9,7 +9,7 @@ import numpy as np
 
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.least_squares.whitening import Whitening
-from discrepancy.team.linear.origin import origin_of, places_of
+from discrepancy.team.linear.origin import beyond, places_of
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import exact_residual
 from discrepancy.team.linear.trial_linear import TrialLinear
@@ -58,8 +58,7 @@ def found_at(
     for index, candidate in enumerate(problem.candidates):
         place = places_of(candidate)
         if place is not None:
-            values, start = fit.part(index)[0] * candidate.units, origin_of(candidate, origin)
-            step[place] = values if start is None else values - start
+            step[place] = beyond(candidate, fit.part(index)[0] * candidate.units, origin)
             moved.append(index)
     units, shared = ArmUnit(linear[0].design, at + step), linear[0].shared.moved(-fit.shared)
     square = [
