@@ -134,3 +134,9 @@ SLOSH_SWINGS = 0.25
 """Largest damping ratio named. Chosen, after one of 0.29 had been named for drag."""
 SLOSH_REACH_M = 1.5
 """From the centre of mass to where it hangs at most. Chosen: no payload of three robots is larger."""
+MASS_OVER_S = 60.0
+"""In which a mass that drifts becomes as much as its columns say. Chosen: any will do; of a minute, it is like one that is put on."""
+MASS_TRIALS = 12
+"""With which another mass may begin at most. Chosen: more are no experiment but a log."""
+MASS_SPANS = 5
+"""Up to which trial one may be there for some trials only. Chosen: of five, each span; of more, only what stays."""

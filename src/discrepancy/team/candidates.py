@@ -43,6 +43,11 @@ def other_shapes(candidate: Candidate, *, finer: bool) -> list[Candidate]:
     return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
 
 
+def within(candidate: Candidate, trials: int) -> bool:
+    """Whether so many trials have those that its shape names."""
+    return max(candidate.shape.get("trial", 1), candidate.shape.get("last_trial", 0) + 1) <= trials
+
+
 def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
     """The candidate with each number of its shape that the data determine changed both ways, and by how much."""
     steps = []

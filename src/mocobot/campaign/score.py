@@ -139,13 +139,16 @@ def _same_place(item: Item, effect: Item, truth: Item) -> bool:
         p, q = {name: entry["value"] for name, entry in item["parameters"].items()}, effect["parameters"]
         both = min(p["start_s"] + p["duration_s"], q["start_s"] + q["duration_s"])
         return p["trial"] == q["trial"] and both > max(p["start_s"], q["start_s"])
+    if answer["cause"] == "payload_mass" and answer["known"].get("mass_kg"):
+        named, known = item["parameters"]["trial"]["value"], answer["known"]["trial"]
+        return item["cause"] == "payload_mass" and named == known
     return _here(item) == _here(answer)
 
 
 def _errors(item: Item, effect: Item) -> tuple[float | None, tuple[float, ...]]:
     """Where a push acts along its line, and how long the interval is, cannot be told."""
     known, named = effect["answer"]["known"], item["parameters"]
-    skipped = ("point", "start", "duration", "trial") if effect["answer"]["cause"] == "push" else ("trial",)
+    skipped = ("point", "start", "duration", "trial") if effect["answer"]["cause"] == "push" else ("trial", "last_trial")
     names = [name for name in named if name in known and not name.startswith(skipped)]
     if not names:
         return None, ()

@@ -1,0 +1,139 @@
+"""A payload whose mass is not the same at all times."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from estimator.errors import InputError
+from estimator.inertia import inertia_matrix
+from mocobot_sim.effects.base import Effect
+
+if TYPE_CHECKING:
+    from estimator.arrays import Array
+    from mocobot_sim.scene.scene import TeamScene
+    from mocobot_sim.trial.actors import Actor, Reader, Stage
+
+LEAST_RATIO = 1e-6
+"""Least principal moment of what is then carried, over the largest: a body needs some."""
+
+
+@dataclass(frozen=True)
+class PayloadMass(Effect):
+    """Something that is put on the payload (taken off, if negative) for some trials, or that leaks out while they last.
+
+    ``mass_kg`` is there from the start of ``trial`` on, to the end of ``last_trial`` (0: of the last one); in each of them
+    ``rate_kgps`` comes to it. Its centre is a point of the payload, given in {1} [m]; ``inertia_*_m2`` are the moments of inertia
+    about that centre, axes of {1}, per kg of it: 0 of a point.
+
+    MJCF has no such thing: the trial writes the payload's mass, centre and inertia. What leaves does so at rest relative to the payload.
+    """
+
+    on_payload = True
+    ranges: ClassVar = {"mass_kg": (-100.0, 100.0), "rate_kgps": (-1.0, 1.0)}
+    mass_kg: float = 0.0
+    rate_kgps: float = 0.0
+    trial: int = 1
+    last_trial: int = 0
+    point_x_m: float = 0.0
+    point_y_m: float = 0.0
+    point_z_m: float = 0.0
+    inertia_xx_m2: float = 0.0
+    inertia_xy_m2: float = 0.0
+    inertia_xz_m2: float = 0.0
+    inertia_yy_m2: float = 0.0
+    inertia_yz_m2: float = 0.0
+    inertia_zz_m2: float = 0.0
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        return scene
+
+    def actors(self, trial_number: int | None) -> Sequence[Actor]:
+        """Who changes the mass in a trial."""
+        number = self.trial if trial_number is None else trial_number
+        there = self.trial <= number and (not self.last_trial or number <= self.last_trial)
+        return (_Carried(self),) if there and (self.mass_kg or self.rate_kgps) else ()
+
+    def readers(self, trial_number: int | None) -> Sequence[Reader]:
+        """No sensor misreads."""
+        return ()
+
+    def more(self, time: float) -> float:
+        """What is carried besides at a time of the trial [s], in kg."""
+        return self.mass_kg + self.rate_kgps * time
+
+
+class _Carried:
+    """The payload's body with what it carries besides in one trial."""
+
+    def __init__(self, effect: PayloadMass) -> None:
+        self._effect = effect
+
+    def start(self, stage: Stage) -> None:
+        """Remember the payload as it is.
+
+        Raises:
+            InputError: more would be taken off than there is.
+        """
+        model, body = stage.model, stage.index.payload_body
+        self._model, self._body, self._dt = model, body, 1.0 / stage.rate_hz
+        self._mass, self._centre = float(model.body_mass[body]), model.body_ipos[body].copy()
+        R = _matrix(model.body_iquat[body])
+        self._inertia = (R * model.body_inertia[body]) @ R.T
+        least = self._mass + min(self._effect.more(0.0), self._effect.more(stage.duration * self._dt))
+        if not least > 0.0:
+            raise InputError(
+                f"payload_mass: the payload of {self._mass:.3g} kg would weigh {least:.3g} kg; it must weigh something"
+            )
+        # MuJoCo takes a shortcut where the inertia's frame is the body's.
+        model.body_sameframe[body] = 0
+        self._change(0.0)
+
+    def act(self, tick: int) -> None:
+        """What it weighs now."""
+        if self._effect.rate_kgps:
+            self._change(tick * self._dt)
+
+    def _change(self, time: float) -> None:
+        from mocobot_sim.scene.payload_mjcf import nearest_inertia
+
+        effect, model, body = self._effect, self._model, self._body
+        more = effect.more(time)
+        point = np.array([effect.point_x_m, effect.point_y_m, effect.point_z_m])
+        per_kg = inertia_matrix(np.array([getattr(effect, f"inertia_{ij}_m2") for ij in ENTRIES]))
+        mass = self._mass + more
+        centre = (self._mass * self._centre + more * point) / mass
+        inertia = self._inertia + self._mass * _about(self._centre - centre)
+        inertia = nearest_inertia(inertia + more * (per_kg + _about(point - centre)), LEAST_RATIO)
+        moments, axes = np.linalg.eigh(inertia)
+        axes[:, 2] *= np.sign(np.linalg.det(axes))
+        model.body_mass[body], model.body_ipos[body] = mass, centre
+        model.body_inertia[body], model.body_iquat[body] = moments, _quaternion(axes)
+
+
+ENTRIES = ("xx", "xy", "xz", "yy", "yz", "zz")
+"""Of an inertia, as ``inertia_matrix`` takes them."""
+
+
+def _about(r: Array) -> Array:
+    """Inertia of 1 kg that is at r [m] from where it is taken about, shape (3, 3)."""
+    return np.asarray(r @ r * np.eye(3) - np.outer(r, r))
+
+
+def _matrix(quaternion: Array) -> Array:
+    import mujoco
+
+    R = np.zeros(9)
+    mujoco.mju_quat2Mat(R, quaternion)
+    return R.reshape(3, 3)
+
+
+def _quaternion(R: Array) -> Array:
+    import mujoco
+
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, R.ravel())
+    return quaternion
