@@ -41,6 +41,11 @@ SIZES: dict[str, dict[str, Any]] = {
     "slosh": {
         "mass_kg": 0.3, "length_m": 0.1, "damping_ratio": 0.05, "point_x_m": 0.0, "point_y_m": 0.0, "point_z_m": 0.1,
     },
+    "payload_mass": {
+        "mass_kg": 0.3, "rate_kgps": 1e-3, "trial": 1, "last_trial": 0, "point_x_m": 0.1, "point_y_m": 0.05,
+        "point_z_m": 0.02, "inertia_xx_m2": 2e-3, "inertia_xy_m2": 0.0, "inertia_xz_m2": 1e-4, "inertia_yy_m2": 2e-3,
+        "inertia_yz_m2": 0.0, "inertia_zz_m2": 3e-3,
+    },
     "law": {
         "target": "tau_1_2", "function": "linear", "of": "tau_1_3", "amplitude": 0.05, "number": 0.0, "second": 0.0,
         "phase_rad": 0.0, "times": "",
@@ -52,6 +57,7 @@ SIZE_NAMES = {
     "payload_tether": ("stiffness_N_per_m",),
     "push": ("force_x_N", "force_y_N", "force_z_N"),
     "slosh": ("mass_kg",),
+    "payload_mass": ("mass_kg", "rate_kgps"),
     "law": ("amplitude",),
 }
 

@@ -13,8 +13,11 @@ from estimator.inertia import inertia_matrix
 from mocobot_sim.effects.base import Effect
 
 if TYPE_CHECKING:
+    import mujoco
+
     from estimator.arrays import Array
     from mocobot_sim.scene.scene import TeamScene
+    from mocobot_sim.scene.team_index import TeamIndex
     from mocobot_sim.trial.actors import Actor, Reader, Stage
 
 LEAST_RATIO = 1e-6
@@ -51,64 +54,89 @@ class PayloadMass(Effect):
     def _edit(self, scene: TeamScene) -> TeamScene:
         return scene
 
+    def load(self, model: mujoco.MjModel, index: TeamIndex, trial_number: int | None) -> None:
+        """Put it on, so that the trial begins at rest with it.
+
+        Raises:
+            InputError: more would be taken off than there is.
+        """
+        if self.mass_kg and self._there(trial_number):
+            _Carried(self, model, index.payload_body).change(self.mass_kg)
+
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
-        """Who changes the mass in a trial."""
-        number = self.trial if trial_number is None else trial_number
-        there = self.trial <= number and (not self.last_trial or number <= self.last_trial)
-        return (_Carried(self),) if there and (self.mass_kg or self.rate_kgps) else ()
+        """What leaks out in a trial."""
+        return (_Leak(self),) if self.rate_kgps and self._there(trial_number) else ()
 
     def readers(self, trial_number: int | None) -> Sequence[Reader]:
         """No sensor misreads."""
         return ()
 
-    def more(self, time: float) -> float:
-        """What is carried besides at a time of the trial [s], in kg."""
-        return self.mass_kg + self.rate_kgps * time
+    def _there(self, trial_number: int | None) -> bool:
+        number = self.trial if trial_number is None else trial_number
+        return self.trial <= number and (not self.last_trial or number <= self.last_trial)
 
 
-class _Carried:
-    """The payload's body with what it carries besides in one trial."""
+class _Leak:
+    """Mass that comes or goes while a trial lasts."""
 
     def __init__(self, effect: PayloadMass) -> None:
         self._effect = effect
 
     def start(self, stage: Stage) -> None:
-        """Remember the payload as it is.
+        """Find the payload.
 
         Raises:
-            InputError: more would be taken off than there is.
+            InputError: more would leave than there is.
         """
-        model, body = stage.model, stage.index.payload_body
-        self._model, self._body, self._dt = model, body, 1.0 / stage.rate_hz
-        self._mass, self._centre = float(model.body_mass[body]), model.body_ipos[body].copy()
-        R = _matrix(model.body_iquat[body])
-        self._inertia = (R * model.body_inertia[body]) @ R.T
-        least = self._mass + min(self._effect.more(0.0), self._effect.more(stage.duration * self._dt))
-        if not least > 0.0:
-            raise InputError(
-                f"payload_mass: the payload of {self._mass:.3g} kg would weigh {least:.3g} kg; it must weigh something"
-            )
-        # MuJoCo takes a shortcut where the inertia's frame is the body's.
-        model.body_sameframe[body] = 0
-        self._change(0.0)
+        self._payload = _Carried(self._effect, stage.model, stage.index.payload_body)
+        self._per_tick = self._effect.rate_kgps / stage.rate_hz
+        self._payload.check(self._per_tick * stage.duration)
 
     def act(self, tick: int) -> None:
         """What it weighs now."""
-        if self._effect.rate_kgps:
-            self._change(tick * self._dt)
+        self._payload.change(self._per_tick * tick)
 
-    def _change(self, time: float) -> None:
+
+class _Carried:
+    """The payload's body, and what it is with more on it."""
+
+    def __init__(self, effect: PayloadMass, model: mujoco.MjModel, body: int) -> None:
+        self._model, self._body = model, body
+        self._mass, self._centre = float(model.body_mass[body]), model.body_ipos[body].copy()
+        R = _matrix(model.body_iquat[body])
+        self._inertia = (R * model.body_inertia[body]) @ R.T
+        self._point = np.array([effect.point_x_m, effect.point_y_m, effect.point_z_m])
+        self._per_kg = inertia_matrix(np.array([getattr(effect, f"inertia_{ij}_m2") for ij in ENTRIES]))
+        # MuJoCo takes a shortcut where the inertia's frame is the body's.
+        model.body_sameframe[body] = 0
+
+    def check(self, more_kg: float) -> None:
+        """Refuse a payload that weighs nothing.
+
+        Raises:
+            InputError: it does.
+        """
+        if not self._mass + more_kg > 0.0:
+            raise InputError(
+                f"payload_mass: the payload of {self._mass:.3g} kg would weigh {self._mass + more_kg:.3g} kg; "
+                "it must weigh something"
+            )
+
+    def change(self, more_kg: float) -> None:
+        """Write mass, centre and inertia with so much more than at first.
+
+        Raises:
+            InputError: nothing would be left.
+        """
         from mocobot_sim.scene.payload_mjcf import nearest_inertia
 
-        effect, model, body = self._effect, self._model, self._body
-        more = effect.more(time)
-        point = np.array([effect.point_x_m, effect.point_y_m, effect.point_z_m])
-        per_kg = inertia_matrix(np.array([getattr(effect, f"inertia_{ij}_m2") for ij in ENTRIES]))
-        mass = self._mass + more
-        centre = (self._mass * self._centre + more * point) / mass
+        self.check(more_kg)
+        model, body = self._model, self._body
+        mass = self._mass + more_kg
+        centre = (self._mass * self._centre + more_kg * self._point) / mass
         inertia = self._inertia + self._mass * _about(self._centre - centre)
-        inertia = nearest_inertia(inertia + more * (per_kg + _about(point - centre)), LEAST_RATIO)
-        moments, axes = np.linalg.eigh(inertia)
+        inertia = inertia + more_kg * (self._per_kg + _about(self._point - centre))
+        moments, axes = np.linalg.eigh(nearest_inertia(inertia, LEAST_RATIO))
         axes[:, 2] *= np.sign(np.linalg.det(axes))
         model.body_mass[body], model.body_ipos[body] = mass, centre
         model.body_inertia[body], model.body_iquat[body] = moments, _quaternion(axes)

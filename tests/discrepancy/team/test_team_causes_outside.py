@@ -10,12 +10,13 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from discrepancy.candidate import Transient
-from discrepancy.team.candidates import other_shapes, shape_steps
+from discrepancy.team.candidates import other_shapes, shape_steps, within
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.linear.trial_linear import linearise
 from estimator.arm.delta import forward_kinematics, inverse_kinematics, jacobian, leg_geometry
 from estimator.arm.dynamics import arm_torque
+from estimator.inertia import inertia_parameters
 from estimator.rigid_team.residual import balance
 from recorded_team import COM, GRASPS, HOME, STEP_S, as_matrix, derivatives
 from team_case import DESIGN, exact, residual_of
@@ -176,6 +177,61 @@ def test_slosh(case, motion):
     physical = reported(case, "slosh", values, shape)
     np.testing.assert_allclose([physical[f"point_{a}_m"] for a in "xyz"], at)
     assert physical["mass_kg"] == mass
+
+
+@pytest.mark.parametrize("shape", [{"trial": 2.0, "last_trial": 0.0}, {"over_s": 60.0}])
+def test_payload_mass(case, motion, shape):
+    """A body that rides along: Newton at its centre, and Euler by its momentum, differentiated in the world."""
+    time, R = case.signals.time, motion[0]
+    mass, at = 0.8, COM + np.array([0.15, -0.1, 0.08])
+    own = np.array([[0.02, 0.003, 0.0], [0.003, 0.03, -0.002], [0.0, -0.002, 0.015]])  # of all of it
+    there = (time / 60.0 if "over_s" in shape else np.ones_like(time))[:, None]
+    accel = make_interp_spline(time, point(motion, at), k=5).derivative(2)(time)
+    R_dot = make_interp_spline(time, R, k=5).derivative(1)(time)
+    turn = R_dot @ R.swapaxes(1, 2)
+    omega = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
+    spin = np.einsum("qij,jk,qlk,ql->qi", R, own, R, omega)
+    force = -mass * there * (accel + [0.0, 0.0, DESIGN.gravity_mps2])
+    moment = np.cross(R @ at, force) - there * make_interp_spline(time, spin, k=5).derivative(1)(time)
+    d = at - COM
+    of_points = d @ d * np.eye(3) - np.outer(d, d)  # what first moments about COM leave of the inertia
+    values = np.concatenate([[mass], mass * d, inertia_parameters(own + mass * of_points)])
+    check_wrench(case, motion, "payload_mass", 0, 0, shape, values, force, moment, 0.01)
+    physical = reported(case, "payload_mass", values, shape)
+    np.testing.assert_allclose([physical[f"point_{a}_m"] for a in "xyz"], at)
+    named = [physical[f"inertia_{ij}_m2"] for ij in ("xx", "xy", "xz", "yy", "yz", "zz")]
+    np.testing.assert_allclose(named, inertia_parameters(own) / mass, atol=1e-12)
+    size = (physical["mass_kg"], physical["rate_kgps"], physical["trial"])
+    assert size == ((0.0, mass / 60.0, 1) if "over_s" in shape else (mass, 0.0, 2))
+
+
+def test_a_mass_is_there_in_its_trials_only():
+    every = CAUSES["payload_mass"].candidate({}, {"trial": 2.0, "last_trial": 0.0})
+    drift = CAUSES["payload_mass"].candidate({}, CAUSES["payload_mass"].shapes[0])
+    assert [drift.acts_in(t) for t in range(3)] == [True] * 3
+    assert [every.acts_in(t) for t in range(4)] == [False, True, True, True]
+    assert every.of_trials and not drift.of_trials
+
+    def spans(trials):
+        shapes = [drift, *other_shapes(drift, finer=False)]
+        return [tuple(s.acts_in(t) for t in range(trials)) for s in shapes if within(s, trials)]
+
+    assert spans(1) == [(True,)]
+    for trials in (2, 3, 4, 5):  # each span of trials that leaves out the first, once
+        first_and_last = [(a, b) for a in range(1, trials) for b in range(a, trials)]
+        expected = {tuple(a <= t <= b for t in range(trials)) for a, b in first_and_last}
+        assert sorted(spans(trials)[1:]) == sorted(expected)
+
+
+def test_a_mass_is_there_and_within_reach():
+    se = np.full(10, 1e-3)
+
+    def possible(mass, moment):
+        return CAUSES["payload_mass"].possible(np.array([mass, moment, *np.zeros(8)]), se, {})
+
+    assert possible(-0.02, 0.01)
+    assert not possible(1.5e-3, 0.0)
+    assert not possible(0.02, 0.05)  # 2.5 m from the centre
 
 
 @pytest.mark.parametrize("joint", [0, 1, 2])
