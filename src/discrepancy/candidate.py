@@ -62,8 +62,8 @@ class Candidate:
         family: causes of one family look alike.
         robot, joint: where, counted from 1; None where the cause has no such place.
         parameters: its numbers, in the order of its columns.
-        shape: further numbers that change the columns themselves, by name; with ``trial`` and ``last_trial`` (0: none) in
-            it, from 1, it acts in these only.
+        shape: further numbers that change the columns themselves, by name; where ``trial`` and ``last_trial`` (from 1,
+            0: none) are among them, it acts in these only.
         transient: when it acts, of an event; None of what lasts.
         where: the place in words, of what sits at no robot and no joint.
         title: the cause in words (``causes.base.Cause``).

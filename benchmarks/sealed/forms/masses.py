@@ -43,7 +43,7 @@ class MassOfTrials(Form):
         return cls(trial=int(rng.integers(2, 4)), more_kg=float(rng.choice([-1.0, 1.0]) * size))
 
     def known(self) -> dict[str, float]:
-        return {"trial": self.trial, "mass_kg": self.more_kg}
+        return {"trial": self.trial, "last_trial": 0, "mass_kg": self.more_kg}
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
         changed = trial_number is not None and trial_number >= self.trial

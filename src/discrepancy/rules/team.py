@@ -135,7 +135,8 @@ SLOSH_SWINGS = 0.25
 SLOSH_REACH_M = 1.5
 """From the centre of mass to where it hangs at most. Chosen: no payload of three robots is larger."""
 MASS_OVER_S = 60.0
-"""In which a mass that drifts becomes as much as its columns say. Chosen: any will do; of a minute, it is like one that is put on."""
+"""In which a mass that drifts becomes as much as its columns say. Chosen: any will do; in a minute it is as much as one
+that is put on."""
 MASS_TRIALS = 12
 """With which another mass may begin at most. Chosen: more are no experiment but a log."""
 MASS_SPANS = 5

@@ -28,11 +28,11 @@ LEAST_RATIO = 1e-6
 class PayloadMass(Effect):
     """Something that is put on the payload (taken off, if negative) for some trials, or that leaks out while they last.
 
-    ``mass_kg`` is there from the start of ``trial`` on, to the end of ``last_trial`` (0: of the last one); in each of them
-    ``rate_kgps`` comes to it. Its centre is a point of the payload, given in {1} [m]; ``inertia_*_m2`` are the moments of inertia
-    about that centre, axes of {1}, per kg of it: 0 of a point.
+    ``mass_kg`` is there from the start of ``trial`` to the end of ``last_trial`` (0: of the last of all); in each of
+    these, ``rate_kgps`` comes to it. Its centre is a point of the payload, given in {1} [m]; ``inertia_*_m2`` is its
+    inertia about that centre, in the axes of {1}, per kg of it: 0 of a point.
 
-    MJCF has no such thing: the trial writes the payload's mass, centre and inertia. What leaves does so at rest relative to the payload.
+    MJCF has no such thing: the trial writes the payload's mass, centre and inertia. What leaves does so without recoil.
     """
 
     on_payload = True

@@ -29,7 +29,9 @@ def inertia(model, k=1):
 
 def on(model, duration_s=10.0):
     index = SimpleNamespace(payload_body=1)
-    return SimpleNamespace(model=model, data=None, index=index, rate_hz=1000, duration=round(1000 * duration_s))
+    return SimpleNamespace(
+        model=model, data=None, index=index, rate_hz=1000, duration=round(1000 * duration_s)
+    )
 
 
 def effect_of(mass, **size):
@@ -94,7 +96,10 @@ def test_a_robot_moves_as_with_a_box_that_is_welded_on(tmp_path):
 
 
 def test_no_more_is_taken_off_than_there_is():
-    sentence, stage = "payload_mass: the payload of 5 kg would weigh -[0-9.]+ kg; it must weigh something", on(body(PAYLOAD))
+    sentence, stage = (
+        "payload_mass: the payload of 5 kg would weigh -[0-9.]+ kg; it must weigh something",
+        on(body(PAYLOAD)),
+    )
     with pytest.raises(InputError, match=sentence):
         make_effect("payload_mass", {"mass_kg": -5.5}).load(stage.model, stage.index, 1)
     (leak,) = make_effect("payload_mass", {"rate_kgps": -0.6}).actors(1)

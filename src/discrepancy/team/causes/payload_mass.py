@@ -80,7 +80,9 @@ def _ten_columns(com: Array) -> Array:
     pi = np.eye(10)
     pi[1:4, 0], pi[4:, 0] = com, inertia_parameters(_of_point(com))
     for k, axis in enumerate(np.eye(3)):
-        pi[4:, 1 + k] = inertia_parameters(2.0 * com[k] * np.eye(3) - np.outer(com, axis) - np.outer(axis, com))
+        pi[4:, 1 + k] = inertia_parameters(
+            2.0 * com[k] * np.eye(3) - np.outer(com, axis) - np.outer(axis, com)
+        )
     return pi
 
 
