@@ -139,6 +139,13 @@ class Candidate:
         return f"robot {self.robot}" if part == "robot" else f"the {part} of robot {self.robot}"
 
     @property
+    def trace(self) -> tuple[object, ...]:
+        """Identity of what it does where it acts: cause, place, and shape but for the trials."""
+        return *self.key, *(
+            (name, x) for name, x in self.shape.items() if name not in ("trial", "last_trial")
+        )
+
+    @property
     def key(self) -> tuple[str, int | None, int | None]:
         """Identity: cause and place."""
         return self.cause, self.robot, self.joint

@@ -36,14 +36,15 @@ def every_candidate(
     return out
 
 
-def other_shapes(candidate: Candidate, *, finer: bool) -> list[Candidate]:
-    """The candidate in every other shape of its cause, or in ``finer`` ones around its own."""
+def other_shapes(candidate: Candidate, *, finer: bool, trials: int) -> list[Candidate]:
+    """The candidate in every other shape that its cause has in so many trials, or in ``finer`` ones around its own."""
     cause = CAUSES[candidate.cause]
     shapes = cause.finer(candidate.shape) if finer else cause.shapes
-    return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
+    others = [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
+    return [other for other in others if _within(other, trials)]
 
 
-def within(candidate: Candidate, trials: int) -> bool:
+def _within(candidate: Candidate, trials: int) -> bool:
     """Whether so many trials have those that its shape names."""
     return max(candidate.shape.get("trial", 1), candidate.shape.get("last_trial", 0) + 1) <= trials
 

@@ -21,7 +21,6 @@ from discrepancy.team.candidates import (
     nearby_events,
     other_shapes,
     shape_steps,
-    within,
     worst_events,
 )
 from discrepancy.team.causes import CAUSES
@@ -170,9 +169,7 @@ class TeamRows(Rig):
             return np.zeros((*linear.residual.shape, len(candidate.parameters)))
         shapes = CAUSES[candidate.cause].shapes if candidate.cause in CAUSES else ()
         again = candidate.transient is None and len(shapes) > 1 and candidate.shape in shapes
-        # In which trials it acts does not change what it does there.
-        inside = ((name, x) for name, x in candidate.shape.items() if name not in ("trial", "last_trial"))
-        key = (trial, *candidate.key, *inside)
+        key = (trial, *candidate.trace)
         if again and key in self.kept:
             return self.kept[key]
         columns = self.whitening[trial](self._unwhitened(trial, candidate))
@@ -273,7 +270,7 @@ class TeamRows(Rig):
         if candidate.transient:
             tolerance = self.tolerances.get(candidate.cause, {})
             return nearby_events(candidate.cause, candidate.transient, tolerance)
-        return [shape for shape in other_shapes(candidate, finer=finer) if within(shape, len(self.linear))]
+        return other_shapes(candidate, finer=finer, trials=len(self.linear))
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the wrench balance is worst.

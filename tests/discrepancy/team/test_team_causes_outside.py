@@ -10,7 +10,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from discrepancy.candidate import Transient
-from discrepancy.team.candidates import other_shapes, shape_steps, within
+from discrepancy.team.candidates import other_shapes, shape_steps
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.linear.trial_linear import linearise
@@ -214,8 +214,8 @@ def test_a_mass_is_there_in_its_trials_only():
     assert not drift.of_trials
 
     def spans(trials):
-        shapes = [drift, *other_shapes(drift, finer=False)]
-        return [tuple(s.acts_in(t) for t in range(trials)) for s in shapes if within(s, trials)]
+        shapes = [drift, *other_shapes(drift, finer=False, trials=trials)]
+        return [tuple(s.acts_in(t) for t in range(trials)) for s in shapes]
 
     assert spans(1) == [(True,)]
     for trials in (2, 3, 4, 5):  # each span of trials that leaves out the first, once
@@ -382,13 +382,15 @@ def test_a_grasp_without_a_point_to_turn_about_does_not_turn(case):
         "compliance_m_per_N": 2e-6, "turning_rad_per_N": 0.0, "relaxation_s": 0.02, "offset_m": 0.0,
     }  # fmt: skip
     assert cause.possible(np.array([2e-6, 0.0]), np.array([1e-7, 0.0]), healthy.shape)
-    turning = next(c for c in other_shapes(healthy, finer=False) if c.shape.get("offset_m", 0.0) < 0.0)
+    turning = next(
+        c for c in other_shapes(healthy, finer=False, trials=1) if c.shape.get("offset_m", 0.0) < 0.0
+    )
     assert cause.physical(np.array([2e-6, 4e-5]), SimpleNamespace(shape=turning.shape)) == {
         "compliance_m_per_N": 2e-6, "turning_rad_per_N": 4e-5, "relaxation_s": 0.02, "offset_m": -0.05,
     }  # fmt: skip
     # Steps and finer shapes stay on their side of the gimbal.
     assert all(less.shape["offset_m"] < 0.0 for less, _, size in shape_steps(turning) if size > 0.0)
-    finer = sorted({c.shape["offset_m"] for c in other_shapes(turning, finer=True)})
+    finer = sorted({c.shape["offset_m"] for c in other_shapes(turning, finer=True, trials=1)})
     assert finer == pytest.approx([-0.1, -0.07, -0.05, -0.035, -0.025])
 
 
