@@ -39,7 +39,8 @@ class Gain:
 
     Attributes:
         before, after: one per trial; None where the simulation failed.
-        held_out: False for a single trial, which predicts itself.
+        held_out: False for a single trial, which predicts itself, and where a cause is there in some trials only, which
+            all have to tell it.
     """
 
     before: tuple[Response | None, ...]
