@@ -1,9 +1,12 @@
 """A loose grasp."""
 
+import math
+
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from discrepancy import rules
-from discrepancy.causes.free_while import free_while
+from discrepancy.causes.free_while import in_parts, pieces_while
 from discrepancy.team.causes.base import Cause, stack
 
 
@@ -31,17 +34,17 @@ class GraspPlay(Cause):
         return stack([_moved(trial, robot, at_end)])
 
     def unknowns(self, trial, robot, joint, shape):
-        between = np.abs(trial.data.wrench[:, robot, 3:]) < shape["force_N"]
-        columns = []
+        force, rate_hz = trial.data.wrench[:, robot, 3:], trial.signals.rate_hz
+        around = np.ones(2 * math.ceil(rules.PLAY_OPEN_S * rate_hz) + 1, dtype=bool)
+        columns = [np.zeros((*trial.residual.shape, 0))]
         for axis in range(3):
-            along = (trial.bases.R[robot] @ trial.data.R_bi[:, robot])[..., axis, None]
-            places = free_while(between[:, axis], trial.signals.rate_hz, rules.PLAY_KNOTS_S)
-            for first in range(0, len(places), 16):  # not all at once, for the sake of memory
-                some = np.stack(places[first : first + 16], axis=-1)
-                moved = trial.of_pose(robot, None, along * some[:, None])
-                # Not before the first row or after the last.
-                columns.append(moved[..., moved.any(axis=(0, 1))])
-        return np.concatenate([np.zeros((*trial.residual.shape, 0)), *columns], axis=2)
+            loose = binary_dilation(np.abs(force[:, axis]) < rules.PLAY_OPEN_N, around)
+            places = in_parts(
+                pieces_while(loose, rate_hz, rules.PLAY_OPEN_KNOTS_S), rules.PLAY_COLUMNS_AT_A_TIME
+            )
+            along = trial.data.R_bi[:, robot, :, axis] @ trial.bases.R[robot].T
+            columns.append(trial.of_shifts(robot, along, places))
+        return np.concatenate(columns, axis=2)
 
 
 def _moved(trial, robot, offset):
