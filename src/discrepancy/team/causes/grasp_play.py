@@ -8,6 +8,8 @@ from scipy.ndimage import binary_dilation
 from discrepancy import rules
 from discrepancy.causes.free_while import in_parts, pieces_while
 from discrepancy.team.causes.base import Cause, stack
+from discrepancy.team.linear.trial_linear import TrialLinear
+from estimator.arrays import Array
 
 
 class GraspPlay(Cause):
@@ -30,8 +32,9 @@ class GraspPlay(Cause):
         return f"the grasp is loose by +-({n('play_m', 'um', 1e6)}) along each axis"
 
     def columns(self, trial, robot, joint, shape):
-        at_end = -np.clip(trial.data.wrench[:, robot, 3:] / shape["force_N"], -1.0, 1.0)
-        return stack([_moved(trial, robot, at_end)])
+        force = trial.data.wrench[:, robot, 3:]
+        at_end = -np.clip(force / shape["force_N"], -1.0, 1.0)
+        return stack([_moved(trial, robot, at_end, force)])
 
     def unknowns(self, trial, robot, joint, shape):
         force, rate_hz = trial.data.wrench[:, robot, 3:], trial.signals.rate_hz
@@ -47,7 +50,12 @@ class GraspPlay(Cause):
         return np.concatenate(columns, axis=2)
 
 
-def _moved(trial, robot, offset):
-    """Rows of an offset of the grasp along the axes of {i}, shape (Q, 3)."""
+def _moved(trial: TrialLinear, robot: int, offset: Array, force: Array) -> Array:
+    """Rows of an offset of the grasp along the axes of {i} under a force in them [N], shape (Q, 3) each.
+
+    The force still goes through the gimbal's centre, of which the payload is off by so much.
+    """
     in_b = np.einsum("qij,qj->qi", trial.data.R_bi[:, robot], offset)
-    return trial.of_pose(robot, None, in_b @ trial.bases.R[robot].T)
+    moment = np.cross(force, offset) @ trial.shared.grasps.R_1i[robot].T
+    rows = trial.of_pose(robot, None, in_b @ trial.bases.R[robot].T)
+    return np.asarray(rows + trial.of_wrench(np.zeros_like(moment), moment))
