@@ -34,7 +34,7 @@ class GraspPlay(Cause):
     def columns(self, trial, robot, joint, shape):
         force = trial.data.wrench[:, robot, 3:]
         at_end = -np.clip(force / shape["force_N"], -1.0, 1.0)
-        return stack([_moved(trial, robot, at_end, force)])
+        return stack([displaced(trial, robot, at_end, force)])
 
     def unknowns(self, trial, robot, joint, shape):
         force, rate_hz = trial.data.wrench[:, robot, 3:], trial.signals.rate_hz
@@ -50,7 +50,7 @@ class GraspPlay(Cause):
         return np.concatenate(columns, axis=2)
 
 
-def _moved(trial: TrialLinear, robot: int, offset: Array, force: Array) -> Array:
+def displaced(trial: TrialLinear, robot: int, offset: Array, force: Array) -> Array:
     """Rows of an offset of the grasp along the axes of {i} under a force in them [N], shape (Q, 3) each.
 
     The force still goes through the gimbal's centre, of which the payload is off by so much.
