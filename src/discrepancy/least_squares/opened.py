@@ -45,8 +45,8 @@ class Opened:
         if not np.any(rows):
             return cls(columns[..., :0], np.zeros((*columns.shape[:2], 0)), np.zeros(0), size)
         flat = rows.reshape(-1, rows.shape[2])
-        # Of their products: of all rows it takes many times as long, and so small an s is still known to 1e-8 of the
-        # largest. Of knots closer than rows, many leave nothing beside the others; turned, unknowns still scatter as one.
+        # Of their products, as of all rows it takes many times as long; so small an s is still known to 1e-8 of the
+        # largest. Of knots closer than rows many leave nothing beside others; turned, unknowns still scatter as one.
         squares, V = np.linalg.eigh(flat.T @ flat)
         keep = squares > rules.OPEN_SHOWS**2 * squares[-1]
         s, V = np.sqrt(squares[keep]), V[:, keep]
