@@ -82,6 +82,9 @@ SAME_TRACE = 1e-6
 OPEN_SHOWS = 1e-4
 """Of what a cause leaves open, trace over the largest from which it counts. Derived: the largest is some hundred times
 the noise, so that one dropped is a hundredth of it."""
+SHAPE_NATS = 5.0
+"""By which a cause with one number more in its shape must be likelier. Derived: half the log of the rows' numbers, some
+ten to thirty thousand (Schwarz's criterion)."""
 LEAST_POWER = 0.5
 """Of a cell over that of its whitening. Chosen: some noise of healthy robots is drawn larger than it is."""
 FLAT_SHARE = 1e-10

@@ -110,6 +110,9 @@ filter of 20 Hz takes to show a force that begins. With 0.4 N alone, half of the
 PLAY_OPEN_KNOTS_S = 0.05
 """Between knots of that travel. Measured: play of 0.8 mm leaves a chi2/n of 51 with knots every 0.2 s and forces below
 0.4 N, 12 every 0.1 s below 1 N, 1.15 every 0.05 s; nothing faster passes the rows' filter."""
+PLAY_CONTACT_PER_N = 0.02
+"""Of a play, by which its ends give way to a newton, over which slopes are taken. Chosen: 1 um/N behind 50 um; columns
+go straight with it."""
 PLAY_COLUMNS_AT_A_TIME = 16
 """Of that travel. Chosen: memory."""
 SHIFT_REACH_S = 0.5

@@ -1,12 +1,14 @@
 """A loose grasp between its ends, where the force is too small to hold it at one."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from discrepancy.causes.free_while import free_while, in_parts, pieces_while
+from discrepancy.team.candidates import shape_steps
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.grasp_play import displaced
 from estimator.arm.delta import forward_kinematics, inverse_kinematics
@@ -94,6 +96,23 @@ def test_shifts_for_a_while_are_displacements(robot):
     for k in range(seen.shape[2]):
         best = np.abs(columns - seen[..., k, None]).max(axis=(0, 1)).min()
         assert best < 1e-4 * np.abs(seen[..., k]).max(), k
+
+
+def test_what_is_behind_a_play():
+    cause = CAUSES["grasp_play"]
+    plain, soft = cause.shapes
+    at = SimpleNamespace(shape={**soft, "contact_per_N": 0.002})
+    assert cause.physical(np.array([2e-4]), at) == pytest.approx({"play_m": 2e-4, "contact_m_per_N": 4e-7})
+    assert cause.physical(np.array([2e-4]), SimpleNamespace(shape=plain))["contact_m_per_N"] == 0.0
+    value, se = np.array([2e-4]), np.array([1e-6])
+    assert cause.possible(value, se, plain) and cause.possible(value, se, at.shape)
+    assert not cause.possible(value, se, {**soft, "contact_per_N": -0.001})
+    # Slopes are there at nought, too.
+    candidate = cause.candidate({"play_m": 3e-6}, soft, 1)
+    ((less, more, size),) = shape_steps(candidate)
+    assert more.shape["contact_per_N"] - less.shape["contact_per_N"] == pytest.approx(size)
+    assert size > 0.0
+    assert shape_steps(cause.candidate({"play_m": 3e-6}, plain, 1)) == []
 
 
 def _about(c):

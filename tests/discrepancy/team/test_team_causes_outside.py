@@ -338,13 +338,14 @@ def test_a_grasp_without_a_point_to_turn_about_does_not_turn(case):
     assert finer == pytest.approx([-0.1, -0.07, -0.05, -0.035, -0.025])
 
 
-@pytest.mark.parametrize("robot", [0, 1])
-def test_grasp_play(case, robot):
+@pytest.mark.parametrize(("robot", "contact_per_N"), [(0, 0.0), (1, 0.0), (1, 0.02)])
+def test_grasp_play(case, robot, contact_per_N):
     play = 2e-5
     f = force_of(case, robot)[0]
-    ahead = play * np.clip(f / 0.4, -1.0, 1.0)
+    ahead = play * (np.clip(f / 0.4, -1.0, 1.0) + contact_per_N * f)
     signals = adapted(case, robot, Rotation.from_euler("ZYX", case.signals.theta[:, robot]).apply(ahead))
-    column = CAUSES["grasp_play"].columns(case.linear, robot, 0, {"force_N": 0.4})
+    shape = {"force_N": 0.4, "contact_per_N": contact_per_N}
+    column = CAUSES["grasp_play"].columns(case.linear, robot, 0, shape)
     R_1i = case.shared.grasps.R_1i[robot]
     # The force acts where the wrist is, which is ahead of where it holds the payload.
     check_pose(case, signals, column, [play], 0.02, moment=np.cross(ahead @ R_1i.T, f @ R_1i.T))

@@ -1,6 +1,7 @@
 """A loose grasp."""
 
 import math
+from typing import ClassVar
 
 import numpy as np
 from scipy.ndimage import binary_dilation
@@ -15,7 +16,8 @@ from estimator.arrays import Array
 class GraspPlay(Cause):
     """The payload rests against one end of its play on every axis of {i}, after the force on it.
 
-    Below ``force_N`` it has not settled there, and is anywhere between the ends.
+    Below ``force_N`` it has not settled there, and is anywhere between the ends. The ends may give way to the force:
+    by ``contact_per_N`` of the play, if that is in its shape.
     """
 
     title = "play in {grasp}"
@@ -23,18 +25,33 @@ class GraspPlay(Cause):
     parameters = ("play_m",)
     tolerances = (3e-6,)
     at = "grasp"
-    shapes = ({"force_N": rules.PLAY_FORCE_N},)
+    shapes = ({"force_N": rules.PLAY_FORCE_N}, {"force_N": rules.PLAY_FORCE_N, "contact_per_N": 0.0})
+    determined: ClassVar = {"contact_per_N": rules.PLAY_CONTACT_PER_N}
     positive = ("play_m",)
     form_share = rules.FRICTION_FORM_SHARE
     separate = "Internal forces of both signs at rest separate play from flexibility."
 
     def sentence(self, n):
-        return f"the grasp is loose by +-({n('play_m', 'um', 1e6)}) along each axis"
+        behind = ""
+        if n.values.get("contact_m_per_N"):
+            behind = f", and gives way by {n('contact_m_per_N', 'nm/N', 1e9)} behind"
+        return f"the grasp is loose by +-({n('play_m', 'um', 1e6)}) along each axis{behind}"
+
+    def slope_step(self, name, number):
+        return self.determined[name]  # from nought on, and straight
+
+    def possible(self, values, se, shape):
+        return super().possible(values, se, shape) and shape.get("contact_per_N", 0.0) >= 0.0
+
+    def physical(self, values, context):
+        play_m = float(values[0])
+        return {"play_m": play_m, "contact_m_per_N": play_m * context.shape.get("contact_per_N", 0.0)}
 
     def columns(self, trial, robot, joint, shape):
         force = trial.data.wrench[:, robot, 3:]
-        at_end = -np.clip(force / shape["force_N"], -1.0, 1.0)
-        return stack([displaced(trial, robot, at_end, force)])
+        end = np.clip(force / shape["force_N"], -1.0, 1.0)
+        behind = shape.get("contact_per_N", 0.0) * force
+        return stack([displaced(trial, robot, -end - behind, force)])
 
     def unknowns(self, trial, robot, joint, shape):
         force, rate_hz = trial.data.wrench[:, robot, 3:], trial.signals.rate_hz
