@@ -65,6 +65,7 @@ class Rig(ABC):
         tuple[str, ...]
     ] = ()  # causes that have a tolerance, and a shape without which they may not show
     reshaped: ClassVar[tuple[str, ...]] = ()  # the same, where what is healthy would have that shape, too
+    behind: ClassVar[tuple[str, ...]] = ()  # causes with a shape that shows only beside what they leave open
     curved: ClassVar[bool] = False  # whether exact residuals hold what is within its tolerance, too
     normal: ClassVar[bool] = False  # whether a simulation has what is normal as the other trials have it
 

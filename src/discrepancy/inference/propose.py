@@ -235,7 +235,18 @@ def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hy
         return new
     healthy = Hypothesis.of(opened, base.free, base.allowed)
     allowed = min(max(0.0, healthy.score - base.score), other.score - new.score)
-    return replace(other, allowed={**base.allowed, index: allowed})
+    return _reshaped(rig, replace(other, allowed={**base.allowed, index: allowed}))
+
+
+def _reshaped(rig: Rig, new: Hypothesis) -> Hypothesis:
+    """The last cause in another shape, if that shows beside what it leaves open (``Rig.behind``)."""
+    index, candidate = new.free[-1], new.causes[-1]
+    for shape in rig.refinements(candidate) if candidate.cause in rig.behind else ():
+        problem = new.problem.with_columns(index, shape, rig.columns(shape))
+        other = _settled_shape(rig, Hypothesis.of(problem, new.free, new.allowed))
+        if other.score > new.score + rules.SHAPE_NATS and other.possible(rig, index):
+            new = other
+    return new
 
 
 def _with(rig: Rig, problem: Problem, shaped: Candidate, item: Scanned) -> tuple[Problem, int]:

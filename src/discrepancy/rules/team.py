@@ -103,6 +103,20 @@ PLAY_FORCE_N = 0.4
 """Below which a payload may be anywhere in its play. Chosen."""
 PLAY_KNOTS_S = 0.2
 """Between knots of the travel that play leaves open at small forces. Chosen."""
+PLAY_OPEN_N, PLAY_OPEN_S = 1.0, 0.03
+"""Force below which a payload that is loose may travel, and for how long before and after. Measured: it travels for a
+tenth of a second, with forces of up to 1 N in the filtered signals where there should be none; and derived: so long a
+filter of 20 Hz takes to show a force that begins. With 0.4 N alone, half of the travel is outside."""
+PLAY_OPEN_KNOTS_S = 0.05
+"""Between knots of that travel. Measured: play of 0.8 mm leaves a chi2/n of 51 with knots every 0.2 s and forces below
+0.4 N, 12 every 0.1 s below 1 N, 1.15 every 0.05 s; nothing faster passes the rows' filter."""
+PLAY_CONTACT_PER_N = 0.02
+"""Of a play, by which its ends give way to a newton, over which slopes are taken. Chosen: 1 um/N behind 50 um; columns
+go straight with it."""
+PLAY_COLUMNS_AT_A_TIME = 16
+"""Of that travel. Chosen: memory."""
+SHIFT_REACH_S = 0.5
+"""Before and after a displacement in which its accelerations show. Derived: a filter of 20 Hz has died to 1e-6."""
 LENGTH_MOST_M = 0.02
 """By which a leg's lengths may be off. Chosen: a thousand tolerances; as large, columns are no straight lines."""
 PULL_SE = 5.0

@@ -40,6 +40,7 @@ class TeamRig(LawfulRows):
     """Recordings of one payload, linearised around the best unknowns without any cause, and their simulator."""
 
     reshaped = ("sea_hysteresis", "grasp_flex")
+    behind = ("grasp_play",)
 
     def effect_parameters(
         self, candidate: Candidate, values: Array, covariance: Array

@@ -302,7 +302,8 @@ def test_weight_of_the_arm_is_that_of_the_estimator(case):
     np.testing.assert_allclose(own_torque(phi, (0, 0, 1)), arm_torque(phi, still, still, DESIGN), atol=1e-7)
 
 
-def check_pose(case, signals, column, values, tolerance=0.01, balance_tolerance=0.03):
+def check_pose(case, signals, column, values, tolerance=0.01, balance_tolerance=0.03, moment=None):
+    """``moment``: what the balance lacks about {1}, where a force acts elsewhere than is thought, shape (Q, 3)."""
     changed = residual_of(case, signals) - case.linear.residual
     got = column @ np.asarray(values)
     assert np.abs(changed[:, :12]).max() > 1e-6
@@ -312,6 +313,8 @@ def check_pose(case, signals, column, values, tolerance=0.01, balance_tolerance=
     data = linearise(signals, case.shared, case.bases, DESIGN, case.reduction, full=False).data
     data = replace(data, wrench=case.linear.data.wrench)
     moved = case.reduction(balance(data, case.shared)[0]) - case.linear.residual[:, 12:]
+    if moment is not None:
+        moved[:, 3:] -= case.reduction(moment)
     np.testing.assert_allclose(got[:, 12:], moved, atol=balance_tolerance * np.abs(moved).max() + 1e-7)
 
 
@@ -394,14 +397,17 @@ def test_a_grasp_without_a_point_to_turn_about_does_not_turn(case):
     assert finer == pytest.approx([-0.1, -0.07, -0.05, -0.035, -0.025])
 
 
-@pytest.mark.parametrize("robot", [0, 1])
-def test_grasp_play(case, robot):
+@pytest.mark.parametrize(("robot", "contact_per_N"), [(0, 0.0), (1, 0.0), (1, 0.02)])
+def test_grasp_play(case, robot, contact_per_N):
     play = 2e-5
     f = force_of(case, robot)[0]
-    lead = Rotation.from_euler("ZYX", case.signals.theta[:, robot]).apply(play * np.clip(f / 0.4, -1.0, 1.0))
-    signals = adapted(case, robot, lead)
-    column = CAUSES["grasp_play"].columns(case.linear, robot, 0, {"force_N": 0.4})
-    check_pose(case, signals, column, [play], 0.02)
+    ahead = play * (np.clip(f / 0.4, -1.0, 1.0) + contact_per_N * f)
+    signals = adapted(case, robot, Rotation.from_euler("ZYX", case.signals.theta[:, robot]).apply(ahead))
+    shape = {"force_N": 0.4, "contact_per_N": contact_per_N}
+    column = CAUSES["grasp_play"].columns(case.linear, robot, 0, shape)
+    R_1i = case.shared.grasps.R_1i[robot]
+    # The force acts where the wrist is, which is ahead of where it holds the payload.
+    check_pose(case, signals, column, [play], 0.02, moment=np.cross(ahead @ R_1i.T, f @ R_1i.T))
 
 
 @pytest.mark.parametrize(("robot", "relaxation_s"), [(0, 0.2), (1, 0.01), (2, 0.03)])

@@ -192,6 +192,15 @@ def test_play_and_flex_in_one_grasp_add_up():
 
 
 @ROBOT
+def test_the_ends_of_a_play_give_way(robot):
+    loop = ClosedLoop(team_with("a", example("grasp_play", robot, play_m=1e-4, contact_m_per_N=1e-6)))
+    loop.run(2.0, loop.scene.wrist_home_b)
+    force = loop.forces_on_payload()[robot - 1]
+    assert force[2] > 20
+    assert abs(_gap(loop, robot)[2]) == pytest.approx(1e-4 + 1e-6 * force[2], abs=2e-6)
+
+
+@ROBOT
 def test_the_gimbal_keeps_its_mass_and_inertia(robot):
     """The pad of a yielding grasp is cut out of the flange."""
     for effect in (example("grasp_flex", robot), example("grasp_play", robot)):
