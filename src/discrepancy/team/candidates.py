@@ -1,12 +1,13 @@
 """Every cause at every place, and in every shape."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate, Transient
+from discrepancy.causes.base import Shape
 from discrepancy.causes.intervals import intervals_near, ramped, worst_intervals
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.reduction import Reduction
@@ -36,11 +37,17 @@ def every_candidate(
     return out
 
 
-def other_shapes(candidate: Candidate, *, finer: bool) -> list[Candidate]:
-    """The candidate in every other shape of its cause, or in ``finer`` ones around its own."""
+def other_shapes(
+    candidate: Candidate, near: Callable[[Shape], Sequence[Shape]] | None = None
+) -> list[Candidate]:
+    """The candidate in every other shape of its cause, or in those near its own."""
     cause = CAUSES[candidate.cause]
-    shapes = cause.finer(candidate.shape) if finer else cause.shapes
-    return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
+    shapes = near(candidate.shape) if near else cause.shapes
+    return [
+        replace(candidate, shape=dict(shape), among=cause.alike(shape))
+        for shape in shapes
+        if dict(shape) != candidate.shape
+    ]
 
 
 def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:

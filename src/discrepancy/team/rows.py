@@ -270,7 +270,12 @@ class TeamRows(Rig):
         if candidate.transient:
             tolerance = self.tolerances.get(candidate.cause, {})
             return nearby_events(candidate.cause, candidate.transient, tolerance)
-        return other_shapes(candidate, finer=finer)
+        return other_shapes(candidate, CAUSES[candidate.cause].finer if finer else None)
+
+    def further(self, candidate: Candidate) -> list[Candidate]:
+        if candidate.transient or candidate.cause not in CAUSES:
+            return []
+        return other_shapes(candidate, CAUSES[candidate.cause].further)
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the wrench balance is worst.
