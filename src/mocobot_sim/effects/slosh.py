@@ -30,8 +30,8 @@ class Slosh(Effect):
 
     on_payload = True
     ranges: ClassVar = {
-        "mass_kg": (0.0, 100.0), "length_m": (0.005, 10.0), "damping_ratio": (0.0, 10.0), "across_length_m": (0.0, 10.0),
-        "second_length_m": (0.0, 10.0), "second_share": (0.0, 1.0),
+        "mass_kg": (0.0, 100.0), "length_m": (0.005, 10.0), "damping_ratio": (0.0, 10.0),
+        "across_length_m": (0.0, 10.0), "second_length_m": (0.0, 10.0), "second_share": (0.0, 1.0),
     }  # fmt: skip
     mass_kg: float
     length_m: float
@@ -73,7 +73,9 @@ class Slosh(Effect):
         )  # fmt: skip
         # Turning about x it swings along y.
         for axis, along, own_m in (("x", [1.0, 0.0, 0.0], across_m), ("y", [0.0, 1.0, 0.0], length_m)):
-            damping = 2.0 * self.damping_ratio * np.sqrt(omnid_design().gravity_mps2 / own_m) * mass_kg * own_m**2
+            damping = (
+                2.0 * self.damping_ratio * np.sqrt(omnid_design().gravity_mps2 / own_m) * mass_kg * own_m**2
+            )
             body.add(
                 "joint", name=f"{name}_{axis}", type="hinge", axis=along, pos=[0.0, 0.0, own_m - length_m],
                 damping=damping, group=3,

@@ -136,7 +136,9 @@ def _second_modes(shape: Shape) -> list[Shape]:
         for x in rules.SLOSH_ACROSS
         for turn in rules.SLOSH_HEADINGS_RAD
     ]
-    return two + [{"second_length_m": length_m * x, "second_share": rules.SLOSH_SHARE} for x in rules.SLOSH_SECOND]
+    return two + [
+        {"second_length_m": length_m * x, "second_share": rules.SLOSH_SHARE} for x in rules.SLOSH_SECOND
+    ]
 
 
 def _nearer_mode(shape: Shape) -> list[Shape]:
