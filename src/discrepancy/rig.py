@@ -147,6 +147,10 @@ class Rig(ABC):
         """The same candidate with other shapes, to choose the best from; ``finer`` ones around its own."""
         return []
 
+    def further(self, candidate: Candidate) -> list[Candidate]:
+        """The same candidate in shapes that have more to them, to try once its own is the best of its kind."""
+        return []
+
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
         """For every number of its shape that the data determine: a little less, a little more, and the difference."""
         return []

@@ -274,20 +274,27 @@ def _best_shape(rig: Rig, problem: Problem, free: Sequence[int], item: Scanned) 
     if start.transient and start.parameters[0].tolerance:
         spike = 1.0
     shapes = [*rig.refinements(start)]
-    if not shapes:
+    if not shapes and not rig.further(start):
         return start
     best, score = start, score_with(fit, start, rig.columns(start), spike)
-    for _ in range(rules.FINER_ROUNDS + 1):
-        last = best
-        each = [(shape, rig.columns(shape)) for shape in shapes]
-        for (shape, _), judged in zip(each, scores_with(fit, each, spike), strict=True):
-            if judged > score:
-                best, score = shape, judged
-        if best is last and best is not start:
-            break
-        shapes = rig.refinements(best, finer=True)
-        if not shapes:
-            break
+
+    def refined(shapes: Sequence[Candidate], best: Candidate, score: float) -> tuple[Candidate, float]:
+        """A better one among some shapes, or among finer ones around it."""
+        for _ in range(rules.FINER_ROUNDS + 1):
+            if not shapes:
+                break
+            last = best
+            each = [(shape, rig.columns(shape)) for shape in shapes]
+            for (shape, _), judged in zip(each, scores_with(fit, each, spike), strict=True):
+                if judged > score:
+                    best, score = shape, judged
+            if best is last and best is not start:
+                break
+            shapes = rig.refinements(best, finer=True)
+        return best, score
+
+    best, score = refined(shapes, best, score)
+    best, score = refined(rig.further(best), best, score)
     for _ in range(rules.POLISH_ROUNDS if rig.steps(best) else 0):
         values = fit.solution_with([c * best.units for c in rig.columns(best)])[0] * best.units
         nearer = nearest_shape(rig, fit, best, values)

@@ -19,7 +19,7 @@ from discrepancy.team.candidates import (
     indices,
     is_adjusted,
     nearby_events,
-    other_shapes,
+    in_shapes,
     shape_steps,
     worst_events,
 )
@@ -270,7 +270,14 @@ class TeamRows(Rig):
         if candidate.transient:
             tolerance = self.tolerances.get(candidate.cause, {})
             return nearby_events(candidate.cause, candidate.transient, tolerance)
-        return other_shapes(candidate, finer=finer, trials=len(self.linear))
+        cause = CAUSES[candidate.cause]
+        shapes = cause.finer(candidate.shape) if finer else cause.shapes
+        return in_shapes(candidate, shapes, len(self.linear))
+
+    def further(self, candidate: Candidate) -> list[Candidate]:
+        if candidate.transient or candidate.cause not in CAUSES:
+            return []
+        return in_shapes(candidate, CAUSES[candidate.cause].further(candidate.shape), len(self.linear))
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the wrench balance is worst.

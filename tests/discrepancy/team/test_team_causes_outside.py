@@ -10,7 +10,7 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from discrepancy.candidate import Transient
-from discrepancy.team.candidates import other_shapes, shape_steps
+from discrepancy.team.candidates import in_shapes, shape_steps
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.linear.trial_linear import linearise
@@ -104,15 +104,26 @@ def test_payload_tether(case, motion, arm):
     np.testing.assert_allclose([physical[f"anchor_{a}_m"] for a in "xyz"], anchor, atol=1e-9)
 
 
-@pytest.mark.parametrize(("along", "turning"), [(5.0, 0.0), (0.0, 3.0), (5.0, 3.0)])
-def test_drag(case, motion, along, turning):
+@pytest.mark.parametrize(
+    ("along", "turning", "squares"),
+    [
+        (5.0, 0.0, None), (0.0, 3.0, None), (5.0, 3.0, None), (5.0, 3.0, (0.0, 0.0)), (0.0, 0.0, (40.0, 0.0)),
+        (1.0, 0.0, (0.0, 20.0)),
+    ],
+)  # fmt: skip
+def test_drag(case, motion, along, turning, squares):
+    """With the speeds, and with their squares where its shape has these."""
     ahead, behind = (
         Rotation.from_euler("xyz", case.path(case.signals.time + h)[:, :3]) for h in (STEP_S, -STEP_S)
     )
     omega = (ahead * behind.inv()).as_rotvec() / (2.0 * STEP_S)  # world
-    force = -along * motion[2]
-    moment = np.cross(motion[0] @ COM, force) - turning * omega
-    check_wrench(case, motion, "drag", 0, 0, {}, [along, turning], force, moment)
+    linear, turning_squared = squares or (0.0, 0.0)
+    speed, rate = (np.linalg.norm(x, axis=1)[:, None] for x in (motion[2], omega))
+    force = -(along + linear * speed) * motion[2]
+    moment = np.cross(motion[0] @ COM, force) - (turning + turning_squared * rate) * omega
+    shape = {} if squares is None else {"powers": 2.0}
+    values = [along, turning, linear, turning_squared]
+    check_wrench(case, motion, "drag", 0, 0, shape, values, force, moment)
 
 
 def test_push(case, motion):
@@ -214,7 +225,7 @@ def test_a_mass_is_there_in_its_trials_only():
     assert not drift.of_trials
 
     def spans(trials):
-        shapes = [drift, *other_shapes(drift, finer=False, trials=trials)]
+        shapes = [drift, *in_shapes(drift, CAUSES["payload_mass"].shapes, trials)]
         return [tuple(s.acts_in(t) for t in range(trials)) for s in shapes]
 
     assert spans(1) == [(True,)]
@@ -233,6 +244,64 @@ def test_a_mass_is_there_and_within_reach():
     assert possible(-0.02, 0.01)
     assert not possible(1.5e-3, 0.0)
     assert not possible(0.02, 0.05)  # 2.5 m from the centre
+
+
+@pytest.mark.parametrize(("second_m", "share"), [(0.08, 0.3), (0.5, 0.4)])
+def test_slosh_of_a_second_pendulum(case, motion, second_m, share):
+    """Beside the first: what two of one mode do, each with its share of the mass."""
+    mass, moments = 0.4, 0.4 * np.array([0.02, -0.03, 0.01])
+    plain = {"length_m": 0.2, "damping_ratio": 0.05}
+    values = np.append(mass, moments)
+
+    def of(shape):
+        return CAUSES["slosh"].columns(case.linear, 0, 0, shape) @ values
+
+    both = (1.0 - share) * of(plain) + share * of(plain | {"length_m": second_m})
+    np.testing.assert_allclose(
+        of(plain | {"second_length_m": second_m, "second_share": share}), both, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize(("across_m", "heading"), [(0.08, 0.4), (0.45, -1.0)])
+def test_slosh_of_two_lengths(case, motion, across_m, heading):
+    """Along one level direction the mass hangs from one point, across from another below or above, Runge-Kutta again.
+
+    Its weight acts where both are; a mass that rides along rigidly at the first point is the payload's own.
+    """
+    mass, length_m, damping = 0.4, 0.2, 0.05
+    at, time, R = COM + np.array([0.02, -0.03, 0.01]), case.signals.time, motion[0]
+    along = R @ [np.cos(heading), np.sin(heading), 0.0]
+    along[:, 2] = 0.0
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    across = np.cross([0.0, 0.0, 1.0], along)
+    upper, gravity = make_interp_spline(time, point(motion, at), k=5).derivative(2)(time), DESIGN.gravity_mps2
+    force, moment = -mass * (0.0 * R[..., 0]), np.zeros((len(time), 3))
+    for way, own_m, below in ((along, length_m, 0.0), (across, across_m, length_m - across_m)):
+        own = at - [0.0, 0.0, below]
+        accel = np.sum(way * make_interp_spline(time, point(motion, own), k=5).derivative(2)(time), axis=1)
+        smooth, w = make_interp_spline(time, accel, k=3), np.sqrt(gravity / own_m)
+
+        def rate(t, y, smooth=smooth, w=w):
+            return [y[1], -smooth(t) - 2 * damping * w * y[1] - w**2 * y[0]]
+
+        x = solve_ivp(rate, (0.0, time[-1]), [0.0, 0.0], t_eval=time, rtol=1e-9, atol=1e-12).y
+        pull = -mass * (-2 * damping * w * x[1] - w**2 * x[0])[:, None] * way  # swinging and carried along
+        force = force + pull
+        moment += np.cross(R @ own, pull) + np.cross(
+            np.sum(R @ [0.0, 0.0, -below] * way, axis=1)[:, None] * way, [0.0, 0.0, -mass * gravity]
+        )
+    rigid = -mass * upper * [1.0, 1.0, 0.0]
+    values = np.append(mass, mass * (at - COM))
+    shape = {
+        "length_m": length_m,
+        "damping_ratio": damping,
+        "across_length_m": across_m,
+        "heading_rad": heading,
+    }
+    check_wrench(
+        case, motion, "slosh", 0, 0, shape, values, force - rigid, moment - np.cross(R @ at, rigid), 0.04
+    )
+    assert reported(case, "slosh", values, shape)["across_length_m"] == across_m
 
 
 @pytest.mark.parametrize("joint", [0, 1, 2])
@@ -318,12 +387,16 @@ def check_pose(case, signals, column, values, tolerance=0.01, balance_tolerance=
     np.testing.assert_allclose(got[:, 12:], moved, atol=balance_tolerance * np.abs(moved).max() + 1e-7)
 
 
+@pytest.mark.parametrize("start_s", [0.0, 4.3])
 @pytest.mark.parametrize("robot", [0, 1, 2])
-def test_base_creep(case, robot):
-    """The base gets ahead by v t; its wrist then lies back in {b}."""
+def test_base_creep(case, robot, start_s):
+    """The base gets ahead by v t, or from its start on; its wrist then lies back in {b}."""
     v = np.array([4e-6, -3e-6])
-    gone = np.append(v, 0.0) * case.signals.time[:, None]
-    column = CAUSES["base_creep"].columns(case.linear, robot, 0, {})
+    time = case.signals.time
+    gone = np.append(v, 0.0) * np.clip(time - start_s, 0.0, None)[:, None]
+    shape = {"start_s": start_s} if start_s else {}
+    column = CAUSES["base_creep"].columns(case.linear, robot, 0, shape)
+    assert reported(case, "base_creep", v, shape) == {"x_mps": 4e-6, "y_mps": -3e-6, "start_s": start_s}
     check_pose(case, adapted(case, robot, -gone), column, v)
 
 
@@ -386,14 +459,16 @@ def test_a_grasp_without_a_point_to_turn_about_does_not_turn(case):
     }  # fmt: skip
     assert cause.possible(np.array([2e-6, 0.0]), np.array([1e-7, 0.0]), healthy.shape)
     turning = next(
-        c for c in other_shapes(healthy, finer=False, trials=1) if c.shape.get("offset_m", 0.0) < 0.0
+        c for c in in_shapes(healthy, CAUSES[healthy.cause].shapes, 1) if c.shape.get("offset_m", 0.0) < 0.0
     )
     assert cause.physical(np.array([2e-6, 4e-5]), SimpleNamespace(shape=turning.shape)) == {
         "compliance_m_per_N": 2e-6, "turning_rad_per_N": 4e-5, "relaxation_s": 0.02, "offset_m": -0.05,
     }  # fmt: skip
     # Steps and finer shapes stay on their side of the gimbal.
     assert all(less.shape["offset_m"] < 0.0 for less, _, size in shape_steps(turning) if size > 0.0)
-    finer = sorted({c.shape["offset_m"] for c in other_shapes(turning, finer=True, trials=1)})
+    finer = sorted(
+        {c.shape["offset_m"] for c in in_shapes(turning, CAUSES[turning.cause].finer(turning.shape), 1)}
+    )
     assert finer == pytest.approx([-0.1, -0.07, -0.05, -0.035, -0.025])
 
 
