@@ -112,7 +112,7 @@ class Fit:
     def chi2(self) -> float:
         """Chi-square of all trials with the noise as whitened, and of the tolerances in use."""
         x = np.append(-self.coefficients, 1.0)
-        left = sum(float(np.einsum("i,kij,j->", x, grams, x)) for grams in self.problem.cell_grams)
+        left = sum(float(grams.squares(x).sum()) for grams in self.problem.cell_grams)
         return left + self.used_of_tolerances
 
     def at(self, index: int) -> NDArray[np.intp]:

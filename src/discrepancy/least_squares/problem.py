@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, reduce
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
+from discrepancy.least_squares.cell_grams import CellGrams
 from discrepancy.least_squares.cells import Cells
-from discrepancy.least_squares.columns import Columns, held
+from discrepancy.least_squares.columns import Columns, held, portions
 from discrepancy.least_squares.gram import added_up, gram_of, orthonormal, project
 from discrepancy.least_squares.opened import Along, Opened, through
 from discrepancy.rig import Rows
@@ -34,7 +36,7 @@ class Problem:
         local: columns of the trial's own unknowns, shape (n, C, l).
         explicable: orthonormal columns that span the same.
         cells: of every trial.
-        cell_grams: Gram matrices over every cell of a trial, shape (K, columns, columns) each.
+        cell_grams: Gram matrices over every cell of a trial, K of (columns, columns) each.
         power: variance of the noise in every cell of a trial, shape (K,) each; 1 as whitened.
         shared: number of shared unknowns.
         spans: columns of every candidate.
@@ -50,7 +52,7 @@ class Problem:
     local: tuple[Array, ...]
     explicable: tuple[Array, ...]
     cells: tuple[Cells, ...]
-    cell_grams: tuple[Array, ...]
+    cell_grams: tuple[CellGrams, ...]
     power: tuple[Array, ...]
     shared: int
     spans: tuple[slice, ...]
@@ -71,16 +73,20 @@ class Problem:
         units = [c.units for c in candidates]
         columns, local, explicable, cells, grams, shared = [], [], [], [], [], 0
         for trial in trials:
-            parts = [trial.shared, *(a * u for a, u in zip(trial.causes, units, strict=True))]
-            raw = np.concatenate([*parts, trial.residual[..., None]], axis=2)
-            shared = trial.shared.shape[2]
-            rows, channels = trial.residual.shape
+            causes = (a * u for a, u in zip(trial.causes, units, strict=True))
+            shared, (rows, channels) = trial.shared.shape[2], trial.residual.shape
             cells.append(Cells.of(rows, channels, trial.moving, trial.groups))
             local.append(trial.local)
             explicable.append(orthonormal(trial.local))
-            columns.append(Columns.of(raw, explicable[-1], cells[-1]))
-            grams.append(columns[-1].own_grams(cells[-1]))
-            columns = held(columns, rules.ROWS_BYTES)
+            own: list[Columns] = []
+            for raw in portions(
+                chain([trial.shared], causes, [trial.residual[..., None]]), rules.PORTION_BYTES
+            ):
+                own.append(Columns.of(raw, explicable[-1], cells[-1]))
+                *columns, one = held([*columns, reduce(Columns.beside, own)], rules.ROWS_BYTES)
+                own = [one]
+            columns += own
+            grams.append(CellGrams.of_columns(own[0], cells[-1]))
         spans, at = [], shared
         for candidate in candidates:
             spans.append(slice(at, at + len(candidate.parameters)))
@@ -146,9 +152,7 @@ class Problem:
     @cached_property
     def grams(self) -> Array:
         """Gram matrices of every trial, every cell over its power, shape (trials, columns, columns)."""
-        return np.array(
-            [np.tensordot(1.0 / p, g, 1) for p, g in zip(self.power, self.cell_grams, strict=True)]
-        )
+        return np.array([own.weighted(1.0 / p) for p, own in zip(self.power, self.cell_grams, strict=True)])
 
     @cached_property
     def weights(self) -> list[Array]:
@@ -218,11 +222,10 @@ class Problem:
         self, start: int, columns: Sequence[Array], candidates: tuple[Candidate, ...], room: int = 0
     ) -> Problem:
         """With other columns from ``start`` on, for which so many of them may be made first."""
-        made, grams, place = [], [], [start] * room
+        made, grams = [], []
         shares: dict[Key, list[Array]] = {key: [] for key in self.opened}
         for t, raw in enumerate(columns):
-            at = slice(start, start + raw.shape[2])
-            stop = start if room else at.stop
+            stop = start if room else start + raw.shape[2]
             new = Columns.of(raw, self.explicable[t], self.cells[t])
             made.append(self.columns[t].replaced(start, stop, new))
             (left,) = new.pieces
@@ -230,11 +233,9 @@ class Problem:
                 along = own[t].along(left)
                 left, old = left - added_up(own[t].basis, along), self.shares[key][t]
                 shares[key].append(np.concatenate([old[:, :start], along, old[:, stop:]], axis=1))
-            grams.append(np.insert(np.insert(self.cell_grams[t], place, 0.0, axis=1), place, 0.0, axis=2))
-            edge = self._grams(t, left)
-            inside = self.cells[t].grams(left, left)
+            edge, inside = self._grams(t, left), self.cells[t].grams(left, left)
             edge = np.concatenate([edge[:, :start], inside, edge[:, stop:]], axis=1)
-            grams[t][:, :, at], grams[t][:, at] = edge, np.swapaxes(edge, 1, 2)
+            grams.append(self.cell_grams[t].replaced(start, stop, edge))
         return replace(
             self, candidates=candidates, columns=tuple(made), cell_grams=tuple(grams),
             shares={key: tuple(each) for key, each in shares.items()},
@@ -255,7 +256,7 @@ class Problem:
             return self
         opened, shares, lost = zip(*(one.of_size(size) for one in along), strict=True)
         return replace(
-            self, cell_grams=tuple(gram - less for gram, less in zip(self.cell_grams, lost, strict=True)),
+            self, cell_grams=tuple(own.less(one) for own, one in zip(self.cell_grams, lost, strict=True)),
             opened={**self.opened, key: opened}, shares={**self.shares, key: shares},
         )  # fmt: skip
 
@@ -269,7 +270,8 @@ class Problem:
         """The problem without what causes other than those to keep leave open."""
         if all(key in keep for key in self.opened):
             return self
-        grams = tuple(x.own_grams(c) for x, c in zip(self.columns, self.cells, strict=True))
+        pairs = zip(self.columns, self.cells, strict=True)
+        grams = tuple(CellGrams.of_columns(*pair) for pair in pairs)
         again = replace(self, cell_grams=grams, opened={}, shares={})
         for key, own in self.opened.items():
             if key in keep:
