@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, reduce
+from functools import cached_property
 from itertools import chain
 
 import numpy as np
@@ -78,15 +78,12 @@ class Problem:
             cells.append(Cells.of(rows, channels, trial.moving, trial.groups))
             local.append(trial.local)
             explicable.append(orthonormal(trial.local))
-            own: list[Columns] = []
-            for raw in portions(
-                chain([trial.shared], causes, [trial.residual[..., None]]), rules.PORTION_BYTES
-            ):
-                own.append(Columns.of(raw, explicable[-1], cells[-1]))
-                *columns, one = held([*columns, reduce(Columns.beside, own)], rules.ROWS_BYTES)
-                own = [one]
-            columns += own
-            grams.append(CellGrams.of_columns(own[0], cells[-1]))
+            every = chain([trial.shared], causes, [trial.residual[..., None]])
+            columns.append(Columns((), np.zeros((explicable[-1].shape[2], 0))))
+            for raw in portions(every, rules.PORTION_BYTES):
+                columns[-1] = columns[-1].beside(Columns.of(raw, explicable[-1], cells[-1]))
+                columns = held(columns, rules.ROWS_BYTES)
+            grams.append(CellGrams.of_columns(columns[-1], cells[-1]))
         spans, at = [], shared
         for candidate in candidates:
             spans.append(slice(at, at + len(candidate.parameters)))
@@ -123,7 +120,7 @@ class Problem:
     def _open(self, trial: int) -> list[tuple[Opened, Array]]:
         """What causes leave open in a trial, and how much of every column lies along it."""
         pairs = ((own[trial], self.shares[key][trial]) for key, own in self.opened.items())
-        return [pair for pair in pairs if len(pair[1])]
+        return [(one, shares) for one, shares in pairs if len(shares)]
 
     def products(self, trial: int, b: Array) -> Array:
         """Products of all such columns with others in the transform, (n, C, k) -> (columns, k)."""
@@ -206,8 +203,7 @@ class Problem:
         """Where a candidate of the same cause and place (and interval) is, or None; one with its tolerance first."""
         wanted = candidate.key, candidate.transient
         same = [i for i, other in enumerate(self.candidates) if (other.key, other.transient) == wanted]
-        alike = [i for i in same if self.candidates[i].parameters == candidate.parameters]
-        return next(iter([*alike, *same]), None)
+        return min(same, key=lambda i: self.candidates[i].parameters != candidate.parameters, default=None)
 
     def with_residual(self, residuals: Sequence[Array]) -> Problem:
         """The same columns with another residual, shape (n, C) per trial."""
@@ -243,12 +239,13 @@ class Problem:
 
     def along(self, unknowns: Sequence[Array]) -> tuple[Along, ...]:
         """All columns along what may be left open, columns (n, C, k) per trial, of whatever size."""
-        own = [Opened.of(u, 1.0, self.spectrum(t, u)) for t, u in enumerate(unknowns)]
-        own = [one.single() if x.is_single else one for one, x in zip(own, self.columns, strict=True)]
-        return tuple(
-            Along(one, np.swapaxes(self._grams(t, one.basis), 1, 2), cells.grams(one.basis, one.basis))
-            for t, (one, cells) in enumerate(zip(own, self.cells, strict=True))
-        )
+        return tuple(self._along(t, u) for t, u in enumerate(unknowns))
+
+    def _along(self, trial: int, unknowns: Array) -> Along:
+        cells, one = self.cells[trial], Opened.of(unknowns, 1.0, self.spectrum(trial, unknowns))
+        one = one.single() if self.columns[trial].is_single else one
+        edge = np.swapaxes(self._grams(trial, one.basis), 1, 2)
+        return Along(one, edge, cells.grams(one.basis, one.basis))
 
     def with_open(self, key: Key, along: Sequence[Along], size: float) -> Problem:
         """The problem with what a cause leaves open, whose values scatter by ``size``."""
