@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,6 +63,12 @@ class CellGrams:
     def whole(self, cell: int) -> Array:
         """One cell's matrix, shape (W, W)."""
         return self._joined(self.first[cell], self.edge[cell])
+
+    def each(self, cells: Iterable[int]) -> Iterator[Array]:
+        """Some cells' matrices one after the other; what is in a file is given back meanwhile."""
+        for cell in cells:
+            yield self.whole(cell)
+            given_back(self.first)
 
     def weighted(self, weights: Array) -> Array:
         """All cells' matrices added up, each times its weight (K,), shape (W, W)."""
@@ -129,8 +135,10 @@ class CellGrams:
 
     def less(self, lost: Callable[[int], Array]) -> CellGrams:
         """With what every cell's matrix loses, (W, W) each, taken off."""
-        out = CellGrams.of(np.array([self.whole(cell) - lost(cell) for cell in range(self.cells)]))
-        given_back(self.first)
+        first = np.empty((self.cells, self.width, self.width))
+        for cell, gram in enumerate(self.each(range(self.cells))):
+            first[cell] = gram - lost(cell)
+        out = CellGrams.of(first)
         return out.stored() if is_stored(self.first) else out
 
     def _joined(self, first: Array, edge: Array) -> Array:

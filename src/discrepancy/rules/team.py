@@ -55,8 +55,8 @@ falls with it. Chosen: the trajectory need only be one that the stairs may have 
 PHASE_TRAVEL = 4.0
 """Steps of travel after which a rounding error is drawn anew. Chosen: independent from one rest to the next, and
 changes an encoder's speed by half at most."""
-DRAWS_AT_A_TIME = 8
-"""Of noise. Chosen: memory."""
+DRAWS_AT_A_TIME, DRAWN_TOGETHER = 8, 4.5e5
+"""Of noise, and samples of all robots in them, at most. Chosen: memory; eight of three minutes of three robots."""
 NOISE_DRAWS = 24
 """From which the rows' covariance is made. Chosen."""
 NOISE_SEED = 20250

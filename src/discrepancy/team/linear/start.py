@@ -15,7 +15,7 @@ from discrepancy.team.linear.filed import held, rested
 from discrepancy.team.linear.inertia import held_inertia, inertia_is_like_held, is_another
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
-from discrepancy.team.linear.rest import Resting, Tolerances
+from discrepancy.team.linear.rest import Resting, Tolerances, draws_at_a_time
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear, filtered, linearise
 from estimator.arm.arms import Arms
@@ -189,7 +189,7 @@ def noise_rows(trial: TrialLinear, noise: Noise, rng: np.random.Generator) -> tu
     """What the sensors' errors alone would leave: residuals (draws, n, C), and signals (draws, n, N, 21)."""
     out: list[tuple[Array, Array]] = []
     errors = noise.draws(trial.signals, rng, rules.NOISE_DRAWS)
-    while some := list(islice(errors, rules.DRAWS_AT_A_TIME)):  # not all at once, for the sake of memory
+    while some := list(islice(errors, draws_at_a_time(trial))):  # not all at once, for the sake of memory
         phi, theta, tau = (np.array([getattr(e, kind) for e in some]) for kind in ("phi", "theta", "tau"))
         out.append(trial.of_all_signals(phi, theta, tau))
     rows, signals = zip(*out, strict=True)
