@@ -97,7 +97,7 @@ class Rig(ABC):
         """Whitened rows of every trial at the nominal unknowns; they may come one at a time."""
 
     @abstractmethod
-    def columns(self, candidate: Candidate) -> list[Array]:
+    def columns(self, candidate: Candidate) -> Sequence[Array]:
         """Whitened columns of one candidate (its shape may differ from the catalogue's), one array per trial."""
 
     @abstractmethod
@@ -114,7 +114,7 @@ class Rig(ABC):
     def candidates(self) -> list[Candidate]:
         """Every cause at every place."""
 
-    def unknowns(self, candidate: Candidate) -> list[Array]:
+    def unknowns(self, candidate: Candidate) -> Sequence[Array]:
         """Whitened columns of what a cause leaves open in every trial, shape (n, C, k), possibly k = 0."""
         return [columns[..., :0] for columns in self.columns(candidate)]
 

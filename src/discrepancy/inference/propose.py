@@ -143,7 +143,7 @@ def _in_best_shape(rig: Rig, fit: Fit, item: Scanned, loud: Collection[int | Non
         fit = Fit.of(fit.problem, fit.free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
         # What the healthy one explains has its own shape, whatever that of the faulty one.
         healthy = score_with(fit, item.candidate, rig.columns(item.candidate)) - item.score
-    each = [(shape, tuple(rig.columns(shape))) for shape in rig.refinements(item.candidate)]
+    each = [(shape, rig.columns(shape)) for shape in rig.refinements(item.candidate)]
     for (shape, columns), score in zip(each, scores_with(fit, each), strict=True):
         if score - healthy > best.score:
             best = Scanned(item.index, shape, score - healthy, columns)

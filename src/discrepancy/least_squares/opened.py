@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.least_squares.gram import added_up, gram_of
+from discrepancy.least_squares.stored import stored
 from estimator.arrays import Array
 
 
@@ -68,8 +69,9 @@ class Opened:
         return 0.5 * float(np.sum(np.log1p((self.size * self.stretch) ** 2)))
 
     def single(self) -> Opened:
-        """The same in single precision."""
-        return replace(self, columns=self.columns.astype(np.float32), basis=self.basis.astype(np.float32))
+        """The same in single precision, and in files."""
+        columns, basis = (stored(x.astype(np.float32)) for x in (self.columns, self.basis))
+        return replace(self, columns=columns, basis=basis)
 
     def along(self, x: Array) -> Array:
         """How much of columns lies along the unknowns, and is taken out, shape (n, C, l) -> (r, l)."""
@@ -98,13 +100,17 @@ class Along:
     edge: Array
     inside: Array
 
-    def of_size(self, size: float) -> tuple[Opened, Array, Array]:
-        """The unknowns of a size, what lies along them (r, columns), what Gram matrices lose (K, columns, columns)."""
+    def of_size(self, size: float) -> tuple[Opened, Array, Callable[[int], Array]]:
+        """The unknowns of a size, what lies along them (r, columns), what a cell's Gram matrix loses, one by one."""
         opened = replace(self.opened, size=size)
         # All cells together: the transform is orthonormal.
         shares = opened.shrink[:, None] * self.edge.sum(axis=0)
-        cross = shares.T @ (self.edge - 0.5 * (self.inside @ shares))
-        return opened, shares, cross + np.swapaxes(cross, 1, 2)
+
+        def lost(cell: int) -> Array:
+            cross = shares.T @ (self.edge[cell] - 0.5 * (self.inside[cell] @ shares))
+            return np.asarray(cross + cross.T)
+
+        return opened, shares, lost
 
 
 def through(opened: Sequence[Opened], x: Array) -> Array:

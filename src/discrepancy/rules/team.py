@@ -20,6 +20,8 @@ TEAM_JACOBIAN_HZ = 25.0
 PART_S = 180.0
 """Of a recording at most that is looked at as one trial. Chosen: what a trial leaves open costs its square, and ten of
 its overlaps are a tenth of that; longer than any trial of the experiment."""
+LINEAR_BYTES = 4e8
+"""Of all linear trials, from which they are kept in files. Chosen: memory; of twenty minutes of three robots."""
 TEAM_TRIM_S = 2.0
 """Left out at both ends of a recording. Chosen."""
 STILL_RAD_PER_S = 1e-3
@@ -53,8 +55,8 @@ falls with it. Chosen: the trajectory need only be one that the stairs may have 
 PHASE_TRAVEL = 4.0
 """Steps of travel after which a rounding error is drawn anew. Chosen: independent from one rest to the next, and
 changes an encoder's speed by half at most."""
-DRAWS_AT_A_TIME = 8
-"""Of noise. Chosen: memory."""
+DRAWS_AT_A_TIME, DRAWN_TOGETHER = 8, 4.5e5
+"""Of noise, and samples of all robots in them, at most. Chosen: memory; eight of three minutes of three robots."""
 NOISE_DRAWS = 24
 """From which the rows' covariance is made. Chosen."""
 NOISE_SEED = 20250

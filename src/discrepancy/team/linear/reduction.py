@@ -39,9 +39,28 @@ class Reduction:
     sample: NDArray[np.intp]
 
     def __call__(self, x: Array) -> Array:
-        """Reduce samples, shape (Q, ...) -> (n, ...)."""
-        rows = self.operator @ x.reshape(len(x), int(np.prod(x.shape[1:])))
+        """Reduce samples, shape (Q, ...) -> (n, ...); what is there for a while only takes as long as that."""
+        flat = x.reshape(len(x), int(np.prod(x.shape[1:])))
+        if flat[0].any() or flat[-1].any() or not flat.size:
+            rows = self.operator @ flat
+        else:
+            rows = np.zeros((len(self.time), flat.shape[1]))
+            there = np.flatnonzero(flat.any(axis=1))
+            first = np.searchsorted(self._last, there[:1], side="left").sum()
+            last = np.searchsorted(self._first, there[-1:], side="right").sum()
+            for at in (slice(first, last), slice(self.moving, None)):
+                rows[at] = self.operator[at] @ flat
         return rows.reshape(len(self.time), *x.shape[1:])
+
+    @cached_property
+    def _first(self) -> NDArray[np.intp]:
+        """First sample of every moving row, shape (moving,)."""
+        return np.asarray(self.operator.indices[self.operator.indptr[: self.moving]], dtype=np.intp)
+
+    @cached_property
+    def _last(self) -> NDArray[np.intp]:
+        """Last sample of every moving row, shape (moving,)."""
+        return np.asarray(self.operator.indices[self.operator.indptr[1 : self.moving + 1] - 1], dtype=np.intp)
 
     def of_pieces(self, direction: Array, pieces: Iterable[tuple[slice, Array]]) -> Array:
         """Rows of values that are there for a while each, as many columns as show in any, shape (n, C, columns).

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
+from discrepancy.least_squares.stored import is_stored, stored
 from discrepancy.team.linear.jacobian import BySignals, by_signals
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals, with_rates
@@ -237,7 +238,7 @@ class TrialLinear:
                 for column, (v, v_dot) in ((k, (along, turned)), (3 + k, (none, along))):
                     needed = needed_wrench(motion, v @ G[:, at].T, v_dot @ G[:, at].T, none, self.shared.pi)
                     out[i, :, :, column] = -np.concatenate(needed, axis=1)
-        return out
+        return stored(out) if is_stored(self.s) else out
 
 
 def linearise(
