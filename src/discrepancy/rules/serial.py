@@ -137,9 +137,6 @@ MOST_SCALE = 0.5
 
 # Servos.
 
-SUPPLY_HZ = 1.0
-"""Cut-off of a supply's reading. Chosen: batteries and their cables sag in seconds; faster is how a bus rings that is
-switched, met by chance (an XL330's reads 5.7 to 9.2 V, with a mean at any duty of 7.0 to 7.4 V)."""
 LEAST_DRIVEN_SHARE = 0.1
 """Of the square of what a drive was given, that the model's torque must account for. Chosen: of a joint that only rubs,
 nobody can tell what a volt is worth."""
