@@ -66,6 +66,9 @@ class Rig(ABC):
     ] = ()  # causes that have a tolerance, and a shape without which they may not show
     reshaped: ClassVar[tuple[str, ...]] = ()  # the same, where what is healthy would have that shape, too
     curved: ClassVar[bool] = False  # whether exact residuals hold what is within its tolerance, too
+    layered: ClassVar[bool] = (
+        False  # whether causes explain so much that their shapes show only beside all others
+    )
     normal: ClassVar[bool] = False  # whether a simulation has what is normal as the other trials have it
 
     @property

@@ -86,6 +86,9 @@ STRIBECK_PER_S = 0.1
 not on how fast a joint was moved; slow logs must not hide it."""
 EXPONENTS = (0.5, 0.3, 0.7)
 """Of the speed in friction that grows more slowly than it. Chosen: between Coulomb (0) and viscous (1)."""
+WARMING_SHARES, WARMING_RANGE = (0.3, 1.0, 0.1), (0.05, 1.0)
+"""Time over which friction fades as a joint warms up, over the longest log's: those tried, and the range. Chosen: what
+takes longer is a straight line in a log, as the longest nearly is; what is faster is the first stroke."""
 BRISTLES_RAD = (5e-4, 1e-3, 2e-3, 4e-3)
 """By which dry friction gives way before it slips, if it does. Chosen: gears and greased bearings bend by a few tenths
 of a mrad to some mrad; friction that bends by 2 mrad was taken for a lack of it near standstill."""
