@@ -53,13 +53,18 @@ def forms_beside(
 
 
 def _worth(rows: SerialRows, trial: int, j: int) -> list[Array]:
-    """What a volt or an ampere of a drive is worth may be another here than there, rows (n, C) of one block."""
+    """What a volt or an ampere of a drive is worth may be another here than there, rows (n, C) of one block.
+
+    In every log, too: a winding that is 25 K warmer has a tenth more resistance.
+    """
     part, k = rows.block_of[trial]
     torque = np.zeros_like(part.signals.torque)
     torque[:, j] = part.signals.torque[:, j]
     trace = part.reduction(torque)[k][:, rows.joints]
     forms = other_forms(part.signals, part.reduction.samples[k], j, "")
-    return [rules.UNKNOWN_SCALE_SHARE * trace * m[:, None] for m in forms.times]
+    here = [rules.UNKNOWN_SCALE_SHARE * trace * m[:, None] for m in forms.times]
+    own = rules.UNKNOWN_SCALE_SHARE * trace
+    return here + [own if other is part else np.zeros_like(own) for other in rows.parts]
 
 
 def _at_a_joint(candidate: Candidate) -> bool:
