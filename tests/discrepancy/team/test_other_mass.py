@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from discrepancy.team.diagnosis import diagnose_team
+from estimator.errors import InputError
 from hidden.schedule import Schedule
 from hidden_quick import TIMESTEP_S
 from mocobot_sim.effects import apply_effects, make_effect
@@ -30,6 +31,8 @@ def test_a_box_on_the_payload_is_named_and_simulated(tmp_path):
         scene = apply_effects(build_team("b", timestep_s=TIMESTEP_S), [make_effect("payload_mass", BOX)])
         log = run_trial(scene, trajectory, trial_number=number)
         recordings.append(measure(log, sensor_preset("nominal"), rng, name=f"trial {number}"))
+    with pytest.raises(InputError, match=r"trial 1 says 11.67 kg and trial 2 says 12.4\d kg; recordings must be of one payload"):
+        diagnose_team(recordings, excluded=["payload_mass"])
     found = diagnose_team(recordings, laws="never")
     verdict = found.to_dict()
     (cause,) = verdict["causes"]
