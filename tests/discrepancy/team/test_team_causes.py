@@ -350,7 +350,8 @@ def test_no_cause_is_silent(case):
     """Every number shows, in one shape or another."""
     rig = team_of(case, 2)
     for candidate in rig.candidates():
-        shapes = [candidate, *other_shapes(candidate, finer=False)]
+        further = other_shapes(candidate, CAUSES[candidate.cause].further)
+        shapes = [candidate, *other_shapes(candidate), *further]
         sizes = [np.abs(rig.columns(shape)[0]).max(axis=(0, 1)) * candidate.units for shape in shapes]
         assert np.all(np.max(sizes, axis=0) > 1e-8), candidate.label
 
