@@ -142,14 +142,14 @@ GRASP_TURNS_M = (0.05, -0.05)
 thickness or a gripper's, on either side; what is along it is found by Gauss-Newton."""
 GRASP_TURNS_FINER, GRASP_TURNS_RANGE_M = (0.5, 0.7, 1.4, 2.0), (0.01, 0.3)
 """Shares of that tried next, and its range. Derived: nearer, nothing turns; farther, it is no part of the grasp."""
-CREEP_STARTS_S, CREEP_FINER_S = (
-    tuple(3.0 * k for k in range(1, 31)),
-    (-2.0, -1.0, -0.5, -0.25, 0.25, 0.5, 1.0, 2.0),
-)
-"""Into a trial, at which a base may begin to creep: tried first, and moves tried next. Chosen: what creeps
-from a second sooner or later goes nearly the same way; trials last less than a minute and a half."""
-CREEP_STEP_S, CREEP_STARTS = 0.5, 100
-"""Step of slopes by that time, and how many there are. Chosen; derived: three bases, by a minute in steps of 2 s."""
+CREEP_STARTS_S = tuple(3.0 * k for k in range(1, 31))
+"""Into a trial, at which a base may begin to creep, tried first. Chosen: trials last less than a minute and a half."""
+CREEP_FINER_S = (-2.0, -1.0, -0.5, -0.25, 0.25, 0.5, 1.0, 2.0)
+"""By which such a time is moved next. Chosen."""
+CREEP_STEP_S = 0.5
+"""Step of slopes by that time. Chosen: what creeps from half a second sooner or later goes nearly the same way."""
+CREEP_STARTS = 100
+"""How many of them there are, each as likely as the others. Derived: three bases, by a minute in steps of 2 s."""
 SLOSH_LENGTHS_M = (0.04, 1.0)
 """Derived: pendulums of 2.5 to 0.5 Hz; slower and faster ones look like drag or play."""
 SLOSH_MOST_DAMPED = 0.3
@@ -166,16 +166,17 @@ MASS_TRIALS = 12
 MASS_SPANS = 5
 """Up to which trial one may be there for some trials only. Chosen: of five, each span; of more, only what stays."""
 SLOSH_ACROSS = (0.3, 0.37, 0.46, 0.58, 0.72, 1.38, 1.7, 2.15, 2.7, 3.4)
+"""Length across over that along of what swings on two lengths, tried first. Measured (tuning set 99300, damping ratio
+0.04): a length 25 % off still helps."""
 SLOSH_HEADINGS_RAD = (0.0, 0.79, 1.57, 2.36)
-"""Length across over that along, and heading, of what swings on two lengths: tried first. Measured (tuning set 99300,
-damping ratio 0.04): a length 25 % off still helps, and a heading 25 deg off."""
+"""Its headings, tried first. Measured, likewise: one 25 deg off still helps."""
 SLOSH_SECOND, SLOSH_SHARE = (0.3, 0.55, 1.8, 3.3), 0.25
-"""Length of a second pendulum over the first's, and its share of the mass: tried first. Chosen: a quarter is what the
+"""Length of a second pendulum over the first's, and its share of the mass, tried first. Chosen: a quarter is what the
 second mode of two equal pendulums in a row has."""
-SLOSH_SECOND_FINER = (0.6, 0.75, 0.87, 0.95, 1.05, 1.15, 1.35, 1.7)
-SLOSH_HEADINGS_FINER_RAD, SLOSH_SHARES_FINER = (-0.26, -0.13, 0.13, 0.26), (0.5, 0.75, 1.3, 2.0)
-SLOSH_TURN_RAD = 0.1
-"""What is tried next of them, and the step of slopes by a heading. Chosen."""
+SLOSH_SECOND_FINER, SLOSH_SHARES_FINER = (0.6, 0.75, 0.87, 0.95, 1.05, 1.15, 1.35, 1.7), (0.5, 0.75, 1.3, 2.0)
+"""Shares of the second length, and of its share, tried next. Chosen."""
+SLOSH_HEADINGS_FINER_RAD, SLOSH_TURN_RAD = (-0.26, -0.13, 0.13, 0.26), 0.1
+"""By which a heading is moved next, and the step of slopes by it. Chosen."""
 SLOSH_SECONDS = 150
 """Second modes that are told apart, each as likely as the others. Derived: thirty lengths, 10 % apart, by five headings
 or shares. Without it a second mode would always explain what a pendulum of one mode does, and noise beside it."""
