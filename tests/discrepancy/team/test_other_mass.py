@@ -31,10 +31,8 @@ def test_a_box_on_the_payload_is_named_and_simulated(tmp_path):
         scene = apply_effects(build_team("b", timestep_s=TIMESTEP_S), [make_effect("payload_mass", BOX)])
         log = run_trial(scene, trajectory, trial_number=number)
         recordings.append(measure(log, sensor_preset("nominal"), rng, name=f"trial {number}"))
-    with pytest.raises(
-        InputError,
-        match=r"trial 1 says 11.67 kg and trial 2 says 12.4\d kg; recordings must be of one payload",
-    ):
+    refused = r"trial 1 says 11.67 kg and trial 2 says 12.4\d kg; recordings must be of one payload"
+    with pytest.raises(InputError, match=refused):
         diagnose_team(recordings, excluded=["payload_mass"])
     found = diagnose_team(recordings, laws="never")
     verdict = found.to_dict()
