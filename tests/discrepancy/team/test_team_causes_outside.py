@@ -398,13 +398,13 @@ def test_a_grasp_without_a_point_to_turn_about_does_not_turn(case):
         "compliance_m_per_N": 2e-6, "turning_rad_per_N": 0.0, "relaxation_s": 0.02, "offset_m": 0.0,
     }  # fmt: skip
     assert cause.possible(np.array([2e-6, 0.0]), np.array([1e-7, 0.0]), healthy.shape)
-    turning = next(c for c in other_shapes(healthy, finer=False) if c.shape.get("offset_m", 0.0) < 0.0)
+    turning = next(c for c in other_shapes(healthy) if c.shape.get("offset_m", 0.0) < 0.0)
     assert cause.physical(np.array([2e-6, 4e-5]), SimpleNamespace(shape=turning.shape)) == {
         "compliance_m_per_N": 2e-6, "turning_rad_per_N": 4e-5, "relaxation_s": 0.02, "offset_m": -0.05,
     }  # fmt: skip
     # Steps and finer shapes stay on their side of the gimbal.
     assert all(less.shape["offset_m"] < 0.0 for less, _, size in shape_steps(turning) if size > 0.0)
-    finer = sorted({c.shape["offset_m"] for c in other_shapes(turning, finer=True)})
+    finer = sorted({c.shape["offset_m"] for c in other_shapes(turning, CAUSES["grasp_flex"].finer)})
     assert finer == pytest.approx([-0.1, -0.07, -0.05, -0.035, -0.025])
 
 
