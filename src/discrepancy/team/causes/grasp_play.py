@@ -58,7 +58,8 @@ class GraspPlay(Cause):
         around = np.ones(2 * math.ceil(rules.PLAY_OPEN_S * rate_hz) + 1, dtype=bool)
         columns = [np.zeros((*trial.residual.shape, 0))]
         for axis in range(3):
-            loose = binary_dilation(np.abs(force[:, axis]) < rules.PLAY_OPEN_N, around)
+            small = np.abs(force[:, axis]) < rules.PLAY_OPEN_N
+            loose = np.asarray(binary_dilation(small, around), dtype=np.bool_)
             places = in_parts(
                 pieces_while(loose, rate_hz, rules.PLAY_OPEN_KNOTS_S), rules.PLAY_COLUMNS_AT_A_TIME
             )
