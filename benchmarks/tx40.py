@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,6 +34,8 @@ from mocobot_logs.joints.read import open_joint_log, read_joint_log
 VARIABLE = "MOCOBOT_TX40_DATA"
 TOP = Path(__file__).resolve().parents[1]
 FILE = TOP / "data" / "tx40" / "excitation.parquet"
+Active = Sequence[tuple[Candidate, np.ndarray]]
+FADES = "warming"
 STANDARD = ("link_mass", "link_com", "link_inertia", "armature", "friction", "torque_offset")
 """Ten inertial numbers, rotor, Coulomb, viscous friction and offset: 14 a joint."""
 
@@ -82,17 +85,38 @@ def shown(error: np.ndarray, torque: np.ndarray) -> str:
     return "".join(f"{100 * x:8.1f}" for x in share)
 
 
-def frictions(model: SerialModel, log: JointLog, causes: list[Candidate]) -> dict[int, np.ndarray]:
-    """Coulomb and viscous friction by joint, all given causes fitted together."""
+def frictions(
+    model: SerialModel, log: JointLog, causes: list[Candidate], told: Active = ()
+) -> dict[int, np.ndarray]:
+    """Coulomb and viscous friction by joint, all given causes fitted together beside those with known values."""
     rig = LawfulSerialRig.of(model, [log])
     kept = {c.key: c for c in causes}
     every = [kept.get(c.key, c) for c in rig.candidates()]
     every += [c for c in causes if c.key not in {k.key for k in every}]
-    fit = Fit.of(Problem.of(rig.rows(every), every), [k for k, c in enumerate(every) if c.key in kept])
+    problem = Problem.of(rig.rows(every), every).with_residual(rig.residual(np.zeros(0), [], told))
+    fit = Fit.of(problem, [k for k, c in enumerate(every) if c.key in kept])
     return {c.joint: v for c, v in fit.active if c.cause == "friction" and c.joint is not None}
 
 
-def drift(rig: SerialRig, active: list[tuple[Candidate, np.ndarray]]) -> dict[int, np.ndarray]:
+def show_halves(model: SerialModel, log: JointLog, active: Active, *, of_one_moment: bool) -> None:
+    """Print every joint's friction from both halves of the log.
+
+    Friction that fades is another in the second half than in the first. How it fades is known from the whole log
+    alone: with that, both halves tell the friction of one moment; without, each its own mean.
+    """
+    lasting = [c for c, _ in active if c.cause != FADES]
+    told = [(c, v) for c, v in active if c.cause == FADES] if of_one_moment else []
+    shares = ((0.0, 0.5), (0.5, 1.0))
+    halves = [frictions(model, crop(log, *share), lasting, told) for share in shares]
+    for joint in sorted(halves[0]):
+        (c1, v1), (c2, v2) = halves[0][joint], halves[1][joint]
+        apart = [200 * abs(a - b) / abs(a + b) for a, b in ((c1, c2), (v1, v2))]
+        print(
+            f"  joint {joint}: {c1:7.3f} {c2:7.3f} ({apart[0]:4.1f} %) {v1:8.3f} {v2:8.3f} ({apart[1]:4.1f} %)"
+        )
+
+
+def drift(rig: SerialRig, active: Active) -> dict[int, np.ndarray]:
     """Share by which a joint's friction grows over the log, with its standard error, shape (2,), by joint.
 
     What all causes leave of its torque in motion is fitted by more Coulomb and viscous friction and by a share of both
@@ -137,17 +161,15 @@ def main() -> None:
         numbers = ", ".join(f"{n} {v:.4g} +- {se[n]:.2g}" for n, v in values.items() if np.isfinite(se[n]))
         held = "" if item.held_out is None else f", {100 * item.held_out:.1f} % held out"
         print(f"  {item.candidate.label}: {numbers}{held}")
-    print("\nCoulomb [N m] and viscous [N m s/rad] friction from the first and the second half")
-    causes = [item.candidate for item in explanation.found]
-    halves = [frictions(model, crop(log, *share), causes) for share in ((0.0, 0.5), (0.5, 1.0))]
-    for joint in sorted(halves[0]):
-        (c1, v1), (c2, v2) = halves[0][joint], halves[1][joint]
-        apart = [200 * abs(a - b) / abs(a + b) for a, b in ((c1, c2), (v1, v2))]
-        print(
-            f"  joint {joint}: {c1:7.3f} {c2:7.3f} ({apart[0]:4.1f} %) {v1:8.3f} {v2:8.3f} ({apart[1]:4.1f} %)"
-        )
+    print(
+        "\nCoulomb [N m] and viscous [N m s/rad] friction from the first and the second half, of one moment"
+    )
+    active = [(item.candidate, item.values) for item in explanation.found]
+    show_halves(model, log, active, of_one_moment=True)
+    print("\nThe same, each half as it is")
+    show_halves(model, log, active, of_one_moment=False)
     print("\nChange of friction over the log [%]")
-    for joint, (share, se) in drift(whole, [(i.candidate, i.values) for i in explanation.found]).items():
+    for joint, (share, se) in drift(whole, active).items():
         print(f"  joint {joint}: {100 * share:+.1f} +- {100 * se:.1f}")
     print("\nTorque left unforetold in the last third, rms over that of the torque [%]")
     last = len(whole.trials) - 1

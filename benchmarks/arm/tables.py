@@ -15,7 +15,8 @@ from mocobot.campaign.shares import interval, reliability
 Item = Mapping[str, Any]
 SILENT = ("consistent", "miscalibrated")
 RUBS = (
-    "friction", "stribeck", "sublinear_friction", "load_friction", "asymmetric_coulomb", "asymmetric_viscous",
+    "friction", "stribeck", "sublinear_friction", "load_friction", "warming", "asymmetric_coulomb",
+    "asymmetric_viscous",
 )  # fmt: skip
 """Terms of one friction over speed, direction and load: a form of its own needs several."""
 

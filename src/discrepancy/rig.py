@@ -65,7 +65,11 @@ class Rig(ABC):
         tuple[str, ...]
     ] = ()  # causes that have a tolerance, and a shape without which they may not show
     reshaped: ClassVar[tuple[str, ...]] = ()  # the same, where what is healthy would have that shape, too
+    behind: ClassVar[tuple[str, ...]] = ()  # causes with a shape that shows only beside what they leave open
     curved: ClassVar[bool] = False  # whether exact residuals hold what is within its tolerance, too
+    layered: ClassVar[bool] = (
+        False  # whether causes explain so much that their shapes show only beside all others
+    )
     normal: ClassVar[bool] = False  # whether a simulation has what is normal as the other trials have it
 
     @property
@@ -144,6 +148,10 @@ class Rig(ABC):
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The same candidate with other shapes, to choose the best from; ``finer`` ones around its own."""
+        return []
+
+    def further(self, candidate: Candidate) -> list[Candidate]:
+        """The same candidate in shapes that have more to them, to try once its own is the best of its kind."""
         return []
 
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:

@@ -7,6 +7,7 @@ NAMES = (
     "stribeck",
     "sublinear_friction",
     "load_friction",
+    "warming",
     "back_emf",
     "coupled_drive",
     "armature",

@@ -14,6 +14,7 @@ from discrepancy.inference.probability import probability
 from discrepancy.inference.propose import proposals
 from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import nats_left, share_left
+from discrepancy.inference.reshape import reshaped
 from discrepancy.inference.twins import twins
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
@@ -171,6 +172,8 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
     rivals: dict[int, list[Rival]] = {}
     for _ in range(rules.EXCHANGES):
         changed = False
+        if rig.layered:
+            best = reshaped(rig, best, nothing)
         for index in best.free:
             less = best.without(index)
             # Its own loss to forms of the others is judged here, but counted once: not theirs to its forms, too.

@@ -154,13 +154,15 @@ class Fit:
         """Values of a trial's own unknowns that go with the solution, shape (l,)."""
         own = self.problem.local[trial]
         left = self.problem.raw_times(trial, np.append(-self.coefficients, 1.0))
-        # What causes leave open has unit size: so many rows more.
+        both = np.concatenate([own, left[..., None]], axis=2).reshape(left.size, -1)
         opened = [each[trial].scaled for each in self.problem.opened.values()]
-        columns = np.concatenate([own, *opened], axis=2).reshape(left.size, -1)
-        more = np.eye(columns.shape[1])[own.shape[2] :]
-        right = np.append(left.ravel(), np.zeros(len(more)))
-        values = np.linalg.lstsq(np.vstack([columns, more]), right, rcond=None)[0]
-        return np.asarray(values[: own.shape[2]], dtype=np.float64)
+        if opened:
+            # What causes leave open has unit size: so many rows more, and each column with its own best beside it.
+            U = np.concatenate(opened, axis=2, dtype=np.float64).reshape(left.size, -1)
+            best = np.linalg.solve(U.T @ U + np.eye(U.shape[1]), U.T @ both)
+            both = np.vstack([both - U @ best, best])
+        values = np.linalg.lstsq(both[:, :-1], both[:, -1], rcond=None)[0]
+        return np.asarray(values, dtype=np.float64)
 
     def remaining(self, trial: int) -> Array:
         """Whitened residual that the solution leaves in one trial, shape (n, C)."""

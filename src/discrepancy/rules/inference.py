@@ -82,6 +82,12 @@ LEARN_ROUNDS, LEARN_NATS = 30, 0.05
 """Steps of powers and spreads at most, and the gain of evidence below which they have settled. Chosen."""
 SAME_TRACE = 1e-6
 """Sine, squared, between columns that are one. Derived: more than rounding, less than what any data could tell."""
+OPEN_SHOWS = 1e-4
+"""Of what a cause leaves open, trace over the largest from which it counts. Derived: the largest is some hundred times
+the noise, so that one dropped is a hundredth of it."""
+SHAPE_NATS = 5.0
+"""By which a cause with one number more in its shape must be likelier. Derived: half the log of the rows' numbers, some
+ten to thirty thousand (Schwarz's criterion)."""
 LEAST_POWER = 0.5
 """Of a cell over that of its whitening. Chosen: some noise of healthy robots is drawn larger than it is."""
 FLAT_SHARE = 1e-10

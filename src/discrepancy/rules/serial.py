@@ -86,6 +86,9 @@ STRIBECK_PER_S = 0.1
 not on how fast a joint was moved; slow logs must not hide it."""
 EXPONENTS = (0.5, 0.3, 0.7)
 """Of the speed in friction that grows more slowly than it. Chosen: between Coulomb (0) and viscous (1)."""
+WARMING_SHARES, WARMING_RANGE = (0.3, 1.0, 0.1), (0.05, 1.0)
+"""Time over which friction fades as a joint warms up, over the longest log's: those tried, and the range. Chosen: what
+takes longer is a straight line in a log, as the longest nearly is; what is faster is the first stroke."""
 BRISTLES_RAD = (5e-4, 1e-3, 2e-3, 4e-3)
 """By which dry friction gives way before it slips, if it does. Chosen: gears and greased bearings bend by a few tenths
 of a mrad to some mrad; friction that bends by 2 mrad was taken for a lack of it near standstill."""
@@ -137,9 +140,6 @@ MOST_SCALE = 0.5
 
 # Servos.
 
-SUPPLY_HZ = 1.0
-"""Cut-off of a supply's reading. Chosen: batteries and their cables sag in seconds; faster is how a bus rings that is
-switched, met by chance (an XL330's reads 5.7 to 9.2 V, with a mean at any duty of 7.0 to 7.4 V)."""
 LEAST_DRIVEN_SHARE = 0.1
 """Of the square of what a drive was given, that the model's torque must account for. Chosen: of a joint that only rubs,
 nobody can tell what a volt is worth."""

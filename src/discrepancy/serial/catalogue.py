@@ -97,6 +97,7 @@ def hints_of(parts: Sequence[Signals], logs: Sequence[JointLog], motors: Sequenc
         _couplings(tree, logs[0]),
         driven_by_voltage(motors, q.shape[1]) & _moves_while_off(parts),
         np.isin(np.arange(q.shape[1]), [motor.joint for motor in motors]),
+        max(float(s.time[-1]) for s in parts),
     )
 
 

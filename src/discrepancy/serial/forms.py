@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy.candidate import Candidate
+from discrepancy.causes.base import Shape
 from discrepancy.rules import serial as rules
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.causes import CAUSES
@@ -20,7 +21,8 @@ def forms_beside(
     """Whitened columns (n, C, k) per block of what a joint's causes leave if their laws have other forms.
 
     Friction in all its forms is one thing: what the catalogue has of it may be added up. But friction that the model
-    names may give way before it slips, by as much as it is known.
+    names may give way before it slips, by as much as it is known; and that which was found has the shape in which it
+    came first, so that another of its shapes would be no second kind.
 
     Args:
         rows: of the logs.
@@ -31,7 +33,7 @@ def forms_beside(
     if candidate.cause not in CAUSES or candidate.transient is not None:
         return []
     own = [(c, v) for c, v in there if _at_a_joint(c) and not (_rubs(candidate) and _rubs(c))]
-    soft = _named_friction(rows, candidate, values)
+    soft = [*_named_friction(rows, candidate, values), *_shapes_of_found(rows, candidate, there)]
     driven = [] if _rubs(candidate) else [motor.joint for motor in rows.motors]
     if not own and not soft and not driven:
         return []
@@ -40,7 +42,7 @@ def forms_beside(
     out = []
     for t in range(len(rows.trials)):
         part, k = rows.block_of[t]
-        columns = [rules.JOINT_SHARE * x[t] for x in soft]
+        columns = [x[t] for x in soft]
         for (c, _), trace, size in zip(own, traces, sizes, strict=True):
             forms = other_forms(part.signals, part.reduction.samples[k], place_of(c), CAUSES[c.cause].family)
             columns += [rules.FORM_SHARE * trace[t] * m[:, None] for m in forms.times]
@@ -51,13 +53,18 @@ def forms_beside(
 
 
 def _worth(rows: SerialRows, trial: int, j: int) -> list[Array]:
-    """What a volt or an ampere of a drive is worth may be another here than there, rows (n, C) of one block."""
+    """What a volt or an ampere of a drive is worth may be another here than there, rows (n, C) of one block.
+
+    In every log, too: a winding that is 25 K warmer has a tenth more resistance.
+    """
     part, k = rows.block_of[trial]
     torque = np.zeros_like(part.signals.torque)
     torque[:, j] = part.signals.torque[:, j]
     trace = part.reduction(torque)[k][:, rows.joints]
     forms = other_forms(part.signals, part.reduction.samples[k], j, "")
-    return [rules.UNKNOWN_SCALE_SHARE * trace * m[:, None] for m in forms.times]
+    here = [rules.UNKNOWN_SCALE_SHARE * trace * m[:, None] for m in forms.times]
+    own = rules.UNKNOWN_SCALE_SHARE * trace
+    return here + [own if other is part else np.zeros_like(own) for other in rows.parts]
 
 
 def _at_a_joint(candidate: Candidate) -> bool:
@@ -68,6 +75,32 @@ def _at_a_joint(candidate: Candidate) -> bool:
 def _rubs(candidate: Candidate) -> bool:
     cause = CAUSES[candidate.cause]
     return cause.dry or cause.family in ("friction", "asymmetric_friction")
+
+
+def _shapes_of_found(
+    rows: SerialRows, candidate: Candidate, there: Sequence[tuple[Candidate, Array]]
+) -> list[list[Array]]:
+    """How dry friction that was found at a joint changes in each of its other shapes, for another kind, rows (n, C)."""
+    if not (_at_a_joint(candidate) and _rubs(candidate)) or candidate.cause == "friction":
+        return []
+    return [
+        change
+        for c, v in there
+        if c.cause == "friction" and c.joint == candidate.joint
+        for change in _changes(rows, c, CAUSES["friction"].shapes(rows.hints, place_of(c)), float(v[0]))
+    ]
+
+
+def _changes(
+    rows: SerialRows, friction: Candidate, shapes: Sequence[Shape], much: float
+) -> list[list[Array]]:
+    """How so much dry friction changes if it has other shapes than its own, rows (n, C) of every block each."""
+    first = rows.physical(friction)
+    others = [replace(friction, shape=dict(s)) for s in shapes if dict(s) != friction.shape]
+    return [
+        [much * (x[..., 0] - y[..., 0]) for x, y in zip(rows.physical(other), first, strict=True)]
+        for other in others
+    ]
 
 
 def _named_friction(rows: SerialRows, candidate: Candidate, values: Array) -> list[list[Array]]:
@@ -83,9 +116,4 @@ def _named_friction(rows: SerialRows, candidate: Candidate, values: Array) -> li
     if not much or not shapes:
         return []
     rigid = CAUSES["friction"].at(rows.tree, rows.model.joints, at, shapes[0])
-    soft = [replace(rigid, shape=dict(s)) for s in shapes if "bristle_rad" in s]
-    first = rows.physical(rigid)
-    return [
-        [much * (x[..., 0] - y[..., 0]) for x, y in zip(rows.physical(other), first, strict=True)]
-        for other in soft
-    ]
+    return _changes(rows, rigid, [s for s in shapes if "bristle_rad" in s], rules.JOINT_SHARE * much)

@@ -32,6 +32,7 @@ class PairedRig(Rig):
     rigid = SerialRig.rigid
     shaped = SerialRig.shaped
     curved = SerialRig.curved
+    layered = SerialRig.layered
     normal = SerialRig.normal
 
     def blocks_of(self, trial: int) -> list[int]:

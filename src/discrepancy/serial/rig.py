@@ -188,6 +188,7 @@ class SerialRig(SerialRows, Rig):
     rigid = ("payload",)
     shaped = ("friction",)
     curved = True
+    layered = True
     normal = True
 
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:

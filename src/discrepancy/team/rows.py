@@ -17,16 +17,15 @@ from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Channel, Rig, Rows
 from discrepancy.team.candidates import (
     every_candidate,
+    in_shapes,
     indices,
     is_adjusted,
     nearby_events,
-    other_shapes,
     shape_steps,
     worst_events,
 )
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.channels import channels_of, groups_of
-from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.imitators import wrong_torques
 from discrepancy.team.linear.adjust import as_loud, noise_of
 from discrepancy.team.linear.elsewhere import HEALTHY, found_at, resting_of
@@ -173,7 +172,7 @@ class TeamRows(Rig):
         linear = self.linear[trial]
         if not candidate.acts_in(trial):
             return np.broadcast_to(0.0, (*linear.residual.shape, len(candidate.parameters)))
-        if (key := (trial, *candidate.key, *candidate.shape.items())) in self.kept:
+        if (key := (trial, *candidate.trace)) in self.kept:
             return self.kept[key]
         columns = self.whitening[trial](self._unwhitened(trial, candidate))
         rested(linear)
@@ -272,9 +271,18 @@ class TeamRows(Rig):
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a transient with its interval moved."""
-        if candidate.transient is None:
-            return other_shapes(candidate, finer=finer)
-        return nearby_events(candidate.cause, candidate.transient, self.tolerances.get(candidate.cause, {}))
+        if candidate.transient:
+            return nearby_events(
+                candidate.cause, candidate.transient, self.tolerances.get(candidate.cause, {})
+            )
+        cause = CAUSES[candidate.cause]
+        shapes = cause.finer(candidate.shape) if finer else cause.shapes
+        return in_shapes(candidate, shapes, len(self.linear))
+
+    def further(self, candidate: Candidate) -> list[Candidate]:
+        if candidate.transient or candidate.cause not in CAUSES:
+            return []
+        return in_shapes(candidate, CAUSES[candidate.cause].further(candidate.shape), len(self.linear))
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the wrench balance is worst."""
@@ -287,14 +295,3 @@ class TeamRows(Rig):
 
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
         return shape_steps(candidate)
-
-    def quantities(self, trial: int) -> dict[str, Array]:
-        """Speed of the payload [m/s], its distance from where it started [m], load [N m]: shape (n,) each."""
-        return quantities_of(self.linear[trial])
-
-    def row_rate_hz(self, trial: int) -> float:
-        return self.linear[trial].signals.rate_hz / self.linear[trial].reduction.step
-
-    def directions(self, trial: int) -> dict[str, Array]:
-        """Directions of every spring torque and every gimbal axis, from the linearisation."""
-        return directions_of(self.linear[trial], self.whitening[trial])

@@ -14,6 +14,7 @@ from mocobot_logs.joints.even import Even
 from mocobot_logs.joints.joint_log import Drive, JointLog
 from mocobot_logs.joints.joint_map import Control, JointMap
 from mocobot_logs.joints.quantities import COMMANDS, DUTIES, EFFORTS, POSITIONS, VELOCITIES
+from mocobot_logs.joints.supply import mean_supply
 
 _STEP_ROWS = 1024
 """Rows of a block in which the step of a reading is looked for."""
@@ -80,7 +81,7 @@ def assemble(part: Even, log_map: JointMap, name: str, control: Control) -> Join
         dq = _joints_from_motors(
             columns.of("dq"), columns.of("motor_velocity"), turns, where, "motor_velocity"
         )
-    supply_V = _supply(columns, control, name)
+    supply_V = _supply(columns, control, name, part.rate_hz)
     drive = Drive(
         gear=np.diag(turns).copy(),
         coupling=np.asarray(np.linalg.inv(turns), dtype=np.float64),
@@ -191,14 +192,14 @@ def _command(columns: _Columns, control: Control, turns: Array, zero: Array, whe
     return at_joints + zero if control.command == "position" else at_joints
 
 
-def _supply(columns: _Columns, control: Control, name: str) -> Array | None:
+def _supply(columns: _Columns, control: Control, name: str, rate_hz: float) -> Array | None:
     supply_V = columns.shared("supply")
     if supply_V is None:
         return None if control.supply_V is None else np.full(len(columns.values), control.supply_V)
     if (supply_V <= 0).any():
         row = int(np.argmax(supply_V <= 0))
         raise InputError(f"{name}: supply is {supply_V[row]:.4g} V in sample {row}; it must be positive")
-    return supply_V
+    return mean_supply(supply_V, rate_hz)
 
 
 def _duty(columns: _Columns, supply_V: Array | None) -> Array | None:

@@ -32,8 +32,8 @@ class Drive:
         gain_of: what the gains make of an error: a torque [N m], a velocity [rad/s] or a duty (1 is full scale); gains
             of a firmware are in its own unit, proportional to one of these by a factor that is not known.
         limit: most that the loop gives, in ``gain_of`` (a duty for a firmware's gains), shape (J,).
-        supply_V: supply voltage, shape (Q,), or None.
-        duty: share of the supply that each motor is given, -1 to 1, shape (Q, J), or None.
+        supply_V: what motors have of the supply: the mean of its reading [V], shape (Q,), or None.
+        duty: share of that which each motor is given, -1 to 1, shape (Q, J), or None.
     """
 
     gear: Array

@@ -58,23 +58,24 @@ def resistances(effects: list[RobotEffect], q: Array, v: Array, damping: Array) 
     return out + np.where((rubbing + damping * v) * v < 0.0, -damping * v, rubbing)
 
 
-def dry_levels(effects: list[RobotEffect], v: Array, load: Array) -> Array:
+def dry_levels(effects: list[RobotEffect], v: Array, load: Array, time: float) -> Array:
     """Dry friction beyond the model's at every joint, shape (J,) [N m or N]; it may be less than that.
 
     Args:
         effects: any; those of ``DRY`` count.
         v: speeds, shape (J,).
         load: torques that the gears pass on, shape (J,).
+        time: since the robot was switched on, as a log of it would have it [s].
     """
     out = np.zeros(len(v))
     for effect in effects:
         if effect.cause in DRY and effect.joint is not None:
             j = effect.joint - 1
-            out[j] += DRY[effect.cause](effect, float(v[j]), float(load[j]))
+            out[j] += DRY[effect.cause](effect, float(v[j]), float(load[j]), time)
     return out
 
 
-def _coulomb(e: RobotEffect, v: float, load: float) -> float:
+def _coulomb(e: RobotEffect, v: float, load: float, time: float) -> float:
     return e.number("coulomb")
 
 
@@ -82,7 +83,7 @@ def _viscous(e: RobotEffect, q: float, v: float) -> float:
     return e.number("viscous") * v
 
 
-def _asymmetric_coulomb(e: RobotEffect, v: float, load: float) -> float:
+def _asymmetric_coulomb(e: RobotEffect, v: float, load: float, time: float) -> float:
     return e.number("asymmetry") * direction(v)
 
 
@@ -90,11 +91,11 @@ def _asymmetric_viscous(e: RobotEffect, q: float, v: float) -> float:
     return e.number("asymmetry") * abs(v)
 
 
-def _stribeck(e: RobotEffect, v: float, load: float) -> float:
+def _stribeck(e: RobotEffect, v: float, load: float, time: float) -> float:
     return e.number("excess") * math.exp(-abs(v) / e.number("fade"))
 
 
-def _sublinear(e: RobotEffect, v: float, load: float) -> float:
+def _sublinear(e: RobotEffect, v: float, load: float, time: float) -> float:
     # A power of the speed less its own best straight line between 0 and twice the typical speed: with moments
     # a = 2^(n+1)/(n+1) and b = 2^(n+2)/(n+2), that line is 2 a - 3 b / 2 + (3 b / 2 - 3 a / 2) u.
     n, u = e.number("exponent"), abs(v) / e.number("typical")
@@ -102,8 +103,16 @@ def _sublinear(e: RobotEffect, v: float, load: float) -> float:
     return e.number("bend") * (u**n - (2.0 * a - 1.5 * b) - (1.5 * b - 1.5 * a) * u)
 
 
-def _load_friction(e: RobotEffect, v: float, load: float) -> float:
+def _load_friction(e: RobotEffect, v: float, load: float, time: float) -> float:
     return e.number("share") * (abs(load) - e.number("load"))
+
+
+def _warming(e: RobotEffect, v: float, load: float, time: float) -> float:
+    # Counted from its mean between 0 and ``until``, which is as much friction as there is without it.
+    over, until = e.number("over"), e.number("until")
+    mean = (1.0 - math.exp(-until / over)) * over / until
+    power = (abs(v) / e.number("typical")) ** e.number("exponent")
+    return e.number("more") * power * (math.exp(-time / over) - mean)
 
 
 def _ripple(e: RobotEffect, q: float, v: float) -> float:
@@ -128,14 +137,15 @@ SMOOTH: dict[str, Callable[[RobotEffect, float, float], float]] = {
 }
 """Torques by position and speed, by cause; a slide's ripple counts waves per metre as ``turns`` over 2 pi."""
 
-DRY: dict[str, Callable[[RobotEffect, float, float], float]] = {
+DRY: dict[str, Callable[[RobotEffect, float, float, float], float]] = {
     "friction": _coulomb,
     "asymmetric_coulomb": _asymmetric_coulomb,
     "stribeck": _stribeck,
     "sublinear_friction": _sublinear,
     "load_friction": _load_friction,
+    "warming": _warming,
 }
-"""Dry friction by speed and load, by cause: against the motion, and at rest as much as keeps the joint there."""
+"""Dry friction by speed, load and time, by cause: against the motion, and at rest as much as keeps the joint there."""
 
 VISCOUS = frozenset({"friction", "asymmetric_viscous"})
 """Of ``SMOOTH``, those that rub."""

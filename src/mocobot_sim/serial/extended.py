@@ -128,7 +128,7 @@ def step(
     for acting in (effect for effect in effects if isinstance(effect, ActingLaw)):
         taken[acting.law.joint - 1] += acting.torque(state)
     data.qfrc_applied[:] = torque - taken
-    _rub(model, data, dry_levels(rubbing, data.qvel, load))
+    _rub(model, data, dry_levels(rubbing, data.qvel, load, data.time))
     mujoco.mj_step2(model, data)
 
 

@@ -1,4 +1,4 @@
-"""What a servo's volts are: a supply that rings where it is read, rows for duties, and what a volt may be worth."""
+"""What a servo's volts are: rows for duties, and what a volt may be worth."""
 
 from __future__ import annotations
 
@@ -14,45 +14,7 @@ from discrepancy.serial.model import SerialModel
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
 from discrepancy.serial.servo.motor import with_torques
-from discrepancy.serial.servo.supply import supply_of
-from test_serial_servo import VOLTS, logs, model  # noqa: F401 (fixtures)
-
-
-def ringing(log: JointLog, seed: int = 0) -> JointLog:
-    """Readings of a bus at any instant of the drive's period: a volt less, as it is, or a volt more."""
-    raw = VOLTS + np.random.default_rng(seed).choice([-1.0, 0.0, 1.0], len(log.time))
-    return replace(log, drive=replace(log.drive, supply_V=raw))
-
-
-def test_a_supply_that_rings_is_read_as_its_mean(logs: list[JointLog]) -> None:  # noqa: F811
-    seen = supply_of(ringing(logs[0]))
-    assert seen is not None
-    # White readings of variance 2/3 V^2 at 200 Hz through about 1 Hz of bandwidth.
-    assert np.std(seen - VOLTS) < 0.15
-    slow = VOLTS - 0.5 * np.sin(2.0 * np.pi * 0.1 * logs[0].time)  # a battery sags
-    sagging = supply_of(replace(logs[0], drive=replace(logs[0].drive, supply_V=slow)))
-    assert sagging is not None
-    np.testing.assert_allclose(sagging, slow, atol=0.1)
-    np.testing.assert_allclose(sagging[400:-400], slow[400:-400], atol=0.01)
-
-
-def test_a_supply_that_is_not_known_stays_unknown(logs: list[JointLog]) -> None:  # noqa: F811
-    raw = np.full(len(logs[0].time), VOLTS)
-    raw[100:110] = np.nan
-    seen = supply_of(replace(logs[0], drive=replace(logs[0].drive, supply_V=raw)))
-    assert seen is not None
-    np.testing.assert_array_equal(np.isnan(seen), np.isnan(raw))
-    np.testing.assert_allclose(seen[~np.isnan(raw)], VOLTS)
-    assert supply_of(replace(logs[0], drive=replace(logs[0].drive, supply_V=None))) is None
-
-
-def test_torques_do_not_ring_with_the_supply(model: SerialModel, logs: list[JointLog]) -> None:  # noqa: F811
-    (quiet,), (steady,) = with_torques(model, logs[:1])
-    (rung,), (motor,) = with_torques(model, [ringing(logs[0])])
-    assert motor.torque_per_unit == pytest.approx(steady.torque_per_unit, rel=0.02)
-    assert quiet.torque is not None
-    assert rung.torque is not None
-    assert np.std(rung.torque - quiet.torque) < 0.03 * np.std(quiet.torque)
+from test_serial_servo import logs, model  # noqa: F401 (fixtures)
 
 
 def test_rows_of_duties_are_slower(model: SerialModel, logs: list[JointLog]) -> None:  # noqa: F811
@@ -79,6 +41,16 @@ def test_a_volt_may_be_worth_another_torque_elsewhere(model: SerialModel, logs: 
     basis = beside[0].reshape(-1, beside[0].shape[2])
     left = trace - basis @ np.linalg.lstsq(basis, trace, rcond=None)[0]
     assert np.sum(left**2) < 0.05 * np.sum(trace**2)
+    # So is one that is a twentieth more in all of one log, with a warmer winding, and not in the other.
+    assert len(rig.parts) == 2
+    more = [
+        0.05 * (own is rig.parts[1]) * own.reduction(own.signals.torque)[k][:, rig.joints]
+        for own, k in rig.block_of
+    ]
+    trace = np.concatenate([rig.whitening[t](x).ravel() for t, x in enumerate(more)])
+    basis = np.concatenate([x.reshape(-1, x.shape[2]) for x in beside])
+    left = trace - basis @ np.linalg.lstsq(basis, trace, rcond=None)[0]
+    assert np.sum(left**2) < 1e-9 * np.sum(trace**2)
     (friction,) = (c for c in rig.candidates() if c.cause == "load_friction")
     assert not forms_beside(rig, friction, np.array([0.1]), [])
 

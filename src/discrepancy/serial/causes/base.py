@@ -31,7 +31,7 @@ SLIDES = {
 
 @dataclass(frozen=True, eq=False)
 class Hints:
-    """What shapes of causes begin with; one number a joint, shape (J,).
+    """What shapes of causes begin with; one number a joint, shape (J,), unless said.
 
     Attributes:
         typical: speed while it moves [rad/s or m/s].
@@ -43,6 +43,7 @@ class Hints:
             joint's turns, if the map says so; else NaN.
         unscaled: whether what a joint's drive gives per volt or ampere was fitted.
         switched: whether a joint's drive is given a voltage, and the joint moves while it is off, too.
+        longest_s: of the logs, the duration of the longest.
     """
 
     typical: Array
@@ -54,6 +55,7 @@ class Hints:
     couplings: Array
     switched: NDArray[np.bool_]
     unscaled: NDArray[np.bool_]
+    longest_s: float
 
 
 class Cause(base.Cause):

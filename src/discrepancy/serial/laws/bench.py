@@ -28,9 +28,8 @@ _DRY = {("play", "q"), ("sign", "dq"), ("linear", "direction")}
 _BENT = {
     (function, signal) for function in ("linear", "cube", "beyond", "spline") for signal in ("load", "torque")
 }
-_FORMS = {
-    "friction": _DRY, "stribeck": _DRY, "sublinear_friction": _DRY, "load_friction": _DRY, "torque_scale": _BENT
-}  # fmt: skip
+_RUBS = ("friction", "stribeck", "sublinear_friction", "load_friction", "warming")
+_FORMS = dict.fromkeys(_RUBS, _DRY) | {"torque_scale": _BENT}
 """Functions and signals of a joint's own torque that are a listed cause in another form."""
 
 

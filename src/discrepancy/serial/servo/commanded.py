@@ -11,7 +11,6 @@ from discrepancy.rules import serial as rules
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.servo.loop import LoopLaw
 from discrepancy.serial.servo.motor import Motor
-from discrepancy.serial.servo.supply import supply_of
 from estimator.arrays import Array
 
 
@@ -108,8 +107,7 @@ class Commanded:
         assert log.command is not None
         count = len(log.time)
         on = np.ones(count) if log.enabled is None else log.enabled.astype(float)
-        supply = supply_of(log)
-        supply = np.ones(count) if supply is None else supply
+        supply = np.ones(count) if log.drive.supply_V is None else log.drive.supply_V
         return cls(tuple(servos), log.time, log.command, supply, on)
 
     def sample(self, time: float) -> int:

@@ -14,7 +14,6 @@ from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rows.signals import Signals
-from discrepancy.serial.servo.supply import supply_of
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.filtering import low_pass
@@ -104,7 +103,7 @@ def _raw(logs: Sequence[JointLog], joints: int) -> tuple[list[Array], list[str]]
         own = np.full(log.q.shape, np.nan) if log.torque is None else log.torque.copy()
         for j, name in enumerate(unit):
             if name in ("V", "full duty") and log.drive.duty is not None:
-                supply = supply_of(log) if name == "V" else None
+                supply = log.drive.supply_V if name == "V" else None
                 own[:, j] = log.drive.duty[:, j] * (1.0 if supply is None else supply)
         raw.append(own)
     return raw, unit

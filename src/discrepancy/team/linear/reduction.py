@@ -69,13 +69,17 @@ class Reduction:
             direction: what a value of 1 is in the samples, shape (Q, C).
             pieces: samples of an interval, and k columns of values there, shape (s, k).
         """
-        parts = [np.zeros((len(self.time), direction.shape[1], 0))]
-        for at, values in pieces:
+        blocks = ((at, direction[at, :, None] * values[:, None]) for at, values in pieces)
+        return self.of_blocks(blocks, direction.shape[1])
+
+    def of_blocks(self, blocks: Iterable[tuple[slice, Array]], channels: int) -> Array:
+        """The same of samples of an interval with all their channels, shape (s, C, k)."""
+        parts = [np.zeros((len(self.time), channels, 0))]
+        for at, samples in blocks:
             block = self._by_sample[:, at]
             rows, here = np.unique(block.indices, return_inverse=True)
-            weights = np.zeros((len(rows), values.shape[0]))
-            weights[here, np.repeat(np.arange(values.shape[0]), np.diff(block.indptr))] = block.data
-            samples = direction[at, :, None] * values[:, None]
+            weights = np.zeros((len(rows), len(samples)))
+            weights[here, np.repeat(np.arange(len(samples)), np.diff(block.indptr))] = block.data
             part = np.zeros((len(self.time), *samples.shape[1:]))
             part[rows] = (weights @ samples.reshape(len(samples), -1)).reshape(-1, *samples.shape[1:])
             parts.append(part[..., part.any(axis=(0, 1))])
