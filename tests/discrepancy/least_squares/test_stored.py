@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tempfile
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +35,16 @@ def test_numbers_stay_and_views_know_where_they_are() -> None:
     nothing = stored(x[..., :0])
     assert nothing.shape == (20, 3, 0)
     assert not is_stored(nothing)
+
+
+def test_a_disk_that_is_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The system's own: whatever is written to it is refused."""
+    if not Path("/dev/full").exists():
+        pytest.skip("no such device")
+    monkeypatch.setattr(tempfile, "TemporaryFile", partial(Path("/dev/full").open, "w+b", 0))
+    for count in (3, 1_000_000):
+        x = np.ones(count)
+        assert stored(x) is x
 
 
 @pytest.mark.skipif(not Path("/proc/self/statm").is_file(), reason="only Linux says what a process has")
