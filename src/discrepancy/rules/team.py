@@ -20,8 +20,8 @@ TEAM_JACOBIAN_HZ = 25.0
 PART_S = 180.0
 """Of a recording at most that is looked at as one trial. Chosen: what a trial leaves open costs its square, and ten of
 its overlaps are a tenth of that; longer than any trial of the experiment."""
-LINEAR_BYTES = 4e8
-"""Of all linear trials, from which they are kept in files. Chosen: memory; of twenty minutes of three robots."""
+LINEAR_BYTES = 1.5e8
+"""Of all linear trials, from which they are kept in files. Chosen: memory; those of seven minutes of three robots."""
 TEAM_TRIM_S = 2.0
 """Left out at both ends of a recording. Chosen."""
 STILL_RAD_PER_S = 1e-3
