@@ -30,6 +30,7 @@ LIMITS: dict[str, dict[str, float]] = {
     "push": {"force_x_N": 0.13, "force_y_N": 0.13, "force_z_N": 0.14},
     "drag": {"coefficient_Ns_per_m": 0.33},
     "slosh": {"mass_kg": 3.4e-3},
+    "payload_mass": {"mass_kg": 4.2e-3},  # in a minute
 }
 
 PENDULUM_LENGTHS_M = (0.08, 0.11, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5)

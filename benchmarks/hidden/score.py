@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.team.causes import CAUSES
 from hidden.limits import LIMITS
 from mocobot.campaign.ground import one_axis
@@ -130,4 +131,6 @@ def _vector(cause: str, parameters: Mapping[str, float]) -> Array:
         for axis, at in zip("xyz", home, strict=True):
             arm = values[f"anchor_{axis}_m"] - at - values.get(f"point_{axis}_m", 0.0)
             values[f"force_{axis}_N"] = values["stiffness_N_per_m"] * arm
+    if cause == "payload_mass":  # of a drift, in a minute
+        values["mass_kg"] += rules.MASS_OVER_S * values["rate_kgps"]
     return np.array([values.get(name, 0.0) / limit for name, limit in LIMITS[cause].items()])

@@ -33,6 +33,7 @@ _LISTED = {
     "robot_cable": (0.44, 0.50, 0.52, 0.48),
     "turning_drag": (0.58, 1.32, 3.36, 0.58),
     "quadratic_drag": (3.0, 7.6, 21.4, 3.0),
+    "power_drag": (1.3, 3.2, 8.5, 1.3),  # not measured: between the two, in logarithm
     "mass_drift": (7.0e-5, 7.1e-5, 7.1e-5, 7.0e-5),
     "mass_of_trials": (9.0e-4, 9.2e-4, 9.3e-4, 9.1e-4),
 }

@@ -62,7 +62,8 @@ class Candidate:
         family: causes of one family look alike.
         robot, joint: where, counted from 1; None where the cause has no such place.
         parameters: its numbers, in the order of its columns.
-        shape: further numbers that change the columns themselves, by name.
+        shape: further numbers that change the columns themselves, by name; where ``trial`` and ``last_trial`` (from 1,
+            0: none) are among them, it acts in these only.
         transient: when it acts, of an event; None of what lasts.
         where: the place in words, of what sits at no robot and no joint.
         title: the cause in words (``causes.base.Cause``).
@@ -90,7 +91,15 @@ class Candidate:
 
     def acts_in(self, trial: int) -> bool:
         """Whether it can act in a trial (index from 0)."""
-        return self.transient is None or self.transient.trial == trial
+        if self.transient is not None:
+            return self.transient.trial == trial
+        last = self.shape.get("last_trial")
+        return self.shape.get("trial", 0.0) <= trial + 1 and (not last or trial + 1 <= last)
+
+    @property
+    def of_trials(self) -> bool:
+        """Whether it is there in some trials only, so that the others do not tell of it."""
+        return self.transient is not None or "trial" in self.shape
 
     def overlaps(self, other: Candidate) -> bool:
         """Whether both are events of one cause that act at the same time."""
@@ -128,6 +137,13 @@ class Candidate:
             joint = f"{part.removeprefix('driven ')} {self.joint}"
             return f"{joint} of robot {self.robot}" if self.robot else joint
         return f"robot {self.robot}" if part == "robot" else f"the {part} of robot {self.robot}"
+
+    @property
+    def trace(self) -> tuple[object, ...]:
+        """Identity of what it does where it acts: cause, place, and shape but for the trials."""
+        return *self.key, *(
+            (name, x) for name, x in self.shape.items() if name not in ("trial", "last_trial")
+        )
 
     @property
     def key(self) -> tuple[str, int | None, int | None]:

@@ -65,6 +65,7 @@ class Rig(ABC):
         tuple[str, ...]
     ] = ()  # causes that have a tolerance, and a shape without which they may not show
     reshaped: ClassVar[tuple[str, ...]] = ()  # the same, where what is healthy would have that shape, too
+    behind: ClassVar[tuple[str, ...]] = ()  # causes with a shape that shows only beside what they leave open
     curved: ClassVar[bool] = False  # whether exact residuals hold what is within its tolerance, too
     layered: ClassVar[bool] = (
         False  # whether causes explain so much that their shapes show only beside all others
@@ -99,7 +100,7 @@ class Rig(ABC):
         """Whitened rows of every trial at the nominal unknowns; they may come one at a time."""
 
     @abstractmethod
-    def columns(self, candidate: Candidate) -> list[Array]:
+    def columns(self, candidate: Candidate) -> Sequence[Array]:
         """Whitened columns of one candidate (its shape may differ from the catalogue's), one array per trial."""
 
     @abstractmethod
@@ -116,7 +117,7 @@ class Rig(ABC):
     def candidates(self) -> list[Candidate]:
         """Every cause at every place."""
 
-    def unknowns(self, candidate: Candidate) -> list[Array]:
+    def unknowns(self, candidate: Candidate) -> Sequence[Array]:
         """Whitened columns of what a cause leaves open in every trial, shape (n, C, k), possibly k = 0."""
         return [columns[..., :0] for columns in self.columns(candidate)]
 
@@ -147,6 +148,10 @@ class Rig(ABC):
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The same candidate with other shapes, to choose the best from; ``finer`` ones around its own."""
+        return []
+
+    def further(self, candidate: Candidate) -> list[Candidate]:
+        """The same candidate in shapes that have more to them, to try once its own is the best of its kind."""
         return []
 
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:

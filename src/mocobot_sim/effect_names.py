@@ -28,6 +28,7 @@ NAMES = (
     "push",
     "drag",
     "slosh",
+    "payload_mass",
     "law",
 )
 """One file of ``mocobot_sim.effects`` each, in the order in which they are listed."""

@@ -109,7 +109,7 @@ def test_an_effects_numbers_are_refused_without_the_simulator(text: str, tmp_pat
 def test_effects_are_known_without_the_simulator() -> None:
     code = (
         "import sys, mocobot_sim.effects.spec as spec\n"
-        "assert len(spec.EFFECTS) == 24 and all(spec.allowed(kind) for kind in spec.EFFECTS.values())\n"
+        "assert len(spec.EFFECTS) == 25 and all(spec.allowed(kind) for kind in spec.EFFECTS.values())\n"
         f"slow = {SLOW - {'numpy'}!r} & set(sys.modules)\n"
         "assert not slow, slow\n"
     )

@@ -12,7 +12,7 @@ SIZES: dict[str, dict[str, Any]] = {
     "theta_zero": {"zero_rad": 1e-3},
     "link_length": {"proximal_m": 5e-4, "rod_m": 1e-3, "base_radius_m": 1e-3},
     "base_tilt": {"roll_rad": 0.01, "pitch_rad": -0.02},
-    "base_creep": {"x_mps": 1e-6, "y_mps": -2e-6},
+    "base_creep": {"x_mps": 1e-6, "y_mps": -2e-6, "start_s": 0.0},
     "base_compliance": {"compliance_m_per_N": 1e-6, "relaxation_s": 0.05},
     "grasp_flex": {
         "compliance_m_per_N": 1e-6, "relaxation_s": 0.0, "turning_rad_per_N": 0.0, "offset_m": 0.0,
@@ -37,9 +37,18 @@ SIZES: dict[str, dict[str, Any]] = {
         "trial": 1, "start_s": 1.0, "duration_s": 0.5, "force_x_N": 3.0, "force_y_N": 0.0, "force_z_N": 1.0,
         "point_x_m": 0.1, "point_y_m": 0.05, "point_z_m": 0.0, "ramp_s": 0.0,
     },
-    "drag": {"coefficient_Ns_per_m": 2.0, "turning_Nms_per_rad": 0.5},
+    "drag": {
+        "coefficient_Ns_per_m": 2.0, "turning_Nms_per_rad": 0.5, "quadratic_Ns2_per_m2": 0.0,
+        "turning_quadratic_Nms2_per_rad2": 0.0,
+    },
     "slosh": {
         "mass_kg": 0.3, "length_m": 0.1, "damping_ratio": 0.05, "point_x_m": 0.0, "point_y_m": 0.0, "point_z_m": 0.1,
+        "across_length_m": 0.0, "heading_rad": 0.0, "second_length_m": 0.0, "second_share": 0.0,
+    },
+    "payload_mass": {
+        "mass_kg": 0.3, "rate_kgps": 1e-3, "trial": 1, "last_trial": 0, "point_x_m": 0.1, "point_y_m": 0.05,
+        "point_z_m": 0.02, "inertia_xx_m2": 2e-3, "inertia_xy_m2": 0.0, "inertia_xz_m2": 1e-4, "inertia_yy_m2": 2e-3,
+        "inertia_yz_m2": 0.0, "inertia_zz_m2": 3e-3,
     },
     "law": {
         "target": "tau_1_2", "function": "linear", "of": "tau_1_3", "amplitude": 0.05, "number": 0.0, "second": 0.0,
@@ -52,6 +61,7 @@ SIZE_NAMES = {
     "payload_tether": ("stiffness_N_per_m",),
     "push": ("force_x_N", "force_y_N", "force_z_N"),
     "slosh": ("mass_kg",),
+    "payload_mass": ("mass_kg", "rate_kgps"),
     "law": ("amplitude",),
 }
 

@@ -11,6 +11,7 @@ from mocobot_sim.effects import EFFECTS
 from sealed import store
 from sealed.backgrounds import BACKGROUNDS, limit_over_nominal, tolerated
 from sealed.draw import CATALOGUE, NOWHERE, OTHER, family, largest
+from sealed.forms.masses import MassDrift, MassOfTrials
 from sealed.limits import LIMITS
 from sealed.registry import FORMS, LISTED, UNLISTED
 from sealed.score import score
@@ -26,7 +27,7 @@ def test_there_are_enough_forms_and_each_has_an_answer_or_a_law():
     assert all(form.answer is None for form in UNLISTED)
     assert set(LIMITS) == set(FORMS)
     assert not set(FORMS) & set(EFFECTS)
-    assert {form.answer for form in LISTED} - set(CAUSES) == {"payload_mass"}  # listed one day
+    assert {form.answer for form in LISTED} <= set(CAUSES)
 
 
 def test_successive_seeds_hide_every_cause_once():
@@ -173,6 +174,27 @@ def test_parallel_gimbals_are_one_place():
     effect = _effect("gimbal_friction", 1, 1)
     assert score(_result([effect], [_named("gimbal_friction", 3, 1)])).whole
     assert not score(_result([effect], [_named("gimbal_friction", 1, 2)])).whole
+
+
+def test_a_mass_is_right_in_its_trials_and_at_its_size():
+    """Put on from trial 3, or leaking out; where it sits is no part of its size."""
+    put_on, leak = MassOfTrials(3, 0.02), MassDrift(-1e-3)
+    named = {"mass_kg": (0.021, 1e-3), "rate_kgps": (0.0, None), "trial": (3, None), "last_trial": (0, None)}
+
+    def scored(form, **other):
+        effect = _effect("payload_mass", None, None, **form.known())
+        return score(_result([effect], [_named("payload_mass", None, None, **(named | other))]))
+
+    assert scored(put_on).whole
+    assert scored(put_on).scores[0].error == pytest.approx(0.05)
+    assert scored(put_on).scores[0].deviations == pytest.approx((1.0,))
+    assert not scored(put_on, trial=(2, None)).whole
+    assert not scored(put_on, last_trial=(3, None)).whole
+    assert not scored(leak).whole
+    drift = {"mass_kg": (0.0, None), "rate_kgps": (-1.1e-3, 1e-4), "trial": (1, None)}
+    assert scored(leak, **drift).scores[0].error == pytest.approx(0.1)
+    assert scored(leak, **drift).whole
+    assert not scored(put_on, **drift).whole
 
 
 def test_of_two_effects_each_gets_its_own_and_a_stranger_is_an_extra():

@@ -19,6 +19,7 @@ from sealed.draw import draw
 from sealed.forms.base import Form
 from sealed.forms.cables import PayloadCable, RobotCable
 from sealed.forms.creep import LateCreep
+from sealed.forms.drags import PowerDrag, QuadraticDrag
 from sealed.forms.grasps import SoftPlay, TurningGrasp
 from sealed.forms.lags import SingleTorqueLag
 from sealed.forms.masses import MassDrift
@@ -170,6 +171,19 @@ def test_a_payload_loses_mass():
     step(loop, actor, 0.8)
     mass = GroundTruth.of(scene).mass_kg - 0.1 * 0.799
     assert loop.forces_on_payload().sum(axis=0)[2] == pytest.approx(GRAVITY * mass, abs=0.05)
+
+
+def test_drag_of_a_power_slows_as_its_power_says():
+    """Of the second power it is that of the square; of the power 1.5, twice the speed is 2^1.5 of the force."""
+    v, omega = np.array([0.1, -0.2, 0.05]), np.array([0.3, 0.1, -0.2])
+
+    def wrench(form, times=1.0):
+        (actor,) = form.actors(1)
+        return np.concatenate(actor._wrench(0.0, np.zeros(3), times * v, times * omega))
+
+    np.testing.assert_allclose(wrench(PowerDrag(3.0, 2.0, 0.2)), wrench(QuadraticDrag(3.0, 0.2)), rtol=1e-12)
+    form = PowerDrag(3.0, 1.5, 0.2)
+    np.testing.assert_allclose(wrench(form, 2.0), 2.0**1.5 * wrench(form), rtol=1e-12)
 
 
 def test_a_base_creeps_from_its_time_on():

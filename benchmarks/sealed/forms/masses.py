@@ -18,7 +18,7 @@ class MassDrift(Form):
     """It loses (or gains) mass all the time, from everywhere alike: sand that runs out, water that runs in."""
 
     answer = "payload_mass"
-    size, either_sign = "rate_kgps", True
+    size, either_sign, size_is_known = "rate_kgps", True, True
     on_payload = True
     ranges: ClassVar = {"rate_kgps": (-0.1, 0.1)}
     rate_kgps: float
@@ -41,6 +41,9 @@ class MassOfTrials(Form):
     @classmethod
     def drawn(cls, size: float, ground: Ground, place: Place, rng: np.random.Generator) -> Form:
         return cls(trial=int(rng.integers(2, 4)), more_kg=float(rng.choice([-1.0, 1.0]) * size))
+
+    def known(self) -> dict[str, float]:
+        return {"trial": self.trial, "last_trial": 0, "mass_kg": self.more_kg}
 
     def actors(self, trial_number: int | None) -> Sequence[Actor]:
         changed = trial_number is not None and trial_number >= self.trial

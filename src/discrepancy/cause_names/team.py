@@ -24,5 +24,6 @@ NAMES = (
     "push",
     "drag",
     "slosh",
+    "payload_mass",
 )
 """In the order of the documentation."""

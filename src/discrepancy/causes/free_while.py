@@ -39,3 +39,13 @@ def pieces_while(
             slice(start, stop),
             np.stack([np.interp(here, knots, unit) for unit in np.eye(pieces + 1)], axis=1),
         )
+
+
+def in_parts(pieces: Iterator[tuple[slice, Array]], most: int) -> Iterator[tuple[slice, Array]]:
+    """The same with at most so many columns at a time, and of the samples those between which they are not nought."""
+    for at, values in pieces:
+        for first in range(0, values.shape[1], most):
+            some = values[:, first : first + most]
+            there = np.flatnonzero(some.any(axis=1))
+            here = slice(there[0], there[-1] + 1)
+            yield slice(at.start + here.start, at.start + here.stop), some[here]

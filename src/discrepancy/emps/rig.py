@@ -164,7 +164,7 @@ class EmpsRig(Rig):
         """A real axis: noise is what differs between its cycles, and every law leaves more than that."""
         return LawDoubt(rules.LAW_SHARE if candidate.transient else rules.EMPS_LAW_SHARE)
 
-    def unknowns(self, candidate: Candidate) -> list[Array]:
+    def unknowns(self, candidate: Candidate) -> Sequence[Array]:
         """Dry friction at rest, whitened columns (n, 2, k) of every block."""
         rests = CAUSES[candidate.cause].rests(self.signals, candidate.shape)
         reduced = [self.reduction(np.column_stack([rest, np.zeros_like(rest)])) for rest in rests]

@@ -127,9 +127,9 @@ def confirm(
         for item, others in zip(explanation.found, alternatives, strict=True)
     )
     explanation = replace(explanation, found=found)
-    return Confirmed(
-        explanation, alternatives, Gain(before, after, len(rig.trials) > 1), contradicted, tuple(notes)
-    )
+    held_out = len(rig.trials) > 1 and not any(item.candidate.of_trials for item in found)
+    gain = Gain(before, after, held_out)
+    return Confirmed(explanation, alternatives, gain, contradicted, tuple(notes))
 
 
 def _decided(found: Found, alternatives: Sequence[Alternative]) -> float:

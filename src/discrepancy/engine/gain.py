@@ -39,7 +39,8 @@ class Gain:
 
     Attributes:
         before, after: one per trial; None where the simulation failed.
-        held_out: False for a single trial, which predicts itself.
+        held_out: False for a single trial, which predicts itself, and where a cause is there in some trials only, which
+            all have to tell it.
     """
 
     before: tuple[Response | None, ...]
@@ -88,8 +89,8 @@ def responses(
     for free in hypotheses:
         for t in rig.resimulated:
             others = [k for k in trials if k != t] or [t]
-            # A push says nothing about other trials; its own trial has to tell it.
-            if any(problem.candidates[i].transient for i in free):
+            # What is there in some trials only says nothing about others; its own trials have to tell it.
+            if any(problem.candidates[i].of_trials for i in free):
                 others = list(trials)
             fit, healthy = fit_to_simulate(rig, problem, free, others)
             tasks.append((t, -fit.shared, -fit.local(t)[: rig.local_unknowns], fit.active, healthy))

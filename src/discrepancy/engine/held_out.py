@@ -12,9 +12,9 @@ from discrepancy.least_squares.problem import Problem
 def held_out_gains(problem: Problem, free: Sequence[int], index: int) -> list[float]:
     """By how much the other trials' fit predicts every trial better with a cause in it than without: of chi-square.
 
-    An event in one trial says nothing of the others: it has none.
+    What is there in some trials only says nothing of the others: it has none.
     """
-    if problem.candidates[index].transient or len(problem.trials) < 2:
+    if problem.candidates[index].of_trials or len(problem.trials) < 2:
         return []
     gains, nothing = [], np.zeros(len(problem.candidates[index].parameters))
     for t in problem.trials:
@@ -52,7 +52,7 @@ def shares(problem: Problem, causes: Sequence[int]) -> list[tuple[float, float |
         ]
         best += Fit.of(problem, _told(problem, causes, t), others).held_out(t)
     # What acts in one trial only cannot be fitted to the others.
-    lasting = [problem.candidates[index].transient is None for index in causes]
+    lasting = [not problem.candidates[index].of_trials for index in causes]
     return [
         (share, held_out if lasts else None)
         for share, held_out, lasts in zip(in_sample, _parts(left, best), lasting, strict=True)

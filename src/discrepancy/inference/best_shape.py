@@ -1,14 +1,59 @@
-"""The numbers of a cause's shape that the data determine: their best values, their standard errors."""
+"""The shape that suits a cause best; numbers of it that the data determine, and their standard errors."""
 
 from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.candidate import Candidate
+from discrepancy.inference.scan import Scanned, score_with, scores_with
 from discrepancy.least_squares.fit import Fit
+from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
 from estimator.arrays import Array
+
+
+def best_shape(rig: Rig, problem: Problem, free: Sequence[int], item: Scanned) -> Candidate:
+    """The shape that the data make likeliest beside what is there, ever finer around the best."""
+    fit, spike = Fit.of(problem, free), 0.0
+    if item.index is not None and problem.has_tolerance(item.index):
+        # What it would add to a model without it: no need to build the problem anew for every shape.
+        # Held against none at all: a kind that scatters for want of the right shape would hide that in any.
+        fit = Fit.of(problem, free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
+    start = item.candidate
+    if start.transient and start.parameters[0].tolerance:
+        spike = 1.0
+    shapes = [*rig.refinements(start)]
+    if not shapes and not rig.further(start):
+        return start
+    best, score = start, score_with(fit, start, rig.columns(start), spike)
+
+    def refined(shapes: Sequence[Candidate], best: Candidate, score: float) -> tuple[Candidate, float]:
+        """A better one among some shapes, or among finer ones around it."""
+        for _ in range(rules.FINER_ROUNDS + 1):
+            if not shapes:
+                break
+            last = best
+            each = [(shape, rig.columns(shape)) for shape in shapes]
+            for (shape, _), judged in zip(each, scores_with(fit, each, spike), strict=True):
+                if judged > score:
+                    best, score = shape, judged
+            if best is last and best is not start:
+                break
+            shapes = rig.refinements(best, finer=True)
+        return best, score
+
+    best, score = refined(shapes, best, score)
+    best, score = refined(rig.further(best), best, score)
+    for _ in range(rules.POLISH_ROUNDS if rig.steps(best) else 0):
+        values = fit.solution_with([c * best.units for c in rig.columns(best)])[0] * best.units
+        nearer = nearest_shape(rig, fit, best, values)
+        judged = score_with(fit, nearer, rig.columns(nearer), spike)
+        if judged <= score:
+            break
+        best, score = nearer, judged
+    return best
 
 
 def covariance_with_shape(rig: Rig, fit: Fit, index: int) -> Array:

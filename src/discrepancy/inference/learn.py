@@ -152,7 +152,7 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
     upper = np.triu_indices(len(both))
     at = both[upper[0]] * (count + 1) + both[upper[1]]
     pairs = zip(problem.cell_grams, problem.cells, strict=True)
-    filled = (gram[cell] for gram, c in pairs for cell in np.flatnonzero(c.sizes))
+    filled = (gram for own, c in pairs for gram in own.each(np.flatnonzero(c.sizes).tolist()))
     grams = np.empty((sum(map(len, sizes)), len(at)))
     for one, gram in zip(grams, filled, strict=True):
         np.take(gram, at, out=one, mode="clip")

@@ -9,7 +9,7 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
-from discrepancy.inference.best_shape import nearest_shape
+from discrepancy.inference.best_shape import best_shape, nearest_shape
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.imitation import imitated
 from discrepancy.inference.other_forms import beside_other_forms
@@ -143,7 +143,7 @@ def _in_best_shape(rig: Rig, fit: Fit, item: Scanned, loud: Collection[int | Non
         fit = Fit.of(fit.problem, fit.free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
         # What the healthy one explains has its own shape, whatever that of the faulty one.
         healthy = score_with(fit, item.candidate, rig.columns(item.candidate)) - item.score
-    each = [(shape, tuple(rig.columns(shape))) for shape in rig.refinements(item.candidate)]
+    each = [(shape, rig.columns(shape)) for shape in rig.refinements(item.candidate)]
     for (shape, columns), score in zip(each, scores_with(fit, each), strict=True):
         if score - healthy > best.score:
             best = Scanned(item.index, shape, score - healthy, columns)
@@ -181,7 +181,7 @@ def sharpened(
         start: the problem with the spreads and powers from which those with the candidate are learnt; None for base's.
     """
     start = base.problem if start is None else start
-    shaped = _best_shape(rig, start, base.free, item) if near else item.candidate
+    shaped = best_shape(rig, start, base.free, item) if near else item.candidate
     problem, index = _with(rig, start, shaped, item)
     new = Hypothesis.of(problem, [*base.free, index], base.allowed)
     if near and not shaped.transient:
@@ -235,7 +235,18 @@ def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hy
         return new
     healthy = Hypothesis.of(opened, base.free, base.allowed)
     allowed = min(max(0.0, healthy.score - base.score), other.score - new.score)
-    return replace(other, allowed={**base.allowed, index: allowed})
+    return _reshaped(rig, replace(other, allowed={**base.allowed, index: allowed}))
+
+
+def _reshaped(rig: Rig, new: Hypothesis) -> Hypothesis:
+    """The last cause in another shape, if that shows beside what it leaves open (``Rig.behind``)."""
+    index, candidate = new.free[-1], new.causes[-1]
+    for shape in rig.refinements(candidate) if candidate.cause in rig.behind else ():
+        problem = new.problem.with_columns(index, shape, rig.columns(shape))
+        other = _settled_shape(rig, Hypothesis.of(problem, new.free, new.allowed))
+        if other.score > new.score + rules.SHAPE_NATS and other.possible(rig, index):
+            new = other
+    return new
 
 
 def _with(rig: Rig, problem: Problem, shaped: Candidate, item: Scanned) -> tuple[Problem, int]:
@@ -250,38 +261,3 @@ def _with(rig: Rig, problem: Problem, shaped: Candidate, item: Scanned) -> tuple
         shaped = replace(shaped, parameters=parameters)
         return problem.extended(shaped, rig.columns(shaped)), len(problem.candidates)
     return problem.with_columns(item.index, shaped, rig.columns(shaped)), item.index
-
-
-def _best_shape(rig: Rig, problem: Problem, free: Sequence[int], item: Scanned) -> Candidate:
-    """The shape that the data make likeliest beside what is there, ever finer around the best."""
-    fit, spike = Fit.of(problem, free), 0.0
-    if item.index is not None and problem.has_tolerance(item.index):
-        # What it would add to a model without it: no need to build the problem anew for every shape.
-        # Held against none at all: a kind that scatters for want of the right shape would hide that in any.
-        fit = Fit.of(problem, free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
-    start = item.candidate
-    if start.transient and start.parameters[0].tolerance:
-        spike = 1.0
-    shapes = [*rig.refinements(start)]
-    if not shapes:
-        return start
-    best, score = start, score_with(fit, start, rig.columns(start), spike)
-    for _ in range(rules.FINER_ROUNDS + 1):
-        last = best
-        each = [(shape, rig.columns(shape)) for shape in shapes]
-        for (shape, _), judged in zip(each, scores_with(fit, each, spike), strict=True):
-            if judged > score:
-                best, score = shape, judged
-        if best is last and best is not start:
-            break
-        shapes = rig.refinements(best, finer=True)
-        if not shapes:
-            break
-    for _ in range(rules.POLISH_ROUNDS if rig.steps(best) else 0):
-        values = fit.solution_with([c * best.units for c in rig.columns(best)])[0] * best.units
-        nearer = nearest_shape(rig, fit, best, values)
-        judged = score_with(fit, nearer, rig.columns(nearer), spike)
-        if judged <= score:
-            break
-        best, score = nearer, judged
-    return best

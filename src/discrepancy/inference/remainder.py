@@ -15,7 +15,7 @@ def left_in_cells(hypothesis: Hypothesis) -> tuple[Array, Array]:
     """Sum of squares that the hypothesis leaves in every cell of all trials, and the numbers in it."""
     problem = hypothesis.problem
     x = np.append(-hypothesis.fit.coefficients, 1.0)
-    left = [np.einsum("i,kij,j->k", x, grams, x, optimize=True) for grams in problem.cell_grams]
+    left = [grams.squares(x) for grams in problem.cell_grams]
     return np.concatenate(left), np.concatenate([cells.sizes for cells in problem.cells]).astype(float)
 
 
@@ -66,8 +66,7 @@ def form_share_of(candidate: Candidate, values: Array) -> float:
 
 def _power(problem: Problem, span: slice, values: Array) -> Array:
     """Sum of squares in every cell of all trials of some columns with their values."""
-    each = [np.einsum("i,kij,j->k", values, grams[:, span, span], values) for grams in problem.cell_grams]
-    return np.concatenate(each)
+    return np.concatenate([grams.squares(values, span.start) for grams in problem.cell_grams])
 
 
 def share_left(hypothesis: Hypothesis, index: int) -> float:

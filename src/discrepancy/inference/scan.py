@@ -30,7 +30,7 @@ class Scanned:
     index: int | None
     candidate: Candidate
     score: float
-    columns: tuple[Array, ...] | None = None
+    columns: Sequence[Array] | None = None
     loud: bool = False
 
 
@@ -61,7 +61,7 @@ def scores_with(
     fit: Fit, each: Sequence[tuple[Candidate, Sequence[Array]]], spike: float = 0.0
 ) -> list[float]:
     """The same of several candidates, each alone."""
-    told = fit.told_by_each([[new * candidate.units for new in columns] for candidate, columns in each])
+    told = fit.told_by_each([columns for _, columns in each], [candidate.units for candidate, _ in each])
     return [
         log_bayes_factor(*one, spike) + log_prior_odds(fit.problem, candidate)
         for (candidate, _), one in zip(each, told, strict=True)
@@ -81,7 +81,7 @@ def events_of(rig: Rig, fit: Fit) -> list[Scanned]:
     for candidate in rig.transients([fit.remaining(t) for t in problem.trials]):
         # What is left of an event that is there is its form, and no other event.
         if not any(candidate.overlaps(other) for other in there):
-            columns, spike = tuple(rig.columns(candidate)), 1.0 if candidate.parameters[0].tolerance else 0.0
+            columns, spike = rig.columns(candidate), 1.0 if candidate.parameters[0].tolerance else 0.0
             found.append(Scanned(None, candidate, score_with(fit, candidate, columns, spike), columns))
             stands_out.append(score_with(quiet, candidate, columns, spike))
     if max(stands_out, default=0.0) > rules.NAMED_NATS:

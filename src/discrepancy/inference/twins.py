@@ -22,7 +22,7 @@ def twins(problem: Problem, kinds: Iterable[str]) -> list[tuple[str, str]]:
     found = []
     for each in places.values():
         at = np.array([columns for _, columns in each])  # (kinds, places)
-        gram = np.sum([g[:, at[:, None], at].sum(axis=0) for g in problem.cell_grams], axis=0)
+        gram = np.sum([grams.summed(at[:, None], at) for grams in problem.cell_grams], axis=0)
         own = np.einsum("aap->ap", gram)
         same = np.all(gram**2 >= (1.0 - rules.SAME_TRACE) * own[:, None] * own, axis=-1)
         found += [(each[a][0], each[b][0]) for a, b in np.argwhere(np.triu(same, 1))]

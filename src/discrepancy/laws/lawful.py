@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from discrepancy.candidate import Candidate
 from discrepancy.laws.bench import Bench
@@ -24,7 +24,7 @@ class Lawful(Rig):
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         return isinstance(candidate, LawCandidate) or super().possible(candidate, values, covariance)
 
-    def unknowns(self, candidate: Candidate) -> list[Array]:
+    def unknowns(self, candidate: Candidate) -> Sequence[Array]:
         if isinstance(candidate, LawCandidate):
             return [columns[..., :0] for columns in self.columns(candidate)]
         return super().unknowns(candidate)

@@ -1,20 +1,22 @@
 """Many columns of one trial's rows, in pieces that problems share: one with other columns copies none of the rest.
 
 They are kept in the cells' cosine transform, without what the trial's own unknowns can explain (and with how much of
-these was taken out, so that rows come back as they were). Of many rows they are kept in single precision: rounding,
+these was taken out, so that rows come back as they were). Many are kept in files, in single precision: rounding,
 6e-8 of a number, is far below the noise of 1 for whatever a fit takes out of them; sums are made in double precision.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import cast
 
 import numpy as np
 
 from discrepancy.least_squares.cells import Cells
 from discrepancy.least_squares.gram import added_up, gram_of, project
+from discrepancy.least_squares.stored import given_back, stored
 from estimator.arrays import Array
 
 
@@ -51,9 +53,13 @@ class Columns:
         return self.pieces[0].dtype == np.float32
 
     def single(self) -> Columns:
-        """The same in single precision."""
-        pieces = [cast(Array, piece.astype(np.float32, copy=False)) for piece in self.pieces]
+        """The same in single precision, and in files."""
+        pieces = [cast(Array, stored(piece.astype(np.float32, copy=False))) for piece in self.pieces]
         return Columns(tuple(pieces), self.inside)
+
+    def beside(self, others: Columns) -> Columns:
+        """These columns, and then others of the same trial."""
+        return Columns((*self.pieces, *others.pieces), np.concatenate([self.inside, others.inside], axis=1))
 
     def take(self, span: slice) -> Array:
         """Some successive columns, shape (n, C, k)."""
@@ -74,19 +80,35 @@ class Columns:
         for piece in self.pieces:
             out += added_up(piece, x[at : at + piece.shape[2]])
             at += piece.shape[2]
+            given_back(piece)
         return out
 
     def products(self, b: Array) -> Array:
         """Products with other columns b, over rows and channels, shape (n, C, k) -> (columns, k)."""
-        return np.concatenate([gram_of(piece, b) for piece in self.pieces])
+        return np.concatenate([gram_of(piece, b) for piece in self._read()])
 
     def grams(self, cells: Cells, b: Array) -> Array:
         """The same over every cell, shape (n, C, k) -> (K, columns, k)."""
-        return np.concatenate([cells.grams(piece, b) for piece in self.pieces], axis=1)
+        return np.concatenate([cells.grams(piece, b) for piece in self._read()], axis=1)
 
     def own_grams(self, cells: Cells) -> Array:
         """Gram matrices over every cell, shape (K, columns, columns)."""
-        return np.concatenate([self.grams(cells, piece) for piece in self.pieces], axis=2)
+        out = np.zeros((len(cells.sizes), self.width, self.width))
+        ends = np.cumsum([0, *(piece.shape[2] for piece in self.pieces)])
+        spans = [slice(*pair) for pair in pairwise(ends)]
+        for k, one in enumerate(self.pieces):
+            for other, at in zip(self.pieces[: k + 1], spans[: k + 1], strict=True):
+                gram = cells.grams(one, other)
+                out[:, spans[k], at], out[:, at, spans[k]] = gram, np.swapaxes(gram, 1, 2)
+                given_back(other)
+            given_back(one)
+        return out
+
+    def _read(self) -> Iterator[Array]:
+        """Each of the pieces, whose memory is given back once the next is asked for."""
+        for piece in self.pieces:
+            yield piece
+            given_back(piece)
 
     def replaced(self, start: int, stop: int, new: Columns) -> Columns:
         """With new columns in place of those from ``start`` to ``stop``, which may be none."""
@@ -111,3 +133,15 @@ def held(trials: Sequence[Columns], most_bytes: float) -> list[Columns]:
     if sum(columns.nbytes for columns in trials) <= most_bytes:
         return list(trials)
     return [columns.single() for columns in trials]
+
+
+def portions(columns: Iterable[Array], most_bytes: float) -> Iterator[Array]:
+    """Successive columns (n, C, k) put together, (n, C, columns), as many as take so much memory but at least one."""
+    together: list[Array] = []
+    for one in columns:
+        together.append(one)
+        if sum(each.nbytes for each in together) >= most_bytes:
+            yield np.concatenate(together, axis=2)
+            together = []
+    if together:
+        yield np.concatenate(together, axis=2)

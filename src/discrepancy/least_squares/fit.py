@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from discrepancy.candidate import Candidate
 from discrepancy.least_squares.gram import flat_inverse, gram_of
 from discrepancy.least_squares.problem import Problem
+from discrepancy.least_squares.stored import given_back
 from estimator.arrays import Array
 
 
@@ -112,7 +113,7 @@ class Fit:
     def chi2(self) -> float:
         """Chi-square of all trials with the noise as whitened, and of the tolerances in use."""
         x = np.append(-self.coefficients, 1.0)
-        left = sum(float(np.einsum("i,kij,j->", x, grams, x)) for grams in self.problem.cell_grams)
+        left = sum(float(grams.squares(x).sum()) for grams in self.problem.cell_grams)
         return left + self.used_of_tolerances
 
     def at(self, index: int) -> NDArray[np.intp]:
@@ -153,13 +154,15 @@ class Fit:
         """Values of a trial's own unknowns that go with the solution, shape (l,)."""
         own = self.problem.local[trial]
         left = self.problem.raw_times(trial, np.append(-self.coefficients, 1.0))
-        # What causes leave open has unit size: so many rows more.
+        both = np.concatenate([own, left[..., None]], axis=2).reshape(left.size, -1)
         opened = [each[trial].scaled for each in self.problem.opened.values()]
-        columns = np.concatenate([own, *opened], axis=2).reshape(left.size, -1)
-        more = np.eye(columns.shape[1])[own.shape[2] :]
-        right = np.append(left.ravel(), np.zeros(len(more)))
-        values = np.linalg.lstsq(np.vstack([columns, more]), right, rcond=None)[0]
-        return np.asarray(values[: own.shape[2]], dtype=np.float64)
+        if opened:
+            # What causes leave open has unit size: so many rows more, and each column with its own best beside it.
+            U = np.concatenate(opened, axis=2, dtype=np.float64).reshape(left.size, -1)
+            best = np.linalg.solve(U.T @ U + np.eye(U.shape[1]), U.T @ both)
+            both = np.vstack([both - U @ best, best])
+        values = np.linalg.lstsq(both[:, :-1], both[:, -1], rcond=None)[0]
+        return np.asarray(values, dtype=np.float64)
 
     def remaining(self, trial: int) -> Array:
         """Whitened residual that the solution leaves in one trial, shape (n, C)."""
@@ -176,19 +179,27 @@ class Fit:
         """Information about the values of further columns given all in the model, and their score vector."""
         return self.told_by_each([columns])[0]
 
-    def told_by_each(self, sets: Sequence[Sequence[Array]]) -> list[tuple[Array, Array]]:
-        """The same of several sets of columns, each alone beside the model; together they take less time."""
-        ends = np.cumsum([0, *(columns[0].shape[2] for columns in sets)])
+    def told_by_each(
+        self, sets: Sequence[Sequence[Array]], units: Sequence[Array] | None = None
+    ) -> list[tuple[Array, Array]]:
+        """The same of several sets of columns, each alone beside the model; together they take less time.
+
+        Args:
+            sets: columns of every trial, shape (n, C, k) each; they may be made as they are asked for.
+            units: of their values, shape (k,) each; None for 1.
+        """
+        units = [np.ones(columns[0].shape[2]) for columns in sets] if units is None else units
+        ends = np.cumsum([0, *map(len, units)])
         spans = [slice(*pair) for pair in pairwise(ends)]
-        own_grams = [np.zeros((columns[0].shape[2],) * 2) for columns in sets]
+        own_grams = [np.zeros((len(unit),) * 2) for unit in units]
         edge = np.zeros((self.gram.shape[0], ends[-1]))
         for t in self.problem.trials:
-            here = [
-                k for k, columns in enumerate(sets) if columns[t].any()
-            ]  # a transient is in one trial only
+            each = [columns[t] for columns in sets]
+            here = [k for k, columns in enumerate(each) if columns.any()]  # a transient is in one trial only
             if not here:
                 continue
-            own = self.problem.spectrum(t, np.concatenate([sets[k][t] for k in here], axis=2))
+            own = self.problem.spectrum(t, np.concatenate([each[k] * units[k] for k in here], axis=2))
+            given_back(*each)
             weighted, at = own * self.problem.weights[t], 0
             products = self.problem.products(t, weighted)
             for k in here:

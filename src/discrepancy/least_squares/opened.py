@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.least_squares.gram import added_up, gram_of
+from discrepancy.least_squares.stored import stored
 from estimator.arrays import Array
 
 
@@ -20,7 +22,7 @@ class Opened:
     again. With U = Q diag(s) V^T that is y - Q diag(f) Q^T y, f = 1 - 1 / sqrt(1 + size^2 s^2).
 
     Attributes:
-        columns: of the unknowns, as they were given, shape (n, C, k).
+        columns: of the unknowns that show, turned so that there is one for each of the basis, shape (n, C, r).
         basis: Q, of the rows that ``of`` was given as ``left``: here in the cells' transform, shape (n, C, r).
         stretch: s, shape (r,).
         size: standard deviation of the unknowns.
@@ -42,13 +44,14 @@ class Opened:
         """
         rows = columns if left is None else left
         if not np.any(rows):
-            return cls(columns, np.zeros((*columns.shape[:2], 0)), np.zeros(0), size)
+            return cls(columns[..., :0], np.zeros((*columns.shape[:2], 0)), np.zeros(0), size)
         flat = rows.reshape(-1, rows.shape[2])
-        # Of the small triangle alone: of all rows it takes six times as long.
-        _, s, Vt = np.linalg.svd(np.linalg.qr(flat, mode="r"), full_matrices=False)
-        keep = s > 1e-6 * s[0]
-        basis = flat @ (Vt[keep].T / s[keep])
-        return cls(columns, basis.reshape(*columns.shape[:2], -1), s[keep], size)
+        # Of their products, as of all rows it takes many times as long; so small an s is still known to 1e-8 of the
+        # largest. Of knots closer than rows many leave nothing beside others; turned, unknowns still scatter as one.
+        squares, V = np.linalg.eigh(flat.T @ flat)
+        keep = squares > rules.OPEN_SHOWS**2 * squares[-1]
+        s, V = np.sqrt(squares[keep]), V[:, keep]
+        return cls(columns @ V, (flat @ (V / s)).reshape(*columns.shape[:2], -1), s, size)
 
     @property
     def scaled(self) -> Array:
@@ -66,8 +69,9 @@ class Opened:
         return 0.5 * float(np.sum(np.log1p((self.size * self.stretch) ** 2)))
 
     def single(self) -> Opened:
-        """The same in single precision."""
-        return replace(self, columns=self.columns.astype(np.float32), basis=self.basis.astype(np.float32))
+        """The same in single precision, and in files."""
+        columns, basis = (stored(x.astype(np.float32)) for x in (self.columns, self.basis))
+        return replace(self, columns=columns, basis=basis)
 
     def along(self, x: Array) -> Array:
         """How much of columns lies along the unknowns, and is taken out, shape (n, C, l) -> (r, l)."""
@@ -96,13 +100,17 @@ class Along:
     edge: Array
     inside: Array
 
-    def of_size(self, size: float) -> tuple[Opened, Array, Array]:
-        """The unknowns of a size, what lies along them (r, columns), what Gram matrices lose (K, columns, columns)."""
+    def of_size(self, size: float) -> tuple[Opened, Array, Callable[[int], Array]]:
+        """The unknowns of a size, what lies along them (r, columns), what a cell's Gram matrix loses, one by one."""
         opened = replace(self.opened, size=size)
         # All cells together: the transform is orthonormal.
         shares = opened.shrink[:, None] * self.edge.sum(axis=0)
-        cross = shares.T @ (self.edge - 0.5 * (self.inside @ shares))
-        return opened, shares, cross + np.swapaxes(cross, 1, 2)
+
+        def lost(cell: int) -> Array:
+            cross = shares.T @ (self.edge[cell] - 0.5 * (self.inside[cell] @ shares))
+            return np.asarray(cross + cross.T)
+
+        return opened, shares, lost
 
 
 def through(opened: Sequence[Opened], x: Array) -> Array:

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
+from discrepancy.least_squares.cell_grams import CellGrams
 from discrepancy.least_squares.cells import Cells
-from discrepancy.least_squares.columns import Columns, held
+from discrepancy.least_squares.columns import Columns, held, portions
 from discrepancy.least_squares.gram import added_up, gram_of, orthonormal, project
 from discrepancy.least_squares.opened import Along, Opened, through
 from discrepancy.rig import Rows
@@ -34,7 +36,7 @@ class Problem:
         local: columns of the trial's own unknowns, shape (n, C, l).
         explicable: orthonormal columns that span the same.
         cells: of every trial.
-        cell_grams: Gram matrices over every cell of a trial, shape (K, columns, columns) each.
+        cell_grams: Gram matrices over every cell of a trial, K of (columns, columns) each.
         power: variance of the noise in every cell of a trial, shape (K,) each; 1 as whitened.
         shared: number of shared unknowns.
         spans: columns of every candidate.
@@ -50,7 +52,7 @@ class Problem:
     local: tuple[Array, ...]
     explicable: tuple[Array, ...]
     cells: tuple[Cells, ...]
-    cell_grams: tuple[Array, ...]
+    cell_grams: tuple[CellGrams, ...]
     power: tuple[Array, ...]
     shared: int
     spans: tuple[slice, ...]
@@ -71,16 +73,17 @@ class Problem:
         units = [c.units for c in candidates]
         columns, local, explicable, cells, grams, shared = [], [], [], [], [], 0
         for trial in trials:
-            parts = [trial.shared, *(a * u for a, u in zip(trial.causes, units, strict=True))]
-            raw = np.concatenate([*parts, trial.residual[..., None]], axis=2)
-            shared = trial.shared.shape[2]
-            rows, channels = trial.residual.shape
+            causes = (a * u for a, u in zip(trial.causes, units, strict=True))
+            shared, (rows, channels) = trial.shared.shape[2], trial.residual.shape
             cells.append(Cells.of(rows, channels, trial.moving, trial.groups))
             local.append(trial.local)
             explicable.append(orthonormal(trial.local))
-            columns.append(Columns.of(raw, explicable[-1], cells[-1]))
-            grams.append(columns[-1].own_grams(cells[-1]))
-            columns = held(columns, rules.ROWS_BYTES)
+            every = chain([trial.shared], causes, [trial.residual[..., None]])
+            columns.append(Columns((), np.zeros((explicable[-1].shape[2], 0))))
+            for raw in portions(every, rules.PORTION_BYTES):
+                columns[-1] = columns[-1].beside(Columns.of(raw, explicable[-1], cells[-1]))
+                columns = held(columns, rules.ROWS_BYTES)
+            grams.append(CellGrams.of_columns(columns[-1], cells[-1]))
         spans, at = [], shared
         for candidate in candidates:
             spans.append(slice(at, at + len(candidate.parameters)))
@@ -117,7 +120,7 @@ class Problem:
     def _open(self, trial: int) -> list[tuple[Opened, Array]]:
         """What causes leave open in a trial, and how much of every column lies along it."""
         pairs = ((own[trial], self.shares[key][trial]) for key, own in self.opened.items())
-        return [pair for pair in pairs if len(pair[1])]
+        return [(one, shares) for one, shares in pairs if len(shares)]
 
     def products(self, trial: int, b: Array) -> Array:
         """Products of all such columns with others in the transform, (n, C, k) -> (columns, k)."""
@@ -146,9 +149,7 @@ class Problem:
     @cached_property
     def grams(self) -> Array:
         """Gram matrices of every trial, every cell over its power, shape (trials, columns, columns)."""
-        return np.array(
-            [np.tensordot(1.0 / p, g, 1) for p, g in zip(self.power, self.cell_grams, strict=True)]
-        )
+        return np.array([own.weighted(1.0 / p) for p, own in zip(self.power, self.cell_grams, strict=True)])
 
     @cached_property
     def weights(self) -> list[Array]:
@@ -202,8 +203,7 @@ class Problem:
         """Where a candidate of the same cause and place (and interval) is, or None; one with its tolerance first."""
         wanted = candidate.key, candidate.transient
         same = [i for i, other in enumerate(self.candidates) if (other.key, other.transient) == wanted]
-        alike = [i for i in same if self.candidates[i].parameters == candidate.parameters]
-        return next(iter([*alike, *same]), None)
+        return min(same, key=lambda i: self.candidates[i].parameters != candidate.parameters, default=None)
 
     def with_residual(self, residuals: Sequence[Array]) -> Problem:
         """The same columns with another residual, shape (n, C) per trial."""
@@ -218,11 +218,10 @@ class Problem:
         self, start: int, columns: Sequence[Array], candidates: tuple[Candidate, ...], room: int = 0
     ) -> Problem:
         """With other columns from ``start`` on, for which so many of them may be made first."""
-        made, grams, place = [], [], [start] * room
+        made, grams = [], []
         shares: dict[Key, list[Array]] = {key: [] for key in self.opened}
         for t, raw in enumerate(columns):
-            at = slice(start, start + raw.shape[2])
-            stop = start if room else at.stop
+            stop = start if room else start + raw.shape[2]
             new = Columns.of(raw, self.explicable[t], self.cells[t])
             made.append(self.columns[t].replaced(start, stop, new))
             (left,) = new.pieces
@@ -230,11 +229,9 @@ class Problem:
                 along = own[t].along(left)
                 left, old = left - added_up(own[t].basis, along), self.shares[key][t]
                 shares[key].append(np.concatenate([old[:, :start], along, old[:, stop:]], axis=1))
-            grams.append(np.insert(np.insert(self.cell_grams[t], place, 0.0, axis=1), place, 0.0, axis=2))
-            edge = self._grams(t, left)
-            inside = self.cells[t].grams(left, left)
+            edge, inside = self._grams(t, left), self.cells[t].grams(left, left)
             edge = np.concatenate([edge[:, :start], inside, edge[:, stop:]], axis=1)
-            grams[t][:, :, at], grams[t][:, at] = edge, np.swapaxes(edge, 1, 2)
+            grams.append(self.cell_grams[t].replaced(start, stop, edge))
         return replace(
             self, candidates=candidates, columns=tuple(made), cell_grams=tuple(grams),
             shares={key: tuple(each) for key, each in shares.items()},
@@ -242,12 +239,13 @@ class Problem:
 
     def along(self, unknowns: Sequence[Array]) -> tuple[Along, ...]:
         """All columns along what may be left open, columns (n, C, k) per trial, of whatever size."""
-        own = [Opened.of(u, 1.0, self.spectrum(t, u)) for t, u in enumerate(unknowns)]
-        own = [one.single() if x.is_single else one for one, x in zip(own, self.columns, strict=True)]
-        return tuple(
-            Along(one, np.swapaxes(self._grams(t, one.basis), 1, 2), cells.grams(one.basis, one.basis))
-            for t, (one, cells) in enumerate(zip(own, self.cells, strict=True))
-        )
+        return tuple(self._along(t, u) for t, u in enumerate(unknowns))
+
+    def _along(self, trial: int, unknowns: Array) -> Along:
+        cells, one = self.cells[trial], Opened.of(unknowns, 1.0, self.spectrum(trial, unknowns))
+        one = one.single() if self.columns[trial].is_single else one
+        edge = np.swapaxes(self._grams(trial, one.basis), 1, 2)
+        return Along(one, edge, cells.grams(one.basis, one.basis))
 
     def with_open(self, key: Key, along: Sequence[Along], size: float) -> Problem:
         """The problem with what a cause leaves open, whose values scatter by ``size``."""
@@ -255,7 +253,7 @@ class Problem:
             return self
         opened, shares, lost = zip(*(one.of_size(size) for one in along), strict=True)
         return replace(
-            self, cell_grams=tuple(gram - less for gram, less in zip(self.cell_grams, lost, strict=True)),
+            self, cell_grams=tuple(own.less(one) for own, one in zip(self.cell_grams, lost, strict=True)),
             opened={**self.opened, key: opened}, shares={**self.shares, key: shares},
         )  # fmt: skip
 
@@ -269,7 +267,8 @@ class Problem:
         """The problem without what causes other than those to keep leave open."""
         if all(key in keep for key in self.opened):
             return self
-        grams = tuple(x.own_grams(c) for x, c in zip(self.columns, self.cells, strict=True))
+        pairs = zip(self.columns, self.cells, strict=True)
+        grams = tuple(CellGrams.of_columns(*pair) for pair in pairs)
         again = replace(self, cell_grams=grams, opened={}, shares={})
         for key, own in self.opened.items():
             if key in keep:

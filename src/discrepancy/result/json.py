@@ -44,7 +44,8 @@ gain                null where the closed loop was not simulated and there is no
     noise           {<channel>_rms}: what noise and integration error alone would leave
     removed         share of the excess error removed, with interval [low, high] over trials, or null
     trials          list of {name, before, after}
-    validated       false for a single trial, which was compared with what it was fitted to
+    validated       false where trials were compared with what they were fitted to: a single one, or a push or a
+                    payload's mass of some trials named
     estimates       {before, after}, as the rig has them
     errors          {before, after} against the truth, only where it is known
 not_simulated       why there is no closed-loop comparison, or null

@@ -37,7 +37,7 @@ def _closed_loop(gain: Values, *, named: bool) -> Iterable[str]:
     before, after = (gain["held_out"][name] for name in ("before", "after"))
     if before is None or after is None:
         return
-    what = "on trials left out of the fit" if gain["validated"] else "on the trial itself: not validated"
+    what = "on trials left out of the fit" if gain["validated"] else "on trials in the fit: not validated"
     yield from ("", f"[[Response to the recorded commands, simulated again ({what})]]")
     heads = ["before", "after", "noise alone"] if named else ["error", "noise alone"]
     yield f"    {'':<26}" + "".join(f"{head:>14}" for head in heads)

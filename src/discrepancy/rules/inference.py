@@ -61,7 +61,9 @@ VISIBLE_CHI2_PER_N = 3.0
 CELL_BANDS = 6
 """Octaves of frequency in which the noise has powers of its own, of every group of channels and trial. Chosen."""
 ROWS_BYTES = 4e8
-"""Of all columns of all trials, from which they are kept in single precision. Chosen: memory."""
+"""Of all columns of all trials, from which they are kept in files and in single precision. Chosen: memory."""
+PORTION_BYTES = 1e8
+"""Of a trial's columns that are made together. Chosen: memory; all of a minute of three robots are a quarter."""
 WIDENED_ROWS = 1024
 """Of these, turned into double precision together. Chosen: as many as a processor's cache holds."""
 POWER_NUMBERS = 20.0
@@ -79,6 +81,12 @@ LEARN_ROUNDS, LEARN_NATS = 30, 0.05
 """Steps of powers and spreads at most, and the gain of evidence below which they have settled. Chosen."""
 SAME_TRACE = 1e-6
 """Sine, squared, between columns that are one. Derived: more than rounding, less than what any data could tell."""
+OPEN_SHOWS = 1e-4
+"""Of what a cause leaves open, trace over the largest from which it counts. Derived: the largest is some hundred times
+the noise, so that one dropped is a hundredth of it."""
+SHAPE_NATS = 5.0
+"""By which a cause with one number more in its shape must be likelier. Derived: half the log of the rows' numbers, some
+ten to thirty thousand (Schwarz's criterion)."""
 LEAST_POWER = 0.5
 """Of a cell over that of its whitening. Chosen: some noise of healthy robots is drawn larger than it is."""
 FLAT_SHARE = 1e-10

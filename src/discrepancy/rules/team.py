@@ -20,6 +20,8 @@ TEAM_JACOBIAN_HZ = 25.0
 PART_S = 180.0
 """Of a recording at most that is looked at as one trial. Chosen: what a trial leaves open costs its square, and ten of
 its overlaps are a tenth of that; longer than any trial of the experiment."""
+LINEAR_BYTES = 4e8
+"""Of all linear trials, from which they are kept in files. Chosen: memory; of twenty minutes of three robots."""
 TEAM_TRIM_S = 2.0
 """Left out at both ends of a recording. Chosen."""
 STILL_RAD_PER_S = 1e-3
@@ -53,8 +55,8 @@ falls with it. Chosen: the trajectory need only be one that the stairs may have 
 PHASE_TRAVEL = 4.0
 """Steps of travel after which a rounding error is drawn anew. Chosen: independent from one rest to the next, and
 changes an encoder's speed by half at most."""
-DRAWS_AT_A_TIME = 8
-"""Of noise. Chosen: memory."""
+DRAWS_AT_A_TIME, DRAWN_TOGETHER = 8, 4.5e5
+"""Of noise, and samples of all robots in them, at most. Chosen: memory; eight of three minutes of three robots."""
 NOISE_DRAWS = 24
 """From which the rows' covariance is made. Chosen."""
 NOISE_SEED = 20250
@@ -103,6 +105,20 @@ PLAY_FORCE_N = 0.4
 """Below which a payload may be anywhere in its play. Chosen."""
 PLAY_KNOTS_S = 0.2
 """Between knots of the travel that play leaves open at small forces. Chosen."""
+PLAY_OPEN_N, PLAY_OPEN_S = 1.0, 0.03
+"""Force below which a payload that is loose may travel, and for how long before and after. Measured: it travels for a
+tenth of a second, with forces of up to 1 N in the filtered signals where there should be none; and derived: so long a
+filter of 20 Hz takes to show a force that begins. With 0.4 N alone, half of the travel is outside."""
+PLAY_OPEN_KNOTS_S = 0.05
+"""Between knots of that travel. Measured: play of 0.8 mm leaves a chi2/n of 51 with knots every 0.2 s and forces below
+0.4 N, 12 every 0.1 s below 1 N, 1.15 every 0.05 s; nothing faster passes the rows' filter."""
+PLAY_CONTACT_PER_N = 0.02
+"""Of a play, by which its ends give way to a newton, over which slopes are taken. Chosen: 1 um/N behind 50 um; columns
+go straight with it."""
+PLAY_COLUMNS_AT_A_TIME = 16
+"""Of that travel. Chosen: memory."""
+SHIFT_REACH_S = 0.5
+"""Before and after a displacement in which its accelerations show. Derived: a filter of 20 Hz has died to 1e-6."""
 LENGTH_MOST_M = 0.02
 """By which a leg's lengths may be off. Chosen: a thousand tolerances; as large, columns are no straight lines."""
 PULL_SE = 5.0
@@ -126,6 +142,14 @@ GRASP_TURNS_M = (0.05, -0.05)
 thickness or a gripper's, on either side; what is along it is found by Gauss-Newton."""
 GRASP_TURNS_FINER, GRASP_TURNS_RANGE_M = (0.5, 0.7, 1.4, 2.0), (0.01, 0.3)
 """Shares of that tried next, and its range. Derived: nearer, nothing turns; farther, it is no part of the grasp."""
+CREEP_STARTS_S = tuple(3.0 * k for k in range(1, 31))
+"""Into a trial, at which a base may begin to creep, tried first. Chosen: trials last less than a minute and a half."""
+CREEP_FINER_S = (-2.0, -1.0, -0.5, -0.25, 0.25, 0.5, 1.0, 2.0)
+"""By which such a time is moved next. Chosen."""
+CREEP_STEP_S = 0.5
+"""Step of slopes by that time. Chosen: what creeps from half a second sooner or later goes nearly the same way."""
+CREEP_STARTS = 100
+"""How many of them there are, each as likely as the others. Derived: three bases, by a minute in steps of 2 s."""
 SLOSH_LENGTHS_M = (0.04, 1.0)
 """Derived: pendulums of 2.5 to 0.5 Hz; slower and faster ones look like drag or play."""
 SLOSH_MOST_DAMPED = 0.3
@@ -134,3 +158,25 @@ SLOSH_SWINGS = 0.25
 """Largest damping ratio named. Chosen, after one of 0.29 had been named for drag."""
 SLOSH_REACH_M = 1.5
 """From the centre of mass to where it hangs at most. Chosen: no payload of three robots is larger."""
+MASS_OVER_S = 60.0
+"""In which a mass that drifts becomes as much as its columns say. Chosen: any will do; in a minute it is as much as one
+that is put on."""
+MASS_TRIALS = 12
+"""With which another mass may begin at most. Chosen: more are no experiment but a log."""
+MASS_SPANS = 5
+"""Up to which trial one may be there for some trials only. Chosen: of five, each span; of more, only what stays."""
+SLOSH_ACROSS = (0.3, 0.37, 0.46, 0.58, 0.72, 1.38, 1.7, 2.15, 2.7, 3.4)
+"""Length across over that along of what swings on two lengths, tried first. Measured (tuning set 99300, damping ratio
+0.04): a length 25 % off still helps."""
+SLOSH_HEADINGS_RAD = (0.0, 0.79, 1.57, 2.36)
+"""Its headings, tried first. Measured, likewise: one 25 deg off still helps."""
+SLOSH_SECOND, SLOSH_SHARE = (0.3, 0.55, 1.8, 3.3), 0.25
+"""Length of a second pendulum over the first's, and its share of the mass, tried first. Chosen: a quarter is what the
+second mode of two equal pendulums in a row has."""
+SLOSH_SECOND_FINER, SLOSH_SHARES_FINER = (0.6, 0.75, 0.87, 0.95, 1.05, 1.15, 1.35, 1.7), (0.5, 0.75, 1.3, 2.0)
+"""Shares of the second length, and of its share, tried next. Chosen."""
+SLOSH_HEADINGS_FINER_RAD, SLOSH_TURN_RAD = (-0.26, -0.13, 0.13, 0.26), 0.1
+"""By which a heading is moved next, and the step of slopes by it. Chosen."""
+SLOSH_SECONDS = 150
+"""Second modes that are told apart, each as likely as the others. Derived: thirty lengths, 10 % apart, by five headings
+or shares. Without it a second mode would always explain what a pendulum of one mode does, and noise beside it."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate, Transient
+from discrepancy.causes.base import Shape
 from discrepancy.causes.intervals import intervals_near, ramped, worst_intervals
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.reduction import Reduction
@@ -36,11 +37,19 @@ def every_candidate(
     return out
 
 
-def other_shapes(candidate: Candidate, *, finer: bool) -> list[Candidate]:
-    """The candidate in every other shape of its cause, or in ``finer`` ones around its own."""
+def in_shapes(candidate: Candidate, shapes: Sequence[Shape], trials: int) -> list[Candidate]:
+    """The candidate in each of some shapes but its own that there can be in so many trials."""
     cause = CAUSES[candidate.cause]
-    shapes = cause.finer(candidate.shape) if finer else cause.shapes
-    return [replace(candidate, shape=dict(shape)) for shape in shapes if dict(shape) != candidate.shape]
+    return [
+        replace(candidate, shape=dict(shape), among=cause.alike(shape))
+        for shape in shapes
+        if dict(shape) != candidate.shape and _within(shape, trials)
+    ]
+
+
+def _within(shape: Shape, trials: int) -> bool:
+    """Whether so many trials have those that a shape names."""
+    return max(shape.get("trial", 1), shape.get("last_trial", 0) + 1) <= trials
 
 
 def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:

@@ -24,6 +24,7 @@ from discrepancy.team.closed_loop import (
     team_of,
     why_not,
 )
+from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.laws.effects import effects_of
 from discrepancy.team.laws.rows import LawfulRows
 from discrepancy.team.linear.origin import origin_of, places_of
@@ -40,6 +41,7 @@ class TeamRig(LawfulRows):
     """Recordings of one payload, linearised around the best unknowns without any cause, and their simulator."""
 
     reshaped = ("sea_hysteresis", "grasp_flex")
+    behind = ("grasp_play",)
 
     def effect_parameters(
         self, candidate: Candidate, values: Array, covariance: Array
@@ -138,3 +140,14 @@ class TeamRig(LawfulRows):
     def undecidable(self) -> list[dict[str, Any]]:
         """What recordings of a parked team with a rigid payload cannot decide."""
         return statements(self.robots, aligned=self.aligned)
+
+    def quantities(self, trial: int) -> dict[str, Array]:
+        """Speed of the payload [m/s], its distance from where it started [m], load [N m]: shape (n,) each."""
+        return quantities_of(self.linear[trial])
+
+    def row_rate_hz(self, trial: int) -> float:
+        return self.linear[trial].signals.rate_hz / self.linear[trial].reduction.step
+
+    def directions(self, trial: int) -> dict[str, Array]:
+        """Directions of every spring torque and every gimbal axis, from the linearisation."""
+        return directions_of(self.linear[trial], self.whitening[trial])

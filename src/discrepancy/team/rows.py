@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
@@ -12,23 +12,24 @@ from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.least_squares.stored import stored
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Channel, Rig, Rows
 from discrepancy.team.candidates import (
     every_candidate,
+    in_shapes,
     indices,
     is_adjusted,
     nearby_events,
-    other_shapes,
     shape_steps,
     worst_events,
 )
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.channels import channels_of, groups_of
-from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.imitators import wrong_torques
 from discrepancy.team.linear.adjust import as_loud, noise_of
 from discrepancy.team.linear.elsewhere import HEALTHY, found_at, resting_of
+from discrepancy.team.linear.filed import OneByOne, is_filed, rested
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.origin import beyond, origin_of
 from discrepancy.team.linear.rest import limits_of
@@ -160,21 +161,25 @@ class TeamRows(Rig):
         """Whether the motion has set the robots' clocks in every trial."""
         return all(any(s.aligned for s in linear.signals.sampling or ()) for linear in self.linear)
 
-    def columns(self, candidate: Candidate) -> list[Array]:
-        return [self._columns(t, candidate) for t in range(len(self.linear))]
+    def columns(self, candidate: Candidate) -> Sequence[Array]:
+        return self._each(lambda t: self._columns(t, candidate), len(self.linear))
+
+    def _each(self, of: Callable[[int], Array], count: int) -> Sequence[Array]:
+        """Arrays by their number; of long recordings each whenever it is asked for."""
+        return OneByOne(of, count) if is_filed(self.linear[0]) else list(map(of, range(count)))
 
     def _columns(self, trial: int, candidate: Candidate) -> Array:
         linear = self.linear[trial]
         if not candidate.acts_in(trial):
-            return np.zeros((*linear.residual.shape, len(candidate.parameters)))
-        shapes = CAUSES[candidate.cause].shapes if candidate.cause in CAUSES else ()
-        again = candidate.transient is None and len(shapes) > 1 and candidate.shape in shapes
-        key = (trial, *candidate.key, *candidate.shape.items())
-        if again and key in self.kept:
+            return np.broadcast_to(0.0, (*linear.residual.shape, len(candidate.parameters)))
+        key = (trial, *candidate.trace)
+        if key in self.kept:
             return self.kept[key]
         columns = self.whitening[trial](self._unwhitened(trial, candidate))
-        if again:
-            self.kept[key] = columns
+        rested(linear)
+        shapes = CAUSES[candidate.cause].shapes if candidate.cause in CAUSES else ()
+        if candidate.transient is None and len(shapes) > 1 and candidate.shape in shapes:
+            self.kept[key] = stored(columns) if is_filed(linear) else columns
         return columns
 
     def _unwhitened(self, trial: int, candidate: Candidate) -> Array:
@@ -206,18 +211,17 @@ class TeamRows(Rig):
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return CAUSES[candidate.cause].possible(values, se, candidate.shape)
 
-    def unknowns(self, candidate: Candidate) -> list[Array]:
-        of = CAUSES[candidate.cause].unknowns
-        pairs = zip(self.linear, self.whitening, strict=True)
-        return [white(of(linear, *indices(candidate), candidate.shape)) for linear, white in pairs]
+    def unknowns(self, candidate: Candidate) -> Sequence[Array]:
+        of, place, shape = CAUSES[candidate.cause].unknowns, indices(candidate), candidate.shape
+        return self._each(lambda t: self.whitening[t](of(self.linear[t], *place, shape)), len(self.linear))
 
     def rows(self, candidates: Sequence[Candidate]) -> Iterator[Rows]:
         for t, linear in enumerate(self.linear):
-            causes = [self._columns(t, candidate) for candidate in candidates]
+            causes = self._each(lambda k, t=t: self._columns(t, candidates[k]), len(candidates))
             residual = self.whitening[t](linear.residual)
-            for candidate, columns in zip(candidates, causes, strict=True):
+            for k, candidate in enumerate(candidates):
                 there = origin_of(candidate, self.origin)
-                residual += 0.0 if there is None else columns @ there
+                residual += 0.0 if there is None else causes[k] @ there
             yield Rows(
                 self.recordings[t].name,
                 residual,
@@ -263,21 +267,26 @@ class TeamRows(Rig):
                 residual -= self._unwhitened(t, candidate) @ self.beyond(candidate, values)
             left = self.whitening[t](residual) + self._all_at_origin(t)
             out.append(left - sum(self._at_origin(t, c) for c in self.candidates() if c.key in there))
+            rested(linear)
         return out
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; a transient with its interval moved."""
         if candidate.transient:
-            tolerance = self.tolerances.get(candidate.cause, {})
-            return nearby_events(candidate.cause, candidate.transient, tolerance)
-        return other_shapes(candidate, finer=finer)
+            return nearby_events(
+                candidate.cause, candidate.transient, self.tolerances.get(candidate.cause, {})
+            )
+        cause = CAUSES[candidate.cause]
+        shapes = cause.finer(candidate.shape) if finer else cause.shapes
+        return in_shapes(candidate, shapes, len(self.linear))
+
+    def further(self, candidate: Candidate) -> list[Candidate]:
+        if candidate.transient or candidate.cause not in CAUSES:
+            return []
+        return in_shapes(candidate, CAUSES[candidate.cause].further(candidate.shape), len(self.linear))
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
-        """Pushes at the intervals where the wrench balance is worst.
-
-        Args:
-            remaining: whitened residual of every trial, shape (n, C).
-        """
+        """Pushes at the intervals where the wrench balance is worst."""
         reductions = [linear.reduction for linear in self.linear]
         return worst_events(reductions, remaining, self.tolerances, self.excluded)
 
@@ -287,14 +296,3 @@ class TeamRows(Rig):
 
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
         return shape_steps(candidate)
-
-    def quantities(self, trial: int) -> dict[str, Array]:
-        """Speed of the payload [m/s], its distance from where it started [m], load [N m]: shape (n,) each."""
-        return quantities_of(self.linear[trial])
-
-    def row_rate_hz(self, trial: int) -> float:
-        return self.linear[trial].signals.rate_hz / self.linear[trial].reduction.step
-
-    def directions(self, trial: int) -> dict[str, Array]:
-        """Directions of every spring torque and every gimbal axis, from the linearisation."""
-        return directions_of(self.linear[trial], self.whitening[trial])

@@ -22,7 +22,7 @@ EVERY_S = 5.0
 """From one push to the next of those whose limits are taken the median of."""
 FORCE = {"force_x_N", "force_y_N", "force_z_N"}
 TETHER = FORCE | {"stiffness_N_per_m"}
-NEEDED = {"slosh": {"mass_kg"}, "tether": TETHER, "payload_tether": TETHER}
+NEEDED = {"slosh": {"mass_kg"}, "tether": TETHER, "payload_tether": TETHER, "payload_mass": {"mass_kg"}}
 """Parameters without whose limits an effect cannot be drawn."""
 
 Json = dict[str, Any]

@@ -139,13 +139,20 @@ def _same_place(item: Item, effect: Item, truth: Item) -> bool:
         p, q = {name: entry["value"] for name, entry in item["parameters"].items()}, effect["parameters"]
         both = min(p["start_s"] + p["duration_s"], q["start_s"] + q["duration_s"])
         return p["trial"] == q["trial"] and both > max(p["start_s"], q["start_s"])
+    if item["cause"] == answer["cause"] == "payload_mass":  # what is put on, or leaks out, and when
+        p, known = {name: entry["value"] for name, entry in item["parameters"].items()}, answer["known"]
+        alike = bool(p["rate_kgps"]) == bool(known.get("rate_kgps"))
+        return alike and all(p[name] == known[name] for name in ("trial", "last_trial") if name in known)
     return _here(item) == _here(answer)
 
 
 def _errors(item: Item, effect: Item) -> tuple[float | None, tuple[float, ...]]:
     """Where a push acts along its line, and how long the interval is, cannot be told."""
     known, named = effect["answer"]["known"], item["parameters"]
-    skipped = ("point", "start", "duration", "trial") if effect["answer"]["cause"] == "push" else ("trial",)
+    cause = effect["answer"]["cause"]
+    skipped = (
+        ("point", "start", "duration", "trial") if cause == "push" else ("trial", "last_trial", "inertia")
+    )
     names = [name for name in named if name in known and not name.startswith(skipped)]
     if not names:
         return None, ()
@@ -154,6 +161,8 @@ def _errors(item: Item, effect: Item) -> tuple[float | None, tuple[float, ...]]:
     se = [named[name]["se"] for name in names]
     deviations = tuple(float(d / s) for d, s in zip(away, se, strict=True) if s)
     units = np.abs(size) > 0.1 * np.abs(size).max() if len(names) > 1 and _alike(names) else size != 0
+    if cause == "payload_mass":  # the size is the mass, however well its place shows
+        units &= [name in ("mass_kg", "rate_kgps") for name in names]
     error = float(np.max(np.abs(away[units] / size[units]))) if units.any() else None
     return error, deviations
 

@@ -65,9 +65,7 @@ def _errors(errors: Values, shown: Mapping[str, Key]) -> Node:
 
 def _closed_loop(book: Book, gain: Values, names: Sequence[str], shown: Mapping[str, Key]) -> list[Node]:
     where = (
-        "on trials left out of the fit"
-        if gain["validated"]
-        else "on the trial it was fitted to: not validated"
+        "on trials left out of the fit" if gain["validated"] else "on trials it was fitted to: not validated"
     )
     said = f"The recorded commands are simulated again, {where}."
     if gain["removed"] is not None and "after" in shown:

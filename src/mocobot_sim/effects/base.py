@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 PLACE = ("robot", "joint")
 JOINTS = 3
+WHOLE = {"robot": 1, "joint": 1, "trial": 1, "last_trial": 0}
+"""Whole numbers, and the least that each may be."""
 
 
 @dataclass(frozen=True)
@@ -54,9 +56,10 @@ class Effect(ABC):
                 if not isinstance(value, str):
                     raise InputError(f"{self.cause}: {entry.name} is {value!r:.60}; it must be text")
                 continue
-            if entry.name in (*PLACE, "trial"):
-                allowed = "1, 2 or 3" if entry.name == "joint" else "a whole number of at least 1"
-                good = type(value) is int and value >= 1 and (entry.name != "joint" or value <= JOINTS)
+            if entry.name in WHOLE:
+                least = WHOLE[entry.name]
+                allowed = "1, 2 or 3" if entry.name == "joint" else f"a whole number of at least {least}"
+                good = type(value) is int and value >= least and (entry.name != "joint" or value <= JOINTS)
             else:
                 low, high = self.ranges.get(entry.name, (-sys.float_info.max, sys.float_info.max))
                 allowed = "a finite number"

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from estimator.errors import InputError
 from estimator.strict import Fields
 from mocobot_sim.effect_names import NAMES
-from mocobot_sim.effects.base import PLACE, Effect
+from mocobot_sim.effects.base import PLACE, WHOLE, Effect
 from mocobot_sim.scene.applied import Applied
 
 if TYPE_CHECKING:
@@ -48,8 +48,9 @@ def make_effect(
             raise InputError(f"{cause}: {name} {problem}; the places are {rule}")
     _check_keys(cause, parameters, kind)
     values = dict(parameters)
-    if isinstance(values.get("trial"), float) and float(values["trial"]).is_integer():
-        values["trial"] = int(values["trial"])
+    for name in WHOLE:
+        if isinstance(values.get(name), float) and float(values[name]).is_integer():
+            values[name] = int(values[name])
     return kind(**place, **values)
 
 
@@ -64,7 +65,7 @@ def _check_keys(cause: str, parameters: Mapping[str, Any], kind: type[Effect]) -
 
 
 def _has_default(entry: Any) -> bool:
-    return isinstance(entry.default, float | str)
+    return isinstance(entry.default, int | float | str)
 
 
 def effect_to_dict(effect: Applied) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 from estimator.errors import InputError
 from mocobot_sim.effect_names import check_effect_name
-from mocobot_sim.effects.base import JOINTS, PLACE, Effect
+from mocobot_sim.effects.base import JOINTS, PLACE, WHOLE, Effect
 from mocobot_sim.effects.catalogue import EFFECTS, make_effect
 
 UNITS = {
@@ -21,7 +21,9 @@ UNITS = {
     "N_per_m": "N/m",
     "Ns_per_m": "N s/m",
     "N": "N",
+    "kgps": "kg/s",
     "kg": "kg",
+    "m2": "m^2",
     "s": "s",
 }
 """Units as they end the names of parameters, and as people write them."""
@@ -55,7 +57,7 @@ def allowed(kind: type[Effect]) -> tuple[Allowed, ...]:
             short=(parted := _without_unit(entry.name))[0],
             unit=parted[1],
             range=_range(kind, entry.name),
-            default=entry.default if isinstance(entry.default, float | str) else None,
+            default=entry.default if isinstance(entry.default, int | float | str) else None,
         )
         for entry in fields(kind)
     )
@@ -101,7 +103,7 @@ def _made(cause: str, values: Mapping[str, float | str]) -> Effect:
 
 
 def _value(text: str, number: Allowed, word: str) -> float:
-    whole = number.name in (*PLACE, "trial")
+    whole = number.name in WHOLE
     try:
         value = int(word) if whole else float(word)
     except ValueError:
@@ -115,8 +117,8 @@ def _value(text: str, number: Allowed, word: str) -> float:
 def _range(kind: type[Effect], name: str) -> str:
     if name == "joint":
         return f"1 to {JOINTS}"
-    if name in (*PLACE, "trial"):
-        return "1, 2, ..."
+    if name in WHOLE:
+        return f"{WHOLE[name]}, {WHOLE[name] + 1}, ..."
     if name in kind.texts:
         return "a name"
     if name not in kind.ranges:

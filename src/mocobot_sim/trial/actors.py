@@ -72,6 +72,15 @@ class Reader(Protocol):
 
 
 @runtime_checkable
+class Loading(Protocol):
+    """An effect that changes the payload of some trials, which begin at rest with it."""
+
+    def load(self, model: mujoco.MjModel, index: TeamIndex, trial_number: int | None) -> None:
+        """Change a trial's model (trials count from 1; None is any), before the team is assembled."""
+        ...
+
+
+@runtime_checkable
 class Acting(Protocol):
     """An effect that MJCF cannot express: somebody acts, or a sensor misreads, while a trial runs."""
 

@@ -12,7 +12,7 @@ from mocobot_sim.control.control import ControlGains, TeamController
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import TeamIndex
-from mocobot_sim.trial.actors import Actor, Stage
+from mocobot_sim.trial.actors import Actor, Loading, Stage
 from mocobot_sim.trial.assemble import assemble_at_home
 from mocobot_sim.trial.others import Others
 from mocobot_sim.trial.rows import Rows
@@ -60,6 +60,9 @@ def run_trial(
     data = mujoco.MjData(model)
     index = TeamIndex.of(model, scene.carries)
     design = omnid_design()
+    for effect in scene.effects:
+        if isinstance(effect, Loading):
+            effect.load(model, index, trial_number)
     assemble_at_home(scene, model, data, index)
     ticks = _whole("control rate over recording rate", gains.rate_hz / RATE_HZ)
     substeps = _whole("control period over time step", 1.0 / (gains.rate_hz * model.opt.timestep))

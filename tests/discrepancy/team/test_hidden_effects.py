@@ -25,6 +25,7 @@ HIDDEN = [
     quick_set("single", 3, "clock_delay", payload="c"),
     quick_set("single", 4, "grasp_flex", payload="d"),
     quick_set("single", 5, "drag", payload="a"),
+    quick_set("single", 7, "payload_mass", payload="b"),
 ]
 
 

@@ -173,3 +173,16 @@ def test_values_that_are_there_for_a_while_are_columns_of_their_rows(trial, redu
     assert shown.sum() >= 9
     np.testing.assert_allclose(reduction.of_pieces(direction, pieces), expected[..., shown], atol=1e-12)
     assert reduction.of_pieces(direction, []).shape == (len(reduction.time), 2, 0)
+
+
+@pytest.mark.parametrize(
+    "span", [(0, 0), (1, 2), (190, 1400), (700, 760), (1000, 1001), (1990, 1999), (1, 1999)]
+)
+def test_what_is_there_for_a_while_is_reduced_as_a_dense_matrix_does_it(span):
+    """Holds before, in and after it, too; nothing at all is no rows but noughts."""
+    reduction = Reduction.of(signals(20.0, holds=((3.0, 8.0), (10.0, 15.0))))
+    x = np.zeros((2000, 3, 2))
+    x[slice(*span)] = np.random.default_rng(6).standard_normal((span[1] - span[0], 3, 2))
+    expected = np.einsum("nq,qci->nci", reduction.operator.toarray(), x)
+    np.testing.assert_allclose(reduction(x), expected, atol=1e-12)
+    assert len(reduction.time) > reduction.moving

@@ -10,12 +10,13 @@ from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from discrepancy.candidate import Transient
-from discrepancy.team.candidates import other_shapes, shape_steps
+from discrepancy.team.candidates import in_shapes, shape_steps
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.linear.trial_linear import linearise
 from estimator.arm.delta import forward_kinematics, inverse_kinematics, jacobian, leg_geometry
 from estimator.arm.dynamics import arm_torque
+from estimator.inertia import inertia_parameters
 from estimator.rigid_team.residual import balance
 from recorded_team import COM, GRASPS, HOME, STEP_S, as_matrix, derivatives
 from team_case import DESIGN, exact, residual_of
@@ -103,15 +104,26 @@ def test_payload_tether(case, motion, arm):
     np.testing.assert_allclose([physical[f"anchor_{a}_m"] for a in "xyz"], anchor, atol=1e-9)
 
 
-@pytest.mark.parametrize(("along", "turning"), [(5.0, 0.0), (0.0, 3.0), (5.0, 3.0)])
-def test_drag(case, motion, along, turning):
+@pytest.mark.parametrize(
+    ("along", "turning", "squares"),
+    [
+        (5.0, 0.0, None), (0.0, 3.0, None), (5.0, 3.0, None), (5.0, 3.0, (0.0, 0.0)), (0.0, 0.0, (40.0, 0.0)),
+        (1.0, 0.0, (0.0, 20.0)),
+    ],
+)  # fmt: skip
+def test_drag(case, motion, along, turning, squares):
+    """With the speeds, and with their squares where its shape has these."""
     ahead, behind = (
         Rotation.from_euler("xyz", case.path(case.signals.time + h)[:, :3]) for h in (STEP_S, -STEP_S)
     )
     omega = (ahead * behind.inv()).as_rotvec() / (2.0 * STEP_S)  # world
-    force = -along * motion[2]
-    moment = np.cross(motion[0] @ COM, force) - turning * omega
-    check_wrench(case, motion, "drag", 0, 0, {}, [along, turning], force, moment)
+    linear, turning_squared = squares or (0.0, 0.0)
+    speed, rate = (np.linalg.norm(x, axis=1)[:, None] for x in (motion[2], omega))
+    force = -(along + linear * speed) * motion[2]
+    moment = np.cross(motion[0] @ COM, force) - (turning + turning_squared * rate) * omega
+    shape = {} if squares is None else {"powers": 2.0}
+    values = [along, turning, linear, turning_squared]
+    check_wrench(case, motion, "drag", 0, 0, shape, values, force, moment)
 
 
 def test_push(case, motion):
@@ -176,6 +188,120 @@ def test_slosh(case, motion):
     physical = reported(case, "slosh", values, shape)
     np.testing.assert_allclose([physical[f"point_{a}_m"] for a in "xyz"], at)
     assert physical["mass_kg"] == mass
+
+
+@pytest.mark.parametrize("shape", [{"trial": 2.0, "last_trial": 0.0}, {"over_s": 60.0}])
+def test_payload_mass(case, motion, shape):
+    """A body that rides along: Newton at its centre, and Euler by its momentum, differentiated in the world."""
+    time, R = case.signals.time, motion[0]
+    mass, at = 0.8, COM + np.array([0.15, -0.1, 0.08])
+    own = np.array([[0.02, 0.003, 0.0], [0.003, 0.03, -0.002], [0.0, -0.002, 0.015]])  # of all of it
+    there = (time / 60.0 if "over_s" in shape else np.ones_like(time))[:, None]
+    accel = make_interp_spline(time, point(motion, at), k=5).derivative(2)(time)
+    R_dot = make_interp_spline(time, R, k=5).derivative(1)(time)
+    turn = R_dot @ R.swapaxes(1, 2)
+    omega = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
+    spin = np.einsum("qij,jk,qlk,ql->qi", R, own, R, omega)
+    force = -mass * there * (accel + np.array([0.0, 0.0, DESIGN.gravity_mps2]))
+    moment = np.cross(R @ at, force) - there * make_interp_spline(time, spin, k=5).derivative(1)(time)
+    d = at - COM
+    of_points = d @ d * np.eye(3) - np.outer(d, d)  # what first moments about COM leave of the inertia
+    values = np.concatenate([[mass], mass * d, inertia_parameters(own + mass * of_points)])
+    check_wrench(case, motion, "payload_mass", 0, 0, shape, values, force, moment, 0.01)
+    physical = reported(case, "payload_mass", values, shape)
+    np.testing.assert_allclose([physical[f"point_{a}_m"] for a in "xyz"], at)
+    named = [physical[f"inertia_{ij}_m2"] for ij in ("xx", "xy", "xz", "yy", "yz", "zz")]
+    np.testing.assert_allclose(named, inertia_parameters(own) / mass, atol=1e-12)
+    size = (physical["mass_kg"], physical["rate_kgps"], physical["trial"])
+    assert size == ((0.0, mass / 60.0, 1) if "over_s" in shape else (mass, 0.0, 2))
+
+
+def test_a_mass_is_there_in_its_trials_only():
+    every = CAUSES["payload_mass"].candidate({}, {"trial": 2.0, "last_trial": 0.0})
+    drift = CAUSES["payload_mass"].candidate({}, CAUSES["payload_mass"].shapes[0])
+    assert [drift.acts_in(t) for t in range(3)] == [True] * 3
+    assert [every.acts_in(t) for t in range(4)] == [False, True, True, True]
+    assert every.of_trials
+    assert not drift.of_trials
+
+    def spans(trials):
+        shapes = [drift, *in_shapes(drift, CAUSES["payload_mass"].shapes, trials)]
+        return [tuple(s.acts_in(t) for t in range(trials)) for s in shapes]
+
+    assert spans(1) == [(True,)]
+    for trials in (2, 3, 4, 5):  # each span of trials that leaves out the first, once
+        first_and_last = [(a, b) for a in range(1, trials) for b in range(a, trials)]
+        expected = {tuple(a <= t <= b for t in range(trials)) for a, b in first_and_last}
+        assert sorted(spans(trials)[1:]) == sorted(expected)
+
+
+def test_a_mass_is_there_and_within_reach():
+    se = np.full(10, 1e-3)
+
+    def possible(mass, moment):
+        return CAUSES["payload_mass"].possible(np.array([mass, moment, *np.zeros(8)]), se, {})
+
+    assert possible(-0.02, 0.01)
+    assert not possible(1.5e-3, 0.0)
+    assert not possible(0.02, 0.05)  # 2.5 m from the centre
+
+
+@pytest.mark.parametrize(("second_m", "share"), [(0.08, 0.3), (0.5, 0.4)])
+def test_slosh_of_a_second_pendulum(case, motion, second_m, share):
+    """Beside the first: what two of one mode do, each with its share of the mass."""
+    mass, moments = 0.4, 0.4 * np.array([0.02, -0.03, 0.01])
+    plain = {"length_m": 0.2, "damping_ratio": 0.05}
+    values = np.append(mass, moments)
+
+    def of(shape):
+        return CAUSES["slosh"].columns(case.linear, 0, 0, shape) @ values
+
+    both = (1.0 - share) * of(plain) + share * of(plain | {"length_m": second_m})
+    np.testing.assert_allclose(
+        of(plain | {"second_length_m": second_m, "second_share": share}), both, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize(("across_m", "heading"), [(0.08, 0.4), (0.45, -1.0)])
+def test_slosh_of_two_lengths(case, motion, across_m, heading):
+    """Along one level direction the mass hangs from one point, across from another below or above, Runge-Kutta again.
+
+    Its weight acts where both are; a mass that rides along rigidly at the first point is the payload's own.
+    """
+    mass, length_m, damping = 0.4, 0.2, 0.05
+    at, time, R = COM + np.array([0.02, -0.03, 0.01]), case.signals.time, motion[0]
+    along = R @ [np.cos(heading), np.sin(heading), 0.0]
+    along[:, 2] = 0.0
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    across = np.cross([0.0, 0.0, 1.0], along)
+    upper, gravity = make_interp_spline(time, point(motion, at), k=5).derivative(2)(time), DESIGN.gravity_mps2
+    force, moment = -mass * (0.0 * R[..., 0]), np.zeros((len(time), 3))
+    for way, own_m, below in ((along, length_m, 0.0), (across, across_m, length_m - across_m)):
+        own = at - [0.0, 0.0, below]
+        accel = np.sum(way * make_interp_spline(time, point(motion, own), k=5).derivative(2)(time), axis=1)
+        smooth, w = make_interp_spline(time, accel, k=3), np.sqrt(gravity / own_m)
+
+        def rate(t, y, smooth=smooth, w=w):
+            return [y[1], -smooth(t) - 2 * damping * w * y[1] - w**2 * y[0]]
+
+        x = solve_ivp(rate, (0.0, time[-1]), [0.0, 0.0], t_eval=time, rtol=1e-9, atol=1e-12).y
+        pull = -mass * (-2 * damping * w * x[1] - w**2 * x[0])[:, None] * way  # swinging and carried along
+        force = force + pull
+        moment += np.cross(R @ own, pull) + np.cross(
+            np.sum(R @ [0.0, 0.0, -below] * way, axis=1)[:, None] * way, [0.0, 0.0, -mass * gravity]
+        )
+    rigid = -mass * upper * [1.0, 1.0, 0.0]
+    values = np.append(mass, mass * (at - COM))
+    shape = {
+        "length_m": length_m,
+        "damping_ratio": damping,
+        "across_length_m": across_m,
+        "heading_rad": heading,
+    }
+    check_wrench(
+        case, motion, "slosh", 0, 0, shape, values, force - rigid, moment - np.cross(R @ at, rigid), 0.04
+    )
+    assert reported(case, "slosh", values, shape)["across_length_m"] == across_m
 
 
 @pytest.mark.parametrize("joint", [0, 1, 2])
@@ -245,7 +371,8 @@ def test_weight_of_the_arm_is_that_of_the_estimator(case):
     np.testing.assert_allclose(own_torque(phi, (0, 0, 1)), arm_torque(phi, still, still, DESIGN), atol=1e-7)
 
 
-def check_pose(case, signals, column, values, tolerance=0.01, balance_tolerance=0.03):
+def check_pose(case, signals, column, values, tolerance=0.01, balance_tolerance=0.03, moment=None):
+    """``moment``: what the balance lacks about {1}, where a force acts elsewhere than is thought, shape (Q, 3)."""
     changed = residual_of(case, signals) - case.linear.residual
     got = column @ np.asarray(values)
     assert np.abs(changed[:, :12]).max() > 1e-6
@@ -255,15 +382,21 @@ def check_pose(case, signals, column, values, tolerance=0.01, balance_tolerance=
     data = linearise(signals, case.shared, case.bases, DESIGN, case.reduction, full=False).data
     data = replace(data, wrench=case.linear.data.wrench)
     moved = case.reduction(balance(data, case.shared)[0]) - case.linear.residual[:, 12:]
+    if moment is not None:
+        moved[:, 3:] -= case.reduction(moment)
     np.testing.assert_allclose(got[:, 12:], moved, atol=balance_tolerance * np.abs(moved).max() + 1e-7)
 
 
+@pytest.mark.parametrize("start_s", [0.0, 4.3])
 @pytest.mark.parametrize("robot", [0, 1, 2])
-def test_base_creep(case, robot):
-    """The base gets ahead by v t; its wrist then lies back in {b}."""
+def test_base_creep(case, robot, start_s):
+    """The base gets ahead by v t, or from its start on; its wrist then lies back in {b}."""
     v = np.array([4e-6, -3e-6])
-    gone = np.append(v, 0.0) * case.signals.time[:, None]
-    column = CAUSES["base_creep"].columns(case.linear, robot, 0, {})
+    time = case.signals.time
+    gone = np.append(v, 0.0) * np.clip(time - start_s, 0.0, None)[:, None]
+    shape = {"start_s": start_s} if start_s else {}
+    column = CAUSES["base_creep"].columns(case.linear, robot, 0, shape)
+    assert reported(case, "base_creep", v, shape) == {"x_mps": 4e-6, "y_mps": -3e-6, "start_s": start_s}
     check_pose(case, adapted(case, robot, -gone), column, v)
 
 
@@ -325,24 +458,31 @@ def test_a_grasp_without_a_point_to_turn_about_does_not_turn(case):
         "compliance_m_per_N": 2e-6, "turning_rad_per_N": 0.0, "relaxation_s": 0.02, "offset_m": 0.0,
     }  # fmt: skip
     assert cause.possible(np.array([2e-6, 0.0]), np.array([1e-7, 0.0]), healthy.shape)
-    turning = next(c for c in other_shapes(healthy, finer=False) if c.shape.get("offset_m", 0.0) < 0.0)
+    turning = next(
+        c for c in in_shapes(healthy, CAUSES[healthy.cause].shapes, 1) if c.shape.get("offset_m", 0.0) < 0.0
+    )
     assert cause.physical(np.array([2e-6, 4e-5]), SimpleNamespace(shape=turning.shape)) == {
         "compliance_m_per_N": 2e-6, "turning_rad_per_N": 4e-5, "relaxation_s": 0.02, "offset_m": -0.05,
     }  # fmt: skip
     # Steps and finer shapes stay on their side of the gimbal.
     assert all(less.shape["offset_m"] < 0.0 for less, _, size in shape_steps(turning) if size > 0.0)
-    finer = sorted({c.shape["offset_m"] for c in other_shapes(turning, finer=True)})
+    finer = sorted(
+        {c.shape["offset_m"] for c in in_shapes(turning, CAUSES[turning.cause].finer(turning.shape), 1)}
+    )
     assert finer == pytest.approx([-0.1, -0.07, -0.05, -0.035, -0.025])
 
 
-@pytest.mark.parametrize("robot", [0, 1])
-def test_grasp_play(case, robot):
+@pytest.mark.parametrize(("robot", "contact_per_N"), [(0, 0.0), (1, 0.0), (1, 0.02)])
+def test_grasp_play(case, robot, contact_per_N):
     play = 2e-5
     f = force_of(case, robot)[0]
-    lead = Rotation.from_euler("ZYX", case.signals.theta[:, robot]).apply(play * np.clip(f / 0.4, -1.0, 1.0))
-    signals = adapted(case, robot, lead)
-    column = CAUSES["grasp_play"].columns(case.linear, robot, 0, {"force_N": 0.4})
-    check_pose(case, signals, column, [play], 0.02)
+    ahead = play * (np.clip(f / 0.4, -1.0, 1.0) + contact_per_N * f)
+    signals = adapted(case, robot, Rotation.from_euler("ZYX", case.signals.theta[:, robot]).apply(ahead))
+    shape = {"force_N": 0.4, "contact_per_N": contact_per_N}
+    column = CAUSES["grasp_play"].columns(case.linear, robot, 0, shape)
+    R_1i = case.shared.grasps.R_1i[robot]
+    # The force acts where the wrist is, which is ahead of where it holds the payload.
+    check_pose(case, signals, column, [play], 0.02, moment=np.cross(ahead @ R_1i.T, f @ R_1i.T))
 
 
 @pytest.mark.parametrize(("robot", "relaxation_s"), [(0, 0.2), (1, 0.01), (2, 0.03)])

@@ -9,6 +9,7 @@ from closed_loop import BASE_HEIGHT_M, ClosedLoop
 from effect_cases import example, team_with
 from mocobot_sim.scene.scene import build_team
 from mocobot_sim.scene.soft import spring_parameters
+from mocobot_sim.trial.actors import Stage
 from mocobot_sim.trial.trajectories import random_vias
 from mocobot_sim.trial.trial import run_trial
 from payload_mjcf import FIVE
@@ -66,6 +67,34 @@ def test_creep_is_velocity_times_time(robot):
         loop.run(1.0, home + 0.01 * np.array([seconds % 2, 0, 1]))
         moved = R_Wb.T @ (loop.data.body(f"omnid{robot}/chassis").xpos - start)
         np.testing.assert_allclose(moved, [*(velocity * (seconds - 0.01)), 0.0], rtol=0, atol=2e-9)
+
+
+def test_a_base_creeps_from_its_start_on():
+    """A trial of 0.9 s at 1 kHz: still until 0.4 s, then v t, but for the 10 ms in which it gathers speed."""
+    velocity, start_s = np.array([2e-4, -1e-4]), 0.4
+    scene = team_with("b", example("base_creep", 2, x_mps=velocity[0], y_mps=velocity[1], start_s=start_s))
+    loop = ClosedLoop(scene)
+    (actor,) = scene.effects[0].actors(1)
+    actor.start(
+        Stage(
+            loop.model,
+            loop.data,
+            loop.index,
+            loop.controller,
+            round(1 / loop.model.opt.timestep),
+            1,
+            900,
+        )
+    )
+    at = [int(loop.model.joint(f"omnid2/creep_{axis}").qposadr[0]) for axis in "xy"]
+    for tick in range(900):
+        loop.data.qfrc_applied[:] = 0.0
+        actor.act(tick)
+        loop.controller.update(scene.wrist_home_b, np.zeros((3, 3)))
+        mujoco.mj_step(loop.model, loop.data)
+        if tick == 399:
+            assert np.abs(loop.data.qpos[at]).max() < 1e-8
+    np.testing.assert_allclose(loop.data.qpos[at], velocity * (0.5 - 0.01), rtol=0.01)
 
 
 @pytest.mark.parametrize("timestep_s", [1e-3, 0.25e-3])
@@ -189,6 +218,15 @@ def test_play_and_flex_in_one_grasp_add_up():
     force = loop.forces_on_payload()[1]
     assert force[2] > 20
     assert _gap(loop, 2)[2] == pytest.approx(-1e-4 - 1e-6 * force[2], abs=2e-6)
+
+
+@ROBOT
+def test_the_ends_of_a_play_give_way(robot):
+    loop = ClosedLoop(team_with("a", example("grasp_play", robot, play_m=1e-4, contact_m_per_N=1e-6)))
+    loop.run(2.0, loop.scene.wrist_home_b)
+    force = loop.forces_on_payload()[robot - 1]
+    assert force[2] > 20
+    assert abs(_gap(loop, robot)[2]) == pytest.approx(1e-4 + 1e-6 * force[2], abs=2e-6)
 
 
 @ROBOT

@@ -70,6 +70,54 @@ def test_drag_resists_turning_with_minus_c_omega():
     assert np.abs(turn @ data.qvel).max() > 0.1
 
 
+def test_drag_with_the_squares_of_the_speeds():
+    """The fluid's generalised force is -q |v| v at the centre of mass and a moment -q_r |omega| omega."""
+    q, turning = 5.0, 2.0
+    squares = {"quadratic_Ns2_per_m2": q, "turning_quadratic_Nms2_per_rad2": turning}
+    scene = team_with("a", example("drag", coefficient_Ns_per_m=0.0, turning_Nms_per_rad=0.0, **squares))
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    data.qpos[:] = 0.02 * np.random.default_rng(0).standard_normal(model.nq)
+    data.qvel[:] = np.random.default_rng(1).standard_normal(model.nv)
+    mujoco.mj_forward(model, data)
+    along, turn = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    mujoco.mj_jacBodyCom(model, data, along, turn, model.body("omnid1/payload/payload").id)
+    v, omega = along @ data.qvel, turn @ data.qvel
+    expected = -q * np.linalg.norm(v) * along.T @ v - turning * np.linalg.norm(omega) * turn.T @ omega
+    assert np.abs(expected).max() > 1.0
+    np.testing.assert_allclose(data.qfrc_fluid, expected, atol=1e-6)
+
+
+def test_a_pendulum_of_two_lengths_and_a_second_one_swing_at_their_own_frequencies():
+    """Their inertia about each hinge, and how gravity turns them back, are those of points on strings."""
+    shape = {"length_m": 0.2, "across_length_m": 0.08, "heading_rad": 0.6}
+    second = {"second_length_m": 0.05, "second_share": 0.3}
+    model = team_with("a", example("slosh", **shape, **second)).compile()
+    data = mujoco.MjData(model)
+    for name, length_m in (
+        ("slosh_y", 0.2),
+        ("slosh_x", 0.08),
+        ("slosh_second_x", 0.05),
+        ("slosh_second_y", 0.05),
+    ):
+        joint = model.joint(f"omnid1/payload/{name}")
+        at, dof, full = int(joint.qposadr[0]), int(joint.dofadr[0]), np.zeros((model.nv, model.nv))
+        sides = []
+        for side in (1e-4, -1e-4):
+            data.qpos[:] = 0.0
+            data.qpos[at] = side
+            mujoco.mj_forward(model, data)
+            sides.append(data.qfrc_bias[dof])
+        mujoco.mj_fullM(model, data, full)
+        frequency = np.sqrt((sides[0] - sides[1]) / 2e-4 / full[dof, dof])
+        assert frequency == pytest.approx(np.sqrt(9.81 / length_m), rel=1e-4), name
+        x, y = np.array([[np.cos(0.6), np.sin(0.6), 0.0], [-np.sin(0.6), np.cos(0.6), 0.0]])
+        R = data.body("omnid1/payload/payload").xmat.reshape(3, 3)
+        np.testing.assert_allclose(R.T @ data.xaxis[joint.id], x if name[-1] == "x" else y, atol=1e-3)
+    masses = [float(model.body(f"omnid1/payload/{name}").mass[0]) for name in ("slosh", "slosh_second")]
+    np.testing.assert_allclose(masses, [0.21, 0.09])
+
+
 @pytest.mark.parametrize("robot", [1, 3])
 def test_a_tether_pulls_with_stiffness_times_distance(robot):
     """At rest the robots hold weight and tether; Newton's balance is MuJoCo's, the tether's force is Hooke's."""

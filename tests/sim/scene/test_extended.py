@@ -30,6 +30,7 @@ HIDDEN = (
     "push",
     "drag",
     "slosh",
+    "payload_mass",
 )
 
 

@@ -32,7 +32,7 @@ from mocobot_sim.trial.trial_log import TrialLog
 
 DESIGN = omnid_design()
 HOME = np.array([[0.0, 0.0, DESIGN.home_height_m]])
-ON_PAYLOAD = {"grasp_flex", "grasp_play", "tether", "payload_tether", "push", "drag", "slosh"}
+ON_PAYLOAD = {"grasp_flex", "grasp_play", "tether", "payload_tether", "push", "drag", "slosh", "payload_mass"}
 HEAVIER = {"proximal": 0.10, "rod": -0.08, "wrist": 0.06}
 
 

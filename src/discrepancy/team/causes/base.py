@@ -88,6 +88,14 @@ class Cause(base.Cause):
         """Shapes near a chosen one, for a second look."""
         return []
 
+    def further(self, shape: Shape) -> Sequence[Shape]:
+        """Shapes that have more to them, to be tried once the best of the plain ones is found."""
+        return []
+
+    def alike(self, shape: Shape) -> int:
+        """Of how many, told apart by their shapes alone, one of a shape is one; 0 where places are listed."""
+        return self.among
+
     def slope_step(self, name: str, number: float) -> float:
         """By how much a number of the shape is changed for slopes: a share of it."""
         return self.determined[name] * abs(number)
@@ -136,7 +144,8 @@ class Cause(base.Cause):
     def _moved(self, values: Array, context: Context, step: Array) -> dict[str, float]:
         """The effect's parameters a step away, in values and shape."""
         k = len(values)
-        further = dict(zip(self.determined, step[k:], strict=False))
+        named = (name for name in self.determined if name in context.shape)
+        further = dict(zip(named, step[k:], strict=False))
         shape = {name: x + further.get(name, 0.0) for name, x in context.shape.items()}
         return self.physical(values + step[:k], replace(context, shape=shape))
 

@@ -1,28 +1,50 @@
 """A base that creeps over the floor."""
 
+from typing import ClassVar
+
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.team.causes.base import Cause, stack
 
 
 class BaseCreep(Cause):
-    """The base moves at constant velocity (x, y in its own axes) during a trial."""
+    """The base moves at constant velocity (x, y in its own axes) during a trial; with ``start_s`` from then on only."""
 
     title = "creep of {base}"
     family = "base_creep"
     parameters = ("x_mps", "y_mps")
     tolerances = (2e-8, 2e-8)
     at = "robot"
+    determined: ClassVar = {"start_s": rules.CREEP_STEP_S}
     separate = "A longer recording at rest."
 
     def sentence(self, n):
+        start = f" from {n('start_s', 's')} into a trial" if n.values.get("start_s") else ""
         return (
-            f"the base creeps over the floor, by {n('x_mps', 'um/min', 6e7, signed=True)} along its x axis and "
+            f"the base creeps over the floor{start}, by {n('x_mps', 'um/min', 6e7, signed=True)} along its x axis and "
             f"{n('y_mps', 'um/min', 6e7, signed=True)} along its y axis"
         )
 
+    def further(self, shape):
+        return [] if shape else [{"start_s": start_s} for start_s in rules.CREEP_STARTS_S]
+
+    def finer(self, shape):
+        starts_s = [shape["start_s"] + x for x in rules.CREEP_FINER_S] if shape else []
+        return [{"start_s": start_s} for start_s in starts_s if start_s > 0.0]
+
+    def alike(self, shape):
+        return rules.CREEP_STARTS if shape else self.among
+
+    def slope_step(self, name, number):
+        return self.determined[name]
+
+    def physical(self, values, context):
+        return super().physical(values, context) | {"start_s": context.shape.get("start_s", 0.0)}
+
     def columns(self, trial, robot, joint, shape):
         time = trial.signals.time - trial.signals.time[0]
+        time = np.maximum(0.0, time - shape.get("start_s", 0.0))
         return stack(
             [
                 trial.of_pose(robot, None, np.outer(time, trial.bases.R[robot] @ np.eye(3)[k]))

@@ -1,16 +1,23 @@
 """A loose grasp."""
 
+import math
+from typing import ClassVar
+
 import numpy as np
+from scipy.ndimage import binary_dilation
 
 from discrepancy import rules
-from discrepancy.causes.free_while import free_while
+from discrepancy.causes.free_while import in_parts, pieces_while
 from discrepancy.team.causes.base import Cause, stack
+from discrepancy.team.linear.trial_linear import TrialLinear
+from estimator.arrays import Array
 
 
 class GraspPlay(Cause):
     """The payload rests against one end of its play on every axis of {i}, after the force on it.
 
-    Below ``force_N`` it has not settled there, and is anywhere between the ends.
+    Below ``force_N`` it has not settled there, and is anywhere between the ends. The ends may give way to the force:
+    by ``contact_per_N`` of the play, if that is in its shape.
     """
 
     title = "play in {grasp}"
@@ -18,33 +25,55 @@ class GraspPlay(Cause):
     parameters = ("play_m",)
     tolerances = (3e-6,)
     at = "grasp"
-    shapes = ({"force_N": rules.PLAY_FORCE_N},)
+    shapes = ({"force_N": rules.PLAY_FORCE_N}, {"force_N": rules.PLAY_FORCE_N, "contact_per_N": 0.0})
+    determined: ClassVar = {"contact_per_N": rules.PLAY_CONTACT_PER_N}
     positive = ("play_m",)
     form_share = rules.FRICTION_FORM_SHARE
     separate = "Internal forces of both signs at rest separate play from flexibility."
 
     def sentence(self, n):
-        return f"the grasp is loose by +-({n('play_m', 'um', 1e6)}) along each axis"
+        behind = ""
+        if n.values.get("contact_m_per_N"):
+            behind = f", and gives way by {n('contact_m_per_N', 'nm/N', 1e9)} behind"
+        return f"the grasp is loose by +-({n('play_m', 'um', 1e6)}) along each axis{behind}"
+
+    def slope_step(self, name, number):
+        return self.determined[name]  # from nought on, and straight
+
+    def possible(self, values, se, shape):
+        return super().possible(values, se, shape) and shape.get("contact_per_N", 0.0) >= 0.0
+
+    def physical(self, values, context):
+        play_m = float(values[0])
+        return {"play_m": play_m, "contact_m_per_N": play_m * context.shape.get("contact_per_N", 0.0)}
 
     def columns(self, trial, robot, joint, shape):
-        at_end = -np.clip(trial.data.wrench[:, robot, 3:] / shape["force_N"], -1.0, 1.0)
-        return stack([_moved(trial, robot, at_end)])
+        force = trial.data.wrench[:, robot, 3:]
+        end = np.clip(force / shape["force_N"], -1.0, 1.0)
+        behind = shape.get("contact_per_N", 0.0) * force
+        return stack([displaced(trial, robot, -end - behind, force)])
 
     def unknowns(self, trial, robot, joint, shape):
-        between = np.abs(trial.data.wrench[:, robot, 3:]) < shape["force_N"]
-        columns = []
+        force, rate_hz = trial.data.wrench[:, robot, 3:], trial.signals.rate_hz
+        around = np.ones(2 * math.ceil(rules.PLAY_OPEN_S * rate_hz) + 1, dtype=bool)
+        columns = [np.zeros((*trial.residual.shape, 0))]
         for axis in range(3):
-            along = (trial.bases.R[robot] @ trial.data.R_bi[:, robot])[..., axis, None]
-            places = free_while(between[:, axis], trial.signals.rate_hz, rules.PLAY_KNOTS_S)
-            for first in range(0, len(places), 16):  # not all at once, for the sake of memory
-                some = np.stack(places[first : first + 16], axis=-1)
-                moved = trial.of_pose(robot, None, along * some[:, None])
-                # Not before the first row or after the last.
-                columns.append(moved[..., moved.any(axis=(0, 1))])
-        return np.concatenate([np.zeros((*trial.residual.shape, 0)), *columns], axis=2)
+            small = np.abs(force[:, axis]) < rules.PLAY_OPEN_N
+            loose = np.asarray(binary_dilation(small, around), dtype=np.bool_)
+            places = in_parts(
+                pieces_while(loose, rate_hz, rules.PLAY_OPEN_KNOTS_S), rules.PLAY_COLUMNS_AT_A_TIME
+            )
+            along = trial.data.R_bi[:, robot, :, axis] @ trial.bases.R[robot].T
+            columns.append(trial.of_shifts(robot, along, places))
+        return np.concatenate(columns, axis=2)
 
 
-def _moved(trial, robot, offset):
-    """Rows of an offset of the grasp along the axes of {i}, shape (Q, 3)."""
+def displaced(trial: TrialLinear, robot: int, offset: Array, force: Array) -> Array:
+    """Rows of an offset of the grasp along the axes of {i} under a force in them [N], shape (Q, 3) each.
+
+    The force still goes through the gimbal's centre, of which the payload is off by so much.
+    """
     in_b = np.einsum("qij,qj->qi", trial.data.R_bi[:, robot], offset)
-    return trial.of_pose(robot, None, in_b @ trial.bases.R[robot].T)
+    moment = np.cross(force, offset) @ trial.shared.grasps.R_1i[robot].T
+    rows = trial.of_pose(robot, None, in_b @ trial.bases.R[robot].T)
+    return np.asarray(rows + trial.of_wrench(np.zeros_like(moment), moment))

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.signal import cont2discrete, lfilter
 
 from discrepancy import rules
+from discrepancy.causes.base import Shape
 from discrepancy.team.causes.base import Cause
 from estimator.arrays import Array
 from estimator.estimate.fusion import fuse
@@ -17,6 +18,11 @@ class Slosh(Cause):
 
     Small swings x relative to the point obey x'' + 2 zeta w x' + w^2 x = -a with w^2 = g / length; the payload feels
     -mass x'' at the point. Its weight and rigid part are in the payload's own parameters.
+
+    What swings may have two modes, of one damping ratio. With ``across_length_m`` in its shape it is Blackburn's
+    pendulum, as a liquid in a box that is longer than wide: it swings on ``length_m`` along ``heading_rad`` (from x of
+    {1}, about z) and on that across; the mass is one, so across it hangs from a point that is lower by the difference.
+    With ``second_length_m`` a share of the mass swings on that, from the same point.
     """
 
     title = "mass that swings in the payload"
@@ -29,61 +35,154 @@ class Slosh(Cause):
         for length in (0.2, 0.05, 0.065, 0.085, 0.11, 0.145, 0.27, 0.37, 0.5, 0.7)
         for damping in (0.05, 0.15)
     )
-    determined: ClassVar = {"length_m": 0.02, "damping_ratio": 0.1}
+    determined: ClassVar = {
+        "length_m": 0.02,
+        "damping_ratio": 0.1,
+        "across_length_m": 0.05,
+        "heading_rad": rules.SLOSH_TURN_RAD,
+        "second_length_m": 0.05,
+        "second_share": 0.1,
+    }
     separate = "Motion near the pendulum's own frequency."
 
     def sentence(self, n):
+        along = second = ""
+        if n.values.get("across_length_m"):
+            along = f" along {n('heading_rad', 'deg', 180.0 / np.pi, signed=True)} from x of {{1}}"
+            along += f" and on {n('across_length_m', 'm')} across,"
+        elif n.values.get("second_length_m"):
+            second = f", {n('second_share', '%', 100.0)} of it on {n('second_length_m', 'm')}"
         return (
-            f"a mass of {n('mass_kg', 'kg', signed=True)} swings in the payload on {n('length_m', 'm')} below "
-            f"{n.vector('point', 'm')} in {{1}} (damping ratio {n('damping_ratio', '')})"
+            f"a mass of {n('mass_kg', 'kg', signed=True)} swings in the payload on {n('length_m', 'm')}{along} below "
+            f"{n.vector('point', 'm')} in {{1}}{second} (damping ratio {n('damping_ratio', '')})"
         )
 
     def columns(self, trial, robot, joint, shape):
         motion = fuse(trial.data, trial.shared.grasps)
         com = trial.shared.pi[1:4] / trial.shared.pi[0]
-        omega, alpha = motion.omega, motion.alpha
-        R_b1 = trial.data.R_bi[:, 0]
-        # Accelerations of the point, and by how much more it is accelerated the further it is along each axis of {1}.
-        points = np.concatenate([com[:, None], np.eye(3)], axis=1)
-        driven = (skew(alpha) + skew(omega) @ skew(omega)) @ points
-        driven[..., 0] += motion.acceleration
-        across = R_b1[:, :2] @ driven
-        # Force on the payload, in {1}, of 1 kg that hangs there.
-        swing = _swing(across, trial.signals.rate_hz, trial.data.gravity_mps2, shape)
-        force = -np.swapaxes(R_b1[:, :2], 1, 2) @ swing
-        # Moving the point by r moves the force, and changes what drives the pendulum.
-        moment = skew(com) @ force
-        moment[..., 1:] -= skew(force[..., 0])  # r x f = -f x r
+        R_b1, gravity = trial.data.R_bi[:, 0], trial.data.gravity_mps2
+        turning = skew(motion.alpha) + skew(motion.omega) @ skew(motion.omega)
+        across_m = shape.get("across_length_m", shape["length_m"])
+        drop_m = shape["length_m"] - across_m
+        force, moment = np.zeros((2, len(R_b1), 3, 4))
+
+        def driven(way, point):
+            """How the point is accelerated along a way, and by how much more the further it is along each axis."""
+            at = turning @ np.concatenate([point[:, None], np.eye(3)], axis=1)
+            at[..., 0] += motion.acceleration
+            return np.einsum("qi,qik->qk", way, at)
+
+        def add(way, acceleration, point, sign=-1.0):
+            """Force on the payload, in {1}, of 1 kg that is accelerated along a way, and its moment."""
+            f = sign * way[:, :, None] * acceleration[:, None, :]
+            m = skew(point) @ f
+            m[..., 1:] -= skew(f[..., 0])  # moving the point by r moves the force: r x f = -f x r
+            force[:] += f
+            moment[:] += m
+
+        for way, length_m, down_m in zip(
+            _ways(R_b1, shape), (shape["length_m"], across_m), (0.0, drop_m), strict=True
+        ):
+            point = com - [0.0, 0.0, down_m]
+            drive = driven(way, point)
+            add(way, _swing(drive, trial.signals.rate_hz, gravity, shape | {"length_m": length_m}), point)
+            if down_m:  # its weight and rigid part, which is not where the payload's own parameters have it
+                add(way, drive, point)
+                add(way, driven(way, com), com, 1.0)
+                aside = -down_m * way[:, 2:] * way
+                moment[..., 0] -= gravity * np.cross(aside, R_b1[:, 2])
         return trial.of_wrench(force, moment)
 
     def finer(self, shape):
         longer = (0.85, 0.9, 0.95, 0.975, 0.9875, 1.0125, 1.025, 1.05, 1.1, 1.15)
         more = (0.5, 0.7, 0.85, 0.95, 1.05, 1.2, 1.4)  # swings less: the mass comes out larger
         length, damping = shape["length_m"], shape["damping_ratio"]
-        shapes = [(length * x, damping) for x in longer]
-        shapes += [(length * x, damping * y) for x in (0.98, 1.0, 1.02) for y in more]
-        return [
-            {"length_m": x, "damping_ratio": y}
-            for x, y in shapes
-            if rules.SLOSH_LENGTHS_M[0] <= x <= rules.SLOSH_LENGTHS_M[1] and y <= rules.SLOSH_MOST_DAMPED
+        near = [{"length_m": length * x} for x in longer]
+        near += [
+            {"length_m": length * x, "damping_ratio": damping * y} for x in (0.98, 1.0, 1.02) for y in more
         ]
+        near += _nearer_mode(shape) if len(shape) > 2 else []
+        return [other for other in (shape | moved for moved in near) if _tried(other)]
+
+    def further(self, shape):
+        return [x for x in (shape | more for more in _second_modes(shape)) if len(shape) == 2 and _tried(x)]
+
+    def alike(self, shape):
+        return rules.SLOSH_SECONDS if len(shape) > 2 else self.among
+
+    def slope_step(self, name, number):
+        return self.determined[name] if name == "heading_rad" else super().slope_step(name, number)
 
     def possible(self, values, se, shape):
         """A mass that is there, swings, and hangs within the payload's reach."""
         within = np.abs(values[1:]) <= rules.SLOSH_REACH_M * max(values[0], 0.0) + 2.0 * se[1:]
-        return bool(values[0] > 2.0 * se[0] and within.all() and shape["damping_ratio"] <= rules.SLOSH_SWINGS)
+        swings = shape["damping_ratio"] <= rules.SLOSH_SWINGS and 0.0 < shape.get("second_share", 0.5) < 1.0
+        return bool(values[0] > 2.0 * se[0] and within.all() and swings)
 
     def physical(self, values, context):
         mass = values[0] if abs(values[0]) > 1e-6 else 1e-6
         point = context.p_1c + values[1:] / mass
-        return {"mass_kg": float(mass), **context.shape} | {
+        plain = {"across_length_m": 0.0, "heading_rad": 0.0, "second_length_m": 0.0, "second_share": 0.0}
+        return {"mass_kg": float(mass), **plain, **context.shape} | {
             f"point_{axis}_m": float(x) for axis, x in zip("xyz", point, strict=True)
         }
 
 
+def _second_modes(shape: Shape) -> list[Shape]:
+    """What a shape with one mode lacks of one with two."""
+    length_m = shape["length_m"]
+    two: list[Shape] = [
+        {"across_length_m": length_m * x, "heading_rad": turn}
+        for x in rules.SLOSH_ACROSS
+        for turn in rules.SLOSH_HEADINGS_RAD
+    ]
+    return two + [
+        {"second_length_m": length_m * x, "second_share": rules.SLOSH_SHARE} for x in rules.SLOSH_SECOND
+    ]
+
+
+def _nearer_mode(shape: Shape) -> list[Shape]:
+    """Numbers of the second mode, changed."""
+    name = "across_length_m" if "across_length_m" in shape else "second_length_m"
+    near: list[Shape] = [{name: shape[name] * x} for x in rules.SLOSH_SECOND_FINER]
+    if name == "across_length_m":
+        return near + [{"heading_rad": shape["heading_rad"] + x} for x in rules.SLOSH_HEADINGS_FINER_RAD]
+    return near + [{"second_share": shape["second_share"] * x} for x in rules.SLOSH_SHARES_FINER]
+
+
+def _tried(shape: Shape) -> bool:
+    """Whether pendulums are so long and so little damped that it is worth a try."""
+    least, most = rules.SLOSH_LENGTHS_M
+    lengths = [x for name, x in shape.items() if name.endswith("length_m")]
+    share = shape.get("second_share", 0.5)
+    return all(least <= x <= most for x in lengths) and (
+        shape["damping_ratio"] <= rules.SLOSH_MOST_DAMPED and share < 1.0
+    )
+
+
+def _ways(R_b1: Array, shape: Shape) -> tuple[Array, Array]:
+    """Level directions of its swings in {1}, shapes (Q, 3): along and across; if they are alike, x and y of {b1}."""
+    if "across_length_m" not in shape:
+        return R_b1[:, 0], R_b1[:, 1]
+    turn = shape["heading_rad"]
+    c, s = (R_b1 @ [np.cos(turn), np.sin(turn), 0.0])[:, :2].T
+    c, s = (x[:, None] / np.hypot(c, s)[:, None] for x in (c, s))
+    x, y = R_b1[:, 0], R_b1[:, 1]
+    return c * x + s * y, c * y - s * x
+
+
 def _swing(a, rate_hz, gravity, shape):
     """Relative acceleration of the swinging mass [m/s^2] from rest, a linear between samples, shapes (Q, ...)."""
-    w = np.sqrt(gravity / shape["length_m"])
-    pendulum = [-1.0, 0.0, 0.0], [1.0, 2.0 * shape["damping_ratio"] * w, w**2]
+    share = shape.get("second_share", 0.0)
+    first = _mode(a, rate_hz, gravity, shape["length_m"], shape["damping_ratio"])
+    if not share:
+        return first
+    second = _mode(a, rate_hz, gravity, shape["second_length_m"], shape["damping_ratio"])
+    return (1.0 - share) * first + share * second
+
+
+def _mode(a: Array, rate_hz: float, gravity: float, length_m: float, damping_ratio: float) -> Array:
+    w = np.sqrt(gravity / length_m)
+    pendulum = [-1.0, 0.0, 0.0], [1.0, 2.0 * damping_ratio * w, w**2]
     discrete = cast("tuple[Array, Array, float]", cont2discrete(pendulum, 1.0 / rate_hz, method="foh"))
     return np.asarray(lfilter(np.ravel(discrete[0]), discrete[1], a, axis=0), dtype=np.float64)

@@ -39,9 +39,28 @@ class Reduction:
     sample: NDArray[np.intp]
 
     def __call__(self, x: Array) -> Array:
-        """Reduce samples, shape (Q, ...) -> (n, ...)."""
-        rows = self.operator @ x.reshape(len(x), int(np.prod(x.shape[1:])))
+        """Reduce samples, shape (Q, ...) -> (n, ...); what is there for a while only takes as long as that."""
+        flat = x.reshape(len(x), int(np.prod(x.shape[1:])))
+        if flat[0].any() or flat[-1].any() or not flat.size:
+            rows = self.operator @ flat
+        else:
+            rows = np.zeros((len(self.time), flat.shape[1]))
+            there = np.flatnonzero(flat.any(axis=1))
+            first = np.searchsorted(self._last, there[:1], side="left").sum()
+            last = np.searchsorted(self._first, there[-1:], side="right").sum()
+            for at in (slice(first, last), slice(self.moving, None)):
+                rows[at] = self.operator[at] @ flat
         return rows.reshape(len(self.time), *x.shape[1:])
+
+    @cached_property
+    def _first(self) -> NDArray[np.intp]:
+        """First sample of every moving row, shape (moving,)."""
+        return np.asarray(self.operator.indices[self.operator.indptr[: self.moving]], dtype=np.intp)
+
+    @cached_property
+    def _last(self) -> NDArray[np.intp]:
+        """Last sample of every moving row, shape (moving,)."""
+        return np.asarray(self.operator.indices[self.operator.indptr[1 : self.moving + 1] - 1], dtype=np.intp)
 
     def of_pieces(self, direction: Array, pieces: Iterable[tuple[slice, Array]]) -> Array:
         """Rows of values that are there for a while each, as many columns as show in any, shape (n, C, columns).
@@ -50,13 +69,17 @@ class Reduction:
             direction: what a value of 1 is in the samples, shape (Q, C).
             pieces: samples of an interval, and k columns of values there, shape (s, k).
         """
-        parts = [np.zeros((len(self.time), direction.shape[1], 0))]
-        for at, values in pieces:
+        blocks = ((at, direction[at, :, None] * values[:, None]) for at, values in pieces)
+        return self.of_blocks(blocks, direction.shape[1])
+
+    def of_blocks(self, blocks: Iterable[tuple[slice, Array]], channels: int) -> Array:
+        """The same of samples of an interval with all their channels, shape (s, C, k)."""
+        parts = [np.zeros((len(self.time), channels, 0))]
+        for at, samples in blocks:
             block = self._by_sample[:, at]
             rows, here = np.unique(block.indices, return_inverse=True)
-            weights = np.zeros((len(rows), values.shape[0]))
-            weights[here, np.repeat(np.arange(values.shape[0]), np.diff(block.indptr))] = block.data
-            samples = direction[at, :, None] * values[:, None]
+            weights = np.zeros((len(rows), len(samples)))
+            weights[here, np.repeat(np.arange(len(samples)), np.diff(block.indptr))] = block.data
             part = np.zeros((len(self.time), *samples.shape[1:]))
             part[rows] = (weights @ samples.reshape(len(samples), -1)).reshape(-1, *samples.shape[1:])
             parts.append(part[..., part.any(axis=(0, 1))])

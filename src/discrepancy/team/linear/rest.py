@@ -52,8 +52,9 @@ class Resting:
     def __call__(self, rng: np.random.Generator, draws: int = 1) -> Array:
         """Draws of it, shape (draws, n, C)."""
         out = []
-        for first in range(0, draws, rules.DRAWS_AT_A_TIME):
-            some = [self._drawn(rng) for _ in range(min(rules.DRAWS_AT_A_TIME, draws - first))]
+        most = draws_at_a_time(self._trial)
+        for first in range(0, draws, most):
+            some = [self._drawn(rng) for _ in range(min(most, draws - first))]
             out.append(self._rows(*(np.stack(part, axis=-1) for part in zip(*some, strict=True))))
         return np.concatenate(out)
 
@@ -96,6 +97,11 @@ class Resting:
         each = self._limit_Nm[moves] * rng.standard_normal((int(rests.max(initial=0)) + 1, *rests.shape[1:]))
         each[0] = 0.0
         return np.asarray(np.take_along_axis(each, rests, axis=0))
+
+
+def draws_at_a_time(trial: TrialLinear) -> int:
+    """How many draws of a trial's noise there may be together."""
+    return max(1, min(rules.DRAWS_AT_A_TIME, int(rules.DRAWN_TOGETHER // trial.s[..., 0].size)))
 
 
 def _numbered(signals: Signals, moves: str, slow: float) -> NDArray[np.intp]:

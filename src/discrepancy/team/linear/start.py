@@ -1,6 +1,6 @@
 """The unknowns before any cause: from the estimate, then Gauss-Newton on the whitened residual."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import cast
@@ -11,10 +11,11 @@ from joblib import Parallel, delayed
 from discrepancy import rules
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.team.linear.adjust import SignalNoise, with_adjusted_signals
+from discrepancy.team.linear.filed import held, rested
 from discrepancy.team.linear.inertia import held_inertia, inertia_is_like_held, is_another
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
-from discrepancy.team.linear.rest import Resting, Tolerances
+from discrepancy.team.linear.rest import Resting, Tolerances, draws_at_a_time
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear, filtered, linearise
 from estimator.arm.arms import Arms
@@ -104,11 +105,12 @@ def linearised_trials(
             for t, b in zip(linear, bases, strict=True)
         )
     pairs = zip(linear, sensed.signals, strict=True)
-    return tuple(with_adjusted_signals(*pair) for pair in pairs), sensed
+    return held(with_adjusted_signals(*pair) for pair in pairs), sensed
 
 
 def _processes(jobs: int) -> Parallel:
-    return Parallel(n_jobs=jobs, prefer="processes" if jobs > 1 else "threads")
+    prefer = "processes" if jobs > 1 else "threads"
+    return Parallel(n_jobs=jobs, prefer=prefer, return_as="generator")  # for the sake of memory
 
 
 def _linearised(
@@ -124,14 +126,14 @@ def _linearised(
     """Every trial, linearised where the unknowns are said to be."""
     tasks = zip(signals, bases, reductions, strict=True)
     each = run(delayed(linearise)(s, shared, b, arms, r, full=full) for s, b, r in tasks)
-    return tuple(cast("list[TrialLinear]", each))
+    return held(cast("Iterator[TrialLinear]", each))
 
 
 def sensed_in(linear: Sequence[TrialLinear], noise: Noise, tolerances: Tolerances, jobs: int = 1) -> Sensed:
     """What noise and friction at rest leave in the rows of linearised trials."""
     run = _processes(jobs)
     left = run(delayed(what_noise_leaves)(t, noise, k, tolerances) for k, t in enumerate(linear))
-    whitening, told = zip(*cast("list[tuple[Whitening, SignalNoise]]", left), strict=True)
+    whitening, told = zip(*cast("Iterator[tuple[Whitening, SignalNoise]]", left), strict=True)
     return Sensed(noise, tuple(whitening), tuple(told))
 
 
@@ -144,6 +146,7 @@ def what_noise_leaves(
     moving = trial.reduction.moving
     told = SignalNoise.of(draws, errors, moving)
     draws = draws + resting(rng, len(draws))
+    rested(trial)
     return Whitening.of(draws, moving, uneven=True), told
 
 
@@ -186,7 +189,7 @@ def noise_rows(trial: TrialLinear, noise: Noise, rng: np.random.Generator) -> tu
     """What the sensors' errors alone would leave: residuals (draws, n, C), and signals (draws, n, N, 21)."""
     out: list[tuple[Array, Array]] = []
     errors = noise.draws(trial.signals, rng, rules.NOISE_DRAWS)
-    while some := list(islice(errors, rules.DRAWS_AT_A_TIME)):  # not all at once, for the sake of memory
+    while some := list(islice(errors, draws_at_a_time(trial))):  # not all at once, for the sake of memory
         phi, theta, tau = (np.array([getattr(e, kind) for e in some]) for kind in ("phi", "theta", "tau"))
         out.append(trial.of_all_signals(phi, theta, tau))
     rows, signals = zip(*out, strict=True)

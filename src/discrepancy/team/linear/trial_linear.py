@@ -1,12 +1,15 @@
 """One trial, linearised: its residual, how robots' signals and unknowns move it, and its whitening."""
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
+from discrepancy.least_squares.stored import is_stored, stored
 from discrepancy.team.linear.jacobian import BySignals, by_signals
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals, with_rates
@@ -150,21 +153,52 @@ class TrialLinear:
         """
         several = () if displacement is None else displacement.shape[2:]
         total = np.zeros((len(self.signals.time), self.channels, *several))
-        for i in range(1, self.robots):
-            sign = 1.0 if robot == 0 else -1.0 if robot == i else 0.0
-            for at, x in ((6 * (i - 1), rotation), (6 * (i - 1) + 3, displacement)):
-                if x is not None:
-                    total[:, at : at + 3] += sign * x
+        if rotation is not None:
+            for i, sign in self._seen_by(robot):
+                total[:, 6 * i : 6 * i + 3] = sign * rotation
         if displacement is not None:
-            of_motion = self._of_wrong_motion(robot, -displacement.reshape(len(total), 3, -1))
-            total[:, -6:] = of_motion.reshape(len(total), 6, *several)
+            moved = displacement.reshape(len(total), 3, -1)
+            total += self._displaced(robot, moved, slice(None)).reshape(total.shape)
         return self.reduction(total)
 
-    def _of_wrong_motion(self, robot: int, moved: Array) -> Array:
-        """Wrench balance (Q, 6, k) of a wrist that moves apart from the payload, by (Q, 3, k) [m] in {b1}."""
+    def of_shifts(self, robot: int, along: Array, pieces: Iterable[tuple[slice, Array]]) -> Array:
+        """The same of displacements that are there for a while each, as many columns as show, shape (n, C, columns).
+
+        Args:
+            robot: index of the robot, from 0.
+            along: direction in {b1}, shape (Q, 3).
+            pieces: samples of an interval, and k columns of displacements there [m], shape (s, k).
+        """
+        reach = math.ceil(rules.SHIFT_REACH_S * self.signals.rate_hz)
+
+        def blocks() -> Iterator[tuple[slice, Array]]:
+            for at, values in pieces:
+                near = slice(max(at.start - reach, 0), min(at.stop + reach, len(along)))
+                moved = np.zeros((near.stop - near.start, 3, values.shape[1]))
+                moved[at.start - near.start : at.stop - near.start] = along[at, :, None] * values[:, None]
+                yield near, self._displaced(robot, moved, near)
+
+        return self.reduction.of_blocks(blocks(), self.channels)
+
+    def _displaced(self, robot: int, displacement: Array, at: slice) -> Array:
+        """Samples (s, C, k) of displacements (s, 3, k) [m] in {b1}, of some samples."""
+        out = np.zeros((len(displacement), self.channels, displacement.shape[2]))
+        for i, sign in self._seen_by(robot):
+            out[:, 6 * i + 3 : 6 * i + 6] = sign * displacement
+        out[:, -6:] = self._of_wrong_motion(robot, -displacement, at)
+        return out
+
+    def _seen_by(self, robot: int) -> list[tuple[int, float]]:
+        """Pose channels, by number, that a motion of robot i's grasp frame is seen by, and its sign."""
+        if robot:
+            return [(robot - 1, -1.0)]
+        return [(i, 1.0) for i in range(self.robots - 1)]
+
+    def _of_wrong_motion(self, robot: int, moved: Array, at: slice) -> Array:
+        """Wrench balance (s, 6, k) of a wrist that moves apart from the payload, by (s, 3, k) [m] in {b1}."""
         wrist = self.bases.R[robot].T @ moved
         rates = np.concatenate(with_rates(wrist, self.signals.rate_hz)[1:], axis=1)
-        return np.asarray(self.by_wrist[robot] @ rates)
+        return np.asarray(self.by_wrist[robot, at] @ rates)
 
     @cached_property
     def by_clocks(self) -> Array:
@@ -204,7 +238,7 @@ class TrialLinear:
                 for column, (v, v_dot) in ((k, (along, turned)), (3 + k, (none, along))):
                     needed = needed_wrench(motion, v @ G[:, at].T, v_dot @ G[:, at].T, none, self.shared.pi)
                     out[i, :, :, column] = -np.concatenate(needed, axis=1)
-        return out
+        return stored(out) if is_stored(self.s) else out
 
 
 def linearise(
