@@ -185,7 +185,7 @@ def _pair(form: Form, step_s: float) -> Torques:
 
 
 def _weekly(form: Form, step_s: float) -> Torques:
-    """Of no cause: a joint's friction that fades as the arm warms up."""
+    """A joint's friction that fades as the arm warms up."""
     return _timed(form, step_s, lambda t: np.exp(-t / 15.0))
 
 
@@ -293,7 +293,7 @@ CAUSE_OF: dict[str, str | None] = {
     "balancer": "counterbalance", "pair": "coupled_drive", "rotor": "armature", "load": "payload",
     "tilt": "gravity_direction", "warm_offset": "torque_offset", "gain": "torque_scale",
     "slow_torque": "torque_delay", "zero": "joint_zero", "yielding": "elasticity", "half_sine_push": "push",
-    "warming_friction": None, "quadratic_drag": None, "neighbour": None, "eccentric": None,
+    "warming_friction": "warming", "quadratic_drag": None, "neighbour": None, "eccentric": None,
 }  # fmt: skip
 """What the catalogue calls a form."""
 TYPICAL: dict[str, float] = {

@@ -186,7 +186,7 @@ class SerialRig(SerialRows, Rig):
         return shapes.others(candidate, self.hints, finer=finer)
 
     rigid = ("payload",)
-    shaped = ("friction",)
+    shaped = ("friction", "warming")
     curved = True
     layered = True
     normal = True

@@ -1,13 +1,17 @@
-"""Kinds of friction: one that fades while a joint runs warm, and a second kind beside friction of another shape."""
+"""Friction that fades while a joint runs warm, its shape, and a second kind beside friction of another shape."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.reshape import reshaped
+from discrepancy.least_squares.problem import Problem
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.diagnosis import diagnose_serial
 from discrepancy.serial.forms import forms_beside
@@ -63,6 +67,27 @@ def test_friction_of_the_stepper_fades() -> None:
         step(model, data, [effect], np.zeros(1))
     left = over * -np.expm1(-data.time / over) - data.time * over / until * -np.expm1(-until / over)
     assert data.qvel[0] == pytest.approx(20.0 - (0.2 * data.time + FADES["more_Nm"] * left) / 0.02, abs=0.02)
+
+
+def test_a_shape_is_told_from_the_noise_that_is_left(tmp_path: Path) -> None:
+    """Friction that stops within 5 mrad/s, taken for one that gives way by 4 mrad."""
+
+    def rubs(q: np.ndarray, v: np.ndarray, torque: np.ndarray, time: float) -> np.ndarray:
+        out = np.zeros_like(q)
+        out[2] = 0.4 * np.tanh(v[2] / 0.005)
+        return out
+
+    rig = SerialRig.of(nominal(tmp_path), [simulated(spec().compile(), 12, rubs, seconds=12.0)])
+    candidates = rig.candidates()
+    (index,) = (k for k, c in enumerate(candidates) if (c.cause, c.joint) == ("friction", 3))
+    soft = next(s for s in CAUSES["friction"].shapes(rig.hints, 2) if s.get("bristle_rad") == 4e-3)
+    candidates[index] = replace(candidates[index], shape=dict(soft))
+    problem = Problem.of(rig.rows(candidates), candidates)
+    nothing, wrong = Hypothesis.of(problem, ()), Hypothesis.of(problem, (index,))
+    found = reshaped(rig, wrong, nothing)
+    assert "bristle_rad" not in found.causes[0].shape
+    assert found.score > wrong.score + 5.0
+    assert found.fit.part(index)[0][0] == pytest.approx(0.4, abs=0.02)
 
 
 def test_what_another_shape_explains_is_no_second_kind(tmp_path: Path) -> None:
