@@ -80,9 +80,10 @@ TEAM_SHORTEST_PUSH_S = 0.1
 REST_RAD_PER_S, REST_NM_PER_S = 1e-3, 0.2
 """Below which a joint, or a spring's torque, rests and its friction is noise. Chosen: as of the causes."""
 REST_KNOTS_S = 0.05
-"""Between knots of friction at rest, which follows the load. Measured on three sets (0.17 N m in a joint, 0.17 inside a spring,
-0.24 in a gimbal): chi2/n 1.75, 1.25 and 1.24 with knots every 0.5 s (0.1 inside springs) and rests of less than 0.15 s
-left out; 1.12, 1.05 and 1.09 with 0.05 s; 1.07, 1.03 and 1.08 with every rest. Nothing faster passes the rows' filter."""
+"""Between knots of friction at rest, which follows the load. Measured on three sets (0.17 N m in a joint, 0.17 inside a
+spring, 0.24 in a gimbal): chi2/n 1.75, 1.25 and 1.24 with knots every 0.5 s (0.1 inside springs) and rests of less than
+0.15 s left out; 1.12, 1.05 and 1.09 with 0.05 s; 1.07, 1.03 and 1.08 with every rest. Nothing faster passes the filter
+of the rows."""
 SPRINGS_SCATTER = 0.05
 """Of stiffnesses, at most. Chosen: `mocobot calibrate` takes 0.02; makers sell springs within a tenth. One of all is
 hardly told from the payload's mass: without a limit, friction and a creep in a team at ten times its tolerances were
