@@ -20,8 +20,8 @@ class Drag(Cause):
     parameters = (
         "coefficient_Ns_per_m", "turning_Nms_per_rad", "quadratic_Ns2_per_m2", "turning_quadratic_Nms2_per_rad2",
     )  # fmt: skip
-    # The second: the first at half a metre. Air against a plate of 0.4 m^2 is within the first at the speeds of a carry,
-    # 0.2 m/s; with squares of speeds goes what is as much at 1 m/s, and at 1 rad/s.
+    # The second: the first at half a metre. A plate of 0.4 m^2 in air is within the first at 0.2 m/s, as a carry has;
+    # with squares of speeds goes what is as much at 1 m/s, and at 1 rad/s.
     tolerances = (0.05, 0.01, 0.05, 0.01)
     at = "payload"
     positive: ClassVar = parameters
