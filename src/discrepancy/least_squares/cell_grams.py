@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -145,9 +146,18 @@ class CellGrams:
         """The matrix of all columns from one of the first and one of the later, (B, B) and (W, E) -> (W, W)."""
         if not edge.shape[1]:
             return first
-        old, late = np.flatnonzero(self.old >= 0), np.flatnonzero(self.new >= 0)
-        out = np.empty((self.width, self.width))
-        out[np.ix_(old, old)] = first[np.ix_(self.old[old], self.old[old])]
+        late, out = np.flatnonzero(self.new >= 0), np.empty((self.width, self.width))
+        for rows, old_rows in self._runs:
+            for columns, old_columns in self._runs:
+                out[rows, columns] = first[old_rows, old_columns]
         out[:, late] = edge[:, self.new[late]]
         out[late] = out[:, late].T
         return out
+
+    @cached_property
+    def _runs(self) -> list[tuple[slice, slice]]:
+        """Successive columns that were successive at first, too: where they are now, and where they were."""
+        at = np.flatnonzero(self.old >= 0)
+        breaks = np.flatnonzero((np.diff(at) != 1) | (np.diff(self.old[at]) != 1)) + 1
+        runs = [run for run in np.split(at, breaks) if len(run)]
+        return [(slice(run[0], run[-1] + 1), slice(self.old[run[0]], self.old[run[-1]] + 1)) for run in runs]

@@ -13,12 +13,16 @@ Kind = TypeVar("Kind", bound=np.generic)
 
 
 def stored(x: NDArray[Kind]) -> NDArray[Kind]:
-    """The same numbers, to be read only, in a file that is gone with the array."""
+    """The same numbers, to be read only, in a file that is gone with the array; where no file can be, the array."""
     if not x.size or is_stored(x):
         return x
-    with tempfile.TemporaryFile() as file:
-        np.ascontiguousarray(x).tofile(file)
-        pages = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    try:
+        with tempfile.TemporaryFile() as file:
+            np.ascontiguousarray(x).tofile(file)
+            file.flush()
+            pages = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+    except OSError:  # a full disk
+        return x
     return np.frombuffer(pages, dtype=x.dtype).reshape(x.shape)
 
 

@@ -172,8 +172,7 @@ class TeamRows(Rig):
         linear = self.linear[trial]
         if not candidate.acts_in(trial):
             return np.broadcast_to(0.0, (*linear.residual.shape, len(candidate.parameters)))
-        key = (trial, *candidate.trace)
-        if key in self.kept:
+        if (key := (trial, *candidate.trace)) in self.kept:
             return self.kept[key]
         columns = self.whitening[trial](self._unwhitened(trial, candidate))
         rested(linear)

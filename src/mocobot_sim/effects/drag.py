@@ -43,9 +43,8 @@ class Drag(Effect):
         root = scene.root
         com = scene.compile().body("omnid1/payload/payload").ipos
         payload = root.find("body", "omnid1/payload/payload")
-        if any(linear):
-            site = payload.add("site", name="drag", pos=com.tolist(), group=4, size=[0.006])
-            still = root.worldbody.add("site", name="drag", group=4, size=[0.006])
+        site = payload.add("site", name="drag", pos=com.tolist(), group=4, size=[0.006])
+        still = root.worldbody.add("site", name="drag", group=4, size=[0.006])
         for k, name in enumerate(("x", "y", "z", "turn_x", "turn_y", "turn_z")):
             c = linear[k // 3]
             if not c:

@@ -7,7 +7,7 @@ import pytest
 
 from discrepancy import rules
 from discrepancy.least_squares.cells import Cells
-from discrepancy.least_squares.columns import Columns, held
+from discrepancy.least_squares.columns import Columns, held, portions
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.gram import orthonormal, project
 from discrepancy.least_squares.problem import Problem
@@ -64,6 +64,24 @@ def test_many_columns_are_kept_in_single_precision(case) -> None:
     assert not any(one.is_single for one in held([columns, columns], 2 * size))
     assert all(one.is_single for one in held([columns, columns], 2 * size - 1))
     assert all(one.is_single for one in held([columns.single(), columns], 2 * size - 1))
+
+
+def test_columns_that_are_made_in_portions_are_the_same(case, rng: np.random.Generator, monkeypatch) -> None:
+    """As many as take a given memory, at least one; a problem of them is that of all at once."""
+    x = case[1]
+    for most, widths in ((1, [2, 3, 2]), (5 * N * C * 8, [5, 2]), (5 * N * C * 8 + 1, [7])):
+        parts = list(portions([x[..., :2], x[..., 2:5], x[..., 5:]], most))
+        assert [part.shape[2] for part in parts] == widths
+        np.testing.assert_array_equal(np.concatenate(parts, axis=2), x)
+    rows = random_rows(rng)
+    whole = Problem.of(rows, CANDIDATES)
+    monkeypatch.setattr(rules, "PORTION_BYTES", 1)
+    made = Problem.of(rows, CANDIDATES)
+    assert len(made.columns[0].pieces) > 2
+    np.testing.assert_allclose(made.grams, whole.grams, atol=1e-10)
+    for t in whole.trials:
+        every = slice(None)
+        np.testing.assert_allclose(made.raw_columns(t, every), whole.raw_columns(t, every), atol=1e-12)
 
 
 def test_a_fit_of_single_precision_is_the_same(rng: np.random.Generator, monkeypatch) -> None:

@@ -9,10 +9,16 @@ import pytest
 
 import mocobot
 from discrepancy import rules
+from discrepancy.least_squares.problem import Problem
+from discrepancy.team.causes import CAUSES
 from discrepancy.team.diagnosis import diagnose_team
+from discrepancy.team.linear.filed import is_filed
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.parts import LaterPart, parted, said
+from discrepancy.team.rig import TeamRig
+from discrepancy.team.tolerances import read_tolerances
+from estimator.estimate.payload import estimate_payload
 
 FRICTION = {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.02}
 
@@ -49,6 +55,35 @@ def test_parts_have_all_rows_of_the_whole_once(recording) -> None:
     np.testing.assert_array_equal(kept, recording.time[Signals.of(recording).keep])
     rows = sum(len(Reduction.of(Signals.of(part)).time) for part in parts[:3])
     assert abs(rows - len(Reduction.of(Signals.of(recording)).time)) <= 2
+
+
+@pytest.mark.slow
+def test_what_is_in_files_is_the_same(recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Linear trials, columns and their Gram matrices: as in memory, to single precision of the columns."""
+    known, causes = read_tolerances(None), ("joint_friction", "sea_bias", "grasp_play", "slosh")
+    left_out = [name for name in CAUSES if name not in causes]
+    estimate, made = estimate_payload([recording]), []
+    for most in (rules.LINEAR_BYTES, 0.0):
+        for name in ("LINEAR_BYTES", "ROWS_BYTES"):
+            monkeypatch.setattr(rules, name, most)
+        rig = TeamRig.of([recording], estimate, known, left_out)
+        candidates = rig.candidates()
+        made.append((rig, Problem.of(rig.rows(candidates), candidates)))
+    (whole, problem), (filed, same) = made
+    assert [is_filed(rig.linear[0]) for rig in (whole, filed)] == [False, True]
+    assert [p.columns[0].is_single for p in (problem, same)] == [False, True]
+    scale = np.sqrt(np.diag(problem.grams[0]))
+    np.testing.assert_allclose(
+        same.grams[0] / np.outer(scale, scale), problem.grams[0] / np.outer(scale, scale), atol=1e-6
+    )
+    for candidate in whole.candidates()[::5]:
+        for one in (candidate, *whole.refinements(candidate)[:1]):
+            for _ in range(2):  # made, and kept
+                np.testing.assert_array_equal(filed.columns(one)[0], whole.columns(one)[0])
+            np.testing.assert_array_equal(filed.unknowns(one)[0], whole.unknowns(one)[0])
+    values = [(c, 0.01 * c.units) for c in candidates if c.cause in ("sea_bias", "joint_friction")][:4]
+    nothing = np.zeros(problem.shared), [np.zeros(whole.local_unknowns)]
+    np.testing.assert_array_equal(filed.residual(*nothing, values)[0], whole.residual(*nothing, values)[0])
 
 
 @pytest.mark.slow

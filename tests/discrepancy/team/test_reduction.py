@@ -176,7 +176,7 @@ def test_values_that_are_there_for_a_while_are_columns_of_their_rows(trial, redu
 
 
 @pytest.mark.parametrize(
-    "span", [(0, 0), (1, 2), (190, 1400), (700, 760), (1000, 1001), (1990, 1999), (1, 1999)]
+    "span", [(0, 0), (1, 2), (190, 1400), (700, 761), (1000, 1001), (1640, 1700), (1, 1999)]
 )
 def test_what_is_there_for_a_while_is_reduced_as_a_dense_matrix_does_it(span):
     """Holds before, in and after it, too; nothing at all is no rows but noughts."""

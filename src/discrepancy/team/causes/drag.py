@@ -20,8 +20,9 @@ class Drag(Cause):
     parameters = (
         "coefficient_Ns_per_m", "turning_Nms_per_rad", "quadratic_Ns2_per_m2", "turning_quadratic_Nms2_per_rad2",
     )  # fmt: skip
-    # The second: the first at half a metre; the third: air against a plate of 0.4 m^2, and the fourth, at half a metre.
-    tolerances = (0.05, 0.01, 0.3, 0.04)
+    # The second: the first at half a metre. Air against a plate of 0.4 m^2 is within the first at the speeds of a carry,
+    # 0.2 m/s; with squares of speeds goes what is as much at 1 m/s, and at 1 rad/s.
+    tolerances = (0.05, 0.01, 0.05, 0.01)
     at = "payload"
     positive: ClassVar = parameters
     clipped: ClassVar = parameters
@@ -46,12 +47,12 @@ class Drag(Cause):
         motion = fuse(trial.data, trial.shared.grasps)
         twist: Array = trial.data.twist.reshape(len(trial.s), -1) @ fusion_matrix(trial.shared.grasps).T
         com = trial.shared.pi[1:4] / trial.shared.pi[0]
-        velocity = twist[:, 3:] + np.cross(motion.omega, com)
+        velocity = np.asarray(twist[:, 3:] + np.cross(motion.omega, com), dtype=np.float64)
         still = np.zeros_like(velocity)
 
-        def resisting(force: Array, moment: Array) -> Array:
-            force, moment = -np.asarray(force, dtype=np.float64), -np.asarray(moment, dtype=np.float64)
-            return trial.of_wrench(force, np.cross(com, force).astype(np.float64) + moment)
+        def resisting(velocity: Array, omega: Array) -> Array:
+            moment = np.asarray(-np.cross(com, velocity) - omega, dtype=np.float64)
+            return trial.of_wrench(-velocity, moment)
 
         columns = [resisting(velocity, still), resisting(still, motion.omega)]
         if not shape:

@@ -23,7 +23,6 @@ class SeaHysteresis(Friction):
     positive = ("friction_Nm",)
     moves = "tau"
     sign = -1.0
-    knots_s = rules.SPRING_REST_KNOTS_S
     gives = "presliding_Nm"
     gives_range = rules.PRESLIDING_RANGE_NM
     separate = (

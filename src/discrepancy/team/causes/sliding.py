@@ -26,7 +26,6 @@ class Friction(Cause):
     Attributes:
         moves: the signal.
         sign: of the torque's reading while that grows.
-        knots_s: between knots of what is open while it holds.
         gives: name of what it gives way by, in units of the signal.
         gives_range: of that.
     """
@@ -43,7 +42,6 @@ class Friction(Cause):
     form_share, form_size = rules.FRICTION_FORM_SHARE, rules.FRICTION_FORM_NM
     moves: ClassVar[Literal["phi", "theta", "tau"]] = "phi"
     sign: ClassVar[float] = 1.0
-    knots_s: ClassVar[float] = rules.REST_KNOTS_S
     gives: ClassVar[str] = "presliding_rad"
     gives_range: ClassVar[tuple[float, float]] = rules.PRESLIDING_RANGE_RAD
 
@@ -89,8 +87,7 @@ class Friction(Cause):
             before = slice(0, slips[0] if len(slips) else len(state))
             rests = [(before, np.ones((before.stop, 1)))] if before.stop else []
         else:
-            shortest_s = min(self.knots_s, rules.TEAM_SHORTEST_REST_S)
-            rests = pieces_while(state < 1.0, rate_hz, self.knots_s, shortest_s)
+            rests = pieces_while(state < 1.0, rate_hz, rules.REST_KNOTS_S)
         return trial.reduction.of_pieces(self.direction(trial, robot, joint), rests)
 
     def _sliding(self, signals: Signals, robot: int, joint: int, shape: Shape) -> Sequence[Array]:

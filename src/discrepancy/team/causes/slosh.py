@@ -85,7 +85,7 @@ class Slosh(Cause):
         ):
             point = com - [0.0, 0.0, down_m]
             drive = driven(way, point)
-            add(way, _swing(drive, trial.signals.rate_hz, gravity, shape | {"length_m": length_m}), point)
+            add(way, _swing(drive, trial.signals.rate_hz, gravity, {**shape, "length_m": length_m}), point)
             if down_m:  # its weight and rigid part, which is not where the payload's own parameters have it
                 add(way, drive, point)
                 add(way, driven(way, com), com, 1.0)
@@ -102,10 +102,12 @@ class Slosh(Cause):
             {"length_m": length * x, "damping_ratio": damping * y} for x in (0.98, 1.0, 1.02) for y in more
         ]
         near += _nearer_mode(shape) if len(shape) > 2 else []
-        return [other for other in (shape | moved for moved in near) if _tried(other)]
+        return [other for other in ({**shape, **moved} for moved in near) if _tried(other)]
 
     def further(self, shape):
-        return [x for x in (shape | more for more in _second_modes(shape)) if len(shape) == 2 and _tried(x)]
+        return [
+            x for x in ({**shape, **more} for more in _second_modes(shape)) if len(shape) == 2 and _tried(x)
+        ]
 
     def alike(self, shape):
         return rules.SLOSH_SECONDS if len(shape) > 2 else self.among
