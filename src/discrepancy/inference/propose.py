@@ -222,11 +222,10 @@ def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hy
     """
     index = new.free[-1]
     shaped = problem.candidates[index]
-    unknowns = rig.unknowns(shaped)
-    if not any(u.shape[2] for u in unknowns):
-        return new
     start = problem.with_noise(new.problem.power, new.problem.spread)
-    along, opened, other = start.along(unknowns), start, new
+    along, opened, other = start.along(rig.unknowns(shaped)), start, new
+    if not any(len(one.opened.stretch) for one in along):
+        return new
     for _ in range(2):  # its size is found with them, and is theirs
         size = abs(float(other.fit.part(index)[0][0] * shaped.units[0]))
         opened = start.with_open(shaped.key, along, max(size, shaped.parameters[0].tolerance))

@@ -242,7 +242,8 @@ class Problem:
         return tuple(self._along(t, u) for t, u in enumerate(unknowns))
 
     def _along(self, trial: int, unknowns: Array) -> Along:
-        cells, one = self.cells[trial], Opened.of(unknowns, 1.0, self.spectrum(trial, unknowns))
+        cells, left = self.cells[trial], self.spectrum(trial, unknowns) if unknowns.size else unknowns
+        one = Opened.of(unknowns, 1.0, left)
         one = one.single() if self.columns[trial].is_single else one
         edge = np.swapaxes(self._grams(trial, one.basis), 1, 2)
         return Along(one, edge, cells.grams(one.basis, one.basis))
@@ -259,9 +260,7 @@ class Problem:
 
     def with_unknowns(self, key: Key, unknowns: Sequence[Array], size: float) -> Problem:
         """The same from its columns, shape (n, C, k) per trial."""
-        if key in self.opened or not any(u.shape[2] for u in unknowns):
-            return self
-        return self.with_open(key, self.along(unknowns), size)
+        return self if key in self.opened else self.with_open(key, self.along(unknowns), size)
 
     def without_unknowns(self, keep: Collection[Key]) -> Problem:
         """The problem without what causes other than those to keep leave open."""

@@ -212,7 +212,8 @@ class TeamRows(Rig):
 
     def unknowns(self, candidate: Candidate) -> Sequence[Array]:
         of, place, shape = CAUSES[candidate.cause].unknowns, indices(candidate), candidate.shape
-        return self._each(lambda t: self.whitening[t](of(self.linear[t], *place, shape)), len(self.linear))
+        # Each when it is asked for: there may be hundreds a trial.
+        return OneByOne(lambda t: self.whitening[t](of(self.linear[t], *place, shape)), len(self.linear))
 
     def rows(self, candidates: Sequence[Candidate]) -> Iterator[Rows]:
         for t, linear in enumerate(self.linear):
