@@ -62,7 +62,7 @@ CELL_BANDS = 6
 """Octaves of frequency in which the noise has powers of its own, of every group of channels and trial. Chosen."""
 ROWS_BYTES = 1.5e8
 """Of all columns of all trials, from which they are kept in files and in single precision. Chosen: memory; those of
-five minutes of three robots. The verdicts on two sets of the tuning pool are the same to 1e-9 either way."""
+five minutes of three robots. On two sets of the tuning pool chi2/n is the same to 1e-5 either way."""
 PORTION_BYTES = 1e8
 """Of a trial's columns that are made together. Chosen: memory; all of a minute of three robots are a quarter."""
 WIDENED_ROWS = 1024
