@@ -1,6 +1,7 @@
 """Dry friction while it slides, and when it does not."""
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -79,15 +80,16 @@ class Friction(Cause):
     def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Array:
         """What it does while it holds: any torque that it takes, as it changes with the load.
 
-        Where it gives way, how far it had before it slips for the first time.
+        Where it gives way, how far it had before it slips for the first time; and as no bristles do so in proportion,
+        it may be another by a share of its limit until it slips.
         """
         rate_hz, state = trial.signals.rate_hz, np.abs(self._sliding(trial.signals, robot, joint, shape)[0])
+        rests = pieces_while(state < 1.0 - 1e-9, rate_hz, rules.REST_KNOTS_S)
         if self.gives in shape:
             slips = np.flatnonzero(state >= 1.0 - 1e-9)
             before = slice(0, slips[0] if len(slips) else len(state))
-            rests = [(before, np.ones((before.stop, 1)))] if before.stop else []
-        else:
-            rests = pieces_while(state < 1.0, rate_hz, rules.REST_KNOTS_S)
+            rests = ((at, rules.PRESLIDING_OPEN_SHARE * values) for at, values in rests)
+            rests = chain([(before, np.ones((before.stop, 1)))] if before.stop else [], rests)
         return trial.reduction.of_pieces(self.direction(trial, robot, joint), rests)
 
     def _sliding(self, signals: Signals, robot: int, joint: int, shape: Shape) -> Sequence[Array]:
