@@ -107,7 +107,7 @@ class Bench:
         return np.sqrt(self.weight) * change
 
     def fitted(self, effect: Effect) -> tuple[np.ndarray, float]:
-        """Values of an effect's own cause that fit its trace best, and the share of the trace that they leave.
+        """Values of an effect's own cause, those that show, that fit its trace best, and the share that they leave.
 
         Only unknowns that any recording has are fitted beside it.
         """
@@ -118,6 +118,8 @@ class Bench:
         else:
             own = self.columns[:, span]
             units = np.ones(own.shape[1])
+        shown = own.any(axis=0)  # some parameters have columns in other shapes only
+        own, units = own[:, shown], units[shown]
         both = np.hstack([own, unknowns])
         scale = 1.0 / np.linalg.norm(both, axis=0)
         values = np.linalg.lstsq(both * scale, trace, rcond=1e-9)[0] * scale

@@ -82,7 +82,7 @@ SIMULATE = {
     "--seed=": "--seed is ''; it must be a whole number",
     "--effect rust": "effect 'rust' does not exist; the effects are phi_zero, theta_zero, ...",
     "--effect joint_fricton:robot=2": "effect 'joint_fricton' does not exist; did you mean 'joint_friction'?",
-    "--effect drag:c=1": "effect 'drag:c=1': there is no 'c'; drag takes coefficient, turning",
+    "--effect drag:c=1": "effect 'drag:c=1': there is no 'c'; drag takes coefficient, turning, quadratic, ...",
     "--effect drag:coefficient=1e4": "drag: coefficient_Ns_per_m is 10000.0; it must be a finite number ...",
     "--effect phi_zero:robot=4,joint=1,zero=0.1": "phi_zero: robot is 4; the team has robots 1 .. 3",
     "--effect push:trial=2,start=1,duration=1,force_x=5": "push: trial is 2; the trials are 1 .. 1",

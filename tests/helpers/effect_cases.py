@@ -17,7 +17,7 @@ SIZES: dict[str, dict[str, Any]] = {
     "grasp_flex": {
         "compliance_m_per_N": 1e-6, "relaxation_s": 0.0, "turning_rad_per_N": 0.0, "offset_m": 0.0,
     },
-    "grasp_play": {"play_m": 1e-4},
+    "grasp_play": {"play_m": 1e-4, "contact_m_per_N": 0.0},
     "sea_bias": {"bias_Nm": 0.05},
     "sea_scale": {"scale": 0.02},
     "sea_hardening": {"cubic_Nm_per_rad3": 200.0},

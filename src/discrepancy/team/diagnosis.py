@@ -15,6 +15,7 @@ from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.traces import traces
 from discrepancy.team.words import TeamWords
+from estimator.errors import InputError
 from estimator.estimate.payload import estimate_payload
 from estimator.recording.model import Recording
 
@@ -52,7 +53,12 @@ def diagnose_team(
     say("estimate")
     # Another mass in some trials is a cause of its own, unless it is none to be named.
     estimate = estimate_payload(recordings, compare_masses="payload_mass" in excluded, withhold=False)
-    check_estimate(estimate)
+    try:
+        check_estimate(estimate)
+    except InputError:
+        # Where nothing fits, masses that differ are the clearer sentence.
+        estimate_payload(recordings, compare_masses=True, withhold=False)
+        raise
     known = read_tolerances(None) if tolerances is None else tolerances
     say("linearise")
     rig = TeamRig.of(parted(recordings), estimate, known, excluded, jobs)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, ClassVar
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.effects.slides import LOOSE_ARMATURE_KG, add_slides, grasp_body, widened
 from mocobot_sim.effects.solver import precise
-from mocobot_sim.scene.soft import spring_parameters
 from mocobot_sim.solver_settings import STIFF
 
 if TYPE_CHECKING:
@@ -44,6 +43,8 @@ class GraspPlay(Effect):
             solreflimit=IMPACT, solimplimit=STIFF["solimp"],
         )  # fmt: skip
         if self.contact_m_per_N:
+            from mocobot_sim.scene.soft import spring_parameters
+
             model = scene.compile()
             for slide in slides:
                 dof = model.joint(slide.full_identifier).dofadr[0]

@@ -20,6 +20,8 @@ UNITS = {
     "m_per_N": "m/N",
     "N_per_m": "N/m",
     "Ns_per_m": "N s/m",
+    "Ns2_per_m2": "N s^2/m^2",
+    "Nms2_per_rad2": "N m s^2/rad^2",
     "N": "N",
     "kgps": "kg/s",
     "kg": "kg",

@@ -11,7 +11,7 @@ from estimator.errors import InputError
 from mocobot_sim.effects.catalogue import EFFECTS, make_effect
 from mocobot_sim.effects.spec import allowed, paragraphs, parse_effect
 
-RATIOS = {"scale", "damping_ratio", "amplitude", "number", "second"}
+RATIOS = {"scale", "damping_ratio", "second_share", "amplitude", "number", "second"}
 """Parameters without a unit; of a law they have that of what it acts on."""
 
 
@@ -38,9 +38,9 @@ def test_what_is_listed_is_what_the_class_takes(cause: str) -> None:
         if each.unit:
             assert each.name.startswith(f"{each.short}_")
         else:
-            known = {"robot", "joint", "trial"} | RATIOS | set(kind.texts)
+            known = {"robot", "joint", "trial", "last_trial"} | RATIOS | set(kind.texts)
             assert each.name in known, "a unit that nobody knows"
-    words = ("1, 2, ...", "1 to 3", "any number", "a name")
+    words = ("0, 1, ...", "1, 2, ...", "1 to 3", "any number", "a name")
     assert {n.name: n.range for n in numbers if n.range not in words} == {
         name: f"{low:g} to {high:g}" for name, (low, high) in kind.ranges.items()
     }
