@@ -67,9 +67,7 @@ class Rig(ABC):
     reshaped: ClassVar[tuple[str, ...]] = ()  # the same, where what is healthy would have that shape, too
     behind: ClassVar[tuple[str, ...]] = ()  # causes with a shape that shows only beside what they leave open
     curved: ClassVar[bool] = False  # whether exact residuals hold what is within its tolerance, too
-    layered: ClassVar[bool] = (
-        False  # whether causes explain so much that their shapes show only beside all others
-    )
+    layered: ClassVar[bool] = False  # whether the shapes of causes show beside all others only
     normal: ClassVar[bool] = False  # whether a simulation has what is normal as the other trials have it
 
     @property

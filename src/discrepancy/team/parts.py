@@ -32,7 +32,7 @@ def said(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """A note for each that is cut."""
     return tuple(
         f"{recording.name} is long, and was looked at in {count} parts; only the commands of its first part were "
-        "simulated again."
+        "simulated again, and where trials are numbered, parts count."
         for recording in recordings
         if (count := len(_edges(recording)) - 1) > 1
     )

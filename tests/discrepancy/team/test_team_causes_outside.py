@@ -387,6 +387,18 @@ def check_pose(case, signals, column, values, tolerance=0.01, balance_tolerance=
     np.testing.assert_allclose(got[:, 12:], moved, atol=balance_tolerance * np.abs(moved).max() + 1e-7)
 
 
+def test_a_base_that_crept_before_a_later_part_of_a_recording_creeps_on(case):
+    """The part keeps the recording's clock; how far the base is by then is in its own place."""
+    cause, late = CAUSES["base_creep"], replace(case.signals, time=case.signals.time + 180.0)
+    later = replace(case.linear, signals=late)
+    whole, begun = (cause.columns(later, 1, 0, shape) for shape in ({}, {"start_s": 170.0}))
+    moved = begun - whole
+    gone = case.linear.of_pose(
+        1, None, np.outer(np.full(len(late.time), 10.0), case.bases.R[1] @ np.eye(3)[0])
+    )
+    np.testing.assert_allclose(moved[..., 0], gone, atol=1e-6 * np.abs(begun).max())
+
+
 @pytest.mark.parametrize("start_s", [0.0, 4.3])
 @pytest.mark.parametrize("robot", [0, 1, 2])
 def test_base_creep(case, robot, start_s):

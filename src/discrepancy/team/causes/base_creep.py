@@ -43,8 +43,9 @@ class BaseCreep(Cause):
         return super().physical(values, context) | {"start_s": context.shape.get("start_s", 0.0)}
 
     def columns(self, trial, robot, joint, shape):
-        time = trial.signals.time - trial.signals.time[0]
-        time = np.maximum(0.0, time - shape.get("start_s", 0.0))
+        # From the recording's begin, of which this may be a later part; a constant way is the bases' own.
+        since = shape.get("start_s", trial.signals.time[0])
+        time = np.maximum(0.0, trial.signals.time - since)
         return stack(
             [
                 trial.of_pose(robot, None, np.outer(time, trial.bases.R[robot] @ np.eye(3)[k]))
