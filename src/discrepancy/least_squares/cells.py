@@ -78,6 +78,11 @@ class Cells:
         pairs = ((a[at], b[at]) for at in spans)
         return np.array([flat_gram(one, one if same else other) for one, other in pairs])
 
+    def numbers(self, cell: int) -> NDArray[np.intp]:
+        """Which numbers of flattened rows (n C, ...) are in a cell."""
+        stop = int(self.sizes[: cell + 1].sum())
+        return self._by_cell[stop - int(self.sizes[cell]) : stop]
+
     @cached_property
     def _by_cell(self) -> NDArray[np.intp]:
         """The numbers in the order of their cells."""

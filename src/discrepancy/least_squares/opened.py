@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.least_squares.cells import Cells
 from discrepancy.least_squares.gram import added_up, gram_of
 from discrepancy.least_squares.stored import stored
 from estimator.arrays import Array
@@ -92,23 +93,26 @@ class Along:
 
     Attributes:
         opened: the unknowns, of any size.
+        cells: of the trial.
         edge: products of their basis with all columns over every cell, shape (K, r, columns).
-        inside: of their basis with itself, shape (K, r, r).
     """
 
     opened: Opened
+    cells: Cells
     edge: Array
-    inside: Array
 
     def of_size(self, size: float) -> tuple[Opened, Array, Callable[[int], Array]]:
         """The unknowns of a size, what lies along them (r, columns), what a cell's Gram matrix loses, one by one."""
         opened = replace(self.opened, size=size)
         # All cells together: the transform is orthonormal.
         shares = opened.shrink[:, None] * self.edge.sum(axis=0)
+        basis = opened.basis.reshape(self.cells.index.size, -1)
 
         def lost(cell: int) -> Array:
-            cross = shares.T @ (self.edge[cell] - 0.5 * (self.inside[cell] @ shares))
-            return np.asarray(cross + cross.T)
+            # Products of the basis with itself, cell by cell, would be the largest arrays of a diagnosis.
+            taken = basis[self.cells.numbers(cell)] @ shares
+            cross = shares.T @ self.edge[cell]
+            return np.asarray(cross + cross.T - taken.T @ taken)
 
         return opened, shares, lost
 

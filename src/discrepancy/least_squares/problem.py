@@ -242,11 +242,10 @@ class Problem:
         return tuple(self._along(t, u) for t, u in enumerate(unknowns))
 
     def _along(self, trial: int, unknowns: Array) -> Along:
-        cells, left = self.cells[trial], self.spectrum(trial, unknowns) if unknowns.size else unknowns
-        one = Opened.of(unknowns, 1.0, left)
+        one = Opened.of(unknowns, 1.0, self.spectrum(trial, unknowns) if unknowns.size else unknowns)
         one = one.single() if self.columns[trial].is_single else one
         edge = np.swapaxes(self._grams(trial, one.basis), 1, 2)
-        return Along(one, edge, cells.grams(one.basis, one.basis))
+        return Along(one, self.cells[trial], edge)
 
     def with_open(self, key: Key, along: Sequence[Along], size: float) -> Problem:
         """The problem with what a cause leaves open, whose values scatter by ``size``."""
