@@ -50,6 +50,7 @@ class _Parts:
         weight: numbers that its prior counts for, shape (groups,).
         own: which groups are spreads of free candidates.
         kinds: group of every kind with a spread.
+        like: of every kind at one place, groups of the kinds of its family at several, which it is as far off as.
     """
 
     grams: Array
@@ -61,6 +62,7 @@ class _Parts:
     weight: Array
     own: NDArray[np.bool_]
     kinds: Mapping[str, int]
+    like: Mapping[int, Indices]
 
 
 def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN_ROUNDS) -> Learnt:
@@ -131,11 +133,12 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
         group[problem.shared + at] = len(names)
         names.append(at)
         least.append(1.0)
-        # One of a kind cannot scatter: it is off or not. Nor may what was left out take what it is not to be named for.
-        scatters = len(members) > 1 and not problem.candidates[members[0]].hidden
-        most.append(widest([problem.candidates[i] for i in members]) if scatters else 1.0)
-        weight.append(rules.SPREAD_NUMBERS)
+        # What was left out may not take what it is not to be named for.
+        named = not problem.candidates[members[0]].hidden
+        most.append(widest([problem.candidates[i] for i in members]) if named else 1.0)
+        weight.append(rules.SPREAD_NUMBERS if len(members) > 1 else 0.0)
         own.append(False)
+    like = _like(problem, kinds, groups)
     for index in free:
         at = np.r_[problem.columns_of(index)]
         group[problem.shared + at] = len(names)
@@ -158,9 +161,23 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
         np.take(gram, at, out=one, mode="clip")
     parts = _Parts(
         grams, upper, np.concatenate(sizes).astype(float), group[used], np.array(least), np.array(most),
-        np.array(weight), np.array(own, dtype=bool), groups,
+        np.array(weight), np.array(own, dtype=bool), groups, like,
     )  # fmt: skip
     return names, parts
+
+
+def _like(
+    problem: Problem, kinds: Mapping[str, Sequence[int]], groups: Mapping[str, int]
+) -> dict[int, Indices]:
+    """Groups of the kinds at several places whose family a kind at one place shares, by the group of that."""
+    family = {kind: problem.candidates[members[0]].family for kind, members in kinds.items()}
+    return {
+        groups[kind]: np.array(
+            [groups[k] for k in kinds if family[k] == family[kind] and len(kinds[k]) > 1], dtype=np.intp
+        )
+        for kind, members in kinds.items()
+        if len(members) == 1
+    }
 
 
 def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Array]:
@@ -201,8 +218,23 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
     squares = np.bincount(parts.group[~shared], solution[~shared] ** 2, minlength=len(spread))
     variance = np.bincount(parts.group[~shared], np.diag(covariance)[~shared], minlength=len(spread))
     told = np.clip(numbers - variance / spread**2, 1e-6, None)
-    spread_next = np.sqrt((squares + parts.weight) / (told + parts.weight))
-    return evidence, np.maximum(power_next, rules.LEAST_POWER), np.clip(spread_next, parts.least, parts.most)
+    spread_next = np.clip(np.sqrt((squares + parts.weight) / (told + parts.weight)), parts.least, parts.most)
+    for one, others in parts.like.items():
+        spread_next[one] = min(_middle(spread_next[others], told[others]), parts.most[one])
+    return evidence, np.maximum(power_next, rules.LEAST_POWER), spread_next
+
+
+def _middle(spreads: Array, weights: Array) -> float:
+    """Weighted median of some spreads; of none, that within tolerances.
+
+    One of a kind cannot show how its kind scatters: it is off or not. Where robots rub ten times as much as they
+    should, though, a payload that is dragged ten times as much is no news: it is as far off as its family is.
+    """
+    if not len(spreads):
+        return 1.0
+    order = np.argsort(spreads)
+    passed = np.cumsum(weights[order])
+    return float(spreads[order][np.searchsorted(passed, 0.5 * passed[-1])])
 
 
 def worth_a_spread(one: Learnt, kind: str) -> float:

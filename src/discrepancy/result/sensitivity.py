@@ -51,7 +51,9 @@ def _judged(explanation: Explanation) -> Iterator[tuple[Candidate, dict[str, Any
     for members in kinds.values():
         told = [_along(*fit.told(index)) for index in members]
         scatters = problem.has_tolerance(members[0]) and len(members) > 1
-        spreads = np.ones(1) if problem.has_tolerance(members[0]) else np.zeros(1)
+        spreads = np.zeros(1)
+        if problem.has_tolerance(members[0]):  # of one alone, as its family scatters
+            spreads = problem.spread[problem.columns_of(members[0])][:1]
         if scatters:
             most_spread = widest([problem.candidates[index] for index in members])
             spreads = LEARNT[most_spread >= LEARNT]

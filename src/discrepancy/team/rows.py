@@ -122,17 +122,19 @@ class TeamRows(Rig):
             return None
         resting = resting_of(nothing)
         same = all(0.5 < resting[kind] / self.resting[kind] < 2.0 for kind in resting)
-        if there.curvature < rules.STRAIGHT_CHI2_PER_N:
-            if same:
-                return None
+        straight = there.curvature < rules.STRAIGHT_CHI2_PER_N
+        if straight and same:
+            return None
+        sensed = self.sensed
+        if not same:  # what noise leaves where what rests scatters so; the sensors are the same
             limits = limits_of(self.tolerances, resting)
-            louder = sensed_in(self.linear, self.noise, limits, self.jobs)  # robots and unknowns stay
-            return replace(self, sensed=louder, resting=resting, kept={})
+            sensed = sensed_in(self.linear, self.noise, limits, self.jobs, sensed)
+        resting = self.resting if same else resting
+        if straight:  # robots and unknowns stay
+            return replace(self, sensed=sensed, resting=resting, kept={})
         moved = [replace(r, metadata=replace(r.metadata, units=there.units)) for r in self.recordings]
-        sensed, resting = (self.sensed, self.resting) if same else (None, resting)
-        return self._at(
-            moved, there.shared, self.tolerances, self.excluded, there.origin, resting, self.jobs, sensed
-        )
+        limits = self.tolerances, self.excluded
+        return self._at(moved, there.shared, *limits, there.origin, resting, self.jobs, sensed)
 
     @property
     def trials(self) -> Sequence[str]:

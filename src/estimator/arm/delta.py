@@ -7,6 +7,7 @@ Everything here follows from that constraint; docs/method-arm.md has the derivat
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,7 +23,7 @@ LEG_DIRECTIONS: Array = np.array([[1.0, 0.0, 0.0], [-0.5, _HALF_SQRT_3, 0.0], [-
 _Z: Array = np.array([0.0, 0.0, 1.0])
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LegGeometry:
     """The rods and knees of one Delta at given driven angles; vectors in {b}, axis -2 counts the legs.
 
@@ -40,6 +41,19 @@ class LegGeometry:
     knee_d1: Array
     knee_d2: Array
     leverage: Array
+
+    @cached_property
+    def across_rods(self) -> Array:
+        """The wrist's displacement per rod_k . dh_k, the inverse of the rods [1/m], shape (..., 3, 3)."""
+        return np.asarray(np.linalg.inv(self.rod), dtype=np.float64)
+
+    def along_rods(self, force: Array) -> Array:
+        """Driven torques [N m] of a force at the wrist in {b} [N]: (dh/dphi)^T force, shape (..., 3)."""
+        return self.leverage * np.einsum("...ij,...i->...j", self.across_rods, force)
+
+    def at_wrist(self, torque: Array) -> Array:
+        """The force at the wrist in {b} [N] that driven torques make [N m], (dh/dphi)^-T torque, shape (..., 3)."""
+        return np.einsum("...ki,...k->...i", self.rod, torque / self.leverage)
 
 
 def forward_kinematics(phi: ArrayLike, design: Arm) -> Array:
@@ -93,7 +107,7 @@ def jacobian(phi: ArrayLike, design: Arm) -> Array:
 
 def jacobian_of(legs: LegGeometry) -> Array:
     """dh/dphi [m/rad], shape (..., 3, 3), from rod_k . dh = leverage_k dphi_k."""
-    return _solve(legs.rod, legs.leverage[..., None] * np.eye(3))
+    return np.asarray(legs.across_rods * legs.leverage[..., None, :])
 
 
 def length_jacobians(legs: LegGeometry, phi: ArrayLike, design: Arm) -> tuple[Array, Array, Array]:
@@ -108,7 +122,7 @@ def length_jacobians(legs: LegGeometry, phi: ArrayLike, design: Arm) -> tuple[Ar
     """
     phi = np.asarray(phi, dtype=float)
     along = np.cos(phi)[..., None] * LEG_DIRECTIONS + np.sin(phi)[..., None] * _Z
-    inverse = np.asarray(np.linalg.inv(legs.rod), dtype=np.float64)
+    inverse = legs.across_rods
     length = np.broadcast_to(np.asarray(design.rod_length_m, dtype=np.float64), phi.shape)
     by_radius: Array = inverse * np.sum(legs.rod * LEG_DIRECTIONS, axis=-1)[..., None, :]
     by_proximal: Array = inverse * np.sum(legs.rod * along, axis=-1)[..., None, :]
@@ -127,11 +141,10 @@ def wrist_motion(legs: LegGeometry, phi_dot: ArrayLike, phi_ddot: ArrayLike) -> 
         phi_ddot: driven accelerations [rad/s^2], shape (..., 3).
     """
     phi_dot, phi_ddot = np.asarray(phi_dot, dtype=float), np.asarray(phi_ddot, dtype=float)
-    h_dot = _solve(legs.rod, (legs.leverage * phi_dot)[..., None])[..., 0]
+    h_dot = np.einsum("...ij,...j->...i", legs.across_rods, legs.leverage * phi_dot)
     rod_dot = h_dot[..., None, :] - legs.knee_d1 * phi_dot[..., None]
     curvature = np.sum(legs.rod * legs.knee_d2, axis=-1) * phi_dot**2 - np.sum(rod_dot**2, axis=-1)
-    h_ddot = _solve(legs.rod, (legs.leverage * phi_ddot + curvature)[..., None])[..., 0]
-    return h_dot, h_ddot
+    return h_dot, np.einsum("...ij,...j->...i", legs.across_rods, legs.leverage * phi_ddot + curvature)
 
 
 def inverse_kinematics(h: ArrayLike, design: Arm) -> Array:
@@ -171,10 +184,6 @@ def _leg_triangles(h: Array, design: Arm) -> tuple[Array, Array, Array]:
         outward, up = np.sum(reach * LEG_DIRECTIONS, axis=-1), reach[..., 2]
         distance = np.hypot(outward, up)
         return outward, up, (l1**2 + np.sum(reach**2, axis=-1) - l2**2) / (2.0 * l1 * distance)
-
-
-def _solve(matrix: Array, right: Array) -> Array:
-    return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
 
 
 def _sphere_centres(phi: Array, design: Arm) -> Array:

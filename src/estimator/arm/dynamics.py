@@ -8,9 +8,9 @@ f_i = (dh/dphi)^-T tau_i for a massless arm; the motor's rotor lies before the s
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.arm.delta import LEG_DIRECTIONS, LegGeometry, jacobian_of, leg_geometry, wrist_motion
+from estimator.arm.delta import LEG_DIRECTIONS, LegGeometry, leg_geometry, wrist_motion
 from estimator.arm.design import Triple
-from estimator.arm.gimbal import angular_motion, rate_matrix, rotation
+from estimator.arm.gimbal import angular_motion, moment_about_axes, rate_matrix, rotation
 from estimator.arm.numbers import Arm
 from estimator.arrays import Array
 from estimator.so3 import cross
@@ -22,6 +22,7 @@ def arm_torque(
     phi_ddot: ArrayLike,
     design: Arm,
     legs: LegGeometry | None = None,
+    h_ddot: Array | None = None,
 ) -> Array:
     """Spring torques that move the unloaded arm [N m], positive raising the link, shape (..., 3).
 
@@ -33,7 +34,7 @@ def arm_torque(
         phi_dot: rates [rad/s], shape (..., 3).
         phi_ddot: accelerations [rad/s^2], shape (..., 3).
         design: the robot's numbers.
-        legs: geometry at ``phi``, if it is known.
+        legs, h_ddot: geometry at ``phi`` and the wrist's acceleration [m/s^2], if they are known.
 
     Raises:
         InputError: no wrist position exists at some configuration.
@@ -41,7 +42,7 @@ def arm_torque(
     phi, phi_dot, phi_ddot = (np.asarray(a, dtype=float) for a in (phi, phi_dot, phi_ddot))
     legs = leg_geometry(phi, design) if legs is None else legs
     g = design.gravity_mps2 * np.asarray(design.up)
-    _, h_ddot = wrist_motion(legs, phi_dot, phi_ddot)
+    h_ddot = wrist_motion(legs, phi_dot, phi_ddot)[1] if h_ddot is None else h_ddot
     knee_ddot = legs.knee_d1 * phi_ddot[..., None] + legs.knee_d2 * (phi_dot**2)[..., None]
     # Consistent mass of a slender rod: T = m/6 (va.va + va.vb + vb.vb), half of the weight at each end.
     wrist_ddot = h_ddot[..., None, :]
@@ -56,7 +57,7 @@ def arm_torque(
         design.proximal_inertia_kgm2 * phi_ddot
         + link_weight
         + np.sum(legs.knee_d1 * at_knee, axis=-1)
-        + np.einsum("...ij,...i->...j", jacobian_of(legs), wrist_force)
+        + legs.along_rods(wrist_force)
     )
 
 
@@ -84,6 +85,7 @@ def wrench_on_payload(
     design: Arm,
     legs: LegGeometry | None = None,
     R_bi: Array | None = None,
+    h_ddot: Array | None = None,
 ) -> Array:
     """Wrench (m_i [N m], f_i [N]) of the robot ON the payload at the origin of {i}, in {i}, shape (..., 6).
 
@@ -94,18 +96,17 @@ def wrench_on_payload(
         theta: gimbal angles (theta_z, theta_y, theta_x) [rad], rates and accelerations, each (..., 3).
         tau: spring torques [N m], shape (..., 3).
         design: the robot's numbers.
-        legs, R_bi: geometry at ``phi`` and orientation at ``theta``, if they are known.
+        legs, R_bi, h_ddot: geometry at ``phi``, orientation at ``theta`` and the wrist's acceleration [m/s^2], if
+            they are known.
 
     Raises:
         InputError: no wrist position exists at some configuration.
     """
     legs = leg_geometry(phi[0], design) if legs is None else legs
     R_bi = rotation(theta[0]) if R_bi is None else R_bi
-    jacobian_T = np.swapaxes(jacobian_of(legs), -1, -2)
-    f_b = np.linalg.solve(jacobian_T, (np.asarray(tau) - arm_torque(*phi, design, legs))[..., None])[..., 0]
+    f_b = legs.at_wrist(np.asarray(tau) - arm_torque(*phi, design, legs, h_ddot))
     f_i = np.einsum("...ji,...j->...i", R_bi, f_b)
-    axes_T = np.swapaxes(rate_matrix(theta[0]), -1, -2)
-    m_i = -np.linalg.solve(axes_T, gimbal_torque(*theta, design)[..., None])[..., 0]
+    m_i = -moment_about_axes(theta[0], gimbal_torque(*theta, design))
     return np.concatenate([m_i, f_i], axis=-1, dtype=np.float64)
 
 

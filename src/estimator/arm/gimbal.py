@@ -74,6 +74,21 @@ def angular_motion(theta: ArrayLike, theta_dot: ArrayLike, theta_ddot: ArrayLike
     return omega, _apply(e, theta_ddot) + _apply(rate_matrix_dot(theta, theta_dot), theta_dot)
 
 
+def moment_about_axes(theta: ArrayLike, torque: ArrayLike) -> Array:
+    """The moment in {i} [N m] with given components about the gimbal's axes: E^-T torque, shape (..., 3).
+
+    Args:
+        theta: gimbal angles (theta_z, theta_y, theta_x) [rad], shape (..., 3).
+        torque: about the axes, in that order [N m], shape (..., 3).
+    """
+    (_, cy, cx), (_, sy, sx) = _cos_sin(theta)
+    about_z, about_y, about_x = np.moveaxis(np.asarray(torque, dtype=float), -1, 0)
+    # {i} before its turn about x: there y is the middle axis, and the first axis is (-sin, 0, cos) of theta_y.
+    up = (about_z + sy * about_x) / cy
+    x, y, z = np.broadcast_arrays(about_x, cx * about_y + sx * up, cx * up - sx * about_y)
+    return np.stack([x, y, z], axis=-1)
+
+
 def _apply(matrix: Array, vector: ArrayLike) -> Array:
     return np.einsum("...ij,...j->...i", matrix, np.asarray(vector, dtype=float))
 

@@ -69,7 +69,7 @@ def joints_of(h: ArrayLike, force: ArrayLike, design: OmnidDesign) -> tuple[Arra
         raise InputError(fault[1])
     phi = inverse_kinematics(h, design)
     legs = leg_geometry(phi, design)
-    return phi, legs.leverage * np.linalg.solve(np.swapaxes(legs.rod, -1, -2), force[..., None])[..., 0]
+    return phi, legs.along_rods(force)
 
 
 def driven_motion(legs: LegGeometry, h_dot: ArrayLike, h_ddot: ArrayLike) -> tuple[Array, Array]:

@@ -52,7 +52,7 @@ def arm_data(
     omega, omega_dot = angular_motion(theta[0], theta[1], theta[2])
     v = np.einsum("...ji,...j->...i", R_bi, h_dot)
     v_dot = np.einsum("...ji,...j->...i", R_bi, h_ddot) - cross(omega, v)
-    wrench = wrench_on_payload(phi, theta, tau, arm, legs, R_bi)
+    wrench = wrench_on_payload(phi, theta, tau, arm, legs, R_bi, h_ddot)
     return ArmData(
         R_bi,
         legs.h,

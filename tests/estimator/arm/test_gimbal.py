@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from estimator.arm.gimbal import angular_motion, rate_matrix, rate_matrix_dot, rotation
+from estimator.arm.gimbal import angular_motion, moment_about_axes, rate_matrix, rate_matrix_dot, rotation
 from omnid_design import DESIGN
 
 RNG = np.random.default_rng(3)
@@ -71,3 +71,14 @@ def test_leading_axes_are_kept():
     assert rotation(theta)[1, 2, 3] == pytest.approx(rotation(theta[1, 2, 3]), abs=0)
     omega, omega_dot = angular_motion(theta, RATES[:24].reshape(theta.shape), theta)
     assert omega.shape == omega_dot.shape == theta.shape
+
+
+def test_moment_about_axes_has_the_given_components_about_them():
+    torques = np.array([1.0, -2.0, 0.5]) + 0.1 * ANGLES
+    moments = moment_about_axes(ANGLES, torques)
+    about = np.einsum("qij,qi->qj", rate_matrix(ANGLES), moments)
+    assert about == pytest.approx(torques, abs=1e-12)
+    one = moment_about_axes(ANGLES, np.eye(3)[1])  # of all angles at once
+    assert np.einsum("qij,qi->qj", rate_matrix(ANGLES), one) == pytest.approx(
+        np.tile(np.eye(3)[1], (len(ANGLES), 1))
+    )

@@ -6,7 +6,7 @@ import numpy as np
 
 from discrepancy.team.causes.base import Cause, stack
 from estimator.arrays import Array
-from estimator.estimate.fusion import fuse, fusion_matrix
+from estimator.estimate.fusion import fusion_matrix
 
 
 class Drag(Cause):
@@ -44,7 +44,7 @@ class Drag(Cause):
         return [] if shape else [{"powers": 2.0}]
 
     def columns(self, trial, robot, joint, shape):
-        motion = fuse(trial.data, trial.shared.grasps)
+        motion = trial.motion
         twist: Array = trial.data.twist.reshape(len(trial.s), -1) @ fusion_matrix(trial.shared.grasps).T
         com = trial.shared.pi[1:4] / trial.shared.pi[0]
         velocity = np.asarray(twist[:, 3:] + np.cross(motion.omega, com), dtype=np.float64)

@@ -4,7 +4,7 @@ import numpy as np
 
 from discrepancy.team.causes.base import Cause
 from discrepancy.team.causes.sliding import Friction
-from estimator.arm.gimbal import rate_matrix
+from estimator.arm.gimbal import moment_about_axes
 from estimator.rigid_team.slots import THETA
 
 
@@ -22,6 +22,6 @@ class GimbalFriction(Friction):
 
     def direction(self, trial, robot, joint):
         """The payload is turned by less than the balance believes: an outside moment against the axis."""
-        axes_T = np.swapaxes(rate_matrix(trial.s[:, robot, THETA]), -1, -2)
-        moment = np.linalg.inv(axes_T)[..., joint] @ trial.shared.grasps.R_1i[robot].T
+        moment = moment_about_axes(trial.s[:, robot, THETA], np.eye(3)[joint])
+        moment = moment @ trial.shared.grasps.R_1i[robot].T
         return np.concatenate([np.zeros((len(moment), trial.channels - 3)), moment], axis=1)

@@ -1,5 +1,6 @@
 """A mass that swings in the payload."""
 
+from functools import lru_cache
 from typing import ClassVar, cast
 
 import numpy as np
@@ -9,7 +10,6 @@ from discrepancy import rules
 from discrepancy.causes.base import Shape
 from discrepancy.team.causes.base import Cause
 from estimator.arrays import Array
-from estimator.estimate.fusion import fuse
 from estimator.so3 import skew
 
 
@@ -58,7 +58,7 @@ class Slosh(Cause):
         )
 
     def columns(self, trial, robot, joint, shape):
-        motion = fuse(trial.data, trial.shared.grasps)
+        motion = trial.motion
         com = trial.shared.pi[1:4] / trial.shared.pi[0]
         R_b1, gravity = trial.data.R_bi[:, 0], trial.data.gravity_mps2
         turning = skew(motion.alpha) + skew(motion.omega) @ skew(motion.omega)
@@ -184,7 +184,15 @@ def _swing(a, rate_hz, gravity, shape):
 
 
 def _mode(a: Array, rate_hz: float, gravity: float, length_m: float, damping_ratio: float) -> Array:
+    return np.asarray(
+        lfilter(*_filter(rate_hz, gravity, length_m, damping_ratio), a, axis=0), dtype=np.float64
+    )
+
+
+@lru_cache(maxsize=256)
+def _filter(rate_hz: float, gravity: float, length_m: float, damping_ratio: float) -> tuple[Array, Array]:
+    """Numerator and denominator, the same in every trial."""
     w = np.sqrt(gravity / length_m)
     pendulum = [-1.0, 0.0, 0.0], [1.0, 2.0 * damping_ratio * w, w**2]
     discrete = cast("tuple[Array, Array, float]", cont2discrete(pendulum, 1.0 / rate_hz, method="foh"))
-    return np.asarray(lfilter(np.ravel(discrete[0]), discrete[1], a, axis=0), dtype=np.float64)
+    return np.ravel(discrete[0]), discrete[1]

@@ -6,9 +6,8 @@ import numpy as np
 
 from discrepancy.laws.place import Place
 from discrepancy.team.linear.trial_linear import TrialLinear
-from estimator.arm.gimbal import rate_matrix
+from estimator.arm.gimbal import moment_about_axes
 from estimator.arrays import Array
-from estimator.estimate.fusion import fuse
 from estimator.rigid_team.slots import PHI, PHI_DDOT, PHI_DOT, TAU, THETA, THETA_DDOT, THETA_DOT
 
 
@@ -31,9 +30,8 @@ def directions_at(linear: TrialLinear, place: Place) -> Array:
         sign = 1.0 if place.name == "tau reading" else -1.0  # a torque beside the spring is not read
         return sign * linear.J.at(robot, TAU, at)[:, None, None, :, joint]
     if place.name == "gimbal torque":
-        axes_T = np.swapaxes(rate_matrix(linear.s[at][:, robot, THETA]), -1, -2)
-        unit = np.tile(np.eye(3)[joint][:, None], (len(at), 1, 1))
-        moment = np.linalg.solve(axes_T, unit)[..., 0] @ linear.shared.grasps.R_1i[robot].T
+        moment = moment_about_axes(linear.s[at][:, robot, THETA], np.eye(3)[joint])
+        moment = moment @ linear.shared.grasps.R_1i[robot].T
         return _wrench(linear, np.zeros_like(moment), moment)[:, None, None]
     if place.name in ("base position", "grasp position"):
         turned = linear.bases.R[robot] if place.name == "base position" else None
@@ -77,7 +75,7 @@ def _moved(linear: TrialLinear, robot: int, axis: Array, base: Array | None) -> 
 def _of_payload(linear: TrialLinear, name: str) -> list[Array]:
     """Residual of every component of an error of the payload, shape (n, 3 or 1, C) each."""
     at = linear.reduction.sample
-    motion = fuse(linear.data, linear.shared.grasps)
+    motion = linear.motion
     R = linear.data.R_bi[at][:, 0]
     com = linear.shared.pi[1:4] / linear.shared.pi[0]
     none = np.zeros((len(at), 3))

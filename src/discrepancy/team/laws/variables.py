@@ -8,7 +8,6 @@ from discrepancy.laws.variable import TIME, Kind, Variable
 from discrepancy.team.linear.signals import with_rates
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
-from estimator.estimate.fusion import fuse
 from estimator.rigid_team.slots import PHI, PHI_DDOT, PHI_DOT, TAU, THETA, THETA_DDOT, THETA_DOT
 
 _JOINTS: dict[str, tuple[slice, str, str, str, Kind]] = {
@@ -60,7 +59,7 @@ def signals_of(linear: TrialLinear) -> dict[str, Array]:
         for i in range(linear.robots):
             for j in range(3):
                 out[f"{name}_{i + 1}_{j + 1}"] = linear.s[:, i, slots][:, j]
-    motion = fuse(linear.data, linear.shared.grasps)
+    motion = linear.motion
     position = linear.data.p_bi[:, 0]
     vectors = {
         "payload_position": position,

@@ -11,7 +11,7 @@ from joblib import Parallel, delayed
 from discrepancy import rules
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.team.linear.adjust import SignalNoise, with_adjusted_signals
-from discrepancy.team.linear.filed import held, rested
+from discrepancy.team.linear.filed import held, is_filed, rested
 from discrepancy.team.linear.inertia import held_inertia, inertia_is_like_held, is_another
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
@@ -54,11 +54,13 @@ class Sensed:
         noise: resolution of the sensors.
         whitening: of every trial.
         signals: what the residual tells of it in the signals, of every trial.
+        draws: what the sensors' noise alone leaves in the rows of every trial, (D, n, C) each; None where it is long.
     """
 
     noise: Noise
     whitening: tuple[Whitening, ...]
     signals: tuple[SignalNoise, ...]
+    draws: tuple[Array | None, ...] = ()
 
 
 def linearised_trials(
@@ -129,25 +131,38 @@ def _linearised(
     return held(cast("Iterator[TrialLinear]", each))
 
 
-def sensed_in(linear: Sequence[TrialLinear], noise: Noise, tolerances: Tolerances, jobs: int = 1) -> Sensed:
-    """What noise and friction at rest leave in the rows of linearised trials."""
-    run = _processes(jobs)
-    left = run(delayed(what_noise_leaves)(t, noise, k, tolerances) for k, t in enumerate(linear))
-    whitening, told = zip(*cast("Iterator[tuple[Whitening, SignalNoise]]", left), strict=True)
-    return Sensed(noise, tuple(whitening), tuple(told))
+def sensed_in(
+    linear: Sequence[TrialLinear],
+    noise: Noise,
+    tolerances: Tolerances,
+    jobs: int = 1,
+    before: Sensed | None = None,
+) -> Sensed:
+    """What noise and friction at rest leave in the rows of linearised trials; of the noise, as it was found before."""
+    told = zip(before.draws, before.signals, strict=True) if before and before.draws else [None] * len(linear)
+    tasks = enumerate(zip(linear, told, strict=True))
+    left = _processes(jobs)(delayed(what_noise_leaves)(t, noise, k, tolerances, old) for k, (t, old) in tasks)
+    parts = cast("Iterator[tuple[Whitening, SignalNoise, Array | None]]", left)
+    whitening, signals, draws = zip(*parts, strict=True)
+    return Sensed(noise, tuple(whitening), tuple(signals), tuple(draws))
 
 
 def what_noise_leaves(
-    trial: TrialLinear, noise: Noise, k: int, tolerances: Tolerances
-) -> tuple[Whitening, SignalNoise]:
-    """What noise and friction at rest leave in the rows of trial number k, and what these tell of its signals."""
-    draws, errors = noise_rows(trial, noise, np.random.default_rng([rules.NOISE_SEED, k]))
-    rng, resting = np.random.default_rng([rules.NOISE_SEED, k, 1]), Resting(trial, tolerances)
+    trial: TrialLinear,
+    noise: Noise,
+    k: int,
+    tolerances: Tolerances,
+    before: tuple[Array | None, SignalNoise] | None = None,
+) -> tuple[Whitening, SignalNoise, Array | None]:
+    """What noise and friction at rest leave in the rows of trial number k, what it tells of signals, and its draws."""
     moving = trial.reduction.moving
-    told = SignalNoise.of(draws, errors, moving)
-    draws = draws + resting(rng, len(draws))
+    draws, told = before or (None, None)
+    if draws is None or told is None:
+        draws, errors = noise_rows(trial, noise, np.random.default_rng([rules.NOISE_SEED, k]))
+        told = SignalNoise.of(draws, errors, moving)
+    rests = Resting(trial, tolerances)(np.random.default_rng([rules.NOISE_SEED, k, 1]), len(draws))
     rested(trial)
-    return Whitening.of(draws, moving, uneven=True), told
+    return Whitening.of(draws + rests, moving, uneven=True), told, None if is_filed(trial) else draws
 
 
 def exact_residual(signals: Signals, shared: Shared, bases: Bases, arms: Arms, reduction: Reduction) -> Array:

@@ -16,7 +16,7 @@ from discrepancy.team.linear.signals import Signals, with_rates
 from estimator.arm.arms import Arms, arm_of, design_of
 from estimator.arm.design import OmnidDesign
 from estimator.arrays import Array
-from estimator.estimate.fusion import fusion_matrix
+from estimator.estimate.fusion import BodyMotion, fuse, fusion_matrix
 from estimator.rigid_team.changes import needed_wrench
 from estimator.rigid_team.residual import (
     Bases,
@@ -67,6 +67,11 @@ class TrialLinear:
     def arm(self, robot: int) -> Arms:
         """One robot (from 0) as it is, or as designed."""
         return arm_of(self.arms, robot)
+
+    @cached_property
+    def motion(self) -> BodyMotion:
+        """Of the payload, as all robots tell it."""
+        return fuse(self.data, self.shared.grasps)
 
     @property
     def robots(self) -> int:
