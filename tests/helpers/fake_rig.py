@@ -10,9 +10,10 @@ from discrepancy.rig import Channel, Rig, Rows
 ROWS, CHANNELS, RATE_HZ = 120, 4, 12.5
 
 
-def cause(name, robot=1, tolerance=1.0, parameters=1, family="made up", transient=None, joint=None):
+def cause(name, robot=1, tolerance=1.0, parameters=1, family="", transient=None, joint=None):
+    """A candidate; of a family of its own where none is given."""
     listed = tuple(Parameter(f"p{k}", tolerance, 1.0) for k in range(parameters))
-    return Candidate(name, family, robot, joint, listed, {}, transient)
+    return Candidate(name, family or name, robot, joint, listed, {}, transient)
 
 
 CATALOGUE = tuple(cause(f"cause {k}", parameters=2 if k == 5 else 1) for k in range(8))

@@ -76,6 +76,8 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
     names, parts = _parts(problem, free)
     power = np.concatenate([p[c.sizes > 0] for p, c in zip(problem.power, problem.cells, strict=True)])
     start = np.array([np.sqrt(np.mean(problem.spread[at] ** 2)) for at in names])
+    for one, others in parts.like.items():  # where it was free before, its spread was its own
+        start[one] = _middle(start[others], np.ones(len(others)))
     evidence, power, spread = _climbed(parts, power, np.clip(start, parts.least, parts.most), rounds)
     # Two kinds that leave the same trace share a scatter, a saddle: one of them alone is likelier.
     wide = [kind for kind, group in parts.kinds.items() if spread[group] > rules.HELD_FACTOR]
