@@ -8,8 +8,8 @@ data/tx40 is used. The same five lines do for any robot in MJCF or URDF and any 
 
 from __future__ import annotations
 
+import argparse
 import os
-import sys
 from pathlib import Path
 
 from mocobot import serial
@@ -20,7 +20,11 @@ FOLDER = ROOT / "data" / "tx40"
 
 def main() -> None:
     """Read the model, look at the log, and find out what the model gets wrong."""
-    given = sys.argv[1] if len(sys.argv) > 1 else os.environ.get("MOCOBOT_TX40_DATA", FOLDER)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "folder", nargs="?", default=os.environ.get("MOCOBOT_TX40_DATA", FOLDER), help="of excitation.parquet"
+    )
+    given = parser.parse_args().folder
     log = Path(given) / "excitation.parquet"
     if not log.is_file():
         raise SystemExit(f"missing: {log}; models/tx40/README.md says where it is published")

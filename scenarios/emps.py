@@ -8,8 +8,8 @@ data/emps is used.
 
 from __future__ import annotations
 
+import argparse
 import os
-import sys
 from pathlib import Path
 
 from mocobot import emps
@@ -19,7 +19,14 @@ FOLDER = Path(__file__).resolve().parents[1] / "data" / "emps"
 
 def main() -> None:
     """Diagnose the first recording; predict the second with it, and say what is different there."""
-    given = sys.argv[1] if len(sys.argv) > 1 else os.environ.get("MOCOBOT_EMPS_DATA", FOLDER)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "folder",
+        nargs="?",
+        default=os.environ.get("MOCOBOT_EMPS_DATA", FOLDER),
+        help="of DATA_EMPS.mat and DATA_EMPS_PULSES.mat",
+    )
+    given = parser.parse_args().folder
     paths = [Path(given) / name for name in ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")]
     if missing := [str(path) for path in paths if not path.is_file()]:
         raise SystemExit(f"missing: {', '.join(missing)}; the recordings are on nonlinearbenchmark.org")

@@ -6,7 +6,7 @@ python scenarios/hidden_effect.py FOLDER    # keeps the recordings, for `mocobot
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -40,4 +40,6 @@ def main(folder: Path | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else None)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", nargs="?", type=Path, help="keeps the recordings, for `mocobot diagnose`")
+    main(parser.parse_args().folder)

@@ -5,7 +5,7 @@ python scenarios/replay_estimate.py [replay.rrd], then: rerun replay.rrd
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import mocobot
@@ -19,4 +19,6 @@ def main(target: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("replay.rrd"))
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("target", nargs="?", type=Path, default=Path("replay.rrd"), help="the replay's file")
+    main(parser.parse_args().target)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import sys
 from pathlib import Path
 
@@ -24,5 +25,8 @@ def main(payload: str, picture: Path) -> None:
 
 
 if __name__ == "__main__":
-    name = sys.argv[1] if len(sys.argv) > 1 else "a"
-    main(name, Path(sys.argv[2] if len(sys.argv) > 2 else f"team_{name}.png"))
+    parser = argparse.ArgumentParser(description="Render a team at rest to a PNG, without a screen.")
+    parser.add_argument("payload", nargs="?", default="a", help="name of a shipped payload")
+    parser.add_argument("picture", nargs="?", type=Path, help="team_PAYLOAD.png if not given")
+    given = parser.parse_args()
+    main(given.payload, given.picture or Path(f"team_{given.payload}.png"))

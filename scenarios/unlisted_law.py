@@ -6,7 +6,7 @@ python scenarios/unlisted_law.py FOLDER    # keeps the verdict: pictures, number
 
 from __future__ import annotations
 
-import sys
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -48,4 +48,8 @@ def main(folder: Path | None = None) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else None)
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument(
+        "folder", nargs="?", type=Path, help="keeps the verdict: pictures, numbers, the extended model"
+    )
+    main(parser.parse_args().folder)

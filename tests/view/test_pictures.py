@@ -72,3 +72,16 @@ def test_scenarios_refuse_bad_input_in_one_sentence(tmp_path, monkeypatch, capsy
         runpy.run_path(str(SCENARIOS / name), run_name="__main__")
     assert stop.value.code == 2
     assert sentence in capsys.readouterr().err.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    "name", sorted(path.name for path in SCENARIOS.glob("*.py") if "argparse" in path.read_text())
+)
+def test_scenarios_that_take_arguments_tell_of_them_and_write_nothing(tmp_path, monkeypatch, capsys, name):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "argv", [name, "--help"])
+    with pytest.raises(SystemExit) as stop:
+        runpy.run_path(str(SCENARIOS / name), run_name="__main__")
+    assert stop.value.code == 0
+    assert capsys.readouterr().out.startswith(f"usage: {name}")
+    assert list(tmp_path.iterdir()) == []
