@@ -18,7 +18,7 @@ FREE = {
     "discrepancy.result.json": {"MOST_PLACES"},
     "discrepancy.result.read": {"VERSION"},
     "discrepancy.result.pictures.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
-    "discrepancy.result.sensitivity": {"HALVINGS", "LEARNT"},  # a grid
+    "discrepancy.result.sensitivity": {"FINER", "LEARNT"},  # a grid
     "discrepancy.result.text": {"SAID", "WIDTH"},
     "discrepancy.result.text_rollouts": {"WIDTH"},
     "discrepancy.result.traces_file": {"VERSION"},
