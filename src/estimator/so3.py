@@ -17,6 +17,12 @@ def cross(a: Array, b: Array) -> Array:
     return out
 
 
+def times(matrix: Array, vector: Array) -> Array:
+    """Matrices (..., 3, 3) times vectors (..., 3); the same bits of each, however many there are, unlike ``einsum``."""
+    x, y, z = (matrix[..., k] * vector[..., k, None] for k in range(3))
+    return np.asarray(x + y + z)
+
+
 def skew(a: Array) -> Array:
     """The matrix [a] with [a] b = a x b, shapes (..., 3) -> (..., 3, 3)."""
     a = np.asarray(a, dtype=float)

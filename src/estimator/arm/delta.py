@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from estimator.arm.numbers import Arm
 from estimator.arrays import Array
 from estimator.errors import InputError
-from estimator.so3 import cross
+from estimator.so3 import cross, times
 
 # Exact values: cos(2 pi / 3) in floating point is off by 2e-16, which would break the legs' symmetry.
 _HALF_SQRT_3 = np.sqrt(3.0) / 2.0
@@ -49,11 +49,11 @@ class LegGeometry:
 
     def along_rods(self, force: Array) -> Array:
         """Driven torques [N m] of a force at the wrist in {b} [N]: (dh/dphi)^T force, shape (..., 3)."""
-        return self.leverage * np.einsum("...ij,...i->...j", self.across_rods, force)
+        return self.leverage * times(np.swapaxes(self.across_rods, -1, -2), force)
 
     def at_wrist(self, torque: Array) -> Array:
         """The force at the wrist in {b} [N] that driven torques make [N m], (dh/dphi)^-T torque, shape (..., 3)."""
-        return np.einsum("...ki,...k->...i", self.rod, torque / self.leverage)
+        return times(np.swapaxes(self.rod, -1, -2), torque / self.leverage)
 
 
 def forward_kinematics(phi: ArrayLike, design: Arm) -> Array:
@@ -141,10 +141,10 @@ def wrist_motion(legs: LegGeometry, phi_dot: ArrayLike, phi_ddot: ArrayLike) -> 
         phi_ddot: driven accelerations [rad/s^2], shape (..., 3).
     """
     phi_dot, phi_ddot = np.asarray(phi_dot, dtype=float), np.asarray(phi_ddot, dtype=float)
-    h_dot = np.einsum("...ij,...j->...i", legs.across_rods, legs.leverage * phi_dot)
+    h_dot = times(legs.across_rods, legs.leverage * phi_dot)
     rod_dot = h_dot[..., None, :] - legs.knee_d1 * phi_dot[..., None]
     curvature = np.sum(legs.rod * legs.knee_d2, axis=-1) * phi_dot**2 - np.sum(rod_dot**2, axis=-1)
-    return h_dot, np.einsum("...ij,...j->...i", legs.across_rods, legs.leverage * phi_ddot + curvature)
+    return h_dot, times(legs.across_rods, legs.leverage * phi_ddot + curvature)
 
 
 def inverse_kinematics(h: ArrayLike, design: Arm) -> Array:

@@ -162,6 +162,14 @@ def test_wrist_motion_is_the_derivative_along_a_path():
     assert np.abs(acceleration).max() > 5.0
 
 
+def test_forces_at_the_wrist_and_driven_torques_follow_the_jacobian():
+    """By virtual work: tau = (dh/dphi)^T f, and back."""
+    legs, force = leg_geometry(PHIS, DESIGN), RNG.normal(0, 30, PHIS.shape)
+    torque = np.einsum("qij,qi->qj", jacobian(PHIS, DESIGN), force)
+    assert legs.along_rods(force) == pytest.approx(torque, abs=1e-11)
+    assert legs.at_wrist(torque) == pytest.approx(force, abs=1e-10)
+
+
 def test_leverage_vanishes_where_the_leg_is_stretched():
     """With knee, driven axis and platform joint in line, raising the knee cannot lengthen the leg."""
     direction = np.deg2rad(110.0)
