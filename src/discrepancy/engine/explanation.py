@@ -212,7 +212,7 @@ def scatter_of(hypothesis: Hypothesis) -> tuple[Scatter, ...]:
             continue
         nats = worth_a_spread(hypothesis.learnt, candidate.cause)
         places = sum(c.cause == candidate.cause for c in problem.candidates)
-        if nats > rules.NAMED_NATS and places > 1:
+        if nats > rules.NAMED_NATS and places > 1:  # the spread of one alone is its family's
             # Numbers that a healthy one has none of, as its shape says nothing of them, are not said to scatter.
             shown = np.diag(problem.grams.sum(axis=0))[problem.spans[index]] > 0.0
             numbers = tuple(p for p, shows in zip(candidate.parameters, shown, strict=True) if shows)

@@ -133,8 +133,8 @@ class TeamRows(Rig):
         if straight:  # robots and unknowns stay
             return replace(self, sensed=sensed, resting=resting, kept={})
         moved = [replace(r, metadata=replace(r.metadata, units=there.units)) for r in self.recordings]
-        limits = self.tolerances, self.excluded
-        return self._at(moved, there.shared, *limits, there.origin, resting, self.jobs, sensed)
+        catalogue = self.tolerances, self.excluded
+        return self._at(moved, there.shared, *catalogue, there.origin, resting, self.jobs, sensed)
 
     @property
     def trials(self) -> Sequence[str]:

@@ -137,11 +137,7 @@ def test_what_is_learnt_is_stationary(rows, free, monkeypatch):
 
 
 def nine_places(rng, values, rows=60):
-    candidates = tuple(place("many", joint, 0.5) for joint in range(1, 10))
-    causes = [rng.standard_normal((rows, 2, 1)) for _ in candidates]
-    x = rng.standard_normal((rows, 2)) + sum(c[..., 0] * v for c, v in zip(causes, values, strict=True))
-    none = np.zeros((rows, 2, 0))
-    return Problem.of([Rows("a", x, none, none, causes, np.arange(rows) / 10.0)], candidates)
+    return drawn(rng, tuple(place("many", joint, 0.5) for joint in range(1, 10)), values, rows)
 
 
 def test_a_kind_that_scatters_is_learnt_as_chi_square_allows(rng):
@@ -159,12 +155,12 @@ def test_a_kind_that_scatters_is_learnt_as_chi_square_allows(rng):
     assert np.mean(squares) == pytest.approx(25.0, abs=3.0 * 25.0 * np.sqrt(2.0 / (9 * 40)))
 
 
-def beside_nine_places(rng, values, one, rows=60):
-    """Nine places of a kind, three of another, and a kind at one place that shares the family of the nine."""
-    nine = [replace(place("many", joint, 0.5), family="rubs") for joint in range(1, 10)]
-    candidates = (*nine, *(place("other", joint, 0.5) for joint in (1, 2, 3)), one)
+NINE = tuple(replace(place("many", joint, 0.5), family="rubs") for joint in range(1, 10))
+
+
+def drawn(rng, candidates, values, rows=60):
+    """Noise, and candidates of these values."""
     causes = [rng.standard_normal((rows, 2, 1)) for _ in candidates]
-    values = [*values, 20.0, -20.0, 20.0, 0.0]
     x = rng.standard_normal((rows, 2)) + sum(c[..., 0] * v for c, v in zip(causes, values, strict=True))
     none = np.zeros((rows, 2, 0))
     return Problem.of([Rows("a", x, none, none, causes, np.arange(rows) / 10.0)], candidates)
@@ -177,7 +173,8 @@ def beside_nine_places(rng, values, one, rows=60):
 def test_one_of_a_kind_is_as_far_off_as_its_family(rng, times, family, hidden):
     values = times * 0.5 * rng.standard_normal(9)
     one = replace(place("single", 1, 0.5), family=family, hidden=hidden)
-    spread = learnt(beside_nine_places(rng, values, one)).problem.spread
+    candidates = (*NINE, *(place("other", joint, 0.5) for joint in (1, 2, 3)), one)
+    spread = learnt(drawn(rng, candidates, [*values, 20.0, -20.0, 20.0, 0.0])).problem.spread
     assert spread[9] > 8.0  # of another family
     assert spread[-1] == (1.0 if hidden or family == "else" else spread[0])
     assert (spread[0] > 4.0) == (times > 1.0)
@@ -186,15 +183,9 @@ def test_one_of_a_kind_is_as_far_off_as_its_family(rng, times, family, hidden):
 def test_one_of_a_kind_is_as_far_off_as_most_of_its_family(rng):
     """Nine places that are well known count for more than one more place of a fault."""
     two = [replace(place("few", joint, 0.5), family="rubs") for joint in (1, 2)]
-    nine = [replace(place("many", joint, 0.5), family="rubs") for joint in range(1, 10)]
-    candidates = (*nine, *two, replace(place("single", 1, 0.5), family="rubs"))
-    causes = [rng.standard_normal((60, 2, 1)) for _ in candidates]
+    candidates = (*NINE, *two, replace(place("single", 1, 0.5), family="rubs"))
     values = [*(0.2 * rng.standard_normal(9)), 40.0, -0.1, 0.0]
-    x = rng.standard_normal((60, 2)) + sum(c[..., 0] * v for c, v in zip(causes, values, strict=True))
-    none = np.zeros((60, 2, 0))
-    spread = learnt(
-        Problem.of([Rows("a", x, none, none, causes, np.arange(60) / 10.0)], candidates)
-    ).problem.spread
+    spread = learnt(drawn(rng, candidates, values)).problem.spread
     assert spread[9] > 10.0
     assert spread[-1] == spread[0] < 1.5
 
