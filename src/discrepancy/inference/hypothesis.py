@@ -61,9 +61,21 @@ class Hypothesis:
 
     def without(self, index: int) -> Hypothesis:
         """The hypothesis that one of the causes is not there."""
-        kept = [i for i in self.free if i != index]
-        keys = {self.problem.candidates[i].key for i in kept}
-        return Hypothesis.of(self.problem.without_unknowns(keys), kept, self.allowed)
+        keys = set(self.problem.opened) - {self.problem.candidates[index].key}
+        return Hypothesis.of(self.problem.without_unknowns(keys), self._others(index), self.allowed)
+
+    def tolerating(self, index: int) -> Hypothesis | None:
+        """The hypothesis that one of the causes is there by its law, but no farther off than its kind scatters.
+
+        None of a cause that a healthy one has none of, or an event.
+        """
+        if not self.problem.has_tolerance(index):
+            return None
+        allowed = {i: nats for i, nats in self.allowed.items() if i != index}
+        return Hypothesis.of(self.problem, self._others(index), allowed)
+
+    def _others(self, index: int) -> list[int]:
+        return [i for i in self.free if i != index]
 
     def possible(self, rig: Rig, index: int) -> bool:
         """Whether one of the causes has values that can be."""

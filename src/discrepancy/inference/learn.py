@@ -11,6 +11,7 @@ from scipy.linalg import cho_solve, cholesky, get_lapack_funcs
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
+from discrepancy.inference.prior import far, levels, nearest
 from discrepancy.inference.twins import twins
 from discrepancy.least_squares.problem import Problem
 from estimator.arrays import Array
@@ -207,7 +208,12 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
     )
     evidence -= 0.5 * float(parts.sizes @ np.log(power))
     evidence -= 0.5 * rules.POWER_NUMBERS * float(np.sum(np.log(power) + 1.0 / power - 1.0))
-    evidence -= 0.5 * float(parts.weight @ (2.0 * np.log(spread) + spread**-2.0 - 1.0))
+    variance = np.bincount(parts.group[~shared], np.diag(covariance)[~shared], minlength=len(spread))
+    told = np.clip(numbers - variance / spread**2, 1e-6, None)
+    scatters = parts.weight > 0.0
+    near = np.ones(len(spread))
+    near[scatters] = nearest(spread[scatters], levels(spread[scatters], (told / numbers)[scatters]))
+    evidence -= 0.5 * float(parts.weight @ far(spread, near))
     # Next powers: what is left over the numbers that are not spent on unknowns.
     x = np.append(-solution, 1.0)
     both = np.zeros((2, count, count))
@@ -218,9 +224,8 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
     power_next = (left + rules.POWER_NUMBERS) / (np.maximum(parts.sizes - spent, 1.0) + rules.POWER_NUMBERS)
     # Next spreads: squares over the numbers that the data determine.
     squares = np.bincount(parts.group[~shared], solution[~shared] ** 2, minlength=len(spread))
-    variance = np.bincount(parts.group[~shared], np.diag(covariance)[~shared], minlength=len(spread))
-    told = np.clip(numbers - variance / spread**2, 1e-6, None)
-    spread_next = np.clip(np.sqrt((squares + parts.weight) / (told + parts.weight)), parts.least, parts.most)
+    spread_next = np.sqrt((squares + parts.weight * near**2) / (told + parts.weight))
+    spread_next = np.clip(spread_next, parts.least, parts.most)
     for one, others in parts.like.items():
         spread_next[one] = min(_middle(spread_next[others], told[others]), parts.most[one])
     return evidence, np.maximum(power_next, rules.LEAST_POWER), spread_next

@@ -78,11 +78,15 @@ def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Se
     doubtful = 0
     while len(best.free) < most and doubtful < rules.DOUBTFUL:
         added = proposals(rig, best).best
-        if added is None or added.score - best.score < _needed(best, added):
+        if added is None or (added.score - best.score < _needed(best, added) and not _scatters(best, added)):
             break
         say(f"refit {added.causes[-1].label}")
         little = added.score - best.score < rules.LITTLE_SHARE * nats_left(best)
-        found, beside = settled(rig, exact(rig, added, nothing), nothing)
+        added = exact(rig, added, nothing)
+        if tolerated := _scatters(best, added):
+            best, rivals = settled(rig, tolerated, nothing)
+            continue
+        found, beside = settled(rig, added, nothing)
         if _gained(best, found) < _needed(best, found):
             break  # what pays where all is linear need not do so where it is exact
         best, rivals = found, beside
@@ -90,6 +94,42 @@ def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Se
         likely = last is None or _law_holds(rig, best, last)
         doubtful = doubtful + 1 if little and not likely else 0
     return Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free))
+
+
+def _scatters(base: Hypothesis, added: Hypothesis) -> Hypothesis | None:
+    """The hypothesis that the last cause of ``added`` is there, but does not stand out of how its kind scatters.
+
+    None where it stands out, or where its law tells no more than straight columns.
+    """
+    tolerated = added.tolerating(added.free[-1])
+    if tolerated is None or _beyond(added, added.free[-1], tolerated) >= _needed(tolerated, added):
+        return None
+    return tolerated if tolerated.score - base.score >= rules.SHAPE_NATS else None
+
+
+def _beyond(there: Hypothesis, index: int, tolerated: Hypothesis) -> float:
+    """By how much a cause is likelier than that it is as far off as its kind scatters [nats].
+
+    What it leaves open is in both, so nothing of that is to be allowed for.
+    """
+    return there.score + there.allowed.get(index, 0.0) - tolerated.score
+
+
+def _healthy(best: Hypothesis, index: int, less: Hypothesis, judged: Hypothesis) -> tuple[Hypothesis, float]:
+    """What is likeliest without one of the causes, and by how much that is less likely [nats].
+
+    Args:
+        best: with the cause.
+        index: which.
+        less: without it.
+        judged: with it, beside other forms of the others.
+    """
+    tolerated, gap = best.tolerating(index), judged.score - less.score
+    if tolerated is not None and tolerated.score > less.score:
+        beyond = _beyond(best, index, tolerated)
+        if beyond < gap:
+            return tolerated, beyond
+    return less, gap
 
 
 def _gained(base: Hypothesis, more: Hypothesis) -> float:
@@ -178,8 +218,9 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
             less = best.without(index)
             # Its own loss to forms of the others is judged here, but counted once: not theirs to its forms, too.
             judged = beside_other_forms(rig, best, index, less)
-            if judged.score - less.score < _needed(less, judged):
-                best, changed = exact(rig, less, nothing), True
+            healthy, gap = _healthy(best, index, less, judged)
+            if gap < _needed(healthy, judged):
+                best, changed = exact(rig, healthy, nothing), True
                 break
             candidate = best.problem.candidates[index]
             # Its own shape may be another beside what was found since.
@@ -189,7 +230,7 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
                 for other, score in others.scores
                 if other.key != candidate.key
             ]
-            rivals[index].append(Rival(None, judged.score - less.score))
+            rivals[index].append(Rival(None, gap))
             if others.best is not None and others.best.score > judged.score + rules.EXCHANGED_NATS:
                 other = exact(rig, others.best, nothing)
                 if other.score > best.score:

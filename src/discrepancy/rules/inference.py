@@ -72,6 +72,9 @@ POWER_NUMBERS = 20.0
 SPREAD_NUMBERS = 4.0
 """Numbers that the tolerance counts for when a kind's spread is learnt. Chosen: that a kind scatters is no likelier
 beforehand than that one of its places is at fault."""
+LEVEL_KINDS = 5.0
+"""Of other kinds that the data tell, from which a kind is expected to be as far off as they are. Chosen: fewer may be
+off for one reason."""
 MOST_SPREAD = 1e3
 """Of a kind over its tolerance. Chosen: an encoder's zero of 6 deg."""
 LEAST_SLAB = 4.0
