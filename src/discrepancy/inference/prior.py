@@ -48,10 +48,11 @@ def levels(spread: Array, told: Array) -> Array:
     Returns:
         Shape (kinds,); at least 1, and 1 where fewer than ``rules.LEVEL_KINDS`` others are told.
     """
+    if not len(spread):
+        return spread
     order = np.argsort(spread)
     others = np.tile(told[order], (len(spread), 1))
     others[np.arange(len(spread)), order.argsort()] = 0.0
     passed = np.cumsum(others, axis=1)
-    total = passed[:, -1:] if len(spread) else passed
-    median = spread[order][np.argmax(passed >= 0.5 * total, axis=1)] if len(spread) else spread
-    return np.where(total[:, 0] >= rules.LEVEL_KINDS, np.maximum(median, 1.0), 1.0) if len(spread) else spread
+    median = spread[order][np.argmax(passed >= 0.5 * passed[:, -1:], axis=1)]
+    return np.where(passed[:, -1] >= rules.LEVEL_KINDS, np.maximum(median, 1.0), 1.0)
