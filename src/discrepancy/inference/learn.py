@@ -30,11 +30,13 @@ class Learnt:
         problem: with the spreads and powers.
         free: candidates that are there; the spread of each is its own.
         log_evidence: of all data, up to what all hypotheses have in common [nats].
+        levels: how far off the other kinds are, for every kind at several places (``prior.levels``).
     """
 
     problem: Problem
     free: tuple[int, ...]
     log_evidence: float
+    levels: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,9 +79,9 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
     names, parts = _parts(problem, free)
     power = np.concatenate([p[c.sizes > 0] for p, c in zip(problem.power, problem.cells, strict=True)])
     start = np.array([np.sqrt(np.mean(problem.spread[at] ** 2)) for at in names])
-    for one, others in parts.like.items():  # where it was free before, its spread was its own
-        start[one] = _middle(start[others], np.ones(len(others)))
-    evidence, power, spread = _climbed(parts, power, np.clip(start, parts.least, parts.most), rounds)
+    for one, family in parts.like.items():  # where it was free before, its spread was its own
+        start[one] = _middle(start[family], np.ones(len(family)))
+    evidence, power, spread, others = _climbed(parts, power, np.clip(start, parts.least, parts.most), rounds)
     # Two kinds that leave the same trace share a scatter, a saddle: one of them alone is likelier.
     wide = [kind for kind, group in parts.kinds.items() if spread[group] > rules.HELD_FACTOR]
     for pair in twins(problem, wide):
@@ -89,7 +91,7 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
             apart[one], apart[other] = min(np.sqrt(2.0) * spread[one], parts.most[one]), parts.least[other]
             alone = _climbed(parts, power, apart, rounds)
             if alone[0] > evidence:
-                evidence, power, spread = alone
+                evidence, power, spread, others = alone
     evidence -= problem.price
     found, at = [], 0
     for old, cells in zip(problem.power, problem.cells, strict=True):
@@ -100,18 +102,20 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
     spreads = np.array(problem.spread)
     for where, value in zip(names, spread, strict=True):
         spreads[where] = value
-    return Learnt(problem.with_noise(found, spreads), tuple(free), evidence)
+    several = {kind: float(others[k]) for kind, k in parts.kinds.items() if parts.weight[k] > 0.0}
+    return Learnt(problem.with_noise(found, spreads), tuple(free), evidence, several)
 
 
-def _climbed(parts: _Parts, power: Array, spread: Array, rounds: int) -> tuple[float, Array, Array]:
-    """Log evidence, powers and spreads at the maximum uphill from some, or after so many steps."""
+def _climbed(parts: _Parts, power: Array, spread: Array, rounds: int) -> tuple[float, Array, Array, Array]:
+    """Log evidence, powers, spreads and levels at the maximum uphill from some, or after so many steps."""
     last = -np.inf
     for _ in range(rounds):
-        evidence, power_next, spread_next = _step(parts, power, spread)
+        evidence, power_next, spread_next, _ = _step(parts, power, spread)
         if evidence - last < rules.LEARN_NATS and np.isfinite(last):
             break
         last, power, spread = evidence, power_next, spread_next
-    return _step(parts, power, spread)[0], power, spread
+    evidence, _, _, others = _step(parts, power, spread)
+    return evidence, power, spread, others
 
 
 def widest(kind: Sequence[Candidate]) -> float:
@@ -183,8 +187,8 @@ def _like(
     }
 
 
-def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Array]:
-    """Log evidence with its priors at given powers and spreads, and the next ones."""
+def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Array, Array]:
+    """Log evidence with its priors at given powers and spreads, the next ones, and every group's level."""
     count = len(parts.group) + 1
     gram = np.zeros((count, count))
     gram[parts.upper] = (1.0 / power) @ parts.grams
@@ -210,9 +214,9 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
     evidence -= 0.5 * rules.POWER_NUMBERS * float(np.sum(np.log(power) + 1.0 / power - 1.0))
     variance = np.bincount(parts.group[~shared], np.diag(covariance)[~shared], minlength=len(spread))
     told = np.clip(numbers - variance / spread**2, 1e-6, None)
-    scatters = parts.weight > 0.0
-    near = np.ones(len(spread))
-    near[scatters] = nearest(spread[scatters], levels(spread[scatters], (told / numbers)[scatters]))
+    several, level = parts.weight > 0.0, np.ones(len(spread))
+    level[several] = levels(spread[several], (told / numbers)[several])
+    near = nearest(spread, level)
     evidence -= 0.5 * float(parts.weight @ far(spread, near))
     # Next powers: what is left over the numbers that are not spent on unknowns.
     x = np.append(-solution, 1.0)
@@ -228,7 +232,7 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
     spread_next = np.clip(spread_next, parts.least, parts.most)
     for one, others in parts.like.items():
         spread_next[one] = min(_middle(spread_next[others], told[others]), parts.most[one])
-    return evidence, np.maximum(power_next, rules.LEAST_POWER), spread_next
+    return evidence, np.maximum(power_next, rules.LEAST_POWER), spread_next, level
 
 
 def _middle(spreads: Array, weights: Array) -> float:

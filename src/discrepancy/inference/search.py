@@ -78,13 +78,16 @@ def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Se
     doubtful = 0
     while len(best.free) < most and doubtful < rules.DOUBTFUL:
         added = proposals(rig, best).best
-        if added is None or (added.score - best.score < _needed(best, added) and not _scatters(best, added)):
+        if added is None or (added.score - best.score < _needed(best, added) and not _tolerated(best, added)):
             break
         say(f"refit {added.causes[-1].label}")
         little = added.score - best.score < rules.LITTLE_SHARE * nats_left(best)
         added = exact(rig, added, nothing)
-        if tolerated := _scatters(best, added):
-            best, rivals = settled(rig, tolerated, nothing)
+        if tolerated := _tolerated(best, added):
+            found, beside = settled(rig, tolerated, nothing)
+            if found.score - best.score < rules.SHAPE_NATS:
+                break
+            best, rivals = found, beside
             continue
         found, beside = settled(rig, added, nothing)
         if _gained(best, found) < _needed(best, found):
@@ -96,7 +99,7 @@ def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Se
     return Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free))
 
 
-def _scatters(base: Hypothesis, added: Hypothesis) -> Hypothesis | None:
+def _tolerated(base: Hypothesis, added: Hypothesis) -> Hypothesis | None:
     """The hypothesis that the last cause of ``added`` is there, but does not stand out of how its kind scatters.
 
     None where it stands out, or where its law tells no more than straight columns.

@@ -9,6 +9,7 @@ from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation
 from discrepancy.inference.learn import widest
+from discrepancy.inference.prior import far, nearest
 from discrepancy.result.evidence_list import needed_nats
 from estimator.arrays import Array
 
@@ -48,7 +49,7 @@ def _judged(explanation: Explanation) -> Iterator[tuple[Candidate, dict[str, Any
     for index, candidate in enumerate(problem.candidates):
         if index not in fit.free and not candidate.transient and not candidate.hidden:
             kinds.setdefault(candidate.cause, []).append(index)
-    for members in kinds.values():
+    for kind, members in kinds.items():
         told = [_along(*fit.told(index)) for index in members]
         scatters = problem.has_tolerance(members[0]) and len(members) > 1
         spreads = np.zeros(1)
@@ -58,9 +59,10 @@ def _judged(explanation: Explanation) -> Iterator[tuple[Candidate, dict[str, Any
             most_spread = widest([problem.candidates[index] for index in members])
             spreads = LEARNT[most_spread >= LEARNT]
         healthy = np.array([_log_evidence(z, lam, spreads) for lam, z, _ in told])
-        prior = (
-            0.5 * rules.SPREAD_NUMBERS * (2.0 * np.log(spreads) + spreads**-2.0 - 1.0) if scatters else 0.0
-        )
+        prior = np.zeros(len(spreads))
+        if scatters:
+            near = nearest(spreads, explanation.hypothesis.learnt.levels[kind])
+            prior = 0.5 * rules.SPREAD_NUMBERS * far(spreads, near)
         for k, index in enumerate(members):
             candidate, (lam, _, vectors) = problem.candidates[index], told[k]
             rest = np.delete(healthy, k, axis=0).sum(axis=0) - prior
