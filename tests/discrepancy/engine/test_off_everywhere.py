@@ -9,7 +9,6 @@ from dense_evidence import dense_evidence, log_prior
 from discrepancy import rules
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.inference.learn import learnt
-from discrepancy.inference.search import search
 from discrepancy.least_squares.problem import Problem
 from discrepancy.result.sensitivity import detection_limits
 from fake_rig import CHANNELS, ROWS, FakeRig, cause
@@ -116,9 +115,3 @@ def test_a_limit_is_wider_where_all_is_off():
         }
         sizes.append(limits["loose", 2])
     assert sizes[1] > 1.5 * sizes[0]
-
-
-def test_the_search_ends(monkeypatch):
-    """However little a tolerated law has to gain."""
-    monkeypatch.setattr(rules, "SHAPE_NATS", 1e-9)
-    assert search(LooseRig(LIKE_ALL_ELSE, catalogue=CATALOGUE)).best.free == ()
