@@ -11,7 +11,7 @@ from scipy.linalg import cho_solve, cholesky, get_lapack_funcs
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
-from discrepancy.inference.prior import far, levels, nearest
+from discrepancy.inference.prior import Level
 from discrepancy.inference.twins import twins
 from discrepancy.least_squares.problem import Problem
 from estimator.arrays import Array
@@ -30,13 +30,13 @@ class Learnt:
         problem: with the spreads and powers.
         free: candidates that are there; the spread of each is its own.
         log_evidence: of all data, up to what all hypotheses have in common [nats].
-        levels: how far off the other kinds are, for every kind at several places (``prior.levels``).
+        levels: what the spread of every kind at several places is held against besides its tolerance.
     """
 
     problem: Problem
     free: tuple[int, ...]
     log_evidence: float
-    levels: Mapping[str, float]
+    levels: Mapping[str, Level]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +50,7 @@ class _Parts:
         sizes: numbers in every cell, shape (K,).
         group: of every used column: -1 for shared unknowns, else the number of its spread.
         least, most: spread that a group has at least and at most, shape (groups,).
-        weight: numbers that its prior counts for, shape (groups,).
+        several: which groups are of kinds at several places, whose spread has a prior, in the order of ``kinds``.
         own: which groups are spreads of free candidates.
         kinds: group of every kind with a spread.
         like: of every kind at one place, groups of the kinds of its family at several, which it is as far off as.
@@ -62,7 +62,7 @@ class _Parts:
     group: Indices
     least: Array
     most: Array
-    weight: Array
+    several: NDArray[np.bool_]
     own: NDArray[np.bool_]
     kinds: Mapping[str, int]
     like: Mapping[int, Indices]
@@ -81,7 +81,7 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
     start = np.array([np.sqrt(np.mean(problem.spread[at] ** 2)) for at in names])
     for one, family in parts.like.items():  # where it was free before, its spread was its own
         start[one] = _middle(start[family], np.ones(len(family)))
-    evidence, power, spread, others = _climbed(parts, power, np.clip(start, parts.least, parts.most), rounds)
+    evidence, power, spread, level = _climbed(parts, power, np.clip(start, parts.least, parts.most), rounds)
     # Two kinds that leave the same trace share a scatter, a saddle: one of them alone is likelier.
     wide = [kind for kind, group in parts.kinds.items() if spread[group] > rules.HELD_FACTOR]
     for pair in twins(problem, wide):
@@ -91,7 +91,7 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
             apart[one], apart[other] = min(np.sqrt(2.0) * spread[one], parts.most[one]), parts.least[other]
             alone = _climbed(parts, power, apart, rounds)
             if alone[0] > evidence:
-                evidence, power, spread, others = alone
+                evidence, power, spread, level = alone
     evidence -= problem.price
     found, at = [], 0
     for old, cells in zip(problem.power, problem.cells, strict=True):
@@ -102,11 +102,12 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
     spreads = np.array(problem.spread)
     for where, value in zip(names, spread, strict=True):
         spreads[where] = value
-    several = {kind: float(others[k]) for kind, k in parts.kinds.items() if parts.weight[k] > 0.0}
-    return Learnt(problem.with_noise(found, spreads), tuple(free), evidence, several)
+    several = [kind for kind, k in parts.kinds.items() if parts.several[k]]
+    levels = {kind: Level(level.spread[k], level.numbers[k]) for k, kind in enumerate(several)}
+    return Learnt(problem.with_noise(found, spreads), tuple(free), evidence, levels)
 
 
-def _climbed(parts: _Parts, power: Array, spread: Array, rounds: int) -> tuple[float, Array, Array, Array]:
+def _climbed(parts: _Parts, power: Array, spread: Array, rounds: int) -> tuple[float, Array, Array, Level]:
     """Log evidence, powers, spreads and levels at the maximum uphill from some, or after so many steps."""
     last = -np.inf
     for _ in range(rounds):
@@ -114,8 +115,8 @@ def _climbed(parts: _Parts, power: Array, spread: Array, rounds: int) -> tuple[f
         if evidence - last < rules.LEARN_NATS and np.isfinite(last):
             break
         last, power, spread = evidence, power_next, spread_next
-    evidence, _, _, others = _step(parts, power, spread)
-    return evidence, power, spread, others
+    evidence, _, _, level = _step(parts, power, spread)
+    return evidence, power, spread, level
 
 
 def widest(kind: Sequence[Candidate]) -> float:
@@ -128,7 +129,7 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
     group = np.full(count, -2)
     group[: problem.shared] = -1
     names: list[Indices] = []
-    least, most, weight, own = [], [], [], []
+    least, most, several, own = [], [], [], []
     kinds: dict[str, list[int]] = {}
     for index, candidate in enumerate(problem.candidates):
         if index not in free and problem.has_tolerance(index):
@@ -143,7 +144,7 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
         # What was left out may not take what it is not to be named for.
         named = not problem.candidates[members[0]].hidden
         most.append(widest([problem.candidates[i] for i in members]) if named else 1.0)
-        weight.append(rules.SPREAD_NUMBERS if len(members) > 1 else 0.0)
+        several.append(len(members) > 1)
         own.append(False)
     like = _like(problem, kinds, groups)
     for index in free:
@@ -154,7 +155,7 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
             rules.LEAST_SLAB if problem.candidates[index].parameters[0].tolerance else rules.LEAST_SIZE
         )
         most.append(np.inf)
-        weight.append(0.0)
+        several.append(False)
         own.append(True)
     used = np.flatnonzero(group > -2)
     both = np.append(used, count)
@@ -168,7 +169,7 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
         np.take(gram, at, out=one, mode="clip")
     parts = _Parts(
         grams, upper, np.concatenate(sizes).astype(float), group[used], np.array(least), np.array(most),
-        np.array(weight), np.array(own, dtype=bool), groups, like,
+        np.array(several, dtype=bool), np.array(own, dtype=bool), groups, like,
     )  # fmt: skip
     return names, parts
 
@@ -187,8 +188,8 @@ def _like(
     }
 
 
-def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Array, Array]:
-    """Log evidence with its priors at given powers and spreads, the next ones, and every group's level."""
+def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Array, Level]:
+    """Log evidence with its priors at given powers and spreads, the next ones, and the kinds' level."""
     count = len(parts.group) + 1
     gram = np.zeros((count, count))
     gram[parts.upper] = (1.0 / power) @ parts.grams
@@ -214,10 +215,10 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
     evidence -= 0.5 * rules.POWER_NUMBERS * float(np.sum(np.log(power) + 1.0 / power - 1.0))
     variance = np.bincount(parts.group[~shared], np.diag(covariance)[~shared], minlength=len(spread))
     told = np.clip(numbers - variance / spread**2, 1e-6, None)
-    several, level = parts.weight > 0.0, np.ones(len(spread))
-    level[several] = levels(spread[several], (told / numbers)[several])
-    near = nearest(spread, level)
-    evidence -= 0.5 * float(parts.weight @ far(spread, near))
+    several, near, weight = parts.several, np.ones(len(spread)), np.zeros(len(spread))
+    level = Level.of(spread[several], (told / numbers)[several])
+    loss, near[several], weight[several] = level.prior(spread[several])
+    evidence -= float(np.sum(loss))
     # Next powers: what is left over the numbers that are not spent on unknowns.
     x = np.append(-solution, 1.0)
     both = np.zeros((2, count, count))
@@ -228,7 +229,7 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
     power_next = (left + rules.POWER_NUMBERS) / (np.maximum(parts.sizes - spent, 1.0) + rules.POWER_NUMBERS)
     # Next spreads: squares over the numbers that the data determine.
     squares = np.bincount(parts.group[~shared], solution[~shared] ** 2, minlength=len(spread))
-    spread_next = np.sqrt((squares + parts.weight * near**2) / (told + parts.weight))
+    spread_next = np.sqrt((squares + weight * near**2) / (told + weight))
     spread_next = np.clip(spread_next, parts.least, parts.most)
     for one, others in parts.like.items():
         spread_next[one] = min(_middle(spread_next[others], told[others]), parts.most[one])

@@ -9,7 +9,6 @@ from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation
 from discrepancy.inference.learn import widest
-from discrepancy.inference.prior import far, nearest
 from discrepancy.result.evidence_list import needed_nats
 from estimator.arrays import Array
 
@@ -61,8 +60,7 @@ def _judged(explanation: Explanation) -> Iterator[tuple[Candidate, dict[str, Any
         healthy = np.array([_log_evidence(z, lam, spreads) for lam, z, _ in told])
         prior = np.zeros(len(spreads))
         if scatters:
-            near = nearest(spreads, explanation.hypothesis.learnt.levels[kind])
-            prior = 0.5 * rules.SPREAD_NUMBERS * far(spreads, near)
+            prior = explanation.hypothesis.learnt.levels[kind].prior(spreads)[0]
         for k, index in enumerate(members):
             candidate, (lam, _, vectors) = problem.candidates[index], told[k]
             rest = np.delete(healthy, k, axis=0).sum(axis=0) - prior

@@ -165,6 +165,8 @@ def _residual(values: Values) -> Iterable[str]:
     )
     if values["causes"] or values["suspected"]:
         text += f", {residual['chi2_per_n']:.3g} with what is {'named' if values['causes'] else 'suspected'}"
+    elif f"{residual['chi2_per_n']:.3g}" != f"{residual['chi2_per_n_tolerated']:.3g}":
+        text += f", {residual['chi2_per_n']:.3g} where what scatters does so by its own law"
     yield f"{text} (up to {rules.CLEAN_CHI2_PER_N:g} counts as clean)."
     if values["verdict"] != "consistent":
         yield f"As simulated: {residual['nominal']['signature']['sentence']}"

@@ -95,11 +95,16 @@ def test_evidence_holds_a_kind_against_the_middle_of_the_others(monkeypatch):
         learned = learnt(Problem.of(rows, candidates))
         one, spread = learned.problem, learned.problem.spread[::PLACES]
         middle = [np.sort(np.delete(spread, k))[3] if least < np.inf else 1.0 for k in range(KINDS)]
-        assert learned.levels == pytest.approx({f"kind {k}": level for k, level in enumerate(middle)})
+        assert [learned.levels[f"kind {k}"].spread for k in range(KINDS)] == pytest.approx(middle)
+        numbers = np.array([float(learned.levels[f"kind {k}"].numbers) for k in range(KINDS)])
+        np.testing.assert_allclose(numbers, rules.SPREAD_NUMBERS + KINDS - 1, atol=0.1)  # all but all is told
         powers = log_prior(one, [])  # in the others, too
-        by_level = [log_prior(one, [[PLACES * k]], spread=one.spread / m) for k, m in enumerate(middle)]
-        alone = [log_prior(one, [[PLACES * k]]) for k in range(KINDS)]
-        prior = powers + sum(max(a, b) - powers for a, b in zip(by_level, alone, strict=True))
+        by_level = [
+            log_prior(one, [[PLACES * k]], spread=one.spread / m) - powers for k, m in enumerate(middle)
+        ]
+        by_level *= numbers / rules.SPREAD_NUMBERS
+        alone = [log_prior(one, [[PLACES * k]]) - powers for k in range(KINDS)]
+        prior = powers + np.sum(np.maximum(by_level, alone))
         gaps.append(learned.log_evidence - dense_evidence(rows, one, ()) - prior)
     assert gaps[1] == pytest.approx(gaps[0], abs=1e-6)
 
