@@ -16,7 +16,7 @@ from discrepancy.inference.other_forms import beside_other_forms
 from discrepancy.inference.scan import Scanned, events_of, scan, score_of, score_with, scores_with
 from discrepancy.inference.twins import twins
 from discrepancy.least_squares.fit import Fit
-from discrepancy.least_squares.problem import Problem
+from discrepancy.least_squares.problem import Key, Problem
 from discrepancy.rig import Rig
 
 
@@ -28,11 +28,14 @@ class Proposed:
         best: the likeliest; the added cause is the last of its ``free``. None where none is possible.
         scores: what is added, in its shape, and how likely that is [nats], the likeliest first.
         other: the likeliest whose added cause is not the one that is known; None without one.
+        open: the one that would be likeliest if its added cause were as far off as its kind scatters, of those that
+            leave something open; None without one.
     """
 
     best: Hypothesis | None
     scores: tuple[tuple[Candidate, float], ...]
     other: Hypothesis | None = None
+    open: Hypothesis | None = None
 
 
 def proposals(
@@ -55,6 +58,8 @@ def proposals(
     ranked.sort(key=lambda item: -item.score)
     best: Hypothesis | None = None  # each has its own columns: all together would be gigabytes
     other: Hypothesis | None = None
+    open_: Hypothesis | None = None
+    most = -np.inf  # score of that, tolerated
     scores: dict[tuple[object, ...], tuple[Candidate, float]] = {}
     rough: Scanned | None = None  # of the best, as long as its shape is
     offered = _hypotheses(rig, base, ranked, narrow=narrow)
@@ -74,16 +79,20 @@ def proposals(
             scores[which] = last, new.score
             if best is None or new.score > best.score:
                 best, rough = new, item
+            if last.key in new.problem.opened and last.key not in base.problem.opened:
+                tolerated = new.tolerating(new.free[-1])
+                if tolerated is not None and tolerated.score > most:
+                    open_, most = new, tolerated.score
             if known is not None and last.key != known.key and (other is None or new.score > other.score):
                 other = new
-    return Proposed(best, tuple(sorted(scores.values(), key=lambda one: -one[1])), other)
+    return Proposed(best, tuple(sorted(scores.values(), key=lambda one: -one[1])), other, open_)
 
 
 def _hypotheses(
     rig: Rig, base: Hypothesis, ranked: Sequence[Scanned], *, narrow: bool
 ) -> Iterator[tuple[Scanned | None, Hypothesis]]:
     """One after the other, each with one cause more, and its item where its shape has not been sharpened."""
-    for item in _chosen(ranked, rules.LEADERS):
+    for item in _chosen(ranked, rules.LEADERS, base.problem.opened):
         near = item.loud or item.score > ranked[0].score - rules.CLOSE_NATS
         yield None if near else item, sharpened(rig, base, item, near=near)
     if narrow:
@@ -118,13 +127,20 @@ def _with_kinds_held(base: Hypothesis) -> list[Scanned]:
     return list(found.values())
 
 
-def _chosen(ranked: Sequence[Scanned], leaders: int) -> list[Scanned]:
-    """The likeliest of all, and of every other cause that may be there its likeliest place."""
+def _chosen(ranked: Sequence[Scanned], leaders: int, opened: Collection[Key]) -> list[Scanned]:
+    """The likeliest of all, and of every other cause that may be there its likeliest place.
+
+    Of a cause that leaves something open also the likeliest where it does not yet.
+    """
+
+    def kind(item: Scanned) -> tuple[str, bool]:
+        return item.candidate.cause, item.candidate.key in opened
+
     likely = [item for item in ranked if item.loud or item.score > rules.LOOKED_AT_NATS]
-    chosen, kinds = likely[:leaders], {item.candidate.cause for item in likely[:leaders]}
+    chosen, kinds = likely[:leaders], {kind(item) for item in likely[:leaders]}
     for item in likely[leaders:]:
-        if item.candidate.cause not in kinds:
-            kinds.add(item.candidate.cause)
+        if kind(item) not in kinds:
+            kinds.add(kind(item))
             chosen.append(item)
     return chosen[: 2 * leaders]
 

@@ -11,7 +11,7 @@ from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.learn import worth_a_spread
 from discrepancy.inference.other_forms import beside_other_forms
 from discrepancy.inference.probability import probability
-from discrepancy.inference.propose import proposals
+from discrepancy.inference.propose import Proposed, proposals
 from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import nats_left, share_left
 from discrepancy.inference.reshape import reshaped
@@ -77,8 +77,8 @@ def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Se
     rivals = dict(zip(best.free, map(list, searched.rivals), strict=True))
     doubtful = 0
     while len(best.free) < most and doubtful < rules.DOUBTFUL:
-        added = proposals(rig, best).best
-        if added is None or (added.score - best.score < _needed(best, added) and not _tolerated(best, added)):
+        added = _added(best, proposals(rig, best))
+        if added is None:
             break
         say(f"refit {added.causes[-1].label}")
         little = added.score - best.score < rules.LITTLE_SHARE * nats_left(best)
@@ -97,6 +97,14 @@ def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Se
         likely = last is None or _law_holds(rig, best, last)
         doubtful = doubtful + 1 if little and not likely else 0
     return Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free))
+
+
+def _added(base: Hypothesis, proposed: Proposed) -> Hypothesis | None:
+    """The proposal to go on with: the likeliest, or else a law that healthy ones have, too; None where neither pays."""
+    best, open_ = proposed.best, proposed.open
+    if best is None or best.score - base.score >= _needed(base, best) or _tolerated(base, best):
+        return best
+    return open_ if open_ is not None and _tolerated(base, open_) else None
 
 
 def _tolerated(base: Hypothesis, added: Hypothesis) -> Hypothesis | None:

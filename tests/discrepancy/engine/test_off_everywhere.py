@@ -48,18 +48,17 @@ def diagnosed(present, times):
     return diagnose(LooseRig(present, catalogue=CATALOGUE, times=times), closed_loop=False)
 
 
-LIKE_ALL_ELSE = {LOOSE: 18.0}
-
-
-def test_what_is_as_far_off_as_all_else_is_scatter_and_is_in_the_model():
-    diagnosis = diagnosed(LIKE_ALL_ELSE, 10.0)
+@pytest.mark.parametrize("others", [{}, {LOOSE + 1: 6.0}, {LOOSE + 1: 6.0, LOOSE + 2: -11.0}])
+def test_what_is_as_far_off_as_all_else_is_scatter_and_is_in_the_model(others):
+    """However many places are."""
+    diagnosis = diagnosed({LOOSE: 18.0, **others}, 10.0)
     explanation = diagnosis.explanation
     assert diagnosis.verdict == "miscalibrated"
     assert explanation.found == explanation.suspected == ()
     assert "loose" in {item.candidate.cause for item in explanation.scatter}
     assert explanation.clean
-    # What the first of them leaves open is told by its law, though it is not named.
-    assert CATALOGUE[LOOSE].key in explanation.problem.opened
+    # What they leave open is told by their law, though they are not named.
+    assert {CATALOGUE[k].key for k in (LOOSE, *others)} <= set(explanation.problem.opened)
     value, covariance = explanation.fit.part(LOOSE)
     assert abs(value[0] - 18.0) < 4.0  # a tolerance off besides, as the rig draws it
     assert covariance[0, 0] < 1.0
