@@ -14,7 +14,7 @@ from discrepancy.inference.best_shape import covariance_with_shape
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.learn import worth_a_spread
 from discrepancy.inference.probability import probability
-from discrepancy.inference.remainder import share_left, unlisted_nats
+from discrepancy.inference.remainder import is_noise, share_left, unlisted_nats
 from discrepancy.inference.search import Rival, Searched
 from discrepancy.law_doubt import LawDoubt
 from discrepancy.least_squares.fit import Fit
@@ -129,9 +129,7 @@ class Explanation:
     @property
     def clean(self) -> bool:
         """Whether what is left is noise."""
-        return (
-            self.after <= rules.CLEAN_CHI2_PER_N * self.samples and self.unlisted_nats < rules.UNLISTED_NATS
-        )
+        return is_noise(self.after, self.samples, self.unlisted_nats)
 
 
 def explain(searched: Searched) -> Explanation:

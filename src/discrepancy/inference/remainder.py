@@ -25,6 +25,11 @@ def nats_left(hypothesis: Hypothesis) -> float:
     return sum(0.5 * float(cells.sizes @ np.log(np.maximum(power, 1.0))) for power, cells in pairs)
 
 
+def is_noise(chi2: float, samples: int, unlisted: float) -> bool:
+    """Whether what is left counts as noise: a misfit of so many samples, and ``unlisted_nats``."""
+    return chi2 <= rules.CLEAN_CHI2_PER_N * samples and unlisted < rules.UNLISTED_NATS
+
+
 def unlisted_nats(hypothesis: Hypothesis) -> float:
     """By how many nats a process of its own in every cell is likelier than clean noise; each has to pay for itself.
 

@@ -13,7 +13,7 @@ from discrepancy.inference.other_forms import beside_other_forms
 from discrepancy.inference.probability import probability
 from discrepancy.inference.propose import Proposed, proposals
 from discrepancy.inference.refit import exact
-from discrepancy.inference.remainder import nats_left, share_left
+from discrepancy.inference.remainder import is_noise, nats_left, share_left, unlisted_nats
 from discrepancy.inference.reshape import reshaped
 from discrepancy.inference.twins import twins
 from discrepancy.least_squares.problem import Problem
@@ -100,11 +100,16 @@ def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Se
 
 
 def _added(base: Hypothesis, proposed: Proposed) -> Hypothesis | None:
-    """The proposal to go on with: the likeliest, or else a law that healthy ones have, too; None where neither pays."""
+    """The proposal to go on with: the likeliest; None where it does not pay.
+
+    Where what is left is no noise a law that healthy ones have, too, may account for it.
+    """
     best, open_ = proposed.best, proposed.open
     if best is None or best.score - base.score >= _needed(base, best) or _tolerated(base, best):
         return best
-    return open_ if open_ is not None and _tolerated(base, open_) else None
+    if open_ is None or is_noise(base.fit.chi2, base.problem.samples, unlisted_nats(base)):
+        return None
+    return open_ if _tolerated(base, open_) else None
 
 
 def _tolerated(base: Hypothesis, added: Hypothesis) -> Hypothesis | None:
