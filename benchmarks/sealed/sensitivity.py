@@ -24,7 +24,7 @@ import tyro
 from discrepancy import rules
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.result.json import diagnosis_to_dict
-from discrepancy.team.parts import parted
+from discrepancy.team.long.parts import parted
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.words import TeamWords

@@ -14,6 +14,7 @@ from estimator.errors import InputError
 from invented import named, result
 from mocobot.campaign.plan import CampaignPlan, CampaignSet
 from mocobot.campaign.plots import save_plots
+from mocobot.campaign.score import match
 from mocobot.campaign.shares import interval, reliability
 from mocobot.campaign.summary import summarise
 from mocobot.campaign.text import COLUMNS, csv_table, format_campaign
@@ -78,6 +79,18 @@ def test_errors_are_of_what_was_found_where_it_was(summary):
     bias = next(entry for entry in summary["causes"] if entry["cause"] == "sea_bias")
     assert bias["error"] == pytest.approx(0.25)
     assert bias["over_se"] == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(("hidden_s", "deviations"), [(0.0, (2.0,)), (0.02, (2.0, -1.0))])
+def test_what_a_simulation_has_of_its_own_is_no_error(hidden_s, deviations):
+    """A spring that is told to follow at once follows as its mass lets it: 10 ms is right, if 20 were not said."""
+    known = {"compliance_m_per_N": 1e-5, "relaxation_s": hidden_s}
+    item = named("grasp_flex", 1, None, 0.9, compliance_m_per_N=(1.2e-5, 1e-6), relaxation_s=(0.01, 0.01))
+    answer = {"cause": "grasp_flex", "robot": 1, "joint": None, "known": known}
+    truth = {"effects": [{"cause": "grasp_flex", "parameters": known, "answer": answer}], "gimbal_axes_1": []}
+    (score,) = match([item], truth, [4.0]).scores
+    assert score.right
+    assert score.deviations == pytest.approx(deviations)
 
 
 def test_brier_score_by_hand(summary):

@@ -11,7 +11,7 @@ from discrepancy.engine.gain import Gain, responses
 from discrepancy.engine.lawful import laws_of, refining, responding
 from discrepancy.engine.verdict import Verdict, verdict_of
 from discrepancy.inference.odds import check_odds
-from discrepancy.inference.search import search
+from discrepancy.inference.search import Searched, search
 from discrepancy.laws.search import with_laws
 from discrepancy.laws.where import Located
 from discrepancy.rig import Rig
@@ -56,6 +56,7 @@ def diagnose(
     most: int = rules.MOST_CAUSES,
     laws: When = "auto",
     odds: float = rules.PRIOR_ODDS,
+    searched: Searched | None = None,
     jobs: int = 1,
     say: Callable[[str], object] | None = None,
     simulated: Callable[[int], object] | None = None,
@@ -69,6 +70,7 @@ def diagnose(
         laws: whether to look for laws that the catalogue lacks: where something unlisted is left, or a named cause is
             not sure, always, or never.
         odds: of any cause being there before the data are seen, at all its places together.
+        searched: what a search with these odds found, where there was one.
         jobs: parallel processes of the simulations.
         say: called with what is being done.
         simulated: called with 1 for every simulated trial.
@@ -76,7 +78,8 @@ def diagnose(
     Raises:
         InputError: the odds are none.
     """
-    searched = search(rig, most, progress=say, odds=check_odds(odds))
+    if searched is None:
+        searched = search(rig, most, progress=say, odds=check_odds(odds))
     explanation = listed = explain(searched)
     notes: list[str] = []
     located: tuple[Located, ...] = ()

@@ -182,3 +182,20 @@ SLOSH_HEADINGS_FINER_RAD, SLOSH_TURN_RAD = (-0.26, -0.13, 0.13, 0.26), 0.1
 SLOSH_SECONDS = 150
 """Second modes that are told apart, each as likely as the others. Derived: thirty lengths, 10 % apart, by five headings
 or shares. Without it a second mode would always explain what a pendulum of one mode does, and noise beside it."""
+
+# Long recordings.
+
+SEARCHED_S, SEARCHED_POWER = 480.0, 1.4
+"""Of recordings of three robots together that is searched for causes; of N robots (3 / N)^power of it. Chosen: a
+minute and a half of CPU. Measured: a minute of three robots takes 10 s, of ten 53 s (docs/commands/performance.md)."""
+SEARCHED_PARTS, SHORTEST_PART_S = 4, 40.0
+"""How many parts at least those are, and how long at least. Chosen: they can be held out of each other's fit, and are
+spread over the recording; several ways of a random motion, and twenty times what the filters leave out."""
+ODD_WINDOW_S = 10.0
+"""Of a part at a time that is held against what was searched. Chosen: a short push, some periods of a motion."""
+ODD_CHANCE, ODD_FACTOR = 0.01, 1.5
+"""A part is searched, too, where in one of its windows more is left than would be by chance once in a hundred such
+diagnoses if windows were normal, and by that factor. Derived: Student's t of the windows that were searched, over all
+comparisons; the factor is chosen: what moves otherwise leaves otherwise. Measured: an hour of a random motion, 0.8."""
+ODD_NAMED = 3
+"""Of such parts that were not searched all the same, how many are named. Chosen."""

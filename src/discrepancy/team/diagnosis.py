@@ -7,10 +7,12 @@ from typing import Any
 
 from discrepancy import rules
 from discrepancy.engine.diagnose import When, diagnose
+from discrepancy.inference.odds import check_odds
 from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.team.checks import check_estimate, check_recordings
 from discrepancy.team.estimates import errors, estimates
-from discrepancy.team.parts import parted, said
+from discrepancy.team.long.choice import Choice
+from discrepancy.team.long.search import search_parts
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.traces import traces
@@ -28,6 +30,7 @@ def diagnose_team(
     closed_loop: bool = True,
     laws: When = "auto",
     odds: float = rules.PRIOR_ODDS,
+    whole: bool = False,
     jobs: int = 1,
     say: Callable[[str], object] = lambda _: None,
     simulated: Callable[[int], object] | None = None,
@@ -41,6 +44,7 @@ def diagnose_team(
         closed_loop: whether to run the recorded commands again.
         laws: whether to look for laws that the catalogue lacks.
         odds: of any cause being there before the data are seen, at all its places together.
+        whole: whether to search all of long recordings, not a choice of their parts.
         jobs: parallel processes.
         say: takes the name of the stage that begins.
         simulated: called with 1 for every simulated trial.
@@ -60,14 +64,22 @@ def diagnose_team(
         estimate_payload(recordings, compare_masses=True, withhold=False)
         raise
     known = read_tolerances(None) if tolerances is None else tolerances
-    say("linearise")
-    rig = TeamRig.of(parted(recordings), estimate, known, excluded, jobs)
+
+    def rig_of(parts: list[Recording]) -> TeamRig:
+        say("linearise")
+        return TeamRig.of(parts, estimate, known, excluded, jobs)
+
+    choice, searched, notes = Choice.of(recordings, whole=whole), None, ()
+    if choice.others:
+        parts = search_parts(choice, rig_of, check_odds(odds), say)
+        choice, searched, notes = parts.choice, parts.searched, parts.notes
     found = diagnose(
-        rig, closed_loop=closed_loop, laws=laws, odds=odds, jobs=jobs, say=say, simulated=simulated
-    )
+        searched.rig if searched else rig_of(choice.searched), closed_loop=closed_loop, laws=laws, odds=odds,
+        searched=searched, jobs=jobs, say=say, simulated=simulated,
+    )  # fmt: skip
     assert isinstance(found.rig, TeamRig)
     payload, own = estimates(found.rig, found.explanation), partial(traces, found.rig, found.explanation)
-    found = replace(found, notes=(*found.notes, *said(recordings)))
+    found = replace(found, notes=(*found.notes, *choice.notes, *notes))
     return Diagnosed(found.rig, found, TeamWords(), own, payload)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -27,14 +27,31 @@ from discrepancy.team.closed_loop import (
 from discrepancy.team.dependence import directions_of, quantities_of
 from discrepancy.team.laws.effects import effects_of
 from discrepancy.team.laws.rows import LawfulRows
+from discrepancy.team.linear.elsewhere import Elsewhere, found_at
 from discrepancy.team.linear.origin import origin_of, places_of
-from discrepancy.team.parts import LaterPart
+from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.start import exact_residual
+from discrepancy.team.linear.unsearched import trial_at, without_bases
+from discrepancy.team.long.parts import LaterPart
 from discrepancy.team.undecidable import statements
 from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 from estimator.recording.model import Recording
 from mocobot_sim.effects.base import Effect
 from mocobot_sim.extended.extended import write_extended
+
+
+@dataclass(frozen=True, eq=False)
+class AsFound:
+    """What a search found.
+
+    Attributes:
+        there: robots and payload.
+        causes: the others with their values.
+    """
+
+    there: Elsewhere
+    causes: list[tuple[Candidate, Array]]
 
 
 class TeamRig(LawfulRows):
@@ -116,6 +133,36 @@ class TeamRig(LawfulRows):
             trial + 1,
             linear.signals.keep,
         )
+
+    def as_found(self, explanation: Explanation) -> AsFound:
+        """Robots, payload and causes as they were found.
+
+        Raises:
+            InputError: there are no such robots.
+        """
+        there = found_at(self.linear, self.whitening, explanation.hypothesis, self.origin)
+        causes = [(found.candidate, found.values) for found in explanation.found]
+        return AsFound(
+            there, [pair for pair in causes if places_of(pair[0]) is None and not pair[0].of_trials]
+        )
+
+    def left_in(self, recording: Recording, found: AsFound) -> tuple[Reduction, Array]:
+        """Rows that another recording of the team leaves, shape (n, C), its bases where they leave the least.
+
+        Args:
+            recording: of the same payload, its units as they were believed to be.
+            found: robots, payload, and causes that are not of one trial alone.
+        """
+        units, shared = found.there.units, found.there.shared
+        known = replace(recording, metadata=replace(recording.metadata, units=units))
+        trial = trial_at(known, shared, full=False)
+        own = replace(self, recordings=(known,), linear=(trial,), kept={})
+        signals, others = own._without(0, found.causes)
+        rows = exact_residual(signals, shared, trial.bases, units, trial.reduction)
+        if others:
+            own = replace(own, linear=(trial_at(known, shared, full=True),))
+            rows -= sum(own._unwhitened(0, candidate) @ values for candidate, values in others)
+        return trial.reduction, without_bases(trial, rows)
 
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
         """Standard deviation of the noise and of the motion, by channel, shape (N, 3) each."""

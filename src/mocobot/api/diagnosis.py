@@ -92,6 +92,7 @@ def diagnose(
     closed_loop: bool = True,
     laws: When = "auto",
     odds: float = rules.PRIOR_ODDS,
+    whole: bool = False,
     jobs: int = 1,
     say: Callable[[str], object] = lambda _: None,
     simulated: Callable[[int], object] | None = None,
@@ -111,6 +112,7 @@ def diagnose(
         laws: whether to look for laws that the catalogue lacks: ``"auto"`` where something unlisted is left, or
             a cause is not sure, ``"always"``, or ``"never"``.
         odds: of any cause being there before the data are seen, at all its places together.
+        whole: whether to search all of long recordings, not a choice of their parts.
         jobs: parallel processes.
         say: takes the name of the stage that begins.
         simulated: called with 1 for every trial that was simulated.
@@ -121,7 +123,7 @@ def diagnose(
     known = read_tolerances(Path(tolerances) if tolerances is not None else None)
     found = diagnose_team(
         list(recordings_of(recordings, map, Robots(calibration))), known, tuple(exclude),
-        closed_loop=closed_loop, laws=laws, odds=odds, jobs=jobs, say=say, simulated=simulated,
+        closed_loop=closed_loop, laws=laws, odds=odds, whole=whole, jobs=jobs, say=say, simulated=simulated,
     )  # fmt: skip
     if truth is not None:
         found = against_truth(found, truth.to_dict())

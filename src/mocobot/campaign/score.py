@@ -8,6 +8,7 @@ import numpy as np
 
 from discrepancy.team.causes import CAUSES
 from mocobot.campaign.ground import one_axis
+from mocobot_sim.effects.catalogue import EFFECTS
 
 Item = Mapping[str, Any]
 
@@ -147,13 +148,15 @@ def _same_place(item: Item, effect: Item, truth: Item) -> bool:
 
 
 def _errors(item: Item, effect: Item) -> tuple[float | None, tuple[float, ...]]:
-    """Where a push acts along its line, and how long the interval is, cannot be told."""
+    """Of a push, where along its line and how long it acts cannot be told; nor is what a simulation has of its own."""
     known, named = effect["answer"]["known"], item["parameters"]
     cause = effect["answer"]["cause"]
     skipped = (
         ("point", "start", "duration", "trial") if cause == "push" else ("trial", "last_trial", "inertia")
     )
+    own = EFFECTS[cause].own if cause in EFFECTS else {}
     names = [name for name in named if name in known and not name.startswith(skipped)]
+    names = [name for name in names if abs(known[name]) >= own.get(name, 0.0)]
     if not names:
         return None, ()
     away = np.array([named[name]["value"] - known[name] for name in names])

@@ -56,10 +56,11 @@ def run(options: Diagnose) -> None:
         data = rig.read(options.rec, logs, robots)
         made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
         with workers_of(options.scheduler), stages() as (say, simulated):
+            own = {"whole": options.whole} if options.rig == "team" else {}
             found = rig.diagnose(
                 data, tolerances, options.exclude,
                 closed_loop=options.closed_loop, laws=options.laws, odds=options.odds, jobs=options.jobs, say=say,
-                simulated=simulated,
+                simulated=simulated, **own,
             )  # fmt: skip
             if options.rig == "team" and (truth := _truth(options.rec)) is not None:
                 found = against_truth(found, truth)

@@ -96,6 +96,8 @@ class Diagnose:
     """Look for laws that the catalogue lacks: where something unlisted is left or a cause is unsure, always, never."""
     odds: float = PRIOR_ODDS
     """Odds of any cause being there before the data are seen; more where a fault is suspected."""
+    whole: bool = False
+    """Search all of a team's long recordings, not a choice of their parts."""
 
 
 @dataclass(frozen=True)

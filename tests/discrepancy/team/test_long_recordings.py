@@ -15,7 +15,8 @@ from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.linear.filed import is_filed
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.parts import LaterPart, parted, said
+from discrepancy.team.long.choice import Choice
+from discrepancy.team.long.parts import LaterPart, parted
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from estimator.estimate.payload import estimate_payload
@@ -36,7 +37,9 @@ def short_parts(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_short_recordings_stay_whole(recording) -> None:
     assert parted([recording])[0] is recording
-    assert said([recording]) == ()
+    choice = Choice.of([recording])
+    assert choice.searched == [recording]
+    assert choice.notes == choice.others == ()
 
 
 @pytest.mark.usefixtures("short_parts")

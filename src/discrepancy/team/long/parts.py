@@ -20,33 +20,32 @@ class LaterPart(Recording):
     """A part that begins in motion: its commands cannot be simulated from there."""
 
 
-def parted(recordings: Sequence[Recording]) -> list[Recording]:
+def parted(recordings: Sequence[Recording], longest_s: float | None = None) -> list[Recording]:
     """The recordings, long ones in parts of equal length.
 
     Parts keep the recording's clock. They overlap by what the filters take at their ends, so that all rows are there.
+
+    Args:
+        recordings: whole.
+        longest_s: of a part [s]; None for that of the rules.
     """
-    return [part for recording in recordings for part in _parts(recording)]
+    return [part for recording in recordings for part in _parts(recording, longest_s or rules.PART_S)]
 
 
-def said(recordings: Sequence[Recording]) -> tuple[str, ...]:
-    """A note for each that is cut."""
-    return tuple(
-        f"{recording.name} is long, and was looked at in {count} parts; only the commands of its first part were "
-        "simulated again, and where trials are numbered, parts count."
-        for recording in recordings
-        if (count := len(_edges(recording)) - 1) > 1
-    )
+def seconds(recordings: Sequence[Recording]) -> float:
+    """How long recordings are together [s]."""
+    return sum(len(recording.time) / recording.metadata.rate_hz for recording in recordings)
 
 
-def _edges(recording: Recording) -> list[int]:
+def _edges(recording: Recording, longest_s: float) -> list[int]:
     """Samples between which the parts are."""
-    samples, longest = len(recording.time), rules.PART_S * recording.metadata.rate_hz
+    samples, longest = len(recording.time), longest_s * recording.metadata.rate_hz
     count = max(1, -int(-samples // longest))
     return [round(k * samples / count) for k in range(count + 1)]
 
 
-def _parts(recording: Recording) -> list[Recording]:
-    edges, trim = _edges(recording), round(rules.TEAM_TRIM_S * recording.metadata.rate_hz)
+def _parts(recording: Recording, longest_s: float) -> list[Recording]:
+    edges, trim = _edges(recording, longest_s), round(rules.TEAM_TRIM_S * recording.metadata.rate_hz)
     if len(edges) == 2:
         return [recording]
     out = []

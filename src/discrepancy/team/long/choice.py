@@ -1,0 +1,85 @@
+"""Which parts of long recordings are searched for causes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+from discrepancy import rules
+from discrepancy.team.long.parts import parted, seconds
+from estimator.recording.model import Recording
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """Some parts of all that there are.
+
+    Attributes:
+        recordings: whole.
+        parts: of all of them, in their order.
+        taken: numbers of those that are searched, rising.
+    """
+
+    recordings: tuple[Recording, ...]
+    parts: tuple[Recording, ...]
+    taken: tuple[int, ...]
+
+    @classmethod
+    def of(cls, recordings: Sequence[Recording], *, whole: bool = False) -> Choice:
+        """Every part, or of recordings that together are longer than is searched, parts spread evenly over them.
+
+        A search takes time and memory with the length of the data, while what minutes of motion tell of robots and
+        causes changes little with more of the same.
+
+        Args:
+            recordings: of one team.
+            whole: whether to take all parts, however long.
+        """
+        most_s = searched_s(recordings[0].metadata.robots)
+        if whole or seconds(recordings) <= most_s:
+            parts = tuple(parted(recordings))
+            return cls(tuple(recordings), parts, tuple(range(len(parts))))
+        longest_s = min(max(most_s / rules.SEARCHED_PARTS, rules.SHORTEST_PART_S), rules.PART_S)
+        parts = tuple(parted(recordings, longest_s))
+        count = min(max(2, int(most_s * len(parts) / seconds(recordings))), len(parts))
+        return cls(tuple(recordings), parts, tuple(k * len(parts) // count for k in range(count)))
+
+    @property
+    def searched(self) -> list[Recording]:
+        """The parts that are searched."""
+        return [self.parts[k] for k in self.taken]
+
+    @property
+    def others(self) -> tuple[int, ...]:
+        """Numbers of the parts that are not."""
+        return tuple(sorted({*range(len(self.parts))} - {*self.taken}))
+
+    def beside(self, more: Iterable[int]) -> Choice:
+        """With further parts among those that are searched."""
+        return replace(self, taken=tuple(sorted({*self.taken, *more})))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What is to be said of it: a sentence for each recording that is cut, or one for all."""
+        if self.others:
+            about = seconds(self.searched) / 60.0, seconds(self.recordings) / 60.0
+            return (
+                f"{len(self.taken)} parts, {about[0]:.1f} of {about[1]:.1f} minutes, were searched for causes, and "
+                f"what was found was held against the other {len(self.others)} parts; where trials are numbered, the "
+                "searched parts count.",
+            )
+        counts = [
+            (recording, sum(part.name.startswith(f"{recording.name}, ") for part in self.parts))
+            for recording in self.recordings
+        ]
+        return tuple(
+            f"{recording.name} is long, and was looked at in {count} parts; only the commands of its first part were "
+            "simulated again, and where trials are numbered, parts count."
+            for recording, count in counts
+            if count > 1
+        )
+
+
+def searched_s(robots: int) -> float:
+    """How much of long recordings is searched, all together [s]: less of many robots, whose minutes take longer."""
+    return rules.SEARCHED_S * (3.0 / robots) ** rules.SEARCHED_POWER

@@ -1,0 +1,138 @@
+"""Of long recordings some parts are searched: which, and how the others show that something else is in them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import mocobot
+from discrepancy import rules
+from discrepancy.team.diagnosis import diagnose_team
+from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.signals import Signals
+from discrepancy.team.long.choice import Choice, searched_s
+from discrepancy.team.long.left import Left, more_left, typical
+
+FRICTION = {"coulomb_Nm": 0.05, "viscous_Nms_per_rad": 0.02}
+PUSH = {
+    "trial": 1, "start_s": 41.0, "duration_s": 4.0, "force_x_N": 0.0, "force_y_N": 2.0, "force_z_N": 0.0,
+    "point_x_m": 0.3, "point_y_m": 0.2, "point_z_m": 0.0,
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def recording():
+    effects = [
+        mocobot.make_effect("joint_friction", FRICTION, robot=2, joint=1),
+        mocobot.make_effect("push", PUSH),
+    ]
+    return mocobot.simulate("b", "random", vias=44, seed=6, effects=effects)
+
+
+@pytest.fixture
+def little_is_searched(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, value in (("SEARCHED_S", 26.0), ("SHORTEST_PART_S", 13.0), ("ODD_WINDOW_S", 2.0)):
+        monkeypatch.setattr(rules, name, value)
+
+
+@pytest.mark.usefixtures("little_is_searched")
+def test_parts_are_spread_evenly(recording) -> None:
+    choice = Choice.of([recording])
+    assert len(choice.parts) == 5
+    assert choice.taken == (0, 2)
+    assert choice.others == (1, 3, 4)
+    assert [part.name for part in choice.searched] == [choice.parts[k].name for k in (0, 2)]
+    assert choice.beside([3]).taken == (0, 2, 3)
+    (note,) = choice.notes
+    assert note.startswith("2 parts, 0.5 of 1.1 minutes, were searched")
+    whole = Choice.of([recording], whole=True)
+    assert whole.others == whole.notes == ()
+    assert len(whole.parts) == 1  # as long as the rules allow of one part
+
+
+@pytest.mark.usefixtures("little_is_searched")
+def test_every_recording_has_its_part(recording) -> None:
+    """As many as fit."""
+    many = [replace(recording, name=f"{k}") for k in range(2)]
+    choice = Choice.of(many)
+    assert [choice.parts[k].name.split(",")[0] for k in choice.taken] == ["0", "1"]
+
+
+def test_less_of_many_robots() -> None:
+    assert searched_s(3) == rules.SEARCHED_S
+    assert searched_s(2) > searched_s(3) > 3.0 * searched_s(10) > 0.0
+
+
+def test_windows(recording) -> None:
+    """Means and what is about them, of every ten seconds of motion; numpy's own for comparison."""
+    reduction = Reduction.of(Signals.of(recording))
+    time = reduction.time[: reduction.moving]
+    rows = np.zeros((len(reduction.time), 2))
+    rows[: reduction.moving, 0] = np.where(time < time[0] + 10.0, 3.0, -1.0)
+    rows[: reduction.moving, 1] = np.where(np.arange(len(time)) % 2, 0.5, -0.5)
+    left = Left.of(reduction, rows)
+    np.testing.assert_allclose(left.means[:, 0], [3.0] + [-1.0] * (len(left.means) - 1))
+    np.testing.assert_allclose(left.rms[:, 0], 0.0, atol=1e-12)
+    np.testing.assert_allclose(left.rms[:, 1], 0.5, rtol=1e-4)
+    np.testing.assert_allclose(left.means[:, 1], 0.0, atol=0.01)
+    assert len(left.holds) == len(reduction.time) - reduction.moving
+    np.testing.assert_allclose(typical([left])[1], 0.25, rtol=1e-3)
+
+
+def drawn(rng: np.random.Generator, windows: int = 12, holds: int = 0) -> Left:
+    """Windows of a hundred normal rows of six channels."""
+    rows = rng.standard_normal((windows, 100, 6)) * [1.0, 1e-3, 10.0, 1.0, 1.0, 1.0]
+    return Left(rows.mean(axis=1), rows.std(axis=1), rng.standard_normal((holds, 6)))
+
+
+@pytest.mark.parametrize("parts", [2, 4])
+def test_noise_is_nothing_else(parts: int) -> None:
+    """Of 300 long recordings with nothing in them, none calls for another part."""
+    rng = np.random.default_rng(3)
+    for _ in range(300):
+        more = more_left({k: drawn(rng) for k in range(20)}, [drawn(rng, 12) for _ in range(parts)])
+        assert max(more.values()) < 1.0
+
+
+@pytest.mark.parametrize("what", ["push", "noise", "hold"])
+def test_something_else_is_seen(what: str) -> None:
+    """In one window of one part: a mean of 1.2 standard deviations of a row, a noise three times as loud, a hold."""
+    rng = np.random.default_rng(4)
+    others, searched = {k: drawn(rng, holds=3) for k in range(20)}, [drawn(rng, holds=12) for _ in range(4)]
+    assert max(more_left(others, searched).values()) < 1.0
+    left = others[7]
+    if what == "push":
+        left.means[3, 1] += 1.2e-3
+    elif what == "noise":
+        left.rms[3, 2] *= 3.0
+    else:
+        left.holds[1, 4] += 12.0
+    more = more_left(others, searched)
+    assert [k for k, by in more.items() if by > 1.0] == [7]
+
+
+def test_what_cannot_be_compared_is_not() -> None:
+    rng = np.random.default_rng(5)
+    others = {0: drawn(rng, holds=2)}
+    others[0].holds[:] = 1e3
+    assert max(more_left(others, [drawn(rng), drawn(rng)]).values()) < 1.0
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures("little_is_searched")
+def test_what_is_in_another_part_is_found(recording) -> None:
+    """A push where nobody searched at first: its part is searched, too, and both are named at their size."""
+    found = diagnose_team([recording], laws="never", closed_loop=False)
+    told = found.to_dict()
+    assert {cause["cause"] for cause in told["causes"]} == {"joint_friction", "push"}
+    friction, push = sorted(told["causes"], key=lambda cause: cause["cause"])
+    assert (friction["robot"], friction["joint"]) == (2, 1)
+    for name, truth in FRICTION.items():
+        assert friction["parameters"][name]["value"] == pytest.approx(truth, rel=0.06)
+    assert push["parameters"]["force_y_N"]["value"] == pytest.approx(2.0, rel=0.1)
+    assert push["parameters"]["start_s"]["value"] == pytest.approx(41.0, abs=0.5)
+    assert len(told["recordings"]) == 3
+    assert any("was held against the other 2 parts" in note for note in told["notes"])
+    assert any("times as much as in those that were, and nowhere" in note for note in told["notes"])
