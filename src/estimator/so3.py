@@ -47,6 +47,21 @@ def left_jacobian(phi: Array) -> Array:
     return np.eye(3) + first * K + second * K @ K
 
 
+def inverse_left_jacobian(phi: Array) -> Array:
+    """J(phi)^-1 of ``left_jacobian``, shapes (..., 3) -> (..., 3, 3), for angles below 2 pi.
+
+    exp(d) exp(phi) = exp(phi + J(phi)^-1 d), and exp(phi) exp(d) = exp(phi + J(-phi)^-1 d), to first order in d.
+    Closed form I - [phi] / 2 + (1 - (a / 2) cot(a / 2)) / a^2 [phi]^2 with the angle a; below 0.01 rad, where that
+    cancels, its series.
+    """
+    angle = np.linalg.norm(phi, axis=-1)[..., None, None]
+    half = 0.5 * np.maximum(angle, 1e-2)
+    closed = (1.0 - half / np.tan(half)) / (4.0 * half**2)
+    second = np.where(angle < 1e-2, 1.0 / 12.0 + angle**2 / 720.0, closed)
+    K = skew(phi)
+    return np.asarray(np.eye(3) - 0.5 * K + second * (K @ K))
+
+
 def rotvec_covariance(R: Array, covariance: Array) -> Array:
     """Covariance of the components of log(R) from that of a left error rotation [rad^2], (3, 3) both.
 

@@ -10,7 +10,6 @@ from estimator.errors import InputError
 from estimator.recording.checks import check_recording
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
-from mocobot_logs.bag.write import write_bag
 from mocobot_logs.cut.choice import WHOLE, Choice, Span, seconds
 from mocobot_logs.cut.extent import extent_of
 from mocobot_logs.cut.piece import Piece
@@ -212,6 +211,8 @@ def write_converted(
     elif kind == "npz":
         write_npz(recording, path, level)
     else:
+        from mocobot_logs.bag.write import write_bag  # its library takes a third of a second to load
+
         write_bag(
             recording, path, level=level, storage="sqlite3" if kind == "sqlite3" else "mcap", advance=advance,
             replace_bag=replace_bag,

@@ -22,6 +22,8 @@ FREE = {
     "discrepancy.result.text": {"SAID", "WIDTH"},
     "discrepancy.result.text_rollouts": {"WIDTH"},
     "discrepancy.result.traces_file": {"VERSION"},
+    "discrepancy.team.linear.by_unknowns": {"STEP"},  # of a difference
+    "discrepancy.team.linear.reduction": {"TOGETHER"},  # speed alone
 }
 """Formats, layouts and sizes of pictures, by module."""
 

@@ -8,10 +8,10 @@ import pytest
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.adjust import SignalNoise, with_adjusted_signals
+from discrepancy.team.linear.by_unknowns import by_bases, by_shared
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.signals import with_rates
 from discrepancy.team.linear.start import Sensed, noise_rows
-from discrepancy.team.linear.trial_linear import by_bases, by_shared
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances
 from estimator.rigid_team.residual import balance, grasp_data

@@ -142,6 +142,14 @@ def test_left_jacobian_against_finite_differences(angle):
     np.testing.assert_allclose(so3.left_jacobian(phi), np.column_stack(columns), atol=2e-9)
 
 
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1e-3, 0.00999, 0.0101, 1.0, np.pi - 1e-6, np.pi, 4.0])
+def test_inverse_left_jacobian(angle):
+    axes = np.array([[0.6, -0.48, 0.64], [0.0, 0.0, 1.0]])
+    inverse = so3.inverse_left_jacobian(angle * axes)
+    for one, axis in zip(inverse, axes, strict=True):
+        np.testing.assert_allclose(one @ so3.left_jacobian(angle * axis), np.eye(3), atol=1e-11)
+
+
 def test_residual_jacobian_against_finite_differences():
     rng = np.random.default_rng(3)
     N = 4

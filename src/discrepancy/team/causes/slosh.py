@@ -61,24 +61,22 @@ class Slosh(Cause):
         motion = trial.motion
         com = trial.shared.pi[1:4] / trial.shared.pi[0]
         R_b1, gravity = trial.data.R_bi[:, 0], trial.data.gravity_mps2
-        turning = skew(motion.alpha) + skew(motion.omega) @ skew(motion.omega)
+        turning = trial.turning
         across_m = shape.get("across_length_m", shape["length_m"])
         drop_m = shape["length_m"] - across_m
         force, moment = np.zeros((2, len(R_b1), 3, 4))
 
         def driven(way, point):
             """How the point is accelerated along a way, and by how much more the further it is along each axis."""
-            at = turning @ np.concatenate([point[:, None], np.eye(3)], axis=1)
-            at[..., 0] += motion.acceleration
-            return np.einsum("qi,qik->qk", way, at)
+            further = (way[:, None] @ turning)[:, 0]
+            at = further @ point + np.sum(way * motion.acceleration, axis=1)
+            return np.concatenate([at[:, None], further], axis=1)
 
         def add(way, acceleration, point, sign=-1.0):
-            """Force on the payload, in {1}, of 1 kg that is accelerated along a way, and its moment."""
-            f = sign * way[:, :, None] * acceleration[:, None, :]
-            m = skew(point) @ f
-            m[..., 1:] -= skew(f[..., 0])  # moving the point by r moves the force: r x f = -f x r
-            force[:] += f
-            moment[:] += m
+            """Force on the payload, in {1}, of 1 kg that is accelerated along a way, and its moment where it is."""
+            acceleration = sign * acceleration[:, None]
+            force[:] += way[:, :, None] * acceleration
+            moment[:] += np.cross(point, way)[:, :, None] * acceleration
 
         for way, length_m, down_m in zip(
             _ways(R_b1, shape), (shape["length_m"], across_m), (0.0, drop_m), strict=True
@@ -91,6 +89,7 @@ class Slosh(Cause):
                 add(way, driven(way, com), com, 1.0)
                 aside = -down_m * way[:, 2:] * way
                 moment[..., 0] -= gravity * np.cross(aside, R_b1[:, 2])
+        moment[..., 1:] -= skew(force[..., 0])  # moving the point by r moves the force: r x f = -f x r
         return trial.of_wrench(force, moment)
 
     def finer(self, shape):

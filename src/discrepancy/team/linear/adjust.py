@@ -15,10 +15,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from discrepancy.team.linear.by_unknowns import by_bases, by_shared
 from discrepancy.team.linear.jacobian import by_signals
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.trial_linear import TrialLinear, by_bases, by_shared, filtered
+from discrepancy.team.linear.trial_linear import TrialLinear, filtered
 from estimator.arrays import Array
 from estimator.rigid_team.residual import Bases, Shared, balance, grasp_data, pose_error
 from estimator.rigid_team.slots import PHI, TAU, THETA

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,9 @@ from discrepancy import rules
 from discrepancy.team.linear.signals import Signals
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
+
+TOGETHER = 16
+"""Moving rows that are made at once; of more, a dense matrix would be zero for the most part."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,16 +45,42 @@ class Reduction:
     def __call__(self, x: Array) -> Array:
         """Reduce samples, shape (Q, ...) -> (n, ...); what is there for a while only takes as long as that."""
         flat = x.reshape(len(x), int(np.prod(x.shape[1:])))
-        if flat[0].any() or flat[-1].any() or not flat.size:
-            rows = self.operator @ flat
-        else:
-            rows = np.zeros((len(self.time), flat.shape[1]))
+        rows = np.zeros((len(self.time), flat.shape[1]))
+        first, last = 0, self.moving
+        if flat.size and not (flat[0].any() or flat[-1].any()):
             there = np.flatnonzero(flat.any(axis=1))
             first = np.searchsorted(self._last, there[:1], side="left").sum()
             last = np.searchsorted(self._first, there[-1:], side="right").sum()
-            for at in (slice(first, last), slice(self.moving, None)):
-                rows[at] = self.operator[at] @ flat
+        for at, start in self._blocks:
+            if at.stop > first and at.start < last:
+                count = at.stop - at.start
+                band = self._band[:count, : self._band.shape[1] - (TOGETHER - count) * self.step]
+                rows[at] = band @ flat[start : start + band.shape[1]]
+        rows[self.moving :] = self._alone @ flat
         return rows.reshape(len(self.time), *x.shape[1:])
+
+    @cached_property
+    def _blocks(self) -> list[tuple[slice, int]]:
+        """Moving rows that follow each other at once, ``TOGETHER`` at most, and the first sample of each such block."""
+        gaps = np.flatnonzero(np.diff(self.sample[: self.moving]) != self.step) + 1
+        out = []
+        for start, stop in pairwise([0, *gaps.tolist(), self.moving]):
+            for row in range(start, stop, TOGETHER):
+                out.append((slice(row, min(row + TOGETHER, stop)), int(self._first[row])))
+        return out
+
+    @cached_property
+    def _band(self) -> Array:
+        """Such a block as a dense matrix, shape (TOGETHER, samples): several times as fast as a sparse one."""
+        kernel = np.asarray(self.operator.data[: self.operator.indptr[1]], dtype=np.float64)
+        return np.array(
+            [np.pad(kernel, (k * self.step, (TOGETHER - 1 - k) * self.step)) for k in range(TOGETHER)]
+        )
+
+    @cached_property
+    def _alone(self) -> csr_array:
+        """Means of the holds, rows that stand alone."""
+        return self.operator[self.moving :]
 
     @cached_property
     def _first(self) -> NDArray[np.intp]:

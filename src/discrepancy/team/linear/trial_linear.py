@@ -1,7 +1,7 @@
 """One trial, linearised: its residual, how robots' signals and unknowns move it, and its whitening."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.least_squares.stored import is_stored, stored
+from discrepancy.team.linear.by_unknowns import by_bases, by_shared
 from discrepancy.team.linear.jacobian import BySignals, by_signals
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals, with_rates
@@ -23,11 +24,11 @@ from estimator.rigid_team.residual import (
     Shared,
     balance,
     grasp_data,
-    pose_error,
     pose_residual,
 )
 from estimator.rigid_team.slots import COUNT, PHI, TAU, THETA, with_its_rates
 from estimator.signals.grasp_data import GraspData
+from estimator.so3 import skew
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +73,12 @@ class TrialLinear:
     def motion(self) -> BodyMotion:
         """Of the payload, as all robots tell it."""
         return fuse(self.data, self.shared.grasps)
+
+    @cached_property
+    def turning(self) -> Array:
+        """By how much more a point of the payload is accelerated the further it is, [alpha] + [omega]^2, (Q, 3, 3)."""
+        turn = skew(self.motion.omega)
+        return skew(self.motion.alpha) + turn @ turn
 
     @property
     def robots(self) -> int:
@@ -257,39 +264,6 @@ def linearise(
     columns = reduction(by_shared(data, shared, bases)), reduction(by_bases(data, shared, bases))
     J = by_signals(s, data, shared, bases, arms) if full else BySignals.none(s.shape[1], 6 * s.shape[1])
     return TrialLinear(signals, s, data, shared, bases, arms, reduction, residual, J, *columns)
-
-
-def by_shared(data: GraspData, shared: Shared, bases: Bases) -> Array:
-    """Derivative of the residual's samples by ``Shared.moved``, shape (Q, 6 N, 6 (N - 1) + 10)."""
-    N, split = data.robots, 6 * (data.robots - 1)
-    out = np.zeros((data.samples, 6 * N, split + 10))
-    out[:, split:, split:] = -balance(data, shared)[1]
-    for k in range(split):
-        out[:, split:, k] = _slope(lambda x: balance(data, shared.moved(x))[0], np.eye(split + 10)[k])
-    # A loop knows its own robot's grasp and base alone: all loops at once.
-    for k in range(6):
-        all_grasps = np.append(np.tile(np.eye(6)[k], N - 1), np.zeros(10))
-        slope = _slope(lambda x: pose_error(data.R_bi, data.p_bi, shared.moved(x), bases), all_grasps)
-        for i in range(N - 1):
-            out[:, 6 * i : 6 * i + 6, 6 * i + k] = slope[:, 6 * i : 6 * i + 6]
-    return out
-
-
-def by_bases(data: GraspData, shared: Shared, bases: Bases) -> Array:
-    """The same by ``Bases.moved``, shape (Q, 6 N, 4 (N - 1))."""
-    N = data.robots
-    out = np.zeros((data.samples, 6 * N, 4 * (N - 1)))
-    for k in range(4):
-        all_bases = np.tile(np.eye(4)[k], N - 1)
-        slope = _slope(lambda x: pose_error(data.R_bi, data.p_bi, shared, bases.moved(x)), all_bases)
-        for i in range(N - 1):
-            out[:, 6 * i : 6 * i + 6, 4 * i + k] = slope[:, 6 * i : 6 * i + 6]
-    return out
-
-
-def _slope(of: Callable[[Array], Array], along: Array) -> Array:
-    """Central difference of a function of unknowns in one direction, at nought."""
-    return (of(1e-5 * along) - of(-1e-5 * along)) / 2e-5
 
 
 def filtered(signals: Signals) -> Array:

@@ -2,10 +2,11 @@
 
 import numpy as np
 
+from discrepancy.team.linear.by_unknowns import by_bases
 from discrepancy.team.linear.jacobian import BySignals, by_signals
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.linear.trial_linear import TrialLinear, by_bases, filtered
+from discrepancy.team.linear.trial_linear import TrialLinear, filtered
 from estimator.arrays import Array
 from estimator.recording.model import Recording
 from estimator.rigid_team.residual import Shared, balance, grasp_data, pose_residual, poses
