@@ -60,6 +60,17 @@ def test_every_recording_has_its_part(recording) -> None:
     assert [choice.parts[k].name.split(",")[0] for k in choice.taken] == ["0", "1"]
 
 
+@pytest.mark.usefixtures("little_is_searched")
+def test_notes_of_recordings_with_one_name(recording, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each says how many parts it has, of all that are searched, too."""
+    choice = Choice.of([recording, recording])
+    notes = choice.beside(choice.others).notes
+    assert len(notes) == 2
+    assert all("in 5 parts" in note for note in notes)
+    monkeypatch.setattr(rules, "PART_S", 30.0)
+    assert all("in 3 parts" in note for note in Choice.of([recording, recording], whole=True).notes)
+
+
 def test_less_of_many_robots() -> None:
     assert searched_s(3) == rules.SEARCHED_S
     assert searched_s(2) > searched_s(3) > 3.0 * searched_s(10) > 0.0

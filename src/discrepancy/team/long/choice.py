@@ -16,11 +16,13 @@ class Choice:
 
     Attributes:
         recordings: whole.
+        longest_s: of a part [s].
         parts: of all of them, in their order.
         taken: numbers of those that are searched, rising.
     """
 
     recordings: tuple[Recording, ...]
+    longest_s: float
     parts: tuple[Recording, ...]
     taken: tuple[int, ...]
 
@@ -35,14 +37,15 @@ class Choice:
             recordings: of one team.
             whole: whether to take all parts, however long.
         """
-        most_s = searched_s(recordings[0].metadata.robots)
-        if whole or seconds(recordings) <= most_s:
-            parts = tuple(parted(recordings))
-            return cls(tuple(recordings), parts, tuple(range(len(parts))))
-        longest_s = min(max(most_s / rules.SEARCHED_PARTS, rules.SHORTEST_PART_S), rules.PART_S)
+        most_s, total_s = searched_s(recordings[0].metadata.robots), seconds(recordings)
+        everything = whole or total_s <= most_s
+        longest_s = rules.PART_S
+        if not everything:
+            longest_s = min(max(most_s / rules.SEARCHED_PARTS, rules.SHORTEST_PART_S), longest_s)
         parts = tuple(parted(recordings, longest_s))
-        count = min(max(2, int(most_s * len(parts) / seconds(recordings))), len(parts))
-        return cls(tuple(recordings), parts, tuple(k * len(parts) // count for k in range(count)))
+        count = len(parts) if everything else min(max(2, int(most_s * len(parts) / total_s)), len(parts))
+        taken = tuple(k * len(parts) // count for k in range(count))
+        return cls(tuple(recordings), longest_s, parts, taken)
 
     @property
     def searched(self) -> list[Recording]:
@@ -68,10 +71,7 @@ class Choice:
                 f"what was found was held against the other {len(self.others)} parts; where trials are numbered, the "
                 "searched parts count.",
             )
-        counts = [
-            (recording, sum(part.name.startswith(f"{recording.name}, ") for part in self.parts))
-            for recording in self.recordings
-        ]
+        counts = [(recording, len(parted([recording], self.longest_s))) for recording in self.recordings]
         return tuple(
             f"{recording.name} is long, and was looked at in {count} parts; only the commands of its first part were "
             "simulated again, and where trials are numbered, parts count."
