@@ -148,15 +148,15 @@ def _same_place(item: Item, effect: Item, truth: Item) -> bool:
 
 
 def _errors(item: Item, effect: Item) -> tuple[float | None, tuple[float, ...]]:
-    """Of a push, where along its line and how long it acts cannot be told; nor is what a simulation has of its own."""
+    """Of a push, where along its line and how long it acts cannot be told; nor is what masses decide."""
     known, named = effect["answer"]["known"], item["parameters"]
     cause = effect["answer"]["cause"]
     skipped = (
         ("point", "start", "duration", "trial") if cause == "push" else ("trial", "last_trial", "inertia")
     )
-    own = EFFECTS[cause].own if cause in EFFECTS else {}
+    least = EFFECTS[cause].inherent if cause in EFFECTS else {}
     names = [name for name in named if name in known and not name.startswith(skipped)]
-    names = [name for name in names if abs(known[name]) >= own.get(name, 0.0)]
+    names = [name for name in names if abs(known[name]) >= least.get(name, 0.0)]
     if not names:
         return None, ()
     away = np.array([named[name]["value"] - known[name] for name in names])

@@ -30,7 +30,7 @@ class Effect(ABC):
     Attributes:
         cause: name of the cause: that of the class, in lower case with underscores.
         ranges: allowed range (low, high) of the parameters that may not be any finite number, both ends included.
-        own: parameters of which a simulation has at least so much, given less: what its bodies and contacts have.
+        inherent: parameters that below so much are not what the simulation has: its bodies' masses decide then.
         texts: parameters that are names, not numbers.
         repeats: whether one place takes several.
         on_payload: whether it needs a payload, or a grasp of one.
@@ -38,7 +38,7 @@ class Effect(ABC):
 
     cause: ClassVar[str]
     ranges: ClassVar[dict[str, tuple[float, float]]] = {}
-    own: ClassVar[dict[str, float]] = {}
+    inherent: ClassVar[dict[str, float]] = {}
     texts: ClassVar[tuple[str, ...]] = ()
     repeats: ClassVar[bool] = False
     on_payload: ClassVar[bool] = False

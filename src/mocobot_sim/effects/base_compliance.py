@@ -22,7 +22,7 @@ class BaseCompliance(Effect):
     """
 
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-2), "relaxation_s": (0.0, 10.0)}
-    own: ClassVar = {"relaxation_s": 0.005}
+    inherent: ClassVar = {"relaxation_s": 0.005}
     robot: int
     compliance_m_per_N: float
     relaxation_s: float = 0.0

@@ -36,7 +36,7 @@ class GraspFlex(Effect):
         "compliance_m_per_N": (0.0, 1e-3), "relaxation_s": (0.0, 10.0), "turning_rad_per_N": (0.0, 0.01),
         "offset_m": (-0.5, 0.5),
     }  # fmt: skip
-    own: ClassVar = {"relaxation_s": 0.005}
+    inherent: ClassVar = {"relaxation_s": 0.005}
     robot: int
     compliance_m_per_N: float
     relaxation_s: float = 0.0

@@ -24,12 +24,11 @@ class GraspPlay(Effect):
     """The grasp moves freely within +-``play_m`` of its place along each axis of {i} [m], and cannot turn.
 
     Three slides with ``range`` limits, on the payload (robot 1) or on a pad between flange and weld (the others). The
-    limits are stiff, some 0.2 um/N, or give way by ``contact_m_per_N`` [m/N], critically damped.
+    limits are stiff, or give way by ``contact_m_per_N`` [m/N], critically damped.
     """
 
     on_payload = True
     ranges: ClassVar = {"play_m": (0.0, 5e-3), "contact_m_per_N": (0.0, 1e-4)}
-    own: ClassVar = {"contact_m_per_N": 5e-7}
     robot: int
     play_m: float
     contact_m_per_N: float = 0.0

@@ -254,14 +254,30 @@ class TrialLinear:
 
 
 def linearise(
-    signals: Signals, shared: Shared, bases: Bases, arms: Arms, reduction: Reduction, *, full: bool
+    signals: Signals,
+    shared: Shared,
+    bases: Bases,
+    arms: Arms,
+    reduction: Reduction,
+    *,
+    full: bool,
+    known: bool = False,
 ) -> TrialLinear:
-    """Linearise one trial; without ``full`` the robots' signals are left out (J is empty)."""
+    """Linearise one trial.
+
+    Args:
+        signals: of the trial.
+        shared, bases, arms: where.
+        reduction: samples to rows.
+        full: whether derivatives by the robots' signals are asked for; J is empty otherwise.
+        known: whether the shared unknowns stay; there are no derivatives by them then.
+    """
     s = filtered(signals)
     data = grasp_data(s, arms, signals.rate_hz)
     pose = pose_residual(signals.phi, signals.theta, shared, bases, arms)
     residual = reduction(np.concatenate([pose, balance(data, shared)[0]], axis=1))
-    columns = reduction(by_shared(data, shared, bases)), reduction(by_bases(data, shared, bases))
+    moved = np.zeros((*residual.shape, 0)) if known else reduction(by_shared(data, shared, bases))
+    columns = moved, reduction(by_bases(data, shared, bases))
     J = by_signals(s, data, shared, bases, arms) if full else BySignals.none(s.shape[1], 6 * s.shape[1])
     return TrialLinear(signals, s, data, shared, bases, arms, reduction, residual, J, *columns)
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import stdtrit
+from scipy.stats import t
 
 from discrepancy import rules
 from discrepancy.team.linear.reduction import Reduction
@@ -31,8 +31,10 @@ class Left:
     def of(cls, reduction: Reduction, rows: Array) -> Left:
         """Of rows, shape (n, C), in any unit."""
         moving, time = rows[: reduction.moving], reduction.time[: reduction.moving]
-        window = np.floor((time - time[0]) / rules.ODD_WINDOW_S) if len(time) else time
-        # One that holds and ends leave little of tells little.
+        lasts_s = time[-1] - time[0] if len(time) else 0.0
+        count = max(1, int(lasts_s / rules.ODD_WINDOW_S))  # equal ones: none is left over at the end
+        window = np.minimum((time - time[:1]) / max(lasts_s, 1e-9) * count, count - 1).astype(int)
+        # One that holds leave little of tells little.
         parts = [moving[window == k] for k in np.unique(window)]
         full = max(map(len, parts), default=0)
         parts = [part for part in parts if 2 * len(part) >= full]
@@ -60,7 +62,7 @@ def more_left(others: Mapping[int, Left], searched: Sequence[Left]) -> dict[int,
         # Means are about nought; how loud windows are, about what they are on average, in shares of it.
         middle = known.mean(axis=0) if name == "rms" else np.zeros(known.shape[1])
         scale = np.sqrt(np.sum((known - middle) ** 2, axis=0) / (len(known) - (name == "rms")))
-        allowed = rules.ODD_FACTOR * -stdtrit(len(known) - 1, 0.5 * rules.ODD_CHANCE / count)
+        allowed = rules.ODD_FACTOR * t.isf(0.5 * rules.ODD_CHANCE / count, len(known) - 1)
         for k, x in each.items():
             away = (x - middle if name == "rms" else np.abs(x)) / np.maximum(scale, 1e-300)
             worst[k] = max(worst[k], float(away.max(initial=0.0) / allowed))
@@ -73,7 +75,10 @@ def _of(name: str, lefts: Sequence[Left]) -> Array:
     return np.log(np.maximum(x, 1e-300)) if name == "rms" else x
 
 
-def typical(lefts: Sequence[Left]) -> Array:
-    """Mean square of every channel in motion, shape (C,)."""
-    means, rms = (np.concatenate([getattr(left, name) for left in lefts]) for name in ("means", "rms"))
-    return np.asarray(np.mean(means**2 + rms**2, axis=0)) if len(means) else np.zeros(means.shape[1])
+def times_as_much(others: Sequence[Left], searched: Sequence[Left]) -> float | None:
+    """How many times as much is left in motion as in what was searched, median of channels; None where all rests."""
+    squares = [_of("means", lefts) ** 2 + np.exp(2.0 * _of("rms", lefts)) for lefts in (others, searched)]
+    if not all(map(len, squares)):
+        return None
+    own, known = (np.mean(square, axis=0) for square in squares)
+    return float(np.sqrt(np.median(own / np.maximum(known, 1e-300))))

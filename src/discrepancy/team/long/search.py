@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-import numpy as np
-
 from discrepancy import rules
-from discrepancy.engine.explanation import Explanation, explain
+from discrepancy.engine.explanation import explain
 from discrepancy.inference.search import Searched, search
 from discrepancy.team.long.choice import Choice
-from discrepancy.team.long.left import Left, more_left, typical
+from discrepancy.team.long.left import Left, more_left, times_as_much
 from discrepancy.team.rig import TeamRig
 from estimator.errors import InputError
 from estimator.recording.model import Recording
@@ -48,11 +46,10 @@ def search_parts(
         searched = search(rig_of(choice.searched), progress=say, odds=odds)
         say("hold against the other parts")
         try:
-            against = _against(choice, searched)
+            odd, ratio = _against(choice, searched)
         except InputError:  # no such robots
             note = "What was found is no team that can be, so it was not held against the other parts."
             return SearchedParts(choice, searched, (note,))
-        odd, ratio = against
         room = most - len(choice.taken)
         if not odd or room <= 0:
             return SearchedParts(choice, searched, _said(choice, odd, ratio))
@@ -62,7 +59,7 @@ def search_parts(
             return SearchedParts(choice, search(rig_of(choice.searched), progress=say, odds=odds), ())
 
 
-def _against(choice: Choice, searched: Searched) -> tuple[dict[int, float], float]:
+def _against(choice: Choice, searched: Searched) -> tuple[dict[int, float], float | None]:
     """Parts in which more is left than in any that was searched, by number, and by how much all others leave more.
 
     Raises:
@@ -70,23 +67,26 @@ def _against(choice: Choice, searched: Searched) -> tuple[dict[int, float], floa
     """
     rig = searched.rig
     assert isinstance(rig, TeamRig)
-    explanation: Explanation = explain(searched)
-    found = rig.as_found(explanation)
+    found = rig.as_found(explain(searched))
     left = {k: Left.of(*rig.left_in(part, found)) for k, part in enumerate(choice.parts)}
     known = [left[k] for k in choice.taken]
-    more = more_left({k: left[k] for k in choice.others}, known)
-    others = typical([left[k] for k in choice.others]) / np.maximum(typical(known), 1e-300)
-    return {k: by for k, by in more.items() if by > 1.0}, float(np.sqrt(np.median(others)))
+    others = {k: left[k] for k in choice.others}
+    odd = {k: by for k, by in more_left(others, known).items() if by > 1.0}
+    return odd, times_as_much(list(others.values()), known)
 
 
-def _said(choice: Choice, odd: dict[int, float], ratio: float) -> tuple[str, ...]:
-    text = f"In the parts that were not searched what was found leaves {ratio:.2f} times as much as in those that were"
+def _said(choice: Choice, odd: dict[int, float], ratio: float | None) -> tuple[str, ...]:
+    searched = "the parts that were not searched"
+    notes = [] if ratio is None else [
+        f"In {searched} what was found leaves {ratio:.2f} times as much as in those that were."
+    ]  # fmt: skip
     if not odd:
-        return (f"{text}, and nowhere so much more that something else had to be there.",)
+        return (*notes, f"In none of {searched} is so much more left that something else had to be there.")
     worst = sorted(odd, key=lambda k: -odd[k])
     names = "; ".join(choice.parts[k].name for k in worst[: rules.ODD_NAMED])
     more = f", and {len(odd) - rules.ODD_NAMED} more" if len(odd) > rules.ODD_NAMED else ""
     return (
-        f"{text}, but something else is in {len(odd)} of them: {names}{more}. Diagnose these by themselves, or "
-        "all with --whole.",
+        *notes,
+        f"Something else is in {len(odd)} of {searched}: {names}{more}. Diagnose these by themselves, or all with "
+        "--whole.",
     )
