@@ -298,6 +298,19 @@ def test_moved_and_changed_recordings_are_named(
     assert "Grasp frames from each other" in text
 
 
+@pytest.mark.parametrize("simulated", [0, 1])
+def test_not_every_trial_was_simulated_again(simulated: int, tmp_path: Path) -> None:
+    """Of a long recording only the first part is; a dot has the name of its own trial."""
+    folder = diagnosis_folder(tmp_path / "long")
+    values = json.loads((folder / "diagnosis.json").read_text(encoding="utf-8"))
+    values["gain"]["trials"] = [values["gain"]["trials"][simulated]]
+    (folder / "diagnosis.json").write_text(json.dumps(values), encoding="utf-8")
+    text = write_report(folder).read_text(encoding="utf-8")
+    names = {match for match in re.findall(r'"([^"]*), with the causes: ', text)}
+    assert len(names) == 1
+    assert ("one" in names.pop()) == (simulated == 0)
+
+
 def test_errors_against_the_truth(pages: dict[str, Reader], folders: dict[str, Path]) -> None:
     estimate = read_folder(folders["estimate"]).estimates[0].estimate
     error = estimate.mass.mass - 11.672

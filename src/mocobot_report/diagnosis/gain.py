@@ -32,7 +32,9 @@ def gain_section(book: Book, values: Values, names: Sequence[str]) -> Node | Non
     shown = {"before": BEFORE, "after": AFTER} if named else {"before": ERROR}
     blocks: list[Node] = []
     if gain["held_out"]["before"] is not None and gain["held_out"]["after"] is not None:
-        blocks += _closed_loop(book, gain, names, shown)
+        # Later parts of a long recording are not simulated again.
+        short = dict(zip(values["recordings"], names, strict=True))
+        blocks += _closed_loop(book, gain, [short[trial["name"]] for trial in gain["trials"]], shown)
     elif values["not_simulated"]:
         blocks.append(
             verdict("plain", "The closed loop was not simulated", tidy(f"{values['not_simulated']}."))
