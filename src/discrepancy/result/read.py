@@ -1,5 +1,6 @@
 """A diagnosis read back from its file (format: ``discrepancy.result.json``)."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,6 +53,11 @@ class WrittenDiagnosis:
     verdict: str
     causes: tuple[NamedCause, ...]
     recordings: tuple[str, ...]
+
+    def is_of(self, recording: str) -> bool:
+        """Whether it was made from a recording, by its file's name, or from parts of it (``team.long.parts``)."""
+        names = {Path(name).name for name in self.recordings}
+        return Path(recording).name in names | {re.sub(r", \d+ to \d+ s$", "", name) for name in names}
 
     def robots(self) -> int:
         """Largest number of a robot that a cause sits at; 0 if none does."""

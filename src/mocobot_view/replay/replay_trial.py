@@ -182,7 +182,7 @@ def _check_diagnosis(diagnosis: WrittenDiagnosis, recording: Recording, notes: l
             f"the diagnosis names robot {diagnosis.robots()}; {recording.name} is of "
             f"{recording.metadata.robots} robots"
         )
-    if Path(recording.name).name not in {Path(name).name for name in diagnosis.recordings}:
+    if not diagnosis.is_of(recording.name):
         notes.append(
             f"The diagnosis was made from other recordings ({', '.join(diagnosis.recordings)}), not from this one."
         )

@@ -9,6 +9,7 @@ import pytest
 
 import mocobot
 from discrepancy import rules
+from discrepancy.result.read import WrittenDiagnosis
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.linear.elsewhere import Elsewhere
 from discrepancy.team.linear.reduction import Reduction
@@ -57,6 +58,17 @@ def test_parts_are_spread_evenly(recording) -> None:
     whole = Choice.of([recording], whole=True)
     assert whole.others == whole.notes == ()
     assert len(whole.parts) == 1  # as long as the rules allow of one part
+
+
+@pytest.mark.usefixtures("little_is_searched")
+def test_a_diagnosis_of_parts_is_of_their_recording(recording) -> None:
+    """As replay asks it, for one; not of another whose name begins alike."""
+    parts = Choice.of([replace(recording, name="logs/a, b.parquet")]).searched
+    written = WrittenDiagnosis("consistent", (), tuple(part.name for part in parts))
+    assert written.is_of("elsewhere/a, b.parquet")
+    assert not written.is_of("a")
+    assert not written.is_of("a, b.parquet2")
+    assert WrittenDiagnosis("consistent", (), ("logs/rec.parquet",)).is_of("rec.parquet")
 
 
 @pytest.mark.usefixtures("little_is_searched")
