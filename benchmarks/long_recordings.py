@@ -1,9 +1,8 @@
-"""Twenty minutes of three robots each, diagnosed by a choice of parts: with nothing, with friction, with one push in them.
+"""Twenty minutes of three robots each, diagnosed by a choice of parts: nothing, friction, or a push is in them.
 
-    python benchmarks/long_recordings.py --first 11 --draws 6 --out DIR
+    python benchmarks/long_recordings.py --first 21 --draws 6 --out DIR
 
-Payloads, robots and what is hidden follow in turn from the seed; a push of 0.64 N lasts 10 s and begins anywhere. Seeds
-11 to 16 were run with the rules of f88b28c (docs/diagnosis/validation.md).
+Payloads, robots and what is hidden follow in turn from the seed; a push of 0.64 N lasts 10 s and begins anywhere.
 """
 
 from __future__ import annotations
