@@ -1,4 +1,4 @@
-"""Twenty minutes of three robots each, diagnosed by a choice of parts: nothing, friction, or a push is in them.
+"""Long recordings of three robots each, diagnosed by a choice of parts: nothing, friction, or a push is in them.
 
     python benchmarks/long_recordings.py --first 21 --draws 6 --out DIR
 
@@ -17,7 +17,7 @@ import tyro
 import growth
 import mocobot
 
-MINUTES, PUSH_S = 20, 10.0
+PUSH_S = 10.0
 FORCE_N, POINT_M = (0.4, -0.4, 0.3), (-0.3, 0.2, 0.0)
 TURN = (("b", "nominal"), ("c", "uncalibrated"), ("ring", "nominal"))
 
@@ -29,22 +29,27 @@ class Options:
     Attributes:
         first: seed of the first.
         draws: how many.
+        minutes: of each.
+        pushed: whether there is a push in every one, not in every other three.
         out: where recordings are kept.
     """
 
     first: int = 100
     draws: int = 6
+    minutes: float = 20.0
+    pushed: bool = False
     out: Path = Path("out/long")
 
 
-def run(seed: int, turn: int, out: Path) -> None:
+def run(seed: int, turn: int, options: Options) -> None:
     """Simulate one, unless it is there, and diagnose it."""
     payload, preset = TURN[turn % len(TURN)]
+    seconds, out = 60.0 * options.minutes, options.out
     rng, effects, said = np.random.default_rng(seed), [], "nothing"
     if payload == "ring":
         effects, said = [mocobot.make_effect("joint_friction", growth.FRICTION, robot=2, joint=1)], "friction"
-    if turn // len(TURN) % 2:
-        start_s = float(rng.uniform(5.0, 60.0 * MINUTES - 20.0))
+    if options.pushed or turn // len(TURN) % 2:
+        start_s = float(rng.uniform(5.0, seconds - 20.0))
         force = {f"force_{a}_N": x for a, x in zip("xyz", FORCE_N, strict=True)}
         point = {f"point_{a}_m": x for a, x in zip("xyz", POINT_M, strict=True)}
         when = {"trial": 1, "start_s": start_s, "duration_s": PUSH_S}
@@ -56,7 +61,7 @@ def run(seed: int, turn: int, out: Path) -> None:
         if payload == "ring":
             given = out / "ring.xml"
             given.write_text(growth.ring_mjcf(3), encoding="utf-8")
-        vias = round(60.0 * MINUTES / growth.VIA_S)
+        vias = round(seconds / growth.VIA_S)
         trial = mocobot.simulate(given, "random", vias=vias, seed=seed, preset=preset, effects=effects)
         mocobot.write_recording(trial, path)
     begun = time.process_time()
@@ -72,7 +77,7 @@ def main(options: Options) -> None:
     """Run all."""
     options.out.mkdir(parents=True, exist_ok=True)
     for turn in range(options.draws):
-        run(options.first + turn, turn, options.out)
+        run(options.first + turn, turn, options)
 
 
 if __name__ == "__main__":

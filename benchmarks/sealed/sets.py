@@ -13,7 +13,9 @@ from hidden.generator import PAYLOADS
 from hidden.schedule import Schedule
 from mocobot.campaign.ground import gimbal_axes
 from mocobot_sim.effects import Effect, apply_effects, effect_to_dict
-from mocobot_sim.scene.scene import build_team
+from mocobot_sim.effects.grasp_flex import GraspFlex
+from mocobot_sim.scene.scene import TeamScene, build_team
+from mocobot_sim.scene.soft import row_relaxation_s
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trial import run_trial
 from mocobot_sim.trial.truth import GroundTruth
@@ -23,7 +25,7 @@ from sealed.forms.base import Form
 from sealed.ground import Ground
 
 TIMESTEP_S = 1e-3
-"""As the diagnosis: the integrator's error is below the sensors' noise (docs/diagnosis/validation.md)."""
+"""As the diagnosis: the integrator's error is below the sensors' noise (docs/diagnosis/validation-history.md)."""
 SCHEDULE = Schedule(randoms=2, vias=22, periodic_s=35.0, hold_s=3.0)
 """146 s or a little more: two random trials, a periodic one, a static one."""
 Kind = Literal[
@@ -41,6 +43,9 @@ Kind = Literal[
 KINDS: tuple[Kind, ...] = get_args(Kind)
 SHARES = (0.4, 0.25, 0.2, 0.15)
 """Of the backgrounds where they are drawn."""
+
+SPRINGS = {"base_compliance": "base{robot}_compliance_x", "grasp_flex": "grasp{robot}_flex_x"}
+"""Rows of a scene that hold what gives way."""
 
 
 @dataclass(frozen=True)
@@ -174,7 +179,7 @@ def generate(request: SealedSet) -> tuple[list[Recording], dict[str, Any]]:
         recordings.append(measure(log, sensor_preset("nominal"), noise, name=f"trial {number}"))
     truth = {
         "mass_kg": GroundTruth.of(nominal).mass_kg,
-        "effects": [_told(effect) for effect in hidden],
+        "effects": [_told(effect, scene, background) for effect in hidden],
         "background": [effect_to_dict(effect) for effect in background],
         "units": [unit.to_dict() for unit in units],
         "gimbal_axes_1": gimbal_axes(nominal),
@@ -198,12 +203,22 @@ def _place(effect: Effect) -> tuple[Any, ...]:
     return effect.cause, *(getattr(effect, name) for name in effect.place_names())
 
 
-def _told(effect: Effect) -> dict[str, Any]:
-    """An effect with its right ``answer`` {cause, robot, joint, known}, and the ``law`` of an unlisted one."""
+def _told(effect: Effect, scene: TeamScene, background: Sequence[Effect]) -> dict[str, Any]:
+    """An effect with its right ``answer`` {cause, robot, joint, known}, and the ``law`` of an unlisted one.
+
+    What masses decide (``Effect.inherent``) is known as the scene has it. Behind a play a grasp gives way by what its
+    ends do and what it would without: in one row, as springs in series.
+    """
     told = effect_to_dict(effect)
     if isinstance(effect, Form):
         cause, known, law = effect.answer, effect.known(), effect.law()
     else:
-        cause, known, law = effect.cause, told["parameters"], None
+        cause, known, law = effect.cause, dict(told["parameters"]), None
+        if cause in SPRINGS and known["relaxation_s"] < effect.inherent["relaxation_s"]:
+            row = SPRINGS[cause].format(robot=told["robot"])
+            known["relaxation_s"] = row_relaxation_s(scene.compile(), row)
+    if "contact_m_per_N" in known:
+        own = (e for e in background if isinstance(e, GraspFlex) and e.robot == told["robot"])
+        known["contact_m_per_N"] += sum(flex.compliance_m_per_N for flex in own)
     answer = {"cause": cause, "robot": told.get("robot"), "joint": told.get("joint"), "known": known}
     return told | {"form": isinstance(effect, Form), "answer": answer, "law": law}

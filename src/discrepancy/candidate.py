@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -52,6 +52,17 @@ class Transient:
         ramp = {"ramp_s": self.ramp_s} if self.ramp_s else {}
         return {"start_s": self.start_s, "duration_s": self.duration_s} | ramp
 
+    def acted(self, time: Array) -> Array:
+        """Integral of its share of its full size up to some times [s]."""
+
+        def grown(since: Array) -> Array:
+            since = np.maximum(since, 0.0)
+            if not self.ramp_s:
+                return since
+            return np.where(since < self.ramp_s, since**2 / (2.0 * self.ramp_s), since - 0.5 * self.ramp_s)
+
+        return grown(time - self.start_s) - grown(time - self.start_s - self.duration_s + self.ramp_s)
+
 
 @dataclass(frozen=True)
 class Candidate:
@@ -89,6 +100,11 @@ class Candidate:
     most_spread: float = np.inf
     hidden: bool = False
 
+    def in_shape(self, shape: Mapping[str, float]) -> Candidate:
+        """The same with other numbers of its shape; an event acts when they say."""
+        when = self.transient and replace(self.transient, **shape)
+        return replace(self, shape=when.shape if when else dict(shape), transient=when)
+
     def acts_in(self, trial: int) -> bool:
         """Whether it can act in a trial (index from 0)."""
         if self.transient is not None:
@@ -107,6 +123,11 @@ class Candidate:
         if not (a and b) or self.cause != other.cause or a.trial != b.trial:
             return False
         return max(a.start_s, b.start_s) < min(a.start_s + a.duration_s, b.start_s + b.duration_s)
+
+    @property
+    def tolerant(self) -> list[bool]:
+        """Whether each parameter has a tolerance; an event is there or not."""
+        return [parameter.tolerance > 0 and self.transient is None for parameter in self.parameters]
 
     @property
     def units(self) -> Array:

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 from discrepancy.candidate import Candidate
 from discrepancy.law_doubt import LawDoubt
+from discrepancy.least_squares.patches import Patches
 from estimator.arrays import Array
 
 Numbers = dict[str, float]
@@ -115,9 +116,9 @@ class Rig(ABC):
     def candidates(self) -> list[Candidate]:
         """Every cause at every place."""
 
-    def unknowns(self, candidate: Candidate) -> Sequence[Array]:
-        """Whitened columns of what a cause leaves open in every trial, shape (n, C, k), possibly k = 0."""
-        return [columns[..., :0] for columns in self.columns(candidate)]
+    def unknowns(self, candidate: Candidate) -> Sequence[Patches]:
+        """Whitened columns of what a cause leaves open in every trial, possibly none."""
+        return [Patches(columns.shape[:2]) for columns in self.columns(candidate)]
 
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         """Whether such values can be: no negative mass, stiffness or friction beyond the errors."""

@@ -15,7 +15,7 @@ from sealed.forms.masses import MassDrift, MassOfTrials
 from sealed.limits import LIMITS
 from sealed.registry import FORMS, LISTED, UNLISTED
 from sealed.score import score
-from sealed.sets import KINDS, plan
+from sealed.sets import KINDS, generate, plan
 from sealed.tables import interval, misses, tables
 
 TINY = Schedule(randoms=1, vias=1, periodic_s=None, hold_s=None)
@@ -63,6 +63,23 @@ def test_limits_follow_the_background():
         [1, 2.86, 9.4, 1], rel=0.05
     )
     assert [limit_over_nominal("slosh", b) for b in BACKGROUNDS] == [1.0] * 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "parameter"), [("grasp_play", "contact_m_per_N"), ("base_compliance", "relaxation_s")]
+)
+def test_what_is_known_is_what_the_simulation_has(name, parameter):
+    """A grasp gives way behind its play as it would without; a spring follows as its mass lets it."""
+    _, truth = generate(replace(plan("single", 11, "x10", 2.0, name), schedule=TINY))
+    (effect,) = truth["effects"]
+    own = [e for e in truth["background"] if e["cause"] == "grasp_flex" and e["robot"] == effect["robot"]]
+    assert effect["parameters"][parameter] == 0.0
+    known = effect["answer"]["known"][parameter]
+    if name == "grasp_play":
+        assert known == own[0]["parameters"]["compliance_m_per_N"] > 0.0
+    else:  # critically damped
+        assert 0.005 < known < 0.1
 
 
 def test_a_wider_background_has_the_same_draws():

@@ -39,21 +39,8 @@ def worst_intervals(
 
 
 def intervals_near(when: Transient, shortest_s: float) -> list[Transient]:
-    """The same event with its ends moved, longer than ``shortest_s``; its ramps are the same share of it."""
-    start, end, share = when.start_s, when.start_s + when.duration_s, when.ramp_s / when.duration_s
+    """The same event with its ends moved, longer than ``shortest_s``."""
+    start, end = when.start_s, when.start_s + when.duration_s
     steps = np.array(rules.PUSH_MOVES) * when.duration_s
     ends = [(float(start + a), float(end + b - start - a)) for a in steps for b in steps if a or b]
-    return [
-        Transient(when.trial, first, duration, share * duration)
-        for first, duration in ends
-        if duration > shortest_s
-    ]
-
-
-def ramped(when: Transient, shares: Sequence[float]) -> list[Transient]:
-    """The same event with ramps of other shares of its duration, as long as it was at half its height."""
-    half = when.duration_s - when.ramp_s
-    middle = when.start_s + 0.5 * when.duration_s
-    each = [(half / (1.0 - share), share) for share in shares]
-    others = [Transient(when.trial, middle - 0.5 * d, d, share * d) for d, share in each]
-    return [other for other in others if abs(other.ramp_s - when.ramp_s) > 1e-9]
+    return [Transient(when.trial, first, duration) for first, duration in ends if duration > shortest_s]

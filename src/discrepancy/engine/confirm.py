@@ -112,7 +112,7 @@ def confirm(
     place = {winner.index: winner.cause.index} if winner else {}
     alternatives = tuple(
         tuple(
-            _alternative(c, gap, tried.get((place.get(item.index, item.index), c.key)), best)
+            _alternative(item, c, gap, tried.get((place.get(item.index, item.index), c.key)), best)
             for c, gap in item.rivals
         )
         for item in explanation.found
@@ -164,14 +164,16 @@ def _exchanged(rig: Rig, explanation: Explanation, problem: Problem, winner: _Sw
     return explain(Searched(rig, explanation.nothing, best, tuple(rivals)))
 
 
-def _alternative(rival: Candidate, gap: float, chi2_per_n: float | None, best: float) -> Alternative:
+def _alternative(
+    found: Found, rival: Candidate, gap: float, chi2_per_n: float | None, best: float
+) -> Alternative:
     apart = chi2_per_n is not None and chi2_per_n > best * (1.0 + rules.MARGIN_SHARE)
-    return Alternative(rival, gap, chi2_per_n, gap < rules.AMBIGUOUS_NATS and not apart)
+    return Alternative(rival, gap, chi2_per_n, gap < found.told_nats and not apart)
 
 
 def not_simulated(found: Found) -> tuple[Alternative, ...]:
     """A cause's rivals by the rows alone."""
-    return tuple(_alternative(rival, gap, None, np.inf) for rival, gap in found.rivals)
+    return tuple(_alternative(found, rival, gap, None, np.inf) for rival, gap in found.rivals)
 
 
 def _swaps(rig: Rig, explanation: Explanation) -> tuple[Problem, list[_Swap]]:

@@ -9,13 +9,13 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
-from discrepancy.engine.held_out import held_out_gains, shares
-from discrepancy.inference.best_shape import covariance_with_shape
+from discrepancy.engine.held_out import Foretold, foretold, held_out_gains, shares
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.inference.learn import worth_a_spread
-from discrepancy.inference.probability import probability
+from discrepancy.inference.learn import worth_spreads
+from discrepancy.inference.probability import probability, told_nats
 from discrepancy.inference.remainder import is_noise, share_left, unlisted_nats
 from discrepancy.inference.search import Rival, Searched
+from discrepancy.inference.shape.best_shape import covariance_with_shape
 from discrepancy.law_doubt import LawDoubt
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
@@ -31,6 +31,7 @@ class Found:
         index: which candidate of the problem.
         candidate: what and where, with its best shape.
         probability: that it is what and where it is said to be.
+        told_nats: gap from which a rival can be told from it.
         probability_alike: that it is this or one of the rivals that cannot be told from it.
         over_nothing: by how much it is likelier than nothing in its place [nats].
         share_left: see ``remainder.share_left``.
@@ -46,6 +47,7 @@ class Found:
     index: int
     candidate: Candidate
     probability: float
+    told_nats: float
     probability_alike: float
     over_nothing: float
     share_left: float
@@ -83,6 +85,7 @@ class Explanation:
         found: causes in the order of discovery.
         suspected: causes that were found with a probability too small to name them.
         scatter: kinds that are off everywhere, the farthest first.
+        foretold: where some are, what it is worth to know by how much every place is; None for a single trial.
         hypothesis: all causes that were found, and the noise and spreads beside them.
         nothing: the same with no cause.
         nominal: misfit of the nominal model, nothing off.
@@ -95,6 +98,7 @@ class Explanation:
     found: tuple[Found, ...]
     suspected: tuple[Found, ...]
     scatter: tuple[Scatter, ...]
+    foretold: Foretold | None
     hypothesis: Hypothesis
     nothing: Hypothesis
     nominal: float
@@ -148,10 +152,12 @@ def explain(searched: Searched) -> Explanation:
         replace(item, in_sample=in_sample, held_out=held_out)
         for item, (in_sample, held_out) in zip(found, removed, strict=True)
     ]
+    scatter = scatter_of(best)
     return Explanation(
         found=tuple(found),
         suspected=tuple(suspected),
-        scatter=scatter_of(best),
+        scatter=scatter,
+        foretold=foretold(problem, best.free) if scatter else None,
         hypothesis=best,
         nothing=nothing,
         nominal=Fit.of(nothing.problem.as_whitened, background=False).misfit,
@@ -173,11 +179,13 @@ def _found(rig: Rig, best: Hypothesis, index: int, rivals: Sequence[Rival]) -> F
     others = [(c, gap) for c, gap in others if c.transient is None or c.cause != candidate.cause]
     gaps = [gap for _, gap in others]
     about = left, rig.law_doubt(candidate), nothing
+    told = told_nats(gaps, *about)
     return Found(
         index=index,
         candidate=candidate,
         probability=probability(gaps, *about),
-        probability_alike=probability([g for g in gaps if g >= rules.AMBIGUOUS_NATS], *about),
+        told_nats=told,
+        probability_alike=probability([g for g in gaps if g >= told], *about),
         over_nothing=float(nothing),
         share_left=left,
         doubt=rig.law_doubt(candidate),
@@ -200,19 +208,18 @@ def _values(rig: Rig, best: Hypothesis, index: int) -> dict[str, Array]:
 
 def scatter_of(hypothesis: Hypothesis) -> tuple[Scatter, ...]:
     """Kinds whose spread the data want beyond their tolerance."""
-    problem, out, seen = hypothesis.problem, [], set()
+    problem, out, kinds = hypothesis.problem, [], dict[str, int]()
     for index, candidate in enumerate(problem.candidates):
-        if index in hypothesis.free or not problem.has_tolerance(index) or candidate.cause in seen:
-            continue
-        seen.add(candidate.cause)
-        factor = float(problem.spread[problem.columns_of(index)][0])
-        if factor < rules.SCATTER_FACTOR:
-            continue
-        nats = worth_a_spread(hypothesis.learnt, candidate.cause)
-        places = sum(c.cause == candidate.cause for c in problem.candidates)
+        if index not in hypothesis.free and problem.has_tolerance(index):
+            kinds.setdefault(candidate.cause, index)
+    factors = {kind: float(problem.spread[problem.columns_of(index)][0]) for kind, index in kinds.items()}
+    wanted = [kind for kind, factor in factors.items() if factor >= rules.SCATTER_FACTOR]
+    for kind, nats in worth_spreads(hypothesis.learnt, wanted).items():
+        candidate, factor = problem.candidates[kinds[kind]], factors[kind]
+        places = sum(c.cause == kind for c in problem.candidates)
         if nats > rules.NAMED_NATS and places > 1:  # the spread of one alone is its family's
             # Numbers that a healthy one has none of, as its shape says nothing of them, are not said to scatter.
-            shown = np.diag(problem.grams.sum(axis=0))[problem.spans[index]] > 0.0
+            shown = np.diag(problem.grams.sum(axis=0))[problem.spans[kinds[kind]]] > 0.0
             numbers = tuple(p for p, shows in zip(candidate.parameters, shown, strict=True) if shows)
             out.append(Scatter(replace(candidate, parameters=numbers), factor, places, nats))
     return tuple(sorted(out, key=lambda item: -item.factor))

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from joblib import Parallel, delayed
-from scipy.stats import t as student
+from scipy.special import stdtrit
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
@@ -63,7 +63,7 @@ class Gain:
         mean = float(np.mean(shares))
         if len(shares) < 2:
             return mean, float("-inf"), 1.0
-        half = student.ppf(0.975, len(shares) - 1) * np.std(shares, ddof=1) / np.sqrt(len(shares))
+        half = stdtrit(len(shares) - 1, 0.975) * np.std(shares, ddof=1) / np.sqrt(len(shares))
         return mean, mean - float(half), min(1.0, mean + float(half))
 
 

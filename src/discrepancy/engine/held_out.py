@@ -1,6 +1,7 @@
-"""Does a cause help where it was not fitted? Trials left out."""
+"""Does a cause, or what all places are off by, help where it was not fitted? Trials left out."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -24,6 +25,33 @@ def held_out_gains(problem: Problem, free: Sequence[int], index: int) -> list[fl
         without = Fit.of(problem, told, others, fixed=(index, nothing))
         gains.append(without.held_out(t) - Fit.of(problem, [*told, index], others).held_out(t))
     return gains
+
+
+@dataclass(frozen=True)
+class Foretold:
+    """How well every trial is foretold by the others; its own unknowns, such as where bases stand, come from itself.
+
+    Attributes:
+        as_designed: chi-square per row with the causes alone, everything else as designed.
+        as_found: with everything as far off as the other trials find it.
+    """
+
+    as_designed: float
+    as_found: float
+
+
+def foretold(problem: Problem, free: Sequence[int]) -> Foretold | None:
+    """What it is worth to know the machine as it is, on trials that it was not learnt from; None for a single one.
+
+    Spreads are of all trials, a number for each kind; what is off at each place is of the others.
+    """
+    if len(problem.trials) < 2:
+        return None
+    left = np.zeros(2)
+    for t in problem.trials:
+        others, told = [k for k in problem.trials if k != t], _told(problem, free, t)
+        left += [Fit.of(problem, told, others, background=off).held_out(t) for off in (False, True)]
+    return Foretold(*map(float, left / problem.samples))
 
 
 def _told(problem: Problem, free: Sequence[int], trial: int) -> list[int]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,13 +110,11 @@ def learnt(problem: Problem, free: Sequence[int] = (), rounds: int = rules.LEARN
 def _climbed(parts: _Parts, power: Array, spread: Array, rounds: int) -> tuple[float, Array, Array, Level]:
     """Log evidence, powers, spreads and levels at the maximum uphill from some, or after so many steps."""
     last = -np.inf
-    for _ in range(rounds):
-        evidence, power_next, spread_next, _ = _step(parts, power, spread)
-        if evidence - last < rules.LEARN_NATS and np.isfinite(last):
-            break
-        last, power, spread = evidence, power_next, spread_next
-    evidence, _, _, level = _step(parts, power, spread)
-    return evidence, power, spread, level
+    while True:
+        evidence, power_next, spread_next, level = _step(parts, power, spread)
+        if not rounds or (evidence - last < rules.LEARN_NATS and np.isfinite(last)):
+            return evidence, power, spread, level
+        last, power, spread, rounds = evidence, power_next, spread_next, rounds - 1
 
 
 def widest(kind: Sequence[Candidate]) -> float:
@@ -249,15 +247,17 @@ def _middle(spreads: Array, weights: Array) -> float:
     return float(spreads[order][np.searchsorted(passed, 0.5 * passed[-1])])
 
 
-def worth_a_spread(one: Learnt, kind: str) -> float:
-    """By how many nats the data want a kind to scatter more than its tolerance; 0 where they do not."""
-    problem = one.problem
-    spread = np.array(problem.spread)
-    for index, candidate in enumerate(problem.candidates):
-        if candidate.cause == kind and index not in one.free and problem.has_tolerance(index):
-            spread[problem.columns_of(index)] = 1.0
-    held = replace(problem, spread=spread)
-    names, parts = _parts(held, one.free)
-    power = np.concatenate([p[c.sizes > 0] for p, c in zip(held.power, held.cells, strict=True)])
-    values = np.array([np.sqrt(np.mean(spread[at] ** 2)) for at in names])
-    return one.log_evidence + held.price - _step(parts, power, values)[0]
+def worth_spreads(one: Learnt, kinds: Collection[str]) -> dict[str, float]:
+    """By how many nats the data want each kind to scatter more than its tolerance; 0 where they do not."""
+    if not kinds:
+        return {}
+    problem, out = one.problem, {}
+    names, parts = _parts(problem, one.free)
+    power = np.concatenate([p[c.sizes > 0] for p, c in zip(problem.power, problem.cells, strict=True)])
+    values = np.array([np.sqrt(np.mean(problem.spread[at] ** 2)) for at in names])
+    for kind in kinds:
+        held = values.copy()
+        if kind in parts.kinds:
+            held[parts.kinds[kind]] = 1.0
+        out[kind] = one.log_evidence + problem.price - _step(parts, power, held)[0]
+    return out

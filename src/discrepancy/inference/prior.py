@@ -19,7 +19,7 @@ def log_prior_odds(problem: Problem, candidate: Candidate) -> float:
     fault is as likely in each of so many octaves.
     """
     if candidate.transient is not None:
-        places = rules.INTERVALS
+        places = rules.INTERVALS * (rules.RAMPS if candidate.transient.ramp_s else 1.0)
     elif candidate.among:
         places = candidate.among
     else:

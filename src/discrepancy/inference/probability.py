@@ -35,6 +35,23 @@ def parted(gaps: Sequence[float], doubt: LawDoubt, worth: float) -> Array:
     return np.asarray(gaps, dtype=float) / (1.0 + more)
 
 
+def told_nats(gaps: Sequence[float], share_left: float, doubt: LawDoubt, worth: float) -> float:
+    """Gap to rivals from which they can be told from a cause [nats]; arguments as of ``probability``.
+
+    Of a cause that is less likely than not because its rivals' laws may be as far off as they are apart, so many of the
+    nearest cannot be told from it as make one of them likelier than not.
+    """
+    told = rules.AMBIGUOUS_NATS
+    for gap in sorted(gap for gap in gaps if gap >= told):
+        far = [other for other in gaps if other >= told]
+        if probability(far, share_left, doubt, worth) >= rules.LEAST_PROBABILITY:
+            break
+        if parted([gap], doubt, worth)[0] >= rules.AMBIGUOUS_NATS:
+            break
+        told = float(np.nextafter(gap, np.inf))
+    return told
+
+
 def _listed_odds(share_left: float, doubt: LawDoubt, worth: float) -> float:
     """Odds that a cause is what it is called rather than something unlisted that looks like it.
 

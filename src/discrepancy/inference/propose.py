@@ -9,11 +9,12 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
-from discrepancy.inference.best_shape import best_shape, nearest_shape
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.imitation import imitated
 from discrepancy.inference.other_forms import beside_other_forms
 from discrepancy.inference.scan import Scanned, events_of, scan, score_of, score_with, scores_with
+from discrepancy.inference.shape.best_shape import best_shape
+from discrepancy.inference.shape.reshape import event_in_shape, in_shape, settled_shape
 from discrepancy.inference.twins import twins
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Key, Problem
@@ -66,7 +67,7 @@ def proposals(
     while True:
         item, new = next(offered, (None, None))
         if new is None:
-            if rough is None or not rig.refinements(rough.candidate):
+            if rough is None or not (rig.refinements(rough.candidate) or rig.steps(rough.candidate)):
                 break
             # Kinds that scatter are scanned as if they did not: where robots are off everywhere nothing else is near.
             new, rough = sharpened(rig, base, rough, near=True), None
@@ -197,28 +198,16 @@ def sharpened(
         start: the problem with the spreads and powers from which those with the candidate are learnt; None for base's.
     """
     start = base.problem if start is None else start
+    if near and item.candidate.transient and rig.steps(item.candidate):
+        new = event_in_shape(rig, base, start, item.candidate)
+        return _beyond_tolerance(base, new.problem, new)
     shaped = best_shape(rig, start, base.free, item) if near else item.candidate
     problem, index = _with(rig, start, shaped, item)
     new = Hypothesis.of(problem, [*base.free, index], base.allowed)
     if near and not shaped.transient:
-        new = _settled_shape(rig, new)
+        new = settled_shape(rig, new, index)
         problem, shaped = new.problem, new.causes[-1]
     return _beyond_tolerance(base, problem, new) if shaped.transient else _opened(rig, base, problem, new)
-
-
-def _settled_shape(rig: Rig, new: Hypothesis) -> Hypothesis:
-    """The last cause in the shape that suits the noise left with it; without it, all misfit counted as noise."""
-    index = new.free[-1]
-    for _ in range(rules.POLISH_ROUNDS if rig.steps(new.causes[-1]) else 0):
-        values, candidate = new.fit.part(index)[0], new.causes[-1]
-        without = Fit.of(new.problem, new.free[:-1], fixed=(index, np.zeros(len(values))))
-        moved = nearest_shape(rig, without, candidate, values * candidate.units)
-        problem = new.problem.with_columns(index, moved, rig.columns(moved))
-        other = Hypothesis.of(problem, new.free, new.allowed)
-        if other.score <= new.score:
-            break
-        new = other
-    return new
 
 
 def _beyond_tolerance(base: Hypothesis, problem: Problem, new: Hypothesis) -> Hypothesis:
@@ -244,6 +233,7 @@ def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hy
         return new
     for _ in range(2):  # its size is found with them, and is theirs
         size = abs(float(other.fit.part(index)[0][0] * shaped.units[0]))
+        opened, other = start, new  # the last ones go first, for the sake of memory
         opened = start.with_open(shaped.key, along, max(size, shaped.parameters[0].tolerance))
         other = Hypothesis.of(opened, new.free, base.allowed)
     if other.score <= new.score:
@@ -257,8 +247,7 @@ def _reshaped(rig: Rig, new: Hypothesis) -> Hypothesis:
     """The last cause in another shape, if that shows beside what it leaves open (``Rig.behind``)."""
     index, candidate = new.free[-1], new.causes[-1]
     for shape in rig.refinements(candidate) if candidate.cause in rig.behind else ():
-        problem = new.problem.with_columns(index, shape, rig.columns(shape))
-        other = _settled_shape(rig, Hypothesis.of(problem, new.free, new.allowed))
+        other = settled_shape(rig, in_shape(rig, new, index, shape), index)
         if other.score > new.score + rules.SHAPE_NATS and other.possible(rig, index):
             new = other
     return new

@@ -76,8 +76,7 @@ def events_of(rig: Rig, fit: Fit) -> list[Scanned]:
     """
     problem = fit.problem
     there = [problem.candidates[i] for i in fit.free]
-    calm = problem.with_noise([np.minimum(power, 1.0) for power in problem.power], problem.spread)
-    quiet, found, stands_out = Fit.of(calm, fit.free), [], []
+    quiet, found, stands_out = Fit.of(problem.calm, fit.free), [], []
     for candidate in rig.transients([fit.remaining(t) for t in problem.trials]):
         # What is left of an event that is there is its form, and no other event.
         if not any(candidate.overlaps(other) for other in there):

@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.inference.learn import worth_a_spread
+from discrepancy.inference.learn import worth_spreads
 from discrepancy.inference.other_forms import beside_other_forms
 from discrepancy.inference.probability import probability
 from discrepancy.inference.propose import Proposed, proposals
 from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import is_noise, nats_left, share_left, unlisted_nats
-from discrepancy.inference.reshape import reshaped
+from discrepancy.inference.shape.reshape import reshaped, settled_shape
 from discrepancy.inference.twins import twins
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
@@ -171,7 +171,7 @@ def _needed(base: Hypothesis, more: Hypothesis) -> float:
     if not _wide(base, rules.SCATTER_FACTOR):
         return rules.NAMED_NATS
     # From three places a spread is known to a half: only one that the data want is one.
-    worth = {kind: worth_a_spread(base.learnt, kind) for kind in _wide(base, rules.HELD_FACTOR)}
+    worth = worth_spreads(base.learnt, _wide(base, rules.HELD_FACTOR))
     off = [kind for kind, nats in worth.items() if nats > rules.NAMED_NATS]
     if len(off) != 1 or not _alike(base.problem, off[0]) & {cause.cause for cause in more.causes}:
         return rules.NAMED_NATS
@@ -230,6 +230,9 @@ def settled(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> tuple[Hypothesis
         changed = False
         if rig.layered:
             best = reshaped(rig, best, nothing)
+        for index in best.free:
+            if best.problem.candidates[index].transient:  # its interval was told beside what was known then
+                best = settled_shape(rig, best, index)
         for index in best.free:
             less = best.without(index)
             # Its own loss to forms of the others is judged here, but counted once: not theirs to its forms, too.

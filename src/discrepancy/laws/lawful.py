@@ -9,6 +9,7 @@ from discrepancy.candidate import Candidate
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate, law_steps, refined
 from discrepancy.laws.said.numbers import report
+from discrepancy.least_squares.patches import Patches
 from discrepancy.rig import Numbers, Rig
 from estimator.arrays import Array
 
@@ -24,9 +25,9 @@ class Lawful(Rig):
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         return isinstance(candidate, LawCandidate) or super().possible(candidate, values, covariance)
 
-    def unknowns(self, candidate: Candidate) -> Sequence[Array]:
+    def unknowns(self, candidate: Candidate) -> Sequence[Patches]:
         if isinstance(candidate, LawCandidate):
-            return [columns[..., :0] for columns in self.columns(candidate)]
+            return [Patches(columns.shape[:2]) for columns in self.columns(candidate)]
         return super().unknowns(candidate)
 
     def imitators(self, candidate: Candidate) -> Iterable[list[Array]]:

@@ -134,11 +134,11 @@ class CellGrams:
         new[start : start + count] = len(kept) + np.arange(count)
         return CellGrams(self.first, np.concatenate([beside, edge], axis=2), old, new)
 
-    def less(self, lost: Callable[[int], Array]) -> CellGrams:
-        """With what every cell's matrix loses, (W, W) each, taken off."""
+    def changed(self, of: Callable[[int, Array], Array]) -> CellGrams:
+        """With every cell's matrix (W, W) changed, by the number of the cell."""
         first = np.empty((self.cells, self.width, self.width))
         for cell, gram in enumerate(self.each(range(self.cells))):
-            first[cell] = gram - lost(cell)
+            first[cell] = of(cell, gram)
         out = CellGrams.of(first)
         return out.stored() if is_stored(self.first) else out
 

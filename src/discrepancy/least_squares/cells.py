@@ -78,6 +78,14 @@ class Cells:
         pairs = ((a[at], b[at]) for at in spans)
         return np.array([flat_gram(one, one if same else other) for one, other in pairs])
 
+    def only(self, cell: int, x: Array) -> Array:
+        """Rows whose transform x, shape (n, C, k), is nought but in a cell."""
+        there = self.index == cell
+        at = np.flatnonzero(there.any(axis=0))
+        out = np.zeros(x.shape)
+        out[:, at] = self.series(np.where(there[:, at, None], x[:, at], 0.0))
+        return out
+
     def numbers(self, cell: int) -> NDArray[np.intp]:
         """Which numbers of flattened rows (n C, ...) are in a cell."""
         stop = int(self.sizes[: cell + 1].sum())

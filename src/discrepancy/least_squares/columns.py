@@ -74,6 +74,10 @@ class Columns:
             return np.zeros((*self.pieces[0].shape[:2], 0))
         return np.asarray(parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2), dtype=np.float64)
 
+    def channels(self, first: int) -> Array:
+        """All columns, of channels from one on, shape (n, C - first, columns)."""
+        return np.concatenate([piece[:, first:] for piece in self._read()], axis=2, dtype=np.float64)
+
     def times(self, x: Array) -> Array:
         """The columns added up, each by its number in x, shape (columns,) or (columns, k) -> (n, C) or (n, C, k)."""
         out, at = np.zeros((*self.pieces[0].shape[:2], *x.shape[1:])), 0

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from discrepancy import rules
 from discrepancy.candidate import Candidate
+from discrepancy.least_squares.columns import portions
 from discrepancy.least_squares.gram import flat_inverse, gram_of
+from discrepancy.least_squares.opened import best_of
 from discrepancy.least_squares.problem import Problem
 from discrepancy.least_squares.stored import given_back
 from estimator.arrays import Array
@@ -154,14 +157,12 @@ class Fit:
         """Values of a trial's own unknowns that go with the solution, shape (l,)."""
         own = self.problem.local[trial]
         left = self.problem.raw_times(trial, np.append(-self.coefficients, 1.0))
-        both = np.concatenate([own, left[..., None]], axis=2).reshape(left.size, -1)
-        opened = [each[trial].scaled for each in self.problem.opened.values()]
-        if opened:
-            # What causes leave open has unit size: so many rows more, and each column with its own best beside it.
-            U = np.concatenate(opened, axis=2, dtype=np.float64).reshape(left.size, -1)
-            best = np.linalg.solve(U.T @ U + np.eye(U.shape[1]), U.T @ both)
-            both = np.vstack([both - U @ best, best])
-        values = np.linalg.lstsq(both[:, :-1], both[:, -1], rcond=None)[0]
+        both = np.concatenate([own, left[..., None]], axis=2)
+        opened = [each[trial] for each in self.problem.opened.values()]
+        # What causes leave open has unit size: so many rows more, and each column with its own best beside it.
+        both, best = best_of(opened, both) if opened else (both, np.zeros((0, both.shape[2])))
+        flat = np.vstack([both.reshape(left.size, -1), best])
+        values = np.linalg.lstsq(flat[:, :-1], flat[:, -1], rcond=None)[0]
         return np.asarray(values, dtype=np.float64)
 
     def remaining(self, trial: int) -> Array:
@@ -194,19 +195,17 @@ class Fit:
         own_grams = [np.zeros((len(unit),) * 2) for unit in units]
         edge = np.zeros((self.gram.shape[0], ends[-1]))
         for t in self.problem.trials:
-            each = [columns[t] for columns in sets]
-            here = [k for k, columns in enumerate(each) if columns.any()]  # a transient is in one trial only
-            if not here:
-                continue
-            own = self.problem.spectrum(t, np.concatenate([each[k] * units[k] for k in here], axis=2))
-            given_back(*each)
-            weighted, at = own * self.problem.weights[t], 0
-            products = self.problem.products(t, weighted)
-            for k in here:
-                its = slice(at, at + len(own_grams[k]))
-                own_grams[k] += gram_of(weighted[..., its], own[..., its])
-                edge[:, spans[k]] += products[:, its]
-                at = its.stop
+            here: list[int] = []  # of which there are columns, as a transient is in one trial only
+            for some in portions(_there(sets, units, t, here), rules.TOLD_BYTES):
+                own = self.problem.spectrum(t, some)
+                weighted, at = own * self.problem.weights[t], 0
+                products = self.problem.products(t, weighted)
+                for k in here:
+                    its = slice(at, at + len(own_grams[k]))
+                    own_grams[k] += gram_of(weighted[..., its], own[..., its])
+                    edge[:, spans[k]] += products[:, its]
+                    at = its.stop
+                here.clear()
         crosses = [edge[self.used, span].T for span in spans]
         return [
             (gram - cross @ self.covariance @ cross.T, edge[-1, span] - cross @ self.solution)
@@ -224,3 +223,15 @@ class Fit:
         cross = self.gram[span][:, self.used]
         information = self.gram[span, span] - cross @ self.covariance @ cross.T
         return information, self.gram[span, -1] - cross @ self.solution
+
+
+def _there(
+    sets: Sequence[Sequence[Array]], units: Sequence[Array], trial: int, here: list[int]
+) -> Iterator[Array]:
+    """Columns of a trial that are not nought, one set after the other, each of which is noted in ``here``."""
+    for k, (columns, unit) in enumerate(zip(sets, units, strict=True)):
+        own = columns[trial]
+        if own.any():
+            here.append(k)
+            yield own * unit
+        given_back(own)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from discrepancy import rules
-from discrepancy.least_squares.cells import Cells
-from discrepancy.least_squares.gram import added_up, gram_of
-from discrepancy.least_squares.stored import stored
+from discrepancy.least_squares.patches import Mixed, Patches
 from estimator.arrays import Array
 
 
@@ -20,44 +18,46 @@ class Opened:
     """Normal unknowns u with columns U in one trial; C channels, n rows.
 
     Rows y = U u + noise of unit power have the covariance I + size^2 U U^T, and (I + size^2 U U^T)^(-1/2) y is white
-    again. With U = Q diag(s) V^T that is y - Q diag(f) Q^T y, f = 1 - 1 / sqrt(1 + size^2 s^2).
+    again. With U = Q diag(s) V^T that is y - Q diag(f) Q^T y, f = 1 - 1 / sqrt(1 + size^2 s^2). Q is dense, as the
+    trial's own unknowns are taken out of it; it is kept as what it is made of.
 
     Attributes:
-        columns: of the unknowns that show, turned so that there is one for each of the basis, shape (n, C, r).
-        basis: Q, of the rows that ``of`` was given as ``left``: here in the cells' transform, shape (n, C, r).
+        columns: of the unknowns, n, C, k.
+        basis: Q, of what others leave of these columns, r of them.
         stretch: s, shape (r,).
         size: standard deviation of the unknowns.
     """
 
-    columns: Array
-    basis: Array
+    columns: Patches
+    basis: Mixed
     stretch: Array
     size: float
 
     @classmethod
-    def of(cls, columns: Array, size: float, left: Array | None = None) -> Opened:
+    def of(cls, columns: Patches, size: float, own: Array, before: Sequence[Opened] = ()) -> Opened:
         """Unknowns of a size.
 
         Args:
-            columns: shape (n, C, k), possibly k = 0.
+            columns: n, C, k; possibly k = 0.
             size: standard deviation of their values.
-            left: what other unknowns leave of these columns, where there are such; the same shape.
+            own: orthonormal columns that the rows are without, shape (n, C, l).
+            before: unknowns that the rows are transformed for already, in turn.
         """
-        rows = columns if left is None else left
-        if not np.any(rows):
-            return cls(columns[..., :0], np.zeros((*columns.shape[:2], 0)), np.zeros(0), size)
-        flat = rows.reshape(-1, rows.shape[2])
+        columns = columns.fewer()
+        left = Mixed.of(columns, own)
+        squares = columns.cross(columns)
+        shown = rules.PATCH_SHOWS**2 * np.max(np.diag(squares), initial=0.0)
+        squares -= left.weights.T @ left.weights
+        for one in before:
+            inside = one.basis.cross(left)
+            squares -= inside.T @ (inside * (1.0 - (1.0 - one.shrink) ** 2)[:, None])
+            left = left.less(one.basis.at(one.shrink[:, None] * inside))
         # Of their products, as of all rows it takes many times as long; so small an s is still known to 1e-8 of the
-        # largest. Of knots closer than rows many leave nothing beside others; turned, unknowns still scatter as one.
-        squares, V = np.linalg.eigh(flat.T @ flat)
-        keep = squares > rules.OPEN_SHOWS**2 * squares[-1]
-        s, V = np.sqrt(squares[keep]), V[:, keep]
-        return cls(columns @ V, (flat @ (V / s)).reshape(*columns.shape[:2], -1), s, size)
-
-    @property
-    def scaled(self) -> Array:
-        """Columns of unknowns whose standard deviation is 1."""
-        return self.size * self.columns
+        # largest.
+        squares, V = np.linalg.eigh(squares)
+        keep = squares > max(rules.OPEN_SHOWS**2 * squares.max(initial=0.0), shown)
+        s = np.sqrt(squares[keep])
+        return cls(columns, left.at(V[:, keep] / s), s, size)
 
     @cached_property
     def shrink(self) -> Array:
@@ -69,52 +69,19 @@ class Opened:
         """Log sqrt det of the covariance [nats]."""
         return 0.5 * float(np.sum(np.log1p((self.size * self.stretch) ** 2)))
 
-    def single(self) -> Opened:
-        """The same in single precision, and in files."""
-        columns, basis = (stored(x.astype(np.float32)) for x in (self.columns, self.basis))
-        return replace(self, columns=columns, basis=basis)
+    def of_size(self, size: float) -> Opened:
+        """The same unknowns of another size."""
+        return replace(self, size=size)
 
     def along(self, x: Array) -> Array:
         """How much of columns lies along the unknowns, and is taken out, shape (n, C, l) -> (r, l)."""
-        if not len(self.stretch):
-            return np.zeros((0, x.shape[2]))
-        return self.shrink[:, None] * gram_of(self.basis, x)
+        return self.shrink[:, None] * self.basis.products(x)
 
     def __call__(self, x: Array) -> Array:
         """Rows that are white with these unknowns integrated out, shape (n, C, l) -> the same."""
         if not len(self.stretch) or not x.size:
             return x
-        return np.asarray(x - added_up(self.basis, self.along(x)))
-
-
-@dataclass(frozen=True, eq=False)
-class Along:
-    """A trial's columns along unknowns, by cell of its noise: made once, for unknowns of whatever size.
-
-    Attributes:
-        opened: the unknowns, of any size.
-        cells: of the trial.
-        edge: products of their basis with all columns over every cell, shape (K, r, columns).
-    """
-
-    opened: Opened
-    cells: Cells
-    edge: Array
-
-    def of_size(self, size: float) -> tuple[Opened, Array, Callable[[int], Array]]:
-        """The unknowns of a size, what lies along them (r, columns), what a cell's Gram matrix loses, one by one."""
-        opened = replace(self.opened, size=size)
-        # All cells together: the transform is orthonormal.
-        shares = opened.shrink[:, None] * self.edge.sum(axis=0)
-        basis = opened.basis.reshape(self.cells.index.size, -1)
-
-        def lost(cell: int) -> Array:
-            # Products of the basis with itself, cell by cell, would be the largest arrays of a diagnosis.
-            taken = basis[self.cells.numbers(cell)] @ shares
-            cross = shares.T @ self.edge[cell]
-            return np.asarray(cross + cross.T - taken.T @ taken)
-
-        return opened, shares, lost
+        return np.asarray(x - self.basis.times(self.along(x)))
 
 
 def through(opened: Sequence[Opened], x: Array) -> Array:
@@ -122,3 +89,16 @@ def through(opened: Sequence[Opened], x: Array) -> Array:
     for one in opened:
         x = one(x)
     return x
+
+
+def best_of(opened: Sequence[Opened], x: Array) -> tuple[Array, Array]:
+    """Columns (n, C, l) without the likeliest values of unknowns, and these values in standard deviations, (k, l)."""
+    each = [(one.columns, one.size) for one in opened]
+    products = np.block([[a * b * u.cross(v) for v, b in each] for u, a in each])
+    both = np.concatenate([a * u.products(x) for u, a in each])
+    best = np.asarray(np.linalg.solve(products + np.eye(len(products)), both), dtype=np.float64)
+    left, at = np.array(x), 0
+    for u, a in each:
+        left -= a * u.times(best[at : at + u.width])
+        at += u.width
+    return left, best

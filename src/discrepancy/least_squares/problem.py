@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import chain
 
 import numpy as np
@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
+from discrepancy.least_squares.along import Along, Taken
 from discrepancy.least_squares.cell_grams import CellGrams
 from discrepancy.least_squares.cells import Cells
 from discrepancy.least_squares.columns import Columns, held, portions
-from discrepancy.least_squares.gram import added_up, gram_of, orthonormal, project
-from discrepancy.least_squares.opened import Along, Opened, through
+from discrepancy.least_squares.gram import orthonormal, project
+from discrepancy.least_squares.opened import Opened, through
+from discrepancy.least_squares.patches import Patches
 from discrepancy.rig import Rows
 from estimator.arrays import Array
 
@@ -45,6 +47,7 @@ class Problem:
         opened: what causes leave open in every trial, by cause.
         shares: how much of every column lies along what they leave open, (r, columns) per trial, by cause.
         odds: of any cause being there before the data are seen, at all its places together.
+        by_own: products of the columns with a trial's own unknowns over every cell, (K, columns, l), once asked for.
     """
 
     candidates: tuple[Candidate, ...]
@@ -61,6 +64,7 @@ class Problem:
     opened: Mapping[Key, tuple[Opened, ...]] = field(default_factory=dict)
     shares: Mapping[Key, tuple[Array, ...]] = field(default_factory=dict)
     odds: float = rules.PRIOR_ODDS
+    by_own: dict[int, Array] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(cls, trials: Iterable[Rows], candidates: Sequence[Candidate]) -> Problem:
@@ -88,7 +92,7 @@ class Problem:
         for candidate in candidates:
             spans.append(slice(at, at + len(candidate.parameters)))
             at += len(candidate.parameters)
-        tolerant = np.array([x for c in candidates for x in _tolerant(c)], dtype=bool)
+        tolerant = np.array([x for c in candidates for x in c.tolerant], dtype=bool)
         power = tuple(np.ones(len(c.sizes)) for c in cells)
         return cls(
             tuple(candidates), tuple(columns), tuple(local), tuple(explicable), tuple(cells), tuple(grams), power,
@@ -112,29 +116,28 @@ class Problem:
 
     def spectra_of(self, trial: int, span: slice) -> Array:
         """Some columns without what the trial's own unknowns and those of causes can explain, in the transform."""
-        x = self.columns[trial].take(span)
-        for one, shares in self._open(trial):
-            x = x - added_up(one.basis, shares[:, span])
-        return x
+        x, taken = self.columns[trial].take(span), self._taken(trial)
+        return x - taken.of(span) if taken.each else x
 
-    def _open(self, trial: int) -> list[tuple[Opened, Array]]:
-        """What causes leave open in a trial, and how much of every column lies along it."""
+    def _channels(self, trial: int, first: int) -> Array:
+        """The same of all columns, of channels from one on, shape (n, C - first, columns)."""
+        x, taken = self.columns[trial].channels(first), self._taken(trial)
+        return x - taken.of(slice(None), first) if taken.each else x
+
+    def _taken(self, trial: int) -> Taken:
+        """What lies along what causes leave open in a trial."""
         pairs = ((own[trial], self.shares[key][trial]) for key, own in self.opened.items())
-        return [(one, shares) for one, shares in pairs if len(shares)]
+        return Taken(self.cells[trial], tuple((one, shares) for one, shares in pairs if len(shares)))
 
     def products(self, trial: int, b: Array) -> Array:
         """Products of all such columns with others in the transform, (n, C, k) -> (columns, k)."""
-        out = self.columns[trial].products(b)
-        for one, shares in self._open(trial):
-            out -= shares.T @ gram_of(one.basis, b)
-        return out
+        out, taken = self.columns[trial].products(b), self._taken(trial)
+        return out - taken.products(self.cells[trial].series(b)) if taken.each else out
 
     def _grams(self, trial: int, b: Array) -> Array:
         """The same over every cell, shape (n, C, k) -> (K, columns, k)."""
-        cells, out = self.cells[trial], self.columns[trial].grams(self.cells[trial], b)
-        for one, shares in self._open(trial):
-            out -= shares.T @ cells.grams(one.basis, b)
-        return out
+        out, taken = self.columns[trial].grams(self.cells[trial], b), self._taken(trial)
+        return out - taken.grams(b) if taken.each else out
 
     @property
     def samples(self) -> int:
@@ -167,6 +170,11 @@ class Problem:
         """With noise of unit power and tolerances as given."""
         return self.with_noise([np.ones_like(p) for p in self.power], np.ones_like(self.spread))
 
+    @property
+    def calm(self) -> Problem:
+        """With noise nowhere louder than as whitened."""
+        return self.with_noise([np.minimum(power, 1.0) for power in self.power], self.spread)
+
     def with_noise(self, power: Sequence[Array], spread: Array) -> Problem:
         """With noise of other powers, and other spreads."""
         return replace(self, power=tuple(power), spread=spread)
@@ -181,14 +189,11 @@ class Problem:
 
     def without_own(self, trial: int, x: Array) -> Array:
         """Rows without what the trial's own unknowns, and those that causes leave open, can explain, (n, C, k)."""
-        if not self._open(trial):
-            return project(x, self.explicable[trial])
-        return self.cells[trial].series(self.spectrum(trial, x))
+        return through([each[trial] for each in self.opened.values()], project(x, self.explicable[trial]))
 
     def spectrum(self, trial: int, columns: Array) -> Array:
-        """Further columns, shape (n, C, k), without what the trial's own unknowns can explain, in the transform."""
-        own = [each[trial] for each in self.opened.values()]
-        return through(own, self.cells[trial].spectrum(project(columns, self.explicable[trial])))
+        """The same in the transform."""
+        return self.cells[trial].spectrum(self.without_own(trial, columns))
 
     def has_tolerance(self, index: int) -> bool:
         """Whether a candidate has a tolerance; a cause has one for all of its parameters or for none."""
@@ -224,41 +229,44 @@ class Problem:
             stop = start if room else start + raw.shape[2]
             new = Columns.of(raw, self.explicable[t], self.cells[t])
             made.append(self.columns[t].replaced(start, stop, new))
-            (left,) = new.pieces
+            left = project(raw, self.explicable[t])
             for key, own in self.opened.items():
-                along = own[t].along(left)
-                left, old = left - added_up(own[t].basis, along), self.shares[key][t]
+                along, old = own[t].along(left), self.shares[key][t]
+                left = left - own[t].basis.times(along)
                 shares[key].append(np.concatenate([old[:, :start], along, old[:, stop:]], axis=1))
+            left = self.cells[t].spectrum(left)
             edge, inside = self._grams(t, left), self.cells[t].grams(left, left)
             edge = np.concatenate([edge[:, :start], inside, edge[:, stop:]], axis=1)
             grams.append(self.cell_grams[t].replaced(start, stop, edge))
         return replace(
             self, candidates=candidates, columns=tuple(made), cell_grams=tuple(grams),
-            shares={key: tuple(each) for key, each in shares.items()},
+            shares={key: tuple(each) for key, each in shares.items()}, by_own={},
         )  # fmt: skip
 
-    def along(self, unknowns: Sequence[Array]) -> tuple[Along, ...]:
-        """All columns along what may be left open, columns (n, C, k) per trial, of whatever size."""
+    def along(self, unknowns: Sequence[Patches]) -> tuple[Along, ...]:
+        """All columns along what may be left open in every trial, of whatever size."""
         return tuple(self._along(t, u) for t, u in enumerate(unknowns))
 
-    def _along(self, trial: int, unknowns: Array) -> Along:
-        one = Opened.of(unknowns, 1.0, self.spectrum(trial, unknowns) if unknowns.size else unknowns)
-        one = one.single() if self.columns[trial].is_single else one
-        edge = np.swapaxes(self._grams(trial, one.basis), 1, 2)
-        return Along(one, self.cells[trial], edge)
+    def _along(self, trial: int, unknowns: Patches) -> Along:
+        before = [each[trial] for each in self.opened.values()]
+        one = Opened.of(unknowns, 1.0, self.explicable[trial], before)
+        if trial not in self.by_own:
+            self.by_own[trial] = self._grams(trial, self.cells[trial].spectrum(self.explicable[trial]))
+        return Along.of(one, self.cells[trial], partial(self._channels, trial), self.by_own[trial])
 
     def with_open(self, key: Key, along: Sequence[Along], size: float) -> Problem:
         """The problem with what a cause leaves open, whose values scatter by ``size``."""
         if key in self.opened or not any(len(one.opened.stretch) for one in along):
             return self
-        opened, shares, lost = zip(*(one.of_size(size) for one in along), strict=True)
+        pairs = zip(along, self.cell_grams, strict=True)
+        opened, shares, grams = zip(*(one.of_size(size, own) for one, own in pairs), strict=True)
         return replace(
-            self, cell_grams=tuple(own.less(one) for own, one in zip(self.cell_grams, lost, strict=True)),
-            opened={**self.opened, key: opened}, shares={**self.shares, key: shares},
+            self, cell_grams=grams, opened={**self.opened, key: opened}, shares={**self.shares, key: shares},
+            by_own={},
         )  # fmt: skip
 
-    def with_unknowns(self, key: Key, unknowns: Sequence[Array], size: float) -> Problem:
-        """The same from its columns, shape (n, C, k) per trial."""
+    def with_unknowns(self, key: Key, unknowns: Sequence[Patches], size: float) -> Problem:
+        """The same from its columns in every trial."""
         return self if key in self.opened else self.with_open(key, self.along(unknowns), size)
 
     def without_unknowns(self, keep: Collection[Key]) -> Problem:
@@ -267,7 +275,7 @@ class Problem:
             return self
         pairs = zip(self.columns, self.cells, strict=True)
         grams = tuple(CellGrams.of_columns(*pair) for pair in pairs)
-        again = replace(self, cell_grams=grams, opened={}, shares={})
+        again = replace(self, cell_grams=grams, opened={}, shares={}, by_own={})
         for key, own in self.opened.items():
             if key in keep:
                 again = again.with_unknowns(key, [one.columns for one in own], own[0].size)
@@ -280,17 +288,11 @@ class Problem:
 
     def extended(self, candidate: Candidate, columns: Sequence[Array]) -> Problem:
         """The problem with one candidate more."""
-        start, count = self.shared + len(self.tolerant), len(candidate.parameters)
-        parts = [c * candidate.units for c in columns]
-        wider = self._with(start, parts, (*self.candidates, candidate), count)  # before the residual
+        start, count = self.width - 1, len(candidate.parameters)  # before the residual
+        own, candidates = [c * candidate.units for c in columns], (*self.candidates, candidate)
         return replace(
-            wider,
+            self._with(start, own, candidates, count),
             spans=(*self.spans, slice(start, start + count)),
-            tolerant=np.append(self.tolerant, _tolerant(candidate)).astype(bool),
+            tolerant=np.append(self.tolerant, candidate.tolerant).astype(bool),
             spread=np.append(self.spread, np.ones(count)),
         )
-
-
-def _tolerant(candidate: Candidate) -> list[bool]:
-    """Whether each parameter has a tolerance; an event is there or not."""
-    return [parameter.tolerance > 0 and candidate.transient is None for parameter in candidate.parameters]

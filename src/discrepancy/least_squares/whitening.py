@@ -9,6 +9,7 @@ import numpy as np
 from scipy.linalg import solve_toeplitz, solve_triangular
 
 from discrepancy import rules
+from discrepancy.least_squares.patches import Patch, Patches
 from estimator.arrays import Array
 
 
@@ -69,16 +70,40 @@ class Whitening:
     def __call__(self, x: Array) -> Array:
         """Whiten rows and channels, shape (n, C, ...) -> the same."""
         y = self.rows_only(x)
-        z = y[: self.moving]
-        shape = (1, -1) + (1,) * (x.ndim - 2)
-        series, order = z.copy(), self.ar.shape[1]
-        for k in range(order):
-            series[k + 1 :] -= self.ar[:, k].reshape(shape) * z[: len(z) - k - 1]
-        # The first rows have no past to predict them from; they keep their own variance of one.
-        series[:order] = z[:order]
-        series[order:] /= self.innovation.reshape(shape)
-        y[: self.moving] = series
+        y[: self.moving] = self._series(y[: self.moving])
         return y
+
+    def _series(self, z: Array, start: int = 0, first: int = 0) -> Array:
+        """Moving rows made independent, from a row and a channel on before which there is nothing."""
+        shape = (1, -1) + (1,) * (z.ndim - 2)
+        out, order = z.copy(), self.ar.shape[1]
+        for k in range(order):
+            out[k + 1 :] -= self.ar[first:, k].reshape(shape) * z[: len(z) - k - 1]
+        # The first rows have no past to predict them from; they keep their own variance of one.
+        early = max(order - start, 0)
+        out[:early] = z[:early]
+        out[early:] /= self.innovation[first:].reshape(shape)
+        return out
+
+    def of_patches(self, patches: Patches) -> Patches:
+        """The same of columns that are there for a while."""
+        return Patches(patches.shape, tuple(map(self._of_patch, patches.each)))
+
+    def _of_patch(self, patch: Patch) -> Patch:
+        moves, first = patch.rows < self.moving, patch.first
+        alone, rows = patch.rows[~moves], patch.rows[moves]
+        if len(rows):  # what comes after them is told by them, too
+            rows = np.arange(rows[0], min(rows[-1] + 1 + self.ar.shape[1], self.moving))
+        series = np.zeros((len(rows), *patch.values.shape[1:]))
+        series[patch.rows[moves] - patch.rows[0]] = patch.values[moves]
+        if len(self.loudness) > 1:
+            series /= self.loudness[rows, first:, None]
+        # Triangular: a channel is told by itself and those before it.
+        series = self._whiten_moving[first:, first:] @ series
+        if len(rows):
+            series = self._series(series, int(rows[0]), first)
+        others = self._whiten_alone[first:, first:] @ patch.values[~moves]
+        return Patch(np.concatenate([rows, alone]), first, np.concatenate([series, others]))
 
     def rows_only(self, x: Array) -> Array:
         """Decorrelate the channels of every row, not the rows, shape (n, C, ...) -> the same."""

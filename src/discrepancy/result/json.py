@@ -36,6 +36,8 @@ scatter             kinds of which all places are off by more than the tolerance
     places                         how many there are
     spread, tolerance              {name: size} of every parameter, standard deviations over the places
     nats                           by how much the spread is likelier than the tolerance
+foretold            {as_designed, as_found}: chi2/n of trials left out, the machine as designed and as the other trials
+                    find it; null where nothing scatters, or for a single trial
 evidence            the strongest candidates, see ``evidence_list``: {before, after} with nothing found and with what
                     is found (null), lists of {cause, kind, name, family, robot, joint, place, at, nats, needed}
 gain                null where the closed loop was not simulated and there is nothing to estimate, or
@@ -65,7 +67,7 @@ notes               sentences
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -137,6 +139,7 @@ def diagnosis_to_dict(
         "places": places_to_dict(diagnosis.located, MOST_PLACES),
         "suspected": [_suspected(found, rig, words) for found in explanation.suspected],
         "scatter": [scatter_to_dict(item) for item in explanation.scatter],
+        "foretold": None if explanation.foretold is None else asdict(explanation.foretold),
         "evidence": evidence_list(explanation),
         "gain": gain,
         "not_simulated": diagnosis.not_simulated,

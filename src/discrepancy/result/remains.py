@@ -9,7 +9,18 @@ from discrepancy.engine.explanation import Scatter
 from discrepancy.result.read import kind_of
 
 Values = Mapping[str, Any]
-REMEDY = 'Find the machine as it is ("mocobot calibrate" does so for a team), and diagnose again with that.'
+
+
+def remedy(values: Values) -> str:
+    """What to do where all places are off, and what it would be worth."""
+    what = 'Find the machine as it is ("mocobot calibrate" does so for a team), and diagnose again with that.'
+    told = values.get("foretold")
+    if told is None:
+        return what
+    return (
+        f"{what} As the other recordings find it, each one is foretold to chi2/n {told['as_found']:.3g}, as designed "
+        f"to {told['as_designed']:.3g}."
+    )
 
 
 def remains(values: Values) -> list[str]:
@@ -39,7 +50,7 @@ def of_scatter(values: Values) -> list[str]:
     if not values["scatter"] or values["verdict"] == "miscalibrated":
         return []
     kinds = ", ".join(kind_of(entry) for entry in values["scatter"])
-    return [f"Besides, all places alike are off by more than their tolerances: {kinds}. {REMEDY}"]
+    return [f"Besides, all places alike are off by more than their tolerances: {kinds}. {remedy(values)}"]
 
 
 def _of_response(values: Values) -> list[str]:

@@ -8,7 +8,7 @@ from discrepancy import rules
 from discrepancy.causes.units import Shown, one_each, parameter
 from discrepancy.result.evidence_list import label
 from discrepancy.result.read import kind_of, name_of
-from discrepancy.result.remains import REMEDY, of_scatter, remains, sizes_of
+from discrepancy.result.remains import of_scatter, remains, remedy, sizes_of
 from discrepancy.result.text_gain import gain_lines
 from discrepancy.result.text_rollouts import rollout_lines
 
@@ -65,7 +65,7 @@ def _verdict(values: Values) -> str:
         scatter = " ".join(entry["sentence"] for entry in values["scatter"])
         return (
             f"MISCALIBRATED. The robots of {data} are off by more than their tolerances, all places alike, so none is "
-            f"named. {scatter} {REMEDY} {open_}"
+            f"named. {scatter} {remedy(values)} {open_}"
         )
     if values["verdict"] == "explained":
         return f"EXPLAINED. {named} {open_}"

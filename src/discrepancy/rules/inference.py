@@ -37,6 +37,14 @@ REFIT_ROUNDS = 3
 """Gauss-Newton steps of causes and unknowns with exact residuals. Chosen."""
 PUSH_MOVES = (-0.4, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2, 0.4)
 """By which ends of a push are moved to refine it, in its duration. Chosen."""
+EVENT_PARTS = 16
+"""Parts of an event's interval in which its ends are sought, and of these at its ends. Chosen: 0.4 % of it."""
+EVENT_LOUD_POWER = 2.25
+"""Of a cell, from which events are looked for in calmer noise, too. Chosen: below, edges weigh little more."""
+EVENT_SHORTEST_S = 0.1
+"""That searching for an interval may leave. Chosen."""
+EVENT_RAMPS = (0.0, 0.15, 0.3, 0.5)
+"""In which an event grows and fades, over its duration, that are tried. Chosen: hands ramp; a half is a triangle."""
 WORST_INTERVALS = 2
 """Per trial and duration that become candidates. Chosen."""
 
@@ -65,6 +73,9 @@ ROWS_BYTES = 1.5e8
 five minutes of three robots. On two sets of the tuning pool chi2/n is the same to 1e-5 either way."""
 PORTION_BYTES = 1e8
 """Of a trial's columns that are made together. Chosen: memory; all of a minute of three robots are a quarter."""
+TOLD_BYTES = 1e7
+"""Of columns that are held against a fit together. Chosen: memory; all pushes near one of a minute of three robots are
+ten times as much."""
 WIDENED_ROWS = 1024
 """Of these, turned into double precision together. Chosen: as many as a processor's cache holds."""
 POWER_NUMBERS = 20.0
@@ -88,6 +99,11 @@ SAME_TRACE = 1e-6
 OPEN_SHOWS = 1e-4
 """Of what a cause leaves open, trace over the largest from which it counts. Derived: the largest is some hundred times
 the noise, so that one dropped is a hundredth of it."""
+PATCH_COLUMNS = 48
+"""Of what a cause leaves open that are kept together. Chosen: a few seconds of friction at rest; of fewer, calls cost
+more than numbers, of more, most numbers are nought."""
+PATCH_SHOWS = 1e-2 * OPEN_SHOWS
+"""The same as ``OPEN_SHOWS`` of such columns alone. Derived: what is left out first must not show beside that."""
 SHAPE_NATS = 5.0
 """By which a cause with one number more in its shape must be likelier. Derived: half the log of the rows' numbers, some
 ten to thirty thousand (Schwarz's criterion)."""
@@ -106,6 +122,9 @@ SLAB_OCTAVES = 10.0
 """In which the size of a fault is equally likely. Chosen: from the tolerance to a thousand times that."""
 INTERVALS = 1000.0
 """At which an event may be. Derived: about so many are searched."""
+RAMPS = 150.0
+"""Ramps of an event that are told apart, each as likely as the others, and all as none. Derived: as SHAPE_NATS, for one
+number more. Without it, a push without ramps would always have short ones."""
 LOOKED_AT_NATS = -5.0
 """Log odds in the scan, from which a candidate is looked at closely. Chosen: what it leaves open may make up for it."""
 HELD_FACTOR = 1.5

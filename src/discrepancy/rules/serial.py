@@ -167,6 +167,9 @@ RIPPLE_TURNS = (1.0, 2.0)
 """Periods of a ripple in one turn of joint or motor. Chosen: eccentricity, and a gear's or a rotor's two sides."""
 MOST_RIPPLE_HZ = 0.5
 """Of the rows' cut-off: at which a ripple may pass at the joint's typical speed. Chosen: faster ones are filtered."""
+NEUTRAL_SHARES, NEUTRAL_STEP_SHARE = (0.0, -0.5, -0.25, 0.25, 0.5), 0.25
+"""Of a joint's travel, from its middle, where a spring's neutral is looked for, the first that of the catalogue; and
+what slopes by it are taken over. Chosen: all of the travel. A spring that is neutral far beyond it is an offset."""
 PAYLOAD_M, PAYLOAD_FINER_M, PAYLOAD_STEP_M = (0.1, 0.25), (-0.03, -0.01, 0.01, 0.03), 0.02
 """Where a payload's centre is looked for in the last link's frame, and differences by it. Chosen: hands are as long."""
 PAYLOAD_GYRATION_M, PAYLOAD_INERTIA_SHARE = 0.04, 0.5

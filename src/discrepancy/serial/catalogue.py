@@ -60,11 +60,14 @@ def candidates(
     for name, cause in CAUSES.items():
         if cause.transient:
             continue
-        for at in places(cause, tree, hints, change=change):
+        where = places(cause, tree, hints, change=change)
+        for at in where:
             given = tolerances.get(name)
             if name == "torque_scale" and given is None and hints.unscaled[at]:
                 given = {"scale": rules.UNKNOWN_SCALE_SHARE}
             candidate = cause.at(tree, names, at, cause.shapes(hints, at)[0], given)
+            if cause.alike:
+                candidate = replace(candidate, among=cause.alike * len(where))
             if name not in excluded:
                 out.append(candidate)
             elif all(p.tolerance > 0 for p in candidate.parameters):

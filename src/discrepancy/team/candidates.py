@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy import rules
-from discrepancy.candidate import Candidate, Transient
+from discrepancy.candidate import Candidate
 from discrepancy.causes.base import Shape
-from discrepancy.causes.intervals import intervals_near, ramped, worst_intervals
+from discrepancy.causes.intervals import worst_intervals
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.reduction import Reduction
 from estimator.arrays import Array
@@ -59,17 +59,12 @@ def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]
     for name in (name for name in cause.determined if name in candidate.shape):
         number = candidate.shape[name]
         step = cause.slope_step(name, number)
-        less, more = (
-            replace(candidate, shape={**candidate.shape, name: x}) for x in (number - step, number + step)
-        )
-        steps.append((less, more, 2.0 * step))
+        ends = number - step, number + step
+        if name == "ramp_s":  # with longer ones it would be smaller, and no other
+            ends = ends[0], min(ends[1], 0.5 * candidate.shape["duration_s"])
+        less, more = (candidate.in_shape({**candidate.shape, name: x}) for x in ends)
+        steps.append((less, more, ends[1] - ends[0]))
     return steps
-
-
-def nearby_events(cause: str, when: Transient, tolerance: Tolerances) -> list[Candidate]:
-    """A transient cause with its interval moved, or with other ramps."""
-    near = [*intervals_near(when, rules.TEAM_SHORTEST_PUSH_S), *ramped(when, rules.TEAM_PUSH_RAMPS)]
-    return [CAUSES[cause].event(tolerance, other) for other in near]
 
 
 def worst_events(

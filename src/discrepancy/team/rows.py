@@ -12,6 +12,7 @@ from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.least_squares.patches import Patches
 from discrepancy.least_squares.stored import stored
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Channel, Rig, Rows
@@ -20,7 +21,6 @@ from discrepancy.team.candidates import (
     in_shapes,
     indices,
     is_adjusted,
-    nearby_events,
     shape_steps,
     worst_events,
 )
@@ -212,10 +212,9 @@ class TeamRows(Rig):
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         return CAUSES[candidate.cause].possible(values, se, candidate.shape)
 
-    def unknowns(self, candidate: Candidate) -> Sequence[Array]:
-        of, place, shape = CAUSES[candidate.cause].unknowns, indices(candidate), candidate.shape
-        # Each when it is asked for: there may be hundreds a trial.
-        return OneByOne(lambda t: self.whitening[t](of(self.linear[t], *place, shape)), len(self.linear))
+    def unknowns(self, candidate: Candidate) -> Sequence[Patches]:
+        of, place = CAUSES[candidate.cause].unknowns, (*indices(candidate), candidate.shape)
+        return [w.of_patches(of(t, *place)) for w, t in zip(self.whitening, self.linear, strict=True)]
 
     def rows(self, candidates: Sequence[Candidate]) -> Iterator[Rows]:
         for t, linear in enumerate(self.linear):
@@ -273,11 +272,9 @@ class TeamRows(Rig):
         return out
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
-        """The candidate with every other shape of its cause; a transient with its interval moved."""
+        """The candidate with every other shape of its cause; any interval of a transient is found by its steps."""
         if candidate.transient:
-            return nearby_events(
-                candidate.cause, candidate.transient, self.tolerances.get(candidate.cause, {})
-            )
+            return []
         cause = CAUSES[candidate.cause]
         shapes = cause.finer(candidate.shape) if finer else cause.shapes
         return in_shapes(candidate, shapes, len(self.linear))

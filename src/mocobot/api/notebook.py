@@ -5,7 +5,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from discrepancy.result.read import name_of
-from discrepancy.result.remains import REMEDY, remains
+from discrepancy.result.remains import remains, remedy
 from estimator.calibrate.calibration import Calibration
 from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.html import Child, Node, el
@@ -75,7 +75,9 @@ def diagnosis_html(values: Values) -> str:
     named = el("p", el("strong", values["verdict"].replace("_", " ").upper()))
     sentences = [tidy(cause["sentence"]) for cause in values["causes"]]
     if values["verdict"] == "miscalibrated":
-        sentences = [tidy(text) for text in (*(entry["sentence"] for entry in values["scatter"]), REMEDY)]
+        sentences = [
+            tidy(text) for text in (*(entry["sentence"] for entry in values["scatter"]), remedy(values))
+        ]
     left = remains(values)
     if not sentences and not left and values["verdict"] != "consistent":
         sentences = [tidy(residual["nominal"]["signature"]["sentence"])]

@@ -21,7 +21,7 @@ from estimator.errors import InputError
 from mocobot_logs.claims import check_claim, read_small
 from mocobot_logs.faults import detail_of, told_in_one_sentence
 from mocobot_logs.formats import DATASET_INFO, dataset_root
-from mocobot_logs.table.parquet import KIND, ParquetTable
+from mocobot_logs.table.parquet import KIND, ParquetTable, check_names
 from mocobot_logs.table.stamps import LARGEST_NS
 from mocobot_logs.table.table import Block, Wanted
 
@@ -189,6 +189,7 @@ def _dataset(paths: list[Path], name: str) -> ds.Dataset:
         data = ds.dataset(
             [str(path) for path in paths], format=ds.ParquetFileFormat(default_fragment_scan_options=_SCAN)
         )
+        check_names(data.schema, name)
         if any(not part.physical_schema.equals(data.schema) for part in data.get_fragments()):
             raise InputError(f"{name}: its Parquet files have different columns")
         rows, stored_bytes = _extent(data)

@@ -37,6 +37,7 @@ class ParquetTable(Table):
         self._path = path
         with opened(path, name) as file:
             rows, schema = file.metadata.num_rows, file.schema_arrow
+            check_names(schema, name)
         self._set_up(name, schema, rows, rows, path.stat().st_size)
 
     def _set_up(self, name: str, schema: pa.Schema, size: int, rows: int, stored_bytes: int) -> None:
@@ -51,9 +52,6 @@ class ParquetTable(Table):
         """
         self.name, self.size = name, size
         self._schema, self._rows, self._stored_bytes = schema, rows, stored_bytes
-        repeated = next((n for n in schema.names if schema.names.count(n) > 1), None)
-        if repeated is not None:
-            raise InputError(f"{name}: column {repeated!r:.80} appears more than once")
         text = (schema.metadata or {}).get(METADATA_KEY)
         where = f"{name}: metadata"
         told = None if text is None else RecordingMetadata.from_json(text, where=where)
@@ -125,6 +123,19 @@ def opened(path: Path, name: str) -> Iterator[pq.ParquetFile]:
         pq.ParquetFile(path, page_checksum_verification=True, pre_buffer=False, buffer_size=1 << 20) as file,
     ):
         yield file
+
+
+def check_names(schema: pa.Schema, name: str) -> None:
+    """Every column has a name of its own; they become text here, inside a block that tells damage in one sentence.
+
+    Raises:
+        InputError: a name is there twice.
+        UnicodeDecodeError: one is no text.
+    """
+    names = schema.names
+    repeated = next((n for n in names if names.count(n) > 1), None)
+    if repeated is not None:
+        raise InputError(f"{name}: column {repeated!r:.80} appears more than once")
 
 
 def is_recording(path: Path) -> bool:

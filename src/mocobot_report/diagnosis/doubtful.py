@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from discrepancy.result.evidence_list import label
-from discrepancy.result.remains import REMEDY, sizes_of
+from discrepancy.result.remains import remedy, sizes_of
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import about
@@ -20,7 +20,9 @@ def doubtful_sections(book: Book, values: Values) -> list[Node]:
     """Kinds that scatter, and suspected causes, where there are any."""
     out = []
     if values["scatter"]:
-        out.append(section(book, "Off at all places alike", paragraph(tidy(REMEDY)), _scatter(values)))
+        out.append(
+            section(book, "Off at all places alike", paragraph(tidy(remedy(values))), _scatter(values))
+        )
     if values["suspected"]:
         out.append(section(book, "Suspected", _suspected(values)))
     return out

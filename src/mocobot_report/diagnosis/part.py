@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from discrepancy.result.read import VERDICTS, read_diagnosis
-from discrepancy.result.remains import REMEDY, remains
+from discrepancy.result.remains import remains, remedy
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
@@ -81,7 +81,7 @@ def answer(diagnosed: Diagnosed) -> list[Node]:
     if values["causes"]:
         said = [bullets([tidy(cause["sentence"]) for cause in values["causes"]])]
     elif values["verdict"] == "miscalibrated":
-        said = [bullets([tidy(entry["sentence"]) for entry in values["scatter"]]), tidy(REMEDY)]
+        said = [bullets([tidy(entry["sentence"]) for entry in values["scatter"]]), tidy(remedy(values))]
     elif values["verdict"] != "consistent" and not left:
         said = [tidy(values["residual"]["nominal"]["signature"]["sentence"])]
     kind = KINDS[values["verdict"]]
@@ -110,6 +110,9 @@ def _tiles(values: Values) -> list[tuple[str, str, str]]:
         out.append(("misfit with nothing named", plain(residual["chi2_per_n_tolerated"]), "chi²/n"))
         worst = values["scatter"][0]
         out.append((worst["kind"], f"{about(worst['factor'])} ×", "spread over its tolerance"))
+        if told := values.get("foretold"):
+            of = f"chi²/n of each recording by the others; {plain(told['as_designed'])} as designed"
+            out.append(("foretold as found", plain(told["as_found"]), of))
     else:
         out.append(("misfit with nothing named", plain(residual["chi2_per_n_tolerated"]), "chi²/n"))
     gain = values["gain"]

@@ -111,3 +111,9 @@ def row_compliance(model: mujoco.MjModel, joint: int) -> float:
             s, soft = -model.eq_solref[k, 0], 1.0 - model.eq_solimp[k, 0]
             return float(soft * model.dof_invweight0[model.jnt_dofadr[joint]] / s)
     return 0.0
+
+
+def row_relaxation_s(model: mujoco.MjModel, equality: str) -> float:
+    """Time constant in which the spring of a row follows its load, read back from the model."""
+    stiffness, damping = -model.eq_solref[model.equality(equality).id]
+    return float(damping / stiffness)

@@ -84,7 +84,8 @@ def test_wrong_torque_lasts_as_long_as_the_push():
     tau[(time >= start) & (time < start + lasting), 1, 2] += 0.2
     changed = residual_of(case, replace(case.signals, tau=tau)) - case.linear.residual
     unwhitened = [lambda x: x] * 2
-    push = CAUSES["push"].event({}, Transient(1, start, lasting))
+    # A sample stands for half of its time before it.
+    push = CAUSES["push"].event({}, Transient(1, start - 0.005, lasting))
     found = wrong_torques([case.linear] * 2, unwhitened, push)
     assert len(found) == 9
     for columns in found:

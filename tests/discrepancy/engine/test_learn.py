@@ -8,8 +8,9 @@ import pytest
 from dense_evidence import dense_evidence, log_prior
 from discrepancy import rules
 from discrepancy.candidate import Candidate, Parameter
-from discrepancy.inference.learn import learnt, worth_a_spread
+from discrepancy.inference.learn import learnt, worth_spreads
 from discrepancy.inference.twins import twins
+from discrepancy.least_squares.patches import Patches
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rows
 from linear_problem import cosines, random_rows, with_residuals
@@ -76,7 +77,7 @@ def test_what_is_left_open_has_the_evidence_of_its_covariance(rng, rows, monkeyp
     monkeypatch.setattr(rules, "POWER_NUMBERS", 1e12)
     U = [rng.standard_normal((*r.residual.shape, 4)) for r in rows]
     problem = Problem.of(rows, CANDIDATES)
-    opened = problem.with_unknowns(("event", 1, 1), U, 0.8)
+    opened = problem.with_unknowns(("event", 1, 1), list(map(Patches.of, U)), 0.8)
     dense_noise = []
     for u in U:
         flat = 0.8 * u.reshape(-1, 4)
@@ -195,7 +196,7 @@ def test_a_kind_within_its_tolerance_does_not_scatter(rng):
     for _ in range(20):
         one = learnt(nine_places(rng, 0.5 * rng.standard_normal(9)))
         assert one.problem.spread[0] < 1.6
-        wanted.append(worth_a_spread(one, "many"))
+        wanted.append(worth_spreads(one, ["many"])["many"])
     assert min(wanted) > -1e-6
     assert max(wanted) < rules.NAMED_NATS
 
@@ -217,9 +218,9 @@ def test_worth_of_a_spread_is_the_evidence_over_that_without(rng):
     expected += log_prior(one.problem, [list(range(9))]) - log_prior(
         one.problem, [list(range(9))], spread=held
     )
-    assert worth_a_spread(one, "many") == pytest.approx(expected, abs=1e-6)
+    assert worth_spreads(one, ["many"])["many"] == pytest.approx(expected, abs=1e-6)
     assert expected > 20.0
-    assert worth_a_spread(one, "another") == pytest.approx(0.0, abs=1e-9)
+    assert worth_spreads(one, ["another"])["another"] == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(("variance", "expected"), [(3.0, 3.0), (0.1, rules.LEAST_POWER)])

@@ -9,6 +9,7 @@ from dense_evidence import dense_evidence, log_prior
 from discrepancy import rules
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.inference.learn import learnt
+from discrepancy.least_squares.patches import Patches
 from discrepancy.least_squares.problem import Problem
 from discrepancy.result.sensitivity import detection_limits
 from fake_rig import CHANNELS, ROWS, FakeRig, cause
@@ -35,13 +36,13 @@ class LooseRig(FakeRig):
                 x = x + self.columns_of[candidate.key][t] @ [self.times * off[k]]
             for k in range(LOOSE, LOOSE + PLACES):
                 draw = np.random.default_rng([t, k]).standard_normal(60)
-                x = x + self.present.get(k, 0.0) * self.unknowns(self.catalogue[k])[t] @ draw
+                x = x + self.present.get(k, 0.0) * self.unknowns(self.catalogue[k])[t].dense() @ draw
             self.data[t] = x, *own
 
     def unknowns(self, candidate):
         count = 60 if candidate.cause == "loose" else 0
         rng = np.random.default_rng([11, candidate.robot])
-        return [0.1 * rng.standard_normal((ROWS, CHANNELS, count)) for _ in self.trials]
+        return [Patches.of(0.1 * rng.standard_normal((ROWS, CHANNELS, count))) for _ in self.trials]
 
 
 def diagnosed(present, times):

@@ -7,7 +7,7 @@ from scipy.stats import binom, halfnorm, norm
 
 from discrepancy import rules
 from discrepancy.engine.explanation import explain
-from discrepancy.inference.probability import parted, probability
+from discrepancy.inference.probability import parted, probability, told_nats
 from discrepancy.inference.search import search
 from discrepancy.law_doubt import LawDoubt
 from fake_rig import FakeRig
@@ -104,3 +104,18 @@ def test_named_causes_are_there_as_often_as_their_probabilities_say():
     sure = np.array(stated) > 0.9
     assert np.mean(np.array(right)[sure]) > 0.9
     assert np.mean(np.array(right)[~sure]) < 0.9
+
+
+def test_as_few_rivals_as_make_a_cause_likelier_than_the_others_cannot_be_told_from_it():
+    """By hand: the nearest are left out until what the others have together is no more than the cause has."""
+    doubt, worth, gaps = LawDoubt(0.2, 0.2), 870.0, [40.0, 41.0, 45.0, 300.0]
+    parts = np.exp(-np.array(gaps) / (1.0 + 2.0 * worth * 0.2**2))
+    nearest = next(k for k in range(len(gaps)) if parts[k:].sum() <= 1.0)
+    assert nearest == 2
+    told = told_nats(gaps, 0.0, doubt, worth)
+    assert gaps[nearest - 1] < told < gaps[nearest]
+    assert probability(gaps, 0.0, doubt, worth) < rules.LEAST_PROBABILITY
+    assert probability(gaps[nearest:], 0.0, doubt, worth) >= rules.LEAST_PROBABILITY
+    # Where the cause itself has a half, and where laws are exact, only what the rows put near.
+    assert told_nats(gaps[nearest:], 0.0, doubt, worth) == rules.AMBIGUOUS_NATS
+    assert told_nats(gaps, 0.0, LawDoubt(0.2), worth) == rules.AMBIGUOUS_NATS

@@ -8,9 +8,10 @@ import pytest
 from discrepancy import rules
 from discrepancy.candidate import Parameter
 from discrepancy.engine.explanation import scatter_of
+from discrepancy.engine.held_out import foretold
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.least_squares.problem import Problem
-from linear_problem import CANDIDATES, random_rows
+from linear_problem import CANDIDATES, brute, random_rows
 
 
 @pytest.mark.parametrize("shown", [True, False])
@@ -30,3 +31,38 @@ def test_a_number_that_no_column_shows_is_not_said_to_scatter(shown):
     assert scatter.factor > rules.SCATTER_FACTOR
     names = [p.name for p in scatter.candidate.parameters]
     assert names == (["first_m", "second_m"] if shown else ["first_m"])
+
+
+def off_everywhere(rng, times=30.0):
+    """Four places of one kind that are all off, and one event besides; three trials."""
+    places = [replace(CANDIDATES[0], robot=k, joint=None) for k in (1, 2, 3, 4)] + [CANDIDATES[2]]
+    rows = []
+    for trial in random_rows(rng, candidates=tuple(places)):
+        off = [times * 0.5 * (-1) ** k * x[..., 0] for k, x in enumerate(trial.causes[:4])]
+        rows.append(replace(trial, residual=trial.residual + sum(off) + trial.causes[4][..., 0]))
+    return rows, places
+
+
+def test_what_knowing_the_machine_is_worth_is_that_of_trials_left_out():
+    """Against one dense least squares of the other trials, and the trial's own unknowns fitted to what it leaves."""
+    rows, places = off_everywhere(np.random.default_rng(21))
+    problem, event = Problem.of(rows, places), [4]
+    expected = np.zeros(2)
+    for t, row in enumerate(rows):
+        for k, background in enumerate((False, True)):
+            others = [s for s in range(3) if s != t]
+            found = brute(rows, places, event, others, background)
+            left = row.residual - row.shared @ found.shared
+            for index, values in found.causes.items():
+                left = left - row.causes[index] @ (places[index].units * np.array(values))
+            own, left = row.local.reshape(left.size, -1), left.ravel()
+            expected[k] += np.sum((left - own @ np.linalg.lstsq(own, left, rcond=None)[0]) ** 2)
+    told = foretold(problem, event)
+    assert told is not None
+    np.testing.assert_allclose((told.as_designed, told.as_found), expected / problem.samples, rtol=1e-8)
+    assert told.as_found < 2.0 < 50.0 < told.as_designed
+
+
+def test_one_trial_foretells_nothing():
+    rows, places = off_everywhere(np.random.default_rng(22))
+    assert foretold(Problem.of(rows[:1], places), []) is None

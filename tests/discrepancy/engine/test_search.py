@@ -15,6 +15,7 @@ from discrepancy.inference.remainder import unlisted_nats
 from discrepancy.inference.scan import score_of
 from discrepancy.inference.search import search
 from discrepancy.least_squares.fit import Fit
+from discrepancy.least_squares.patches import Patches
 from discrepancy.least_squares.problem import Problem
 from discrepancy.result.evidence_list import evidence_list
 from discrepancy.rules import CLEAN_CHI2_PER_N
@@ -379,7 +380,7 @@ class OpenRig(FakeRig):
     def unknowns(self, candidate):
         count = 60 if candidate.cause == "cause 2" else 0
         rng = np.random.default_rng(11)
-        return [0.3 * rng.standard_normal((ROWS, CHANNELS, count)) for _ in self.trials]
+        return [Patches.of(0.3 * rng.standard_normal((ROWS, CHANNELS, count))) for _ in self.trials]
 
 
 SMALL = tuple(cause(f"cause {k}", tolerance=0.1) for k in range(8))
@@ -391,7 +392,7 @@ def test_what_a_cause_leaves_open_is_integrated_out():
     rng = np.random.default_rng(5)
     for t, u in enumerate(rig.unknowns(SMALL[2])):
         x, *own = rig.data[t]
-        rig.data[t] = x + 2.5 * u @ rng.standard_normal(60), *own
+        rig.data[t] = x + 2.5 * u.dense() @ rng.standard_normal(60), *own
     explanation = found_in(rig)
     assert names(explanation.found) == ["cause 2"]
     assert list(explanation.problem.opened) == [SMALL[2].key]
@@ -415,7 +416,7 @@ class HoldingRig(OpenRig):
         opened = super().unknowns(candidate)
         if candidate.cause != "cause 2":
             return opened
-        return [np.concatenate([u, c], axis=2) for u, c in zip(opened, self.columns(candidate), strict=True)]
+        return [u.beside([Patches.of(c)]) for u, c in zip(opened, self.columns(candidate), strict=True)]
 
 
 def test_what_a_cause_explains_with_nothing_open_stays_to_it():
@@ -423,7 +424,7 @@ def test_what_a_cause_explains_with_nothing_open_stays_to_it():
     rng = np.random.default_rng(5)
     for t, u in enumerate(rig.unknowns(SMALL[2])):
         x, *own = rig.data[t]
-        rig.data[t] = x + 2.5 * u[..., :60] @ rng.standard_normal(60), *own
+        rig.data[t] = x + 2.5 * u.dense()[..., :60] @ rng.standard_normal(60), *own
     nothing = search(rig).nothing
     alone = Hypothesis.of(nothing.problem, [2])
     best = proposals(rig, nothing).best

@@ -74,7 +74,7 @@ def test_others_in_place_of_some(rng: np.random.Generator, changes, kept: bool) 
         check(found, x, rng)
     assert is_stored(found.first) == kept
     loss = rng.standard_normal((K, ROWS, x.shape[2]))
-    less = found.less(lambda cell: grams(loss)[cell])
+    less = found.changed(lambda cell, gram: gram - grams(loss)[cell])
     assert is_stored(less.first) == kept
     for cell in range(K):
         np.testing.assert_allclose(less.whole(cell), grams(x)[cell] - grams(loss)[cell], atol=1e-10)

@@ -10,6 +10,7 @@ from discrepancy.least_squares.cells import Cells
 from discrepancy.least_squares.columns import Columns, held, portions
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.gram import orthonormal, project
+from discrepancy.least_squares.patches import Patches
 from discrepancy.least_squares.problem import Problem
 from linear_problem import CANDIDATES, random_rows
 
@@ -91,7 +92,7 @@ def test_a_fit_of_single_precision_is_the_same(rng: np.random.Generator, monkeyp
     monkeypatch.setattr(rules, "ROWS_BYTES", 0)
     problem = Problem.of(rows, CANDIDATES)
     assert all(columns.is_single for columns in problem.columns)
-    unknowns = [rng.standard_normal((*row.residual.shape, 2)) for row in rows]
+    unknowns = [Patches.of(rng.standard_normal((*row.residual.shape, 2))) for row in rows]
     residuals = [row.residual for row in rows]
     single = Fit.of(problem.with_residual(residuals), [2])
     np.testing.assert_allclose(single.solution, double.solution, rtol=1e-5, atol=1e-6)

@@ -6,6 +6,7 @@ from scipy.stats import multivariate_normal
 
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.opened import Opened, through
+from discrepancy.least_squares.patches import Patches
 from discrepancy.least_squares.problem import Problem
 from linear_problem import CANDIDATES, brute, random_rows
 from test_problem import same_fit, same_problem
@@ -23,8 +24,28 @@ def rows(rng):
     return random_rows(rng, n=20, moving=17, groups=[0, 0, 1])
 
 
-def unknowns(rng, rows, count):
-    return [rng.standard_normal((*r.residual.shape, count)) for r in rows]
+def unknowns(rng, rows, count, first=0):
+    """Columns in all rows and channels; or of the last channel alone, in some rows each."""
+    out = [rng.standard_normal((*r.residual.shape, count)) for r in rows]
+    for x in out if first else ():
+        x[:, :first] = 0.0
+        for k in range(count):
+            x[: 4 * k, :, k] = x[4 * k + 7 :, :, k] = 0.0
+    return out
+
+
+def patches(unknowns):
+    """Each column by itself."""
+    none = [Patches(u.shape[:2]) for u in unknowns]
+    return [
+        n.beside(Patches.of(c) for c in np.split(u, max(u.shape[2], 1), axis=2))
+        for n, u in zip(none, unknowns, strict=True)
+    ]
+
+
+def alone(U, size, before=()):
+    """Of a trial without unknowns of its own."""
+    return Opened.of(Patches.of(U), size, np.zeros((*U.shape[:2], 0)), before)
 
 
 def flat(x):
@@ -35,7 +56,7 @@ def flat(x):
 def test_transformed_rows_and_price_are_the_dense_likelihood(rng, size):
     U = rng.standard_normal((10, 3, 4))
     U[..., 3] = U[..., 0] - 2.0 * U[..., 1]  # dependent: three directions
-    opened = Opened.of(U, size)
+    opened = alone(U, size)
     dense = np.eye(30) + size**2 * flat(U) @ flat(U).T
     for _ in range(3):
         y = rng.standard_normal((10, 3, 1))
@@ -47,15 +68,15 @@ def test_transformed_rows_and_price_are_the_dense_likelihood(rng, size):
 
 def test_what_is_transformed_is_white(rng):
     U = rng.standard_normal((10, 3, 4))
-    whiten = flat(Opened.of(U, 2.0)(np.eye(30).reshape(10, 3, 30)))
+    whiten = flat(alone(U, 2.0)(np.eye(30).reshape(10, 3, 30)))
     dense = np.eye(30) + 4.0 * flat(U) @ flat(U).T
     np.testing.assert_allclose(whiten @ dense @ whiten.T, np.eye(30), atol=1e-9)
 
 
 def test_one_after_the_other_is_both_together(rng):
     U, V, y = (rng.standard_normal((10, 3, k)) for k in (4, 2, 1))
-    first = Opened.of(U, 2.0)
-    second = Opened.of(first(V), 0.7)
+    first = alone(U, 2.0)
+    second = alone(V, 0.7, [first])
     white = through([first, second], y)
     dense = np.eye(30) + 4.0 * flat(U) @ flat(U).T + 0.49 * flat(V) @ flat(V).T
     assert np.sum(white**2) == pytest.approx(y.ravel() @ np.linalg.solve(dense, y.ravel()))
@@ -65,16 +86,18 @@ def test_one_after_the_other_is_both_together(rng):
 def test_nothing_open_costs_nothing(rng):
     y = rng.standard_normal((10, 3, 2))
     for columns in (np.zeros((10, 3, 0)), np.zeros((10, 3, 2))):
-        opened = Opened.of(columns, 5.0)
+        opened = alone(columns, 5.0)
         assert opened.price == 0.0
         np.testing.assert_array_equal(opened(y), y)
 
 
-def test_problem_with_unknowns_is_made_of_transformed_rows(rng, rows):
-    """Gram matrices are updated, not made anew."""
-    problem, U, V = Problem.of(rows, CANDIDATES), unknowns(rng, rows, 4), unknowns(rng, rows, 2)
+@pytest.mark.parametrize("firsts", [(0, 0), (2, 2), (0, 2), (2, 0)])
+def test_problem_with_unknowns_is_made_of_transformed_rows(rng, rows, firsts):
+    """Gram matrices are updated, not made anew; where unknowns show in some channels only, in the others, too."""
+    problem = Problem.of(rows, CANDIDATES)
+    U, V = (unknowns(rng, rows, count, first) for count, first in zip((4, 2), firsts, strict=True))
     U[1] = U[1][..., :0]  # nothing is open in the second trial
-    wider = problem.with_unknowns(ONE, U, 3.0).with_unknowns(TWO, V, 0.5)
+    wider = problem.with_unknowns(ONE, patches(U), 3.0).with_unknowns(TWO, patches(V), 0.5)
     for t, cells in enumerate(wider.cells):
         spectrum = cells.spectrum(wider.rows(t))
         np.testing.assert_allclose(wider.spectra_of(t, slice(None)), spectrum, atol=1e-10)
@@ -82,11 +105,14 @@ def test_problem_with_unknowns_is_made_of_transformed_rows(rng, rows):
             np.testing.assert_allclose(wider.cell_grams[t].whole(cell), gram, atol=1e-8)
 
 
+@pytest.mark.parametrize("firsts", [(0, 0), (2, 2), (0, 2)])
 @pytest.mark.parametrize("free", [(), (1,), (2, 3)])
-def test_fit_with_unknowns_is_generalised_least_squares(rng, rows, free):
+def test_fit_with_unknowns_is_generalised_least_squares(rng, rows, free, firsts):
     """Dense covariances, with every trial's own unknowns as free columns; their values, too."""
-    U, V = unknowns(rng, rows, 4), unknowns(rng, rows, 2)
-    problem = Problem.of(rows, CANDIDATES).with_unknowns(ONE, U, 3.0).with_unknowns(TWO, V, 0.5)
+    U, V = (unknowns(rng, rows, count, first) for count, first in zip((4, 2), firsts, strict=True))
+    problem = (
+        Problem.of(rows, CANDIDATES).with_unknowns(ONE, patches(U), 3.0).with_unknowns(TWO, patches(V), 0.5)
+    )
     noise = [
         np.eye(r.residual.size) + 9.0 * flat(u) @ flat(u).T + 0.25 * flat(v) @ flat(v).T
         for r, u, v in zip(rows, U, V, strict=True)
@@ -108,35 +134,41 @@ def test_price_is_that_of_what_own_unknowns_leave(rng, rows):
         own = np.linalg.qr(flat(r.local), mode="complete")[0][:, r.local.shape[2] :]
         K = np.eye(r.residual.size) + 9.0 * flat(u) @ flat(u).T + 0.25 * flat(v) @ flat(v).T
         expected += 0.5 * np.linalg.slogdet(own.T @ K @ own)[1]
-    both = problem.with_unknowns(ONE, U, 3.0).with_unknowns(TWO, V, 0.5)
+    both = problem.with_unknowns(ONE, patches(U), 3.0).with_unknowns(TWO, patches(V), 0.5)
     assert both.price == pytest.approx(expected)
 
 
 def test_unknowns_that_are_taken_away_leave_no_trace(rng, rows):
     problem, U, V = Problem.of(rows, CANDIDATES), unknowns(rng, rows, 4), unknowns(rng, rows, 2)
-    both = problem.with_unknowns(ONE, U, 3.0).with_unknowns(TWO, V, 0.5)
+    both = problem.with_unknowns(ONE, patches(U), 3.0).with_unknowns(TWO, patches(V), 0.5)
     same_problem(both.without_unknowns(()), problem)
-    same_problem(both.without_unknowns((ONE,)), problem.with_unknowns(ONE, U, 3.0))
-    same_problem(both.without_unknowns((TWO,)), problem.with_unknowns(TWO, V, 0.5))
-    assert both.without_unknowns((TWO,)).price == pytest.approx(problem.with_unknowns(TWO, V, 0.5).price)
+    same_problem(both.without_unknowns((ONE,)), problem.with_unknowns(ONE, patches(U), 3.0))
+    same_problem(both.without_unknowns((TWO,)), problem.with_unknowns(TWO, patches(V), 0.5))
+    assert both.without_unknowns((TWO,)).price == pytest.approx(
+        problem.with_unknowns(TWO, patches(V), 0.5).price
+    )
     assert both.without_unknowns((ONE, TWO)) is both
-    assert both.with_unknowns(ONE, V, 9.0) is both  # open already
-    assert problem.with_unknowns(ONE, [u[..., :0] for u in U], 3.0) is problem
+    assert both.with_unknowns(ONE, patches(V), 9.0) is both  # open already
+    assert problem.with_unknowns(ONE, patches([u[..., :0] for u in U]), 3.0) is problem
 
 
 def test_what_changes_later_is_transformed_too(rng, rows):
     problem, U = Problem.of(rows, CANDIDATES), unknowns(rng, rows, 4)
     residuals, columns = [rng.standard_normal(r.residual.shape) for r in rows], unknowns(rng, rows, 1)
-    opened = problem.with_unknowns(ONE, U, 3.0)
+    opened = problem.with_unknowns(ONE, patches(U), 3.0)
     same_problem(
         opened.with_residual(residuals).with_columns(0, CANDIDATES[0], columns),
-        problem.with_residual(residuals).with_columns(0, CANDIDATES[0], columns).with_unknowns(ONE, U, 3.0),
+        problem.with_residual(residuals)
+        .with_columns(0, CANDIDATES[0], columns)
+        .with_unknowns(ONE, patches(U), 3.0),
     )
     event = CANDIDATES[2]
-    same_problem(opened.extended(event, columns), problem.extended(event, columns).with_unknowns(ONE, U, 3.0))
+    same_problem(
+        opened.extended(event, columns), problem.extended(event, columns).with_unknowns(ONE, patches(U), 3.0)
+    )
 
 
 def test_nothing_stays_nothing() -> None:
     """A trial in which another cause leaves nothing open beside one that does."""
-    opened = Opened.of(np.random.default_rng(0).standard_normal((5, 2, 3)), 2.0)
+    opened = alone(np.random.default_rng(0).standard_normal((5, 2, 3)), 2.0)
     assert opened(np.zeros((5, 2, 0))).shape == (5, 2, 0)

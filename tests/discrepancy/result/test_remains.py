@@ -65,6 +65,16 @@ def test_a_small_rest_that_is_no_noise_is_told() -> None:
 
 
 @pytest.mark.parametrize("verdict", ["explained", "miscalibrated"])
+def test_the_remedy_of_what_is_off_everywhere_says_what_it_is_worth(verdict: str) -> None:
+    values = small_diagnosis(verdict)
+    values["scatter"] = [scattered()]
+    worth = "each one is foretold to chi2/n 1.07, as designed to 8.53e+03."
+    assert worth not in words(format_diagnosis(values))
+    values["foretold"] = {"as_designed": 8530.0, "as_found": 1.07}
+    assert words(format_diagnosis(values)).count(worth) == 1
+
+
+@pytest.mark.parametrize("verdict", ["explained", "miscalibrated"])
 def test_what_is_off_everywhere_is_told_once(verdict: str) -> None:
     values = small_diagnosis(verdict)
     values["scatter"] = [scattered()]

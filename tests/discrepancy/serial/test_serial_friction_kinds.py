@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.inference.reshape import reshaped
+from discrepancy.inference.shape.reshape import reshaped
 from discrepancy.least_squares.problem import Problem
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.diagnosis import diagnose_serial

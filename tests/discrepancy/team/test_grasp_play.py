@@ -35,7 +35,7 @@ def test_travel_between_the_ends_is_left_open(robot):
     changed = residual_of(case, replace(case.signals, phi=phi)) - case.linear.residual
     poses = changed[:, :12]
     column = cause.columns(case.linear, robot, 0, shape)[:, :12, 0]
-    unknowns = cause.unknowns(case.linear, robot, 0, shape)[:, :12]
+    unknowns = cause.unknowns(case.linear, robot, 0, shape).dense()[:, :12]
     closed = poses - PLAY_M * column
     flat = unknowns.reshape(closed.size, -1)
     # Knots are closer than rows: as in the diagnosis they scatter by the play, beside noise of 0.1 um.
@@ -54,7 +54,7 @@ def test_nothing_is_open_where_the_force_is_large():
     wrench = case.linear.data.wrench.copy()
     wrench[:, 1, 3:] = 5.0
     pressed = replace(case.linear, data=replace(case.linear.data, wrench=wrench))
-    assert CAUSES["grasp_play"].unknowns(pressed, 1, 0, {"force_N": FORCE_N}).shape[2] == 0
+    assert CAUSES["grasp_play"].unknowns(pressed, 1, 0, {"force_N": FORCE_N}).width == 0
 
 
 @pytest.mark.parametrize("robot", [0, 1, 2])
@@ -88,7 +88,7 @@ def test_shifts_for_a_while_are_displacements(robot):
     where = np.zeros(len(along), dtype=bool)
     where[500:530] = where[900:] = True
     pieces = list(pieces_while(where, linear.signals.rate_hz, 0.05))
-    columns = linear.of_shifts(robot, along[..., 0], in_parts(iter(pieces), 3))
+    columns = linear.of_shifts(robot, along[..., 0], in_parts(iter(pieces), 3)).dense()
     whole = np.stack(free_while(where, linear.signals.rate_hz, 0.05), axis=-1)
     expected = linear.of_pose(robot, None, along * whole[:, None])
     seen = expected[..., np.abs(expected).max(axis=(0, 1)) > 1e-4 * np.abs(expected).max()]
@@ -114,6 +114,21 @@ def test_what_is_behind_a_play():
     assert more.shape["contact_per_N"] - less.shape["contact_per_N"] == pytest.approx(size)
     assert size > 0.0
     assert shape_steps(cause.candidate({"play_m": 3e-6}, plain, 1)) == []
+
+
+@pytest.mark.parametrize("robot", [0, 1, 2])
+def test_ends_that_give_way_are_a_healthy_grasp_that_does(robot):
+    """Both are the force over a stiffness, so that neither is named for what the other does within its tolerance."""
+    case, play, flex = exact(), CAUSES["grasp_play"], CAUSES["grasp_flex"]
+    plain, behind = (
+        play.columns(case.linear, robot, 0, {"force_N": FORCE_N, "contact_per_N": contact})[..., 0].ravel()
+        for contact in (0.0, 1.0)
+    )
+    gives = flex.columns(case.linear, robot, 0, flex.shapes[0])[..., 0].ravel()
+    ends = behind - plain
+    compliance = gives @ ends / (gives @ gives)
+    assert compliance == pytest.approx(1.0, abs=0.005)
+    assert np.linalg.norm(ends - compliance * gives) < 0.02 * np.linalg.norm(ends)
 
 
 def _about(c):

@@ -227,7 +227,7 @@ def test_what_is_in_another_part_is_found(recording) -> None:
     for name, truth in FRICTION.items():
         assert friction["parameters"][name]["value"] == pytest.approx(truth, rel=0.06)
     assert push["parameters"]["force_y_N"]["value"] == pytest.approx(2.0, rel=0.1)
-    assert push["parameters"]["start_s"]["value"] == pytest.approx(41.0, abs=0.5)
+    assert push["parameters"]["start_s"]["value"] == pytest.approx(41.0, abs=0.03)
     assert len(told["recordings"]) == 3
     assert any("was held against the other 2 parts" in note for note in told["notes"])
     assert any(note.startswith("In none of the parts that were not searched") for note in told["notes"])

@@ -142,5 +142,18 @@ def test_damaged_datasets(dataset: Path) -> None:
     assert "has no Parquet files under data" in refused(dataset, episode=0)
 
 
+@pytest.mark.parametrize(
+    ("file", "column"),
+    [("data/chunk-000/file-000.parquet", b"frame_index"), ("meta/episodes", b"data/chunk_index")],
+)
+def test_names_of_columns_that_are_no_text(dataset: Path, file: str, column: bytes) -> None:
+    path = dataset / file
+    path = path if path.is_file() else next(path.glob("*/*.parquet"))
+    content = path.read_bytes()
+    path.write_bytes(content.replace(column, b"\xff" + column[1:]))
+    assert path.read_bytes() != content
+    assert "damaged one ('utf-8' codec can't decode byte 0xff" in refused(dataset, episode=0)
+
+
 def test_directories_that_are_no_logs(tmp_path: Path) -> None:
     assert "is a directory, and neither a rosbag2 bag nor a LeRobot dataset" in refused(tmp_path)

@@ -213,3 +213,10 @@ def test_no_rows_is_an_empty_log(path: Path, table: pa.Table) -> None:
 def test_column_twice(path: Path, table: pa.Table) -> None:
     pq.write_table(table.append_column("omnid1.phi1", table["time"]), path)
     assert "column 'omnid1.phi1' appears more than once" in refused(path)
+
+
+def test_a_name_of_a_column_that_is_no_text(path: Path, table: pa.Table) -> None:
+    pq.write_table(table.replace_schema_metadata(None), path, store_schema=False)
+    name = table.schema.names[-1].encode()
+    path.write_bytes(path.read_bytes().replace(name, b"\xff" + name[1:]))
+    assert "damaged one ('utf-8' codec can't decode byte 0xff" in refused(path)

@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from closed_loop import BASE_HEIGHT_M, ClosedLoop
 from effect_cases import example, team_with
 from mocobot_sim.scene.scene import build_team
-from mocobot_sim.scene.soft import spring_parameters
+from mocobot_sim.scene.soft import row_relaxation_s, spring_parameters
 from mocobot_sim.trial.actors import Stage
 from mocobot_sim.trial.trajectories import random_vias
 from mocobot_sim.trial.trial import run_trial
@@ -238,3 +238,23 @@ def test_the_gimbal_keeps_its_mass_and_inertia(robot):
         parts = [f"omnid{robot}/flange"] + ([f"omnid{robot}/pad"] if robot > 1 else [])
         inertia = sum(yielding.body(part).inertia for part in parts)
         np.testing.assert_allclose(inertia, clean.body(parts[0]).inertia, rtol=1e-12)
+
+
+@pytest.mark.parametrize("compliance", [1e-7, 1e-5])
+def test_a_spring_follows_a_growing_force_as_late_as_its_row_says(compliance):
+    """Behind a ramp it stays by its time constant, however much mass moves along."""
+    inverse_kg, grows_N_per_s = 0.5, 100.0
+    (s, b), impedance = spring_parameters(compliance, inverse_kg)
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="0.0005" gravity="0 0 0" tolerance="0"/><worldbody><body>
+        <joint name="x" type="slide" axis="1 0 0"/><geom size="0.1" mass="{1.0 / inverse_kg}"/></body></worldbody>
+        <equality><joint name="spring" joint1="x" solref="{s} {b}" solimp="{" ".join(map(str, impedance))}"/></equality>
+        </mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    for _ in range(2000):
+        data.qfrc_applied[0] = grows_N_per_s * data.time
+        mujoco.mj_step(model, data)
+    late_s = data.time - data.qpos[0] / (compliance * grows_N_per_s)
+    assert late_s > 5e-3
+    assert row_relaxation_s(model, "spring") == pytest.approx(late_s, rel=0.1)

@@ -66,6 +66,7 @@ class Cause(base.Cause):
         dry: whether it jumps where a joint turns round.
         built: whether it is how the robot was made, and so the same on two days.
         reversible: whether, between two days, it may as well have gone as come.
+        alike: how many shapes at every place are equally likely beforehand; 0 where that is not charged.
     """
 
     where = "arm"
@@ -73,6 +74,7 @@ class Cause(base.Cause):
     dry: ClassVar[bool] = False
     built: ClassVar[bool] = False
     reversible: ClassVar[bool] = False
+    alike: ClassVar[int] = 0
 
     @abstractmethod
     def columns(self, signals: Signals, at: int, shape: Shape) -> Array:

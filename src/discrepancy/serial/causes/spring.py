@@ -1,5 +1,6 @@
 """A spring at a joint."""
 
+from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause, at_joint
 
 
@@ -10,6 +11,7 @@ class Spring(Cause):
     family = "position_torque"
     parameters = ("stiffness_Nm_per_rad",)
     scales = (1.0,)
+    alike = len(rules.NEUTRAL_SHARES)
     separate = "Slow motions over the whole range."
 
     def sentence(self, n):
@@ -20,5 +22,9 @@ class Spring(Cause):
         return at_joint(signals, at, signals.q[:, at] - shape["neutral"])
 
     def shapes(self, hints, at):
-        # Where it is neutral is one with the torque's offset; the middle of the travel is no worse than any.
-        return [{"neutral": float(hints.middle[at])}]
+        # Masses take up what a joint's gravity does, and of a spring there is left what its neutral makes of it.
+        middle, travel = float(hints.middle[at]), float(hints.travel[at])
+        return [{"neutral": middle + share * travel, "travel": travel} for share in rules.NEUTRAL_SHARES]
+
+    def steps(self, shape):
+        return {"neutral": rules.NEUTRAL_STEP_SHARE * shape["travel"]}

@@ -10,6 +10,7 @@ import numpy as np
 from discrepancy.candidate import Candidate
 from discrepancy.causes import base
 from discrepancy.causes.base import Shape
+from discrepancy.least_squares.patches import Patches
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.design import OmnidDesign
@@ -100,9 +101,9 @@ class Cause(base.Cause):
         """By how much a number of the shape is changed for slopes: a share of it."""
         return self.determined[name] * abs(number)
 
-    def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Array:
-        """Columns (n, C, k) of what the cause leaves open in one trial, such as the friction of a joint at rest."""
-        return np.zeros((*trial.residual.shape, 0))
+    def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Patches:
+        """Columns of what the cause leaves open in one trial, such as the friction of a joint at rest."""
+        return Patches(trial.residual.shape)
 
     def possible(self, values: Array, se: Array, shape: Shape) -> bool:
         """Whether such values (standard errors ``se``) can be: nothing negative beyond two standard errors."""

@@ -29,8 +29,11 @@ class GraspFlex(Yielding):
     clipped = ("turning_rad_per_N",)
     at = "grasp"
     shapes = (
-        *Yielding.shapes,
-        *({"relaxation_s": rules.RELAXATIONS_S[0], "offset_m": offset_m} for offset_m in rules.GRASP_TURNS_M),
+        *({"relaxation_s": time_s} for time_s in sorted(rules.RELAXATIONS_S)),  # no base moves along
+        *(
+            {"relaxation_s": min(rules.RELAXATIONS_S), "offset_m": offset_m}
+            for offset_m in rules.GRASP_TURNS_M
+        ),
     )
     determined: ClassVar = {**Yielding.determined, "offset_m": 0.1}
     separate = (

@@ -56,7 +56,7 @@ class GraspPlay(Cause):
     def unknowns(self, trial, robot, joint, shape):
         force, rate_hz = trial.data.wrench[:, robot, 3:], trial.signals.rate_hz
         around = np.ones(2 * math.ceil(rules.PLAY_OPEN_S * rate_hz) + 1, dtype=bool)
-        columns = [np.zeros((*trial.residual.shape, 0))]
+        columns = []
         for axis in range(3):
             small = np.abs(force[:, axis]) < rules.PLAY_OPEN_N
             loose = np.asarray(binary_dilation(small, around), dtype=np.bool_)
@@ -65,7 +65,7 @@ class GraspPlay(Cause):
             )
             along = trial.data.R_bi[:, robot, :, axis] @ trial.bases.R[robot].T
             columns.append(trial.of_shifts(robot, along, places))
-        return np.concatenate(columns, axis=2)
+        return columns[0].beside(columns[1:])
 
 
 def displaced(trial: TrialLinear, robot: int, offset: Array, force: Array) -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.team.causes.base import ReadingError, one_joint
-from estimator.arm.delta import LEG_DIRECTIONS, leg_geometry
+from estimator.arm.delta import LEG_DIRECTIONS, jacobian_of, leg_geometry
 
 
 class LinkLength(ReadingError):
@@ -44,7 +44,7 @@ class LinkLength(ReadingError):
 
 def _errors(phi, tau, joint, design):
     """Readings minus those of a leg of design lengths, per metre: angles (3, Q) and torques (3, Q, 3)."""
-    angle, slopes = np.array(_phi_error(phi, joint, design)), _slopes(phi, joint, design)
+    angle, slopes = _phi_error(phi, joint, design)
     gravity, at = design.gravity_mps2, phi[:, joint]
     at_knee = 0.5 * design.rod_mass_kg * gravity
     weight = design.proximal_mass_kg * gravity * design.proximal_com_m + at_knee * design.proximal_length_m
@@ -56,19 +56,25 @@ def _errors(phi, tau, joint, design):
     return angle, torque
 
 
-def _slopes(phi, joint, design, step=1e-5):
-    """Derivative of ``_phi_error`` by the three angles, shape (3, Q, 3)."""
-    slopes = np.empty((3, *phi.shape))
-    for leg, direction in enumerate(np.eye(3)):
-        ahead, behind = (_phi_error(phi + s * direction, joint, design) for s in (step, -step))
-        slopes[:, :, leg] = (np.array(ahead) - np.array(behind)) / (2.0 * step)
-    return slopes
-
-
 def _phi_error(phi, joint, design):
-    """Reading minus the angle at which a leg of design lengths would reach the same wrist, per metre: three (Q,)."""
-    legs = leg_geometry(phi, design)
-    rod, lever = legs.rod[:, joint], legs.leverage[:, joint]
-    u, angle = LEG_DIRECTIONS[joint], phi[:, joint]
-    along = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * np.array([0.0, 0.0, 1.0])
-    return [-np.sum(rod * along, axis=1) / lever, -design.rod_length_m / lever, -(rod @ u) / lever]
+    """Reading minus the angle at which a leg of design lengths would reach the same wrist, per metre, shape (3, Q).
+
+    And its derivative by the three angles, (3, Q, 3). It is minus what the rod has of a longer link, a longer rod or a
+    wider base, over the rod's leverage.
+    """
+    legs, own = leg_geometry(phi, design), np.eye(3)[joint]
+    rod, knee, lever = legs.rod[:, joint], legs.knee_d1[:, joint], legs.leverage[:, joint]
+    u, up, angle = LEG_DIRECTIONS[joint], np.eye(3)[2], phi[:, joint]
+    along = np.cos(angle)[:, None] * u + np.sin(angle)[:, None] * up
+    across = np.cos(angle)[:, None] * up - np.sin(angle)[:, None] * u
+    length = np.full(len(phi), design.rod_length_m)
+    shares = np.stack([np.sum(rod * along, axis=1), length, rod @ u])
+    # By every angle the wrist moves, and by the leg's own the knee does.
+    rod_moves = jacobian_of(legs) - knee[..., None] * own  # (Q, 3, 3)
+    of_along = np.einsum("qij,qi->qj", rod_moves, along) + np.sum(rod * across, axis=1)[:, None] * own
+    of_lever = (
+        np.einsum("qij,qi->qj", rod_moves, knee) + np.sum(rod * legs.knee_d2[:, joint], axis=1)[:, None] * own
+    )
+    of_shares = np.stack([of_along, np.zeros_like(of_along), np.einsum("qij,i->qj", rod_moves, u)])
+    error = -shares / lever
+    return error, -(of_shares + error[..., None] * of_lever) / lever[:, None]

@@ -2,17 +2,21 @@
 
 import numpy as np
 
+from discrepancy import rules
+from discrepancy.candidate import Transient
 from discrepancy.team.causes.base import Cause, Shape, stack
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 
 
 def during(trial: TrialLinear, shape: Shape) -> Array:
-    """1 during the interval of a shape but for its ramps, 0 outside, shape (Q,)."""
-    time, start, end = trial.signals.time, shape["start_s"], shape["start_s"] + shape["duration_s"]
-    inside = ((time >= start) & (time < end)).astype(float)
-    ramp = shape.get("ramp_s", 0.0)
-    return inside * np.clip(np.minimum(time - start, end - time) / ramp, 0.0, 1.0) if ramp else inside
+    """Share of a push that acts about each sample: 1 within its interval but for the ramps, 0 outside, shape (Q,).
+
+    A mean over the sample's own time, so that ends between samples are told apart.
+    """
+    each = 1.0 / trial.signals.rate_hz
+    edges = np.append(trial.signals.time - 0.5 * each, trial.signals.time[-1] + 0.5 * each)
+    return np.asarray(np.diff(Transient(0, **shape).acted(edges)) / each, dtype=np.float64)
 
 
 class Push(Cause):
@@ -30,20 +34,21 @@ class Push(Cause):
         0.02,
     )  # friction that rests anew is a small push while it lasts
     transient = True
+    determined = dict.fromkeys(("start_s", "duration_s", "ramp_s"), 0.25)
     at = "payload"
     separate = "Another trial: a push does not repeat."
 
     def sentence(self, n):
-        ramp = (
-            f", {n.values['ramp_s']:.2f} s of it to grow and as many to fade"
-            if n.values.get("ramp_s")
-            else ""
-        )
+        ramp = f", {n('ramp_s', 's')} of it to grow and as much to fade" if n.values.get("ramp_s") else ""
         return (
-            f"something pushed the payload in trial {n.values['trial']:.0f} from {n.values['start_s']:.2f} s on for "
-            f"{n.values['duration_s']:.2f} s{ramp}, with {n.vector('force', 'N')} along a line "
+            f"something pushed the payload in trial {n.values['trial']:.0f} from {n('start_s', 's')} on for "
+            f"{n('duration_s', 's')}{ramp}, with {n.vector('force', 'N')} along a line "
             f"through {n.vector('point', 'm')} in {{1}}"
         )
+
+    def slope_step(self, name, number):
+        most = rules.TEAM_PUSH_EDGE_S
+        return most if name == "start_s" else min(most, super().slope_step(name, number))
 
     def columns(self, trial, robot, joint, shape):
         window = during(trial, shape)

@@ -8,8 +8,9 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.causes.base import Shape
-from discrepancy.causes.free_while import pieces_while
+from discrepancy.causes.free_while import in_parts, pieces_while
 from discrepancy.causes.play import played
+from discrepancy.least_squares.patches import Patches
 from discrepancy.team.causes.base import Cause, one_joint, one_robot
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
@@ -77,7 +78,7 @@ class Friction(Cause):
             torque += value * state
         return signals.minus(tau=one_robot(one_joint(torque, joint), trial.robots, robot))
 
-    def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Array:
+    def unknowns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Patches:
         """What it does while it holds: any torque that it takes, as it changes with the load.
 
         Where it gives way, how far it had before it slips for the first time; and as no bristles do so in proportion,
@@ -85,6 +86,7 @@ class Friction(Cause):
         """
         rate_hz, state = trial.signals.rate_hz, np.abs(self._sliding(trial.signals, robot, joint, shape)[0])
         rests = pieces_while(state < 1.0 - 1e-9, rate_hz, rules.REST_KNOTS_S)
+        rests = in_parts(rests, rules.PATCH_COLUMNS)
         if self.gives in shape:
             slips = np.flatnonzero(state >= 1.0 - 1e-9)
             before = slice(0, slips[0] if len(slips) else len(state))

@@ -16,8 +16,10 @@ from estimator.so3 import skew
 class Slosh(Cause):
     """A pendulum that hangs from a point of the payload; what it does beyond riding along rigidly.
 
-    Small swings x relative to the point obey x'' + 2 zeta w x' + w^2 x = -a with w^2 = g / length; the payload feels
-    -mass x'' at the point. Its weight and rigid part are in the payload's own parameters.
+    Small swings x relative to the point obey x'' + 2 zeta w (x' - v) + w^2 x = -a with w^2 = g / length; v is how fast
+    it would swing if it turned with the payload, to which its damper is fixed. The payload feels -mass x'' at the point
+    and, as the damper pulls where the mass is, the moment of 2 zeta w mass (x' - v) a length below. Its weight and
+    rigid part are in the payload's own parameters.
 
     What swings may have two modes, of one damping ratio. With ``across_length_m`` in its shape it is Blackburn's
     pendulum, as a liquid in a box that is longer than wide: it swings on ``length_m`` along ``heading_rad`` (from x of
@@ -61,7 +63,7 @@ class Slosh(Cause):
         motion = trial.motion
         com = trial.shared.pi[1:4] / trial.shared.pi[0]
         R_b1, gravity = trial.data.R_bi[:, 0], trial.data.gravity_mps2
-        turning = trial.turning
+        turning, up = trial.turning, R_b1[:, 2]
         across_m = shape.get("across_length_m", shape["length_m"])
         drop_m = shape["length_m"] - across_m
         force, moment = np.zeros((2, len(R_b1), 3, 4))
@@ -82,13 +84,17 @@ class Slosh(Cause):
             _ways(R_b1, shape), (shape["length_m"], across_m), (0.0, drop_m), strict=True
         ):
             point = com - [0.0, 0.0, down_m]
-            drive = driven(way, point)
-            add(way, _swing(drive, trial.signals.rate_hz, gravity, {**shape, "length_m": length_m}), point)
+            drive, about = driven(way, point), np.cross(way, up)
+            turned = np.sum(about * motion.omega, axis=1)
+            own = {**shape, "length_m": length_m}
+            swing, damped = _swing(drive, turned, trial.signals.rate_hz, gravity, own)
+            add(way, swing, point)
+            moment += about[:, :, None] * damped[:, None]
             if down_m:  # its weight and rigid part, which is not where the payload's own parameters have it
                 add(way, drive, point)
                 add(way, driven(way, com), com, 1.0)
                 aside = -down_m * way[:, 2:] * way
-                moment[..., 0] -= gravity * np.cross(aside, R_b1[:, 2])
+                moment[..., 0] -= gravity * np.cross(aside, up)
         moment[..., 1:] -= skew(force[..., 0])  # moving the point by r moves the force: r x f = -f x r
         return trial.of_wrench(force, moment)
 
@@ -172,26 +178,41 @@ def _ways(R_b1: Array, shape: Shape) -> tuple[Array, Array]:
     return c * x + s * y, c * y - s * x
 
 
-def _swing(a, rate_hz, gravity, shape):
-    """Relative acceleration of the swinging mass [m/s^2] from rest, a linear between samples, shapes (Q, ...)."""
-    share = shape.get("second_share", 0.0)
-    first = _mode(a, rate_hz, gravity, shape["length_m"], shape["damping_ratio"])
-    if not share:
-        return first
-    second = _mode(a, rate_hz, gravity, shape["second_length_m"], shape["damping_ratio"])
-    return (1.0 - share) * first + share * second
+def _swing(drive: Array, turned: Array, rate_hz: float, gravity: float, shape: Shape) -> tuple[Array, Array]:
+    """Relative acceleration of 1 kg that swings [m/s^2] and the moment of its damper [N m], from rest, (Q, 4) each.
+
+    Args:
+        drive: acceleration of the point along its way, linear between samples, and by moments of the mass, (Q, 4).
+        turned: rate at which the payload turns about its axis [rad/s], shape (Q,).
+        rate_hz, gravity: of samples; of the place [m/s^2].
+        shape: its lengths, their shares, and its damping ratio.
+    """
+    second = shape.get("second_share", 0.0)
+    modes = [(1.0 - second, shape["length_m"])]
+    modes += [(second, shape["second_length_m"])] if second else []
+    swing, damped = np.zeros_like(drive), np.zeros_like(drive)
+    for share, length_m in modes:
+        damping_per_s = 2.0 * shape["damping_ratio"] * np.sqrt(gravity / length_m)
+        own, behind = drive.copy(), length_m * turned  # how fast it would swing if it turned with the payload
+        own[:, 0] -= damping_per_s * behind
+        pendulum = rate_hz, gravity, length_m, shape["damping_ratio"]
+        speed = _through(_filter(1, *pendulum), own)
+        speed[:, 0] -= behind
+        swing += share * _through(_filter(0, *pendulum), own)
+        damped += share * damping_per_s * length_m * speed
+    return swing, damped
 
 
-def _mode(a: Array, rate_hz: float, gravity: float, length_m: float, damping_ratio: float) -> Array:
-    return np.asarray(
-        lfilter(*_filter(rate_hz, gravity, length_m, damping_ratio), a, axis=0), dtype=np.float64
-    )
+def _through(a_filter: tuple[Array, Array], x: Array) -> Array:
+    return np.asarray(lfilter(*a_filter, x, axis=0), dtype=np.float64)
 
 
 @lru_cache(maxsize=256)
-def _filter(rate_hz: float, gravity: float, length_m: float, damping_ratio: float) -> tuple[Array, Array]:
-    """Numerator and denominator, the same in every trial."""
+def _filter(
+    integrals: int, rate_hz: float, gravity: float, length_m: float, damping_ratio: float
+) -> tuple[Array, Array]:
+    """Numerator and denominator, the same in every trial, of acceleration (0 integrals) or speed (1)."""
     w = np.sqrt(gravity / length_m)
-    pendulum = [-1.0, 0.0, 0.0], [1.0, 2.0 * damping_ratio * w, w**2]
+    pendulum = [-1.0, *[0.0] * (2 - integrals)], [1.0, 2.0 * damping_ratio * w, w**2]
     discrete = cast("tuple[Array, Array, float]", cont2discrete(pendulum, 1.0 / rate_hz, method="foh"))
     return np.ravel(discrete[0]), discrete[1]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array
 
 from discrepancy import rules
+from discrepancy.least_squares.patches import Patch, Patches
 from discrepancy.team.linear.signals import Signals
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
@@ -92,8 +93,8 @@ class Reduction:
         """Last sample of every moving row, shape (moving,)."""
         return np.asarray(self.operator.indices[self.operator.indptr[1 : self.moving + 1] - 1], dtype=np.intp)
 
-    def of_pieces(self, direction: Array, pieces: Iterable[tuple[slice, Array]]) -> Array:
-        """Rows of values that are there for a while each, as many columns as show in any, shape (n, C, columns).
+    def of_pieces(self, direction: Array, pieces: Iterable[tuple[slice, Array]]) -> Patches:
+        """Rows of values that are there for a while each, as many columns as show in any.
 
         Args:
             direction: what a value of 1 is in the samples, shape (Q, C).
@@ -102,18 +103,21 @@ class Reduction:
         blocks = ((at, direction[at, :, None] * values[:, None]) for at, values in pieces)
         return self.of_blocks(blocks, direction.shape[1])
 
-    def of_blocks(self, blocks: Iterable[tuple[slice, Array]], channels: int) -> Array:
+    def of_blocks(self, blocks: Iterable[tuple[slice, Array]], channels: int) -> Patches:
         """The same of samples of an interval with all their channels, shape (s, C, k)."""
-        parts = [np.zeros((len(self.time), channels, 0))]
+        shape, each = (len(self.time), channels), []
         for at, samples in blocks:
             block = self._by_sample[:, at]
             rows, here = np.unique(block.indices, return_inverse=True)
             weights = np.zeros((len(rows), len(samples)))
             weights[here, np.repeat(np.arange(len(samples)), np.diff(block.indptr))] = block.data
-            part = np.zeros((len(self.time), *samples.shape[1:]))
-            part[rows] = (weights @ samples.reshape(len(samples), -1)).reshape(-1, *samples.shape[1:])
-            parts.append(part[..., part.any(axis=(0, 1))])
-        return np.concatenate(parts, axis=2)
+            first = int(np.argmax(samples.any(axis=(0, 2))))
+            samples = samples[:, first:]
+            values = (weights @ samples.reshape(len(samples), -1)).reshape(-1, *samples.shape[1:])
+            values = values[..., values.any(axis=(0, 1))]
+            if values.size:
+                each.append(Patch(rows, first, values))
+        return Patches(shape, tuple(each)).together()
 
     @cached_property
     def _by_sample(self) -> csc_array:

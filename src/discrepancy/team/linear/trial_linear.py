@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
+from discrepancy.least_squares.patches import Patches
 from discrepancy.least_squares.stored import is_stored, stored
 from discrepancy.team.linear.by_unknowns import by_bases, by_shared
 from discrepancy.team.linear.jacobian import BySignals, by_signals
@@ -173,8 +174,8 @@ class TrialLinear:
             total += self._displaced(robot, moved, slice(None)).reshape(total.shape)
         return self.reduction(total)
 
-    def of_shifts(self, robot: int, along: Array, pieces: Iterable[tuple[slice, Array]]) -> Array:
-        """The same of displacements that are there for a while each, as many columns as show, shape (n, C, columns).
+    def of_shifts(self, robot: int, along: Array, pieces: Iterable[tuple[slice, Array]]) -> Patches:
+        """The same of displacements that are there for a while each, as many columns as show.
 
         Args:
             robot: index of the robot, from 0.

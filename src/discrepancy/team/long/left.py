@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t
+from scipy.special import stdtrit
 
 from discrepancy import rules
 from discrepancy.team.linear.reduction import Reduction
@@ -62,7 +62,7 @@ def more_left(others: Mapping[int, Left], searched: Sequence[Left]) -> dict[int,
         # Means are about nought; how loud windows are, about what they are on average, in shares of it.
         middle = known.mean(axis=0) if name == "rms" else np.zeros(known.shape[1])
         scale = np.sqrt(np.sum((known - middle) ** 2, axis=0) / (len(known) - (name == "rms")))
-        allowed = rules.ODD_FACTOR * t.isf(0.5 * rules.ODD_CHANCE / count, len(known) - 1)
+        allowed = -rules.ODD_FACTOR * stdtrit(len(known) - 1, 0.5 * rules.ODD_CHANCE / count)
         for k, x in each.items():
             away = (x - middle if name == "rms" else np.abs(x)) / np.maximum(scale, 1e-300)
             worst[k] = max(worst[k], float(away.max(initial=0.0) / allowed))

@@ -1,7 +1,8 @@
 """The shape that suits a cause best; numbers of it that the data determine, and their standard errors."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -89,8 +90,15 @@ def nearest_shape(rig: Rig, without: Fit, candidate: Candidate, values: Array) -
     shape = dict(candidate.shape)
     for (less, more, difference), step in zip(rig.steps(candidate), found, strict=True):
         (name,) = (n for n in shape if less.shape[n] != more.shape[n])
-        shape[name] += float(np.clip(step, -difference / 2, difference / 2))
-    return replace(candidate, shape=shape)
+        reach = max(difference, candidate.shape.get("ramp_s", 0.0)) / 2
+        shape[name] += float(np.clip(step, -reach, reach))
+    if "duration_s" in shape:
+        shape["duration_s"] = max(shape["duration_s"], rules.EVENT_SHORTEST_S)
+    if "ramp_s" in shape:  # an event has grown before it fades
+        shape["ramp_s"] = min(
+            max(shape["ramp_s"], 0.5 * candidate.shape["ramp_s"]), 0.5 * shape["duration_s"]
+        )
+    return candidate.in_shape(shape)
 
 
 def _with_slopes(rig: Rig, candidate: Candidate, values: Array) -> Sequence[Array]:

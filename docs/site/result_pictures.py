@@ -1,0 +1,134 @@
+"""Pictures of results in docs/img, made anew: python docs/site/result_pictures.py [FOLDER]
+
+Runs the two scenarios of the diagnosis, copies what their verdicts show, and photographs report pages in an installed
+Chromium. FOLDER (out/pictures) keeps verdicts and pages. Of the paper's experiment the page that `make paper` left in
+out/paper is taken.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+from PIL import Image, ImageDraw
+from playwright.sync_api import Browser, sync_playwright
+
+ROOT = Path(__file__).resolve().parents[2]
+IMAGES = ROOT / "docs" / "img"
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+FLAGS = [
+    "--no-sandbox",
+    "--disable-gpu",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-sync",
+]
+WIDTH, COLOURS = 1200, 128
+DESKTOP, PHONE = (1400, 1094), (390, 844)
+SEAM, BACKGROUND = 18, (212, 218, 225)
+DRAWN = """[...document.querySelectorAll('.plot')]
+    .filter((plot) => plot.offsetParent && plot.getBoundingClientRect().top < innerHeight)
+    .every((plot) => plot.dataset.drawn)"""
+
+
+def main(folder: Path) -> None:
+    """Make all pictures."""
+    paper = ROOT / "out" / "paper" / "report.html"
+    if not paper.is_file():
+        sys.exit(f"{paper} is not there; run 'make paper' first")
+    folder.mkdir(parents=True, exist_ok=True)
+    recordings = verdicts(folder)
+    copied(folder / "verdict", folder / "law")
+    ours("estimate", *map(str, recordings), "--out", folder / "estimate" / "est.json", "--force")
+    for part in ("estimate", "verdict"):
+        ours("report", folder / part, "--force")
+    with sync_playwright() as started:
+        path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
+        browser = started.chromium.launch(executable_path=path, args=FLAGS)
+        verdict = folder / "verdict" / "report.html"
+        shot(browser, verdict, DESKTOP, dark=True).save(IMAGES / "report_diagnosis.jpg", quality=85)
+        shot(browser, paper, (1400, 941), at="Table II").save(IMAGES / "report_paper.jpg", quality=85)
+        phones = [
+            shot(browser, folder / "estimate" / "report.html", PHONE),
+            shot(browser, paper, PHONE, at="Table II"),
+            shot(browser, verdict, PHONE, at="What is named"),
+        ]
+        beside(phones).save(IMAGES / "report_phone.jpg", quality=85)
+        browser.close()
+
+
+def verdicts(folder: Path) -> list[Path]:
+    """Run both scenarios; the recordings of the first."""
+    scenarios = ROOT / "scenarios"
+    subprocess.run([sys.executable, scenarios / "hidden_effect.py", folder / "recordings"], check=True)
+    recordings = sorted((folder / "recordings").glob("*.parquet"))
+    ours("diagnose", *map(str, recordings), "--out", folder / "verdict", "--force")
+    shutil.rmtree(folder / "law", ignore_errors=True)
+    subprocess.run([sys.executable, scenarios / "unlisted_law.py", folder / "law"], check=True)
+    return recordings
+
+
+def ours(*words: str | Path) -> None:
+    """Run a command of mocobot."""
+    subprocess.run([sys.executable, "-m", "mocobot", *words], check=True)
+
+
+def copied(verdict: Path, law: Path) -> None:
+    """Plots of the verdicts, as wide as a page shows them."""
+    residual = next(p for p in sorted(verdict.glob("residual_*.png")) if p.stem != "residual_against")
+    sources = {
+        "diagnosis_residual.png": residual,
+        "diagnosis_evidence.png": verdict / "evidence.png",
+        "diagnosis_closed_loop.png": verdict / "closed_loop.png",
+        "diagnosis_law.png": law / "law.png",
+    }
+    for name, source in sources.items():
+        picture = Image.open(source).convert("RGB")
+        height = round(picture.height * WIDTH / picture.width)
+        small = picture.resize((WIDTH, height), Image.Resampling.LANCZOS)
+        small.quantize(COLOURS, dither=Image.Dither.NONE).save(IMAGES / name, optimize=True)
+
+
+def shot(
+    browser: Browser, page: Path, size: tuple[int, int], *, dark: bool = False, at: str | None = None
+) -> Image.Image:
+    """A page, from its beginning or from the first heading that holds some words."""
+    width, height = size
+    scheme = "dark" if dark else "light"
+    # The page's policy forbids scripts from elsewhere, ours to wait with among them.
+    context = browser.new_context(
+        viewport={"width": width, "height": height}, color_scheme=scheme, bypass_csp=True
+    )
+    seen = context.new_page()
+    seen.goto(page.as_uri())
+    if at is not None:
+        seen.locator("h2, h3, h4, figcaption, .title", has_text=at).first.scroll_into_view_if_needed()
+        seen.mouse.wheel(0, height - 200)
+    seen.wait_for_timeout(1000)
+    seen.wait_for_function(DRAWN, timeout=20_000)
+    out = page.with_suffix(".png")
+    seen.screenshot(path=out)
+    context.close()
+    with Image.open(out) as picture:
+        taken = picture.convert("RGB")
+    out.unlink()
+    return taken
+
+
+def beside(pictures: list[Image.Image]) -> Image.Image:
+    """Pictures of one height side by side."""
+    width = sum(p.width for p in pictures) + SEAM * (len(pictures) + 1)
+    height = pictures[0].height + 2 * SEAM
+    out = Image.new("RGB", (width, height), BACKGROUND)
+    mask, left = ImageDraw.Draw(out), SEAM
+    for picture in pictures:
+        out.paste(picture, (left, SEAM))
+        mask.rectangle((left, SEAM, left + picture.width - 1, SEAM + picture.height - 1), outline=BACKGROUND)
+        left += picture.width + SEAM
+    return out
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1] if len(sys.argv) > 1 else ROOT / "out" / "pictures"))

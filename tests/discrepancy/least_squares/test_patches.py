@@ -1,0 +1,92 @@
+"""Columns that are there for a while, against the same as whole arrays."""
+
+import numpy as np
+import pytest
+
+from discrepancy.least_squares.gram import gram_of, orthonormal
+from discrepancy.least_squares.patches import Mixed, Patches
+from discrepancy.least_squares.whitening import Whitening
+
+N, C, MOVING = 60, 5, 50
+
+
+@pytest.fixture
+def rng():
+    return np.random.default_rng(31)
+
+
+def columns(rng, spans, firsts):
+    """Whole columns, and patches of two each, in some rows from some channel on."""
+    whole, parts = [], []
+    for (start, stop), first in zip(spans, firsts, strict=True):
+        x = np.zeros((N, C, 2))
+        x[start:stop, first:] = rng.standard_normal((stop - start, C - first, 2))
+        whole.append(x)
+        parts.append(Patches.of(x))
+    return np.concatenate(whole, axis=2), Patches((N, C)).beside(parts)
+
+
+@pytest.fixture
+def case(rng):
+    return columns(rng, [(0, 9), (5, 20), (30, 55), (48, 60), (52, 60)], [2, 0, 3, 2, 4])
+
+
+def test_sums_and_products(rng, case):
+    whole, patches = case
+    assert patches.width == 10
+    assert patches.first == 0
+    np.testing.assert_array_equal(patches.dense(), whole)
+    x, z = rng.standard_normal((N, C, 3)), rng.standard_normal((10, 4))
+    np.testing.assert_allclose(patches.times(z), whole @ z, atol=1e-12)
+    np.testing.assert_allclose(patches.times(z, 3), (whole @ z)[:, 3:], atol=1e-12)
+    np.testing.assert_allclose(patches.products(x), gram_of(whole, x), atol=1e-12)
+    np.testing.assert_allclose(patches.cross(patches), gram_of(whole, whole), atol=1e-12)
+    other_whole, other = columns(rng, [(3, 33), (59, 60)], [1, 3])
+    np.testing.assert_allclose(patches.cross(other), gram_of(whole, other_whole), atol=1e-12)
+    np.testing.assert_array_equal(patches.together(4).dense(), whole)
+    assert len(patches.together(4).each) == 3
+
+
+def test_as_few_columns_as_scatter_alike(rng, case):
+    """Normal unknowns of size one have the same covariance; columns that others are made of are no more of them."""
+    whole, patches = case
+    twice = Patches.of(np.concatenate([whole[..., :2], whole[..., :2] @ rng.standard_normal((2, 3))], axis=2))
+    both = patches.beside([twice])
+    assert both.width == 15
+    assert both.fewer().width == 12
+    flat, few = (x.dense().reshape(N * C, -1) for x in (both, both.fewer()))
+    np.testing.assert_allclose(few @ few.T, flat @ flat.T, atol=1e-9)
+
+
+def test_whitened_as_whole_columns_are(rng, case):
+    whole, patches = case
+    draws = rng.standard_normal((24, N, C)) @ rng.standard_normal((C, C))
+    draws[:, :4] *= 5.0  # louder
+    draws[:, 1:MOVING] += 0.6 * draws[:, : MOVING - 1]
+    white = Whitening.of(draws, MOVING, uneven=True)
+    assert len(white.loudness) == MOVING
+    assert np.abs(white.ar).max() > 0.1
+    np.testing.assert_allclose(white.of_patches(patches).dense(), white(whole), atol=1e-12)
+    together = white.of_patches(patches.together(4))
+    np.testing.assert_allclose(together.dense(), white(whole), atol=1e-12)
+
+
+def test_mixed_with_dense_columns(rng, case):
+    whole, patches = case
+    own = orthonormal(rng.standard_normal((N, C, 3)))
+    left = whole - own @ gram_of(own, whole)
+    mixed, turn, x = Mixed.of(patches, own), rng.standard_normal((10, 6)), rng.standard_normal((N, C, 2))
+    np.testing.assert_allclose(mixed.times(np.eye(10)), left, atol=1e-12)
+    np.testing.assert_allclose(mixed.products(x), gram_of(left, x), atol=1e-12)
+    _, other = columns(rng, [(3, 33), (40, 60)], [3, 4])
+    first = Mixed.of(other, own).at(rng.standard_normal((4, 6)))
+    both = mixed.at(turn).less(first)
+    dense = left @ turn - first.times(np.eye(6))
+    np.testing.assert_allclose(both.times(np.eye(6), 2), dense[:, 2:], atol=1e-12)
+    np.testing.assert_allclose(both.cross(first), gram_of(dense, first.times(np.eye(6))), atol=1e-10)
+    np.testing.assert_allclose(both.cross(both), gram_of(dense, dense), atol=1e-10)
+    # Of what the dense columns can explain nothing of, channels with patches are enough.
+    apart = x - own @ gram_of(own, x)
+    np.testing.assert_allclose(
+        first.products(apart[:, 3:], 3), gram_of(first.times(np.eye(6)), apart), atol=1e-12
+    )
