@@ -24,7 +24,7 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     assert set(values) - {"provenance"} == {
         "format", "version", "recordings", "verdict", "causes", "suspected", "scatter", "evidence", "gain",
         "not_simulated", "undecidable", "detection_limits", "residual", "remains", "notes", "places", "prior_odds",
-        "rollouts",
+        "rollouts", "foretold",
     }  # fmt: skip
     assert (values["format"], values["version"]) == ("mocobot-diagnosis", 2)
     assert values["verdict"] in VERDICTS
@@ -66,6 +66,10 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
     assert all(set(entry) == {"place", "robot", "joint", "nats"} for entry in values["places"])
     assert values["prior_odds"] > 0.0
     assert values["scatter"] or values["verdict"] != "miscalibrated"
+    if values["foretold"] is not None:
+        assert values["scatter"]
+        assert set(values["foretold"]) == {"as_designed", "as_found"}
+        assert all(value > 0.0 for value in values["foretold"].values())
     for entry in values["scatter"]:
         assert set(entry) == {
             "cause", "kind", "family", "sentence", "factor", "places", "spread", "tolerance", "nats"

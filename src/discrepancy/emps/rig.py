@@ -34,6 +34,7 @@ from discrepancy.emps.reduction import Reduction
 from discrepancy.emps.undecidable import statements
 from discrepancy.engine.explanation import Explanation
 from discrepancy.law_doubt import LawDoubt
+from discrepancy.least_squares.patches import Patches
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rig import Channel, Rig, Rows
 from estimator.arrays import Array
@@ -164,14 +165,14 @@ class EmpsRig(Rig):
         """A real axis: noise is what differs between its cycles, and every law leaves more than that."""
         return LawDoubt(rules.LAW_SHARE if candidate.transient else rules.EMPS_LAW_SHARE)
 
-    def unknowns(self, candidate: Candidate) -> Sequence[Array]:
+    def unknowns(self, candidate: Candidate) -> Sequence[Patches]:
         """Dry friction at rest, whitened columns (n, 2, k) of every block."""
         rests = CAUSES[candidate.cause].rests(self.signals, candidate.shape)
         reduced = [self.reduction(np.column_stack([rest, np.zeros_like(rest)])) for rest in rests]
         out = []
         for t, (white, samples) in enumerate(zip(self.whitening, self.reduction.samples, strict=True)):
             seen = [r[t] for r in reduced if np.abs(r[t]).max(initial=0.0) > 1e-6]
-            out.append(white(np.stack(seen, axis=2)) if seen else np.zeros((len(samples), 2, 0)))
+            out.append(Patches.of(white(np.stack(seen, axis=2))) if seen else Patches((len(samples), 2)))
         return out
 
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
