@@ -1,7 +1,11 @@
 """A mass that swings in the payload."""
 
+from __future__ import annotations
+
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import ClassVar, cast
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
@@ -9,6 +13,7 @@ from scipy.signal import cont2discrete, lfilter
 from discrepancy import rules
 from discrepancy.causes.base import Shape
 from discrepancy.team.causes.base import Cause
+from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 from estimator.so3 import skew
 
@@ -60,43 +65,24 @@ class Slosh(Cause):
         )
 
     def columns(self, trial, robot, joint, shape):
-        motion = trial.motion
         com = trial.shared.pi[1:4] / trial.shared.pi[0]
         R_b1, gravity = trial.data.R_bi[:, 0], trial.data.gravity_mps2
-        turning, up = trial.turning, R_b1[:, 2]
-        across_m = shape.get("across_length_m", shape["length_m"])
-        drop_m = shape["length_m"] - across_m
-        force, moment = np.zeros((2, len(R_b1), 3, 4))
-
-        def driven(way, point):
-            """How the point is accelerated along a way, and by how much more the further it is along each axis."""
-            further = (way[:, None] @ turning)[:, 0]
-            at = further @ point + np.sum(way * motion.acceleration, axis=1)
-            return np.concatenate([at[:, None], further], axis=1)
-
-        def add(way, acceleration, point, sign=-1.0):
-            """Force on the payload, in {1}, of 1 kg that is accelerated along a way, and its moment where it is."""
-            acceleration = sign * acceleration[:, None]
-            force[:] += way[:, :, None] * acceleration
-            moment[:] += np.cross(point, way)[:, :, None] * acceleration
-
-        for way, length_m, down_m in zip(
-            _ways(R_b1, shape), (shape["length_m"], across_m), (0.0, drop_m), strict=True
-        ):
-            point = com - [0.0, 0.0, down_m]
-            drive, about = driven(way, point), np.cross(way, up)
-            turned = np.sum(about * motion.omega, axis=1)
-            own = {**shape, "length_m": length_m}
-            swing, damped = _swing(drive, turned, trial.signals.rate_hz, gravity, own)
-            add(way, swing, point)
-            moment += about[:, :, None] * damped[:, None]
-            if down_m:  # its weight and rigid part, which is not where the payload's own parameters have it
-                add(way, drive, point)
-                add(way, driven(way, com), com, 1.0)
-                aside = -down_m * way[:, 2:] * way
-                moment[..., 0] -= gravity * np.cross(aside, up)
-        moment[..., 1:] -= skew(force[..., 0])  # moving the point by r moves the force: r x f = -f x r
-        return trial.of_wrench(force, moment)
+        ways, wrench = alike(trial), np.zeros((len(R_b1), 6, 4))
+        if "across_length_m" in shape:
+            drop_m = shape["length_m"] - shape["across_length_m"]
+            along, across = _ways(R_b1, shape["heading_rad"])
+            ways = Way.of(trial, along, com), Way.of(trial, across, com - [0.0, 0.0, drop_m])
+            # Its weight and rigid part are not where the payload's own parameters have it.
+            for way, sign in (ways[1], -1.0), (Way.of(trial, across, com), 1.0):
+                wrench += sign * way.pull[:, :, None] * way.drive[:, None]
+            wrench[:, 3:, 0] += drop_m * gravity * np.cross(across[:, 2:] * across, R_b1[:, 2])
+        for way, length in zip(ways, ("length_m", "across_length_m"), strict=True):
+            own = {**shape, "length_m": shape.get(length, shape["length_m"])}
+            swing, damped = _swing(way.drive, way.turned, trial.signals.rate_hz, gravity, own)
+            wrench -= way.pull[:, :, None] * swing[:, None]
+            wrench[:, 3:] += way.about[:, :, None] * damped[:, None]
+        wrench[:, 3:, 1:] -= skew(wrench[:, :3, 0])  # moving the point by r moves the force: r x f = -f x r
+        return trial.of_wrench(wrench[:, :3], wrench[:, 3:])
 
     def finer(self, shape):
         longer = (0.85, 0.9, 0.95, 0.975, 0.9875, 1.0125, 1.025, 1.05, 1.1, 1.15)
@@ -135,6 +121,44 @@ class Slosh(Cause):
         }
 
 
+@dataclass(frozen=True, eq=False)
+class Way:
+    """A level way on which a mass swings that hangs from a point of the payload.
+
+    Attributes:
+        pull: wrench on the payload, in {1}, of 1 N along it at the point, shape (Q, 6).
+        about: axis, in {1}, about which it swings, shape (Q, 3).
+        drive: how the point is accelerated along it, and by how much more the further it is on each axis, shape (Q, 4).
+        turned: how fast the payload turns about that axis [rad/s], shape (Q,).
+    """
+
+    pull: Array
+    about: Array
+    drive: Array
+    turned: Array
+
+    @classmethod
+    def of(cls, trial: TrialLinear, way: Array, point: Array) -> Way:
+        """Along unit vectors in {1}, shape (Q, 3), from a point in {1}."""
+        about, motion = np.cross(way, trial.data.R_bi[:, 0, 2]), trial.motion
+        further = (way[:, None] @ trial.turning)[:, 0]
+        at = further @ point + np.sum(way * motion.acceleration, axis=1)
+        pull = np.concatenate([way, np.cross(point, way)], axis=1)
+        turned = np.sum(about * motion.omega, axis=1)
+        return cls(pull, about, np.concatenate([at[:, None], further], axis=1), turned)
+
+
+_ALIKE: WeakKeyDictionary[TrialLinear, tuple[Way, Way]] = WeakKeyDictionary()
+
+
+def alike(trial: TrialLinear) -> tuple[Way, Way]:
+    """Two ways from the centre of mass that swings of one length may be told by; for all shapes of a trial the same."""
+    if trial not in _ALIKE:
+        com, R_b1 = trial.shared.pi[1:4] / trial.shared.pi[0], trial.data.R_bi[:, 0]
+        _ALIKE[trial] = Way.of(trial, R_b1[:, 0], com), Way.of(trial, R_b1[:, 1], com)
+    return _ALIKE[trial]
+
+
 def _second_modes(shape: Shape) -> list[Shape]:
     """What a shape with one mode lacks of one with two."""
     length_m = shape["length_m"]
@@ -167,12 +191,9 @@ def _tried(shape: Shape) -> bool:
     )
 
 
-def _ways(R_b1: Array, shape: Shape) -> tuple[Array, Array]:
-    """Level directions of its swings in {1}, shapes (Q, 3): along and across; if they are alike, x and y of {b1}."""
-    if "across_length_m" not in shape:
-        return R_b1[:, 0], R_b1[:, 1]
-    turn = shape["heading_rad"]
-    c, s = (R_b1 @ [np.cos(turn), np.sin(turn), 0.0])[:, :2].T
+def _ways(R_b1: Array, heading_rad: float) -> tuple[Array, Array]:
+    """Level directions in {1}, shapes (Q, 3): on a heading from x of {1}, and across."""
+    c, s = (R_b1 @ [np.cos(heading_rad), np.sin(heading_rad), 0.0])[:, :2].T
     c, s = (x[:, None] / np.hypot(c, s)[:, None] for x in (c, s))
     x, y = R_b1[:, 0], R_b1[:, 1]
     return c * x + s * y, c * y - s * x
