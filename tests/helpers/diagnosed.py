@@ -236,6 +236,7 @@ def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:
         "prior_odds": 0.05,
         "suspected": [],
         "scatter": [scattered()] if verdict == "miscalibrated" else [],
+        "foretold": None,
         "gain": {
             "held_out": {"before": before, "after": after},
             "units": {"phi": "rad", "theta": "rad", "tau": "N m"},
