@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import ClassVar, cast
+from typing import ClassVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter
 
 from discrepancy import rules
 from discrepancy.causes.base import Shape
+from discrepancy.causes.pendulum import Pendulum, swung
 from discrepancy.team.causes.base import Cause
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
@@ -21,10 +20,11 @@ from estimator.so3 import skew
 class Slosh(Cause):
     """A pendulum that hangs from a point of the payload; what it does beyond riding along rigidly.
 
-    Small swings x relative to the point obey x'' + 2 zeta w (x' - v) + w^2 x = -a with w^2 = g / length; v is how fast
-    it would swing if it turned with the payload, to which its damper is fixed. The payload feels -mass x'' at the point
-    and, as the damper pulls where the mass is, the moment of 2 zeta w mass (x' - v) a length below. Its weight and
-    rigid part are in the payload's own parameters.
+    Swings x relative to the point obey x'' + 2 zeta w (x' - v) + w^2 x = -a with w^2 = g / length, and to third order
+    what ``discrepancy.causes.pendulum`` says; v is how fast it would swing if it turned with the payload, to which its
+    damper is fixed. The payload feels -mass x'' at the point, upwards what raises the mass, and, as the damper pulls
+    where the mass is, the moment of 2 zeta w mass (x' - v) a length below. Its weight and rigid part are in the
+    payload's own parameters.
 
     What swings may have two modes, of one damping ratio. With ``across_length_m`` in its shape it is Blackburn's
     pendulum, as a liquid in a box that is longer than wide: it swings on ``length_m`` along ``heading_rad`` (from x of
@@ -67,20 +67,23 @@ class Slosh(Cause):
     def columns(self, trial, robot, joint, shape):
         com = trial.shared.pi[1:4] / trial.shared.pi[0]
         R_b1, gravity = trial.data.R_bi[:, 0], trial.data.gravity_mps2
-        ways, wrench = alike(trial), np.zeros((len(R_b1), 6, 4))
+        (*ways, up), wrench = alike(trial), np.zeros((len(R_b1), 6, 4))
         if "across_length_m" in shape:
             drop_m = shape["length_m"] - shape["across_length_m"]
             along, across = _ways(R_b1, shape["heading_rad"])
-            ways = Way.of(trial, along, com), Way.of(trial, across, com - [0.0, 0.0, drop_m])
+            ways = [Way.of(trial, along, com), Way.of(trial, across, com - [0.0, 0.0, drop_m])]
             # Its weight and rigid part are not where the payload's own parameters have it.
             for way, sign in (ways[1], -1.0), (Way.of(trial, across, com), 1.0):
                 wrench += sign * way.pull[:, :, None] * way.drive[:, None]
             wrench[:, 3:, 0] += drop_m * gravity * np.cross(across[:, 2:] * across, R_b1[:, 2])
-        for way, length in zip(ways, ("length_m", "across_length_m"), strict=True):
-            own = {**shape, "length_m": shape.get(length, shape["length_m"])}
-            swing, damped = _swing(way.drive, way.turned, trial.signals.rate_hz, gravity, own)
-            wrench -= way.pull[:, :, None] * swing[:, None]
-            wrench[:, 3:] += way.about[:, :, None] * damped[:, None]
+        for share, lengths_m in _modes(shape):
+            own = [Pendulum(x, shape["damping_ratio"], gravity, trial.signals.rate_hz) for x in lengths_m]
+            drives, turned = [way.drive for way in ways], [way.turned for way in ways]
+            swings, damped, rising = swung(drives, turned, up.drive[:, 0], own)
+            for way, swing, moment in zip(ways, swings, damped, strict=True):
+                wrench -= share * way.pull[:, :, None] * swing[:, None]
+                wrench[:, 3:] += share * way.about[:, :, None] * moment[:, None]
+            wrench[..., 0] -= share * up.pull * rising[:, None]
         wrench[:, 3:, 1:] -= skew(wrench[:, :3, 0])  # moving the point by r moves the force: r x f = -f x r
         return trial.of_wrench(wrench[:, :3], wrench[:, 3:])
 
@@ -148,14 +151,15 @@ class Way:
         return cls(pull, about, np.concatenate([at[:, None], further], axis=1), turned)
 
 
-_ALIKE: WeakKeyDictionary[TrialLinear, tuple[Way, Way]] = WeakKeyDictionary()
+_ALIKE: WeakKeyDictionary[TrialLinear, tuple[Way, Way, Way]] = WeakKeyDictionary()
 
 
-def alike(trial: TrialLinear) -> tuple[Way, Way]:
-    """Two ways from the centre of mass that swings of one length may be told by; for all shapes of a trial the same."""
+def alike(trial: TrialLinear) -> tuple[Way, Way, Way]:
+    """From the centre of mass two ways to tell swings of one length by, and upwards; for all shapes the same."""
     if trial not in _ALIKE:
         com, R_b1 = trial.shared.pi[1:4] / trial.shared.pi[0], trial.data.R_bi[:, 0]
-        _ALIKE[trial] = Way.of(trial, R_b1[:, 0], com), Way.of(trial, R_b1[:, 1], com)
+        x, y, up = (Way.of(trial, R_b1[:, k], com) for k in range(3))
+        _ALIKE[trial] = x, y, up
     return _ALIKE[trial]
 
 
@@ -199,41 +203,10 @@ def _ways(R_b1: Array, heading_rad: float) -> tuple[Array, Array]:
     return c * x + s * y, c * y - s * x
 
 
-def _swing(drive: Array, turned: Array, rate_hz: float, gravity: float, shape: Shape) -> tuple[Array, Array]:
-    """Relative acceleration of 1 kg that swings [m/s^2] and the moment of its damper [N m], from rest, (Q, 4) each.
-
-    Args:
-        drive: acceleration of the point along its way, linear between samples, and by moments of the mass, (Q, 4).
-        turned: rate at which the payload turns about its axis [rad/s], shape (Q,).
-        rate_hz, gravity: of samples; of the place [m/s^2].
-        shape: its lengths, their shares, and its damping ratio.
-    """
-    second = shape.get("second_share", 0.0)
-    modes = [(1.0 - second, shape["length_m"])]
-    modes += [(second, shape["second_length_m"])] if second else []
-    swing, damped = np.zeros_like(drive), np.zeros_like(drive)
-    for share, length_m in modes:
-        damping_per_s = 2.0 * shape["damping_ratio"] * np.sqrt(gravity / length_m)
-        own, behind = drive.copy(), length_m * turned  # how fast it would swing if it turned with the payload
-        own[:, 0] -= damping_per_s * behind
-        pendulum = rate_hz, gravity, length_m, shape["damping_ratio"]
-        speed = _through(_filter(1, *pendulum), own)
-        speed[:, 0] -= behind
-        swing += share * _through(_filter(0, *pendulum), own)
-        damped += share * damping_per_s * length_m * speed
-    return swing, damped
-
-
-def _through(a_filter: tuple[Array, Array], x: Array) -> Array:
-    return np.asarray(lfilter(*a_filter, x, axis=0), dtype=np.float64)
-
-
-@lru_cache(maxsize=256)
-def _filter(
-    integrals: int, rate_hz: float, gravity: float, length_m: float, damping_ratio: float
-) -> tuple[Array, Array]:
-    """Numerator and denominator, the same in every trial, of acceleration (0 integrals) or speed (1)."""
-    w = np.sqrt(gravity / length_m)
-    pendulum = [-1.0, *[0.0] * (2 - integrals)], [1.0, 2.0 * damping_ratio * w, w**2]
-    discrete = cast("tuple[Array, Array, float]", cont2discrete(pendulum, 1.0 / rate_hz, method="foh"))
-    return np.ravel(discrete[0]), discrete[1]
+def _modes(shape: Shape) -> list[tuple[float, tuple[float, float]]]:
+    """Share of the mass, and lengths along and across, of each mode."""
+    length_m, second = shape["length_m"], shape.get("second_share", 0.0)
+    modes = [(1.0 - second, (length_m, shape.get("across_length_m", length_m)))]
+    if second:
+        modes.append((second, (shape["second_length_m"], shape["second_length_m"])))
+    return modes
