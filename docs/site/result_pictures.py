@@ -16,7 +16,7 @@ from PIL import Image, ImageDraw
 from playwright.sync_api import Browser, sync_playwright
 
 ROOT = Path(__file__).resolve().parents[2]
-IMAGES = ROOT / "docs" / "img"
+IMAGES, SCENARIOS = ROOT / "docs" / "img", ROOT / "scenarios"
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
 FLAGS = [
     "--no-sandbox",
@@ -25,8 +25,8 @@ FLAGS = [
     "--disable-background-networking",
     "--disable-sync",
 ]
-WIDTH, COLOURS = 1200, 128
-DESKTOP, PHONE = (1400, 1094), (390, 844)
+WIDTH, COLOURS = 1200, 256
+DESKTOP, PHONE, ABOVE = (1400, 1094), (390, 844), 150
 SEAM, BACKGROUND = 18, (212, 218, 225)
 DRAWN = """[...document.querySelectorAll('.plot')]
     .filter((plot) => plot.offsetParent && plot.getBoundingClientRect().top < innerHeight)
@@ -39,11 +39,8 @@ def main(folder: Path) -> None:
     if not paper.is_file():
         sys.exit(f"{paper} is not there; run 'make paper' first")
     folder.mkdir(parents=True, exist_ok=True)
-    recordings = verdicts(folder)
+    results(folder)
     copied(folder / "verdict", folder / "law")
-    ours("estimate", *map(str, recordings), "--out", folder / "estimate" / "est.json", "--force")
-    for part in ("estimate", "verdict"):
-        ours("report", folder / part, "--force")
     with sync_playwright() as started:
         path = next((found for name in BROWSERS if (found := shutil.which(name))), None)
         browser = started.chromium.launch(executable_path=path, args=FLAGS)
@@ -59,20 +56,31 @@ def main(folder: Path) -> None:
         browser.close()
 
 
-def verdicts(folder: Path) -> list[Path]:
-    """Run both scenarios; the recordings of the first."""
-    scenarios = ROOT / "scenarios"
-    subprocess.run([sys.executable, scenarios / "hidden_effect.py", folder / "recordings"], check=True)
-    recordings = sorted((folder / "recordings").glob("*.parquet"))
-    ours("diagnose", *map(str, recordings), "--out", folder / "verdict", "--force")
+def results(folder: Path) -> None:
+    """An estimate of a healthy team, and the verdicts of both scenarios; pages name files relative to the folder."""
     shutil.rmtree(folder / "law", ignore_errors=True)
-    subprocess.run([sys.executable, scenarios / "unlisted_law.py", folder / "law"], check=True)
-    return recordings
-
-
-def ours(*words: str | Path) -> None:
-    """Run a command of mocobot."""
-    subprocess.run([sys.executable, "-m", "mocobot", *words], check=True)
+    healthy = [f"healthy/trial{k}_{kind}.parquet" for k, kind in ((1, "random"), (2, "periodic"))]
+    faulty = [f"hidden/trial{k}.parquet" for k in (1, 2)]
+    mocobot = ("-m", "mocobot")
+    for words in (
+        [
+            *mocobot,
+            "simulate",
+            "--payload",
+            "b",
+            "--trials",
+            "random,periodic",
+            "--out-dir",
+            "healthy",
+            "--force",
+        ],
+        [*mocobot, "estimate", *healthy, "--out", "estimate/est.json", "--force"],
+        [str(SCENARIOS / "hidden_effect.py"), "hidden"],
+        [*mocobot, "diagnose", *faulty, "--out", "verdict", "--force"],
+        [str(SCENARIOS / "unlisted_law.py"), "law"],
+        *([*mocobot, "report", part, "--force"] for part in ("estimate", "verdict")),
+    ):
+        subprocess.run([sys.executable, *words], check=True, cwd=folder)
 
 
 def copied(verdict: Path, law: Path) -> None:
@@ -104,8 +112,8 @@ def shot(
     seen = context.new_page()
     seen.goto(page.as_uri())
     if at is not None:
-        seen.locator("h2, h3, h4, figcaption, .title", has_text=at).first.scroll_into_view_if_needed()
-        seen.mouse.wheel(0, height - 200)
+        heading = seen.locator("h2, h3, h4, figcaption, caption, .title", has_text=at).first
+        heading.evaluate("(here, above) => scrollBy(0, here.getBoundingClientRect().top - above)", ABOVE)
     seen.wait_for_timeout(1000)
     seen.wait_for_function(DRAWN, timeout=20_000)
     out = page.with_suffix(".png")
