@@ -412,6 +412,17 @@ def test_shares_of_causes_add_up(tmp_path: Path, no_pictures: pytest.MonkeyPatch
     assert "beyond those above it, so that shares add up" in text
 
 
+def test_a_number_of_a_form_that_a_cause_does_not_have_is_left_out(
+    tmp_path: Path, no_pictures: pytest.MonkeyPatch
+) -> None:
+    folder = diagnosis_folder(tmp_path / "one")
+    values = json.loads((folder / "diagnosis.json").read_text())
+    for value, shown in ((0.0, False), (0.002, True)):
+        values["causes"][0]["parameters"]["presliding_rad"] = {"value": value, "se": None}
+        (folder / "diagnosis.json").write_text(json.dumps(values))
+        assert ("presliding" in Reader(write_report(folder).read_bytes()).rows()) == shown
+
+
 def test_terms_are_explained_where_they_stand(pages: dict[str, Reader]) -> None:
     for page in pages.values():
         entries = {a["id"] for tag, a in page.tags if tag == "dt" and "id" in a}

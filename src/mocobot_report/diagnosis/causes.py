@@ -25,7 +25,9 @@ def cause_tables(causes: Sequence[Values]) -> list[Node]:
     support: list[list[Entry]] = []
     for cause in causes:
         who = cause_name(name_of(cause), cause["cause"])
-        for k, (name, entry) in enumerate(cause["parameters"].items()):
+        # A number without an error that is 0 is of a form that the cause does not have.
+        there = {name: of for name, of in cause["parameters"].items() if of["value"] or of["se"] is not None}
+        for k, (name, entry) in enumerate(there.items()):
             words, unit = _said(cause, name)
             unit, scale = units[unit] if unit in ("s", "m", "rad", "m/N") else (unit, 1.0)
             se = None if entry["se"] is None else scale * entry["se"]
