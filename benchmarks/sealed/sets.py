@@ -14,6 +14,8 @@ from hidden.schedule import Schedule
 from mocobot.campaign.ground import gimbal_axes
 from mocobot_sim.effects import Effect, apply_effects, effect_to_dict
 from mocobot_sim.effects.grasp_flex import GraspFlex
+from mocobot_sim.effects.torque_lag import TorqueLag
+from mocobot_sim.effects.torque_skew import TorqueSkew
 from mocobot_sim.scene.scene import TeamScene, build_team
 from mocobot_sim.scene.soft import row_relaxation_s
 from mocobot_sim.trial.sensors import measure, sensor_preset
@@ -46,6 +48,8 @@ SHARES = (0.4, 0.25, 0.2, 0.15)
 
 SPRINGS = {"base_compliance": "base{robot}_compliance_x", "grasp_flex": "grasp{robot}_flex_x"}
 """Rows of a scene that hold what gives way."""
+LATE = {"torque_skew": "delay_s", "torque_lag": "time_constant_s"}
+"""By how much one robot's torques come late: to rows it is the same who delays them."""
 
 
 @dataclass(frozen=True)
@@ -207,7 +211,8 @@ def _told(effect: Effect, scene: TeamScene, background: Sequence[Effect]) -> dic
     """An effect with its right ``answer`` {cause, robot, joint, known}, and the ``law`` of an unlisted one.
 
     What masses decide (``Effect.inherent``) is known as the scene has it. Behind a play a grasp gives way by what its
-    ends do and what it would without: in one row, as springs in series.
+    ends do and what it would without: in one row, as springs in series. Torques are as late as the log and its
+    sensors' own lag make them.
     """
     told = effect_to_dict(effect)
     if isinstance(effect, Form):
@@ -220,5 +225,8 @@ def _told(effect: Effect, scene: TeamScene, background: Sequence[Effect]) -> dic
     if "contact_m_per_N" in known:
         own = (e for e in background if isinstance(e, GraspFlex) and e.robot == told["robot"])
         known["contact_m_per_N"] += sum(flex.compliance_m_per_N for flex in own)
+    if cause in LATE and LATE[cause] in known:
+        own = (e for e in background if isinstance(e, TorqueSkew | TorqueLag) and e.robot == told["robot"])
+        known[LATE[cause]] += sum(getattr(late, LATE[late.cause]) for late in own)
     answer = {"cause": cause, "robot": told.get("robot"), "joint": told.get("joint"), "known": known}
     return told | {"form": isinstance(effect, Form), "answer": answer, "law": law}

@@ -82,6 +82,20 @@ def test_what_is_known_is_what_the_simulation_has(name, parameter):
         assert 0.005 < known < 0.1
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "parameter", "other"),
+    [("torque_skew", "delay_s", "torque_lag"), ("torque_lag", "time_constant_s", "torque_skew")],
+)
+def test_torques_are_as_late_as_log_and_sensors_make_them(name, parameter, other):
+    _, truth = generate(replace(plan("single", 11, "x1", 2.0, name), schedule=TINY))
+    (effect,) = truth["effects"]
+    (own,) = [e for e in truth["background"] if e["cause"] == other and e["robot"] == effect["robot"]]
+    (late,) = own["parameters"].values()
+    assert late != 0.0
+    assert effect["answer"]["known"][parameter] == effect["parameters"][parameter] + late
+
+
 def test_a_wider_background_has_the_same_draws():
     one, ten = (tolerated(b, 3, np.random.default_rng(5)) for b in ("x1", "x10"))
     assert [type(effect) for effect in one] == [type(effect) for effect in ten]
