@@ -12,7 +12,7 @@ from discrepancy.engine.lawful import laws_of, refining, responding
 from discrepancy.engine.verdict import Verdict, verdict_of
 from discrepancy.inference.odds import check_odds
 from discrepancy.inference.search import Searched, search
-from discrepancy.laws.search import with_laws
+from discrepancy.laws.search import Lawful, in_place_of_several, with_laws
 from discrepancy.laws.where import Located
 from discrepancy.rig import Rig
 
@@ -67,8 +67,8 @@ def diagnose(
         rig: recordings and causes.
         closed_loop: whether to resimulate the recorded commands.
         most: largest number of causes.
-        laws: whether to look for laws that the catalogue lacks: where something unlisted is left, or a named cause is
-            not sure, always, or never.
+        laws: whether to look for laws that the catalogue lacks: where something unlisted is left, a named cause is
+            not sure, or several are at one joint; always; or never.
         odds: of any cause being there before the data are seen, at all its places together.
         searched: what a search with these odds found, where there was one.
         jobs: parallel processes of the simulations.
@@ -84,8 +84,12 @@ def diagnose(
     notes: list[str] = []
     located: tuple[Located, ...] = ()
     unsure = any(found.probability < rules.LAW_INSTEAD for found in explanation.found)
+    lawful: Lawful | None = None
     if laws == "always" or (laws == "auto" and (unsure or not explanation.clean)):
         lawful = with_laws(searched, most, say, always=laws == "always", instead=unsure)
+    elif laws == "auto":
+        lawful = in_place_of_several(searched, say)
+    if lawful is not None:
         searched, located = lawful.searched, lawful.places
         explanation = explain(searched)
         notes += refining(lawful.refinements, explanation)

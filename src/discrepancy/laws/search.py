@@ -92,6 +92,47 @@ def with_laws(
     return Lawful(_with_rivals(searched, rivals), first, tuple(refined))
 
 
+def in_place_of_several(searched: Searched, progress: Callable[[str], object] | None = None) -> Lawful | None:
+    """One law in place of several causes at one joint, as if each stood for a part of it; None where there is none.
+
+    Args:
+        searched: what the catalogue can do; it leaves noise.
+        progress: called with what is being done.
+    """
+    bench: Bench | None = searched.rig.bench
+    found: Lawful | None = None
+    for joint in _crowded(searched.best) if bench is not None else ():
+        assert bench is not None
+        less = searched.best
+        for index in less.free:
+            if _joint(less.problem.candidates[index]) == joint:
+                less = less.without(index)
+        start = Searched(searched.rig, searched.nothing, exact(searched.rig, less, searched.nothing), ())
+        here = [place for place in bench.places if (place.robot, place.joint) == joint]
+        places, refined = located(start.best.fit, bench, here), list[Refinement]()
+        step = _with_one(
+            start,
+            bench,
+            places,
+            progress or (lambda what: None),
+            _Forms(bench, likely_causes(searched.best), refined),
+        )
+        if step is not None and _suffices(step[0].best, searched.best) and _replaces(step[0].best, searched):
+            searched = _with_rivals(*step)
+            found = Lawful(searched, tuple(places))
+    return found
+
+
+def _crowded(hypothesis: Hypothesis) -> list[tuple[int | None, int | None]]:
+    """Joints with several causes."""
+    joints = [_joint(cause) for cause in hypothesis.causes if cause.joint is not None]
+    return [joint for joint in dict.fromkeys(joints) if joints.count(joint) > 1]
+
+
+def _joint(cause: Candidate) -> tuple[int | None, int | None]:
+    return cause.robot, cause.joint
+
+
 @dataclass(frozen=True)
 class _Forms:
     """Tells laws that only refine those of listed causes, and keeps them.
