@@ -76,7 +76,7 @@ def proposals(
         which = (last.key, last.transient)
         if which in scores and scores[which][1] >= new.score:
             continue
-        if new.possible(rig, new.free[-1]) and not imitated(rig, base, last):
+        if new.possible(rig, new.free[-1]) and not imitated(rig, base, new):
             scores[which] = last, new.score
             if best is None or new.score > best.score:
                 best, rough = new, item

@@ -41,6 +41,7 @@ def with_burst(rig, values):
     [
         (0.0, [3.0, 0.0], False),  # the sensor alone does it, with one number
         (0.0, [3.0, 2.0], True),  # the sensor does half of it
+        (0.0, [100.0, 6.0], True),  # the rest is far below what counts as noise as long as nothing is named
         (np.pi / 2, [3.0, 0.0], True),  # the sensor has nothing to do with it
     ],
 )
