@@ -12,7 +12,8 @@ from discrepancy.engine.lawful import laws_of, refining, responding
 from discrepancy.engine.verdict import Verdict, verdict_of
 from discrepancy.inference.odds import check_odds
 from discrepancy.inference.search import Searched, search
-from discrepancy.laws.search import Lawful, in_place_of_several, with_laws
+from discrepancy.laws.instead import in_place_of_several
+from discrepancy.laws.search import Lawful, with_laws
 from discrepancy.laws.where import Located
 from discrepancy.rig import Rig
 

@@ -68,73 +68,32 @@ def with_laws(
         if replacing:
             # Causes that were named may have stood for what nobody lists.
             starts.insert(0, Searched(searched.rig, searched.nothing, searched.nothing, ()))
-        found, forms = [], _Forms(bench, likely_causes(searched.best), refined)
+        found, forms = [], Forms(bench, likely_causes(searched.best), refined)
         for start in starts:
             places = located_in(start, bench, say)
             first = first or tuple(places)
-            step = _with_one(start, bench, places, say, forms)
+            step = with_one(start, bench, places, say, forms)
             if step is not None:
                 # Beside noise it has to stand with all that it does not replace.
                 besides = rules.LAW_CAUSES if left else len(searched.best.free)
                 enough = min(most, len(step[0].best.free) + besides)
                 now = _of_their_own(continued(step[0], enough, say), forms)
                 found.append((now, step[1]))
-                if _suffices(now.best, searched.best):
+                if suffices(now.best, searched.best):
                     break
         if not found:
             break
         best, more = max(found, key=lambda one: one[0].best.score)
         if best.best.score < searched.best.score + rules.NAMED_NATS:
             break
-        if not left and not _replaces(best.best, searched):
+        if not left and not replaces(best.best, searched):
             break
         searched, rivals = best, rivals | more
-    return Lawful(_with_rivals(searched, rivals), first, tuple(refined))
-
-
-def in_place_of_several(searched: Searched, progress: Callable[[str], object] | None = None) -> Lawful | None:
-    """One law in place of several causes at one joint, as if each stood for a part of it; None where there is none.
-
-    Args:
-        searched: what the catalogue can do; it leaves noise.
-        progress: called with what is being done.
-    """
-    bench: Bench | None = searched.rig.bench
-    found: Lawful | None = None
-    for joint in _crowded(searched.best) if bench is not None else ():
-        assert bench is not None
-        less = searched.best
-        for index in less.free:
-            if _joint(less.problem.candidates[index]) == joint:
-                less = less.without(index)
-        start = Searched(searched.rig, searched.nothing, exact(searched.rig, less, searched.nothing), ())
-        here = [place for place in bench.places if (place.robot, place.joint) == joint]
-        places, refined = located(start.best.fit, bench, here), list[Refinement]()
-        step = _with_one(
-            start,
-            bench,
-            places,
-            progress or (lambda what: None),
-            _Forms(bench, likely_causes(searched.best), refined),
-        )
-        if step is not None and _suffices(step[0].best, searched.best) and _replaces(step[0].best, searched):
-            searched = _with_rivals(*step)
-            found = Lawful(searched, tuple(places))
-    return found
-
-
-def _crowded(hypothesis: Hypothesis) -> list[tuple[int | None, int | None]]:
-    """Joints with several causes."""
-    joints = [_joint(cause) for cause in hypothesis.causes if cause.joint is not None]
-    return [joint for joint in dict.fromkeys(joints) if joints.count(joint) > 1]
-
-
-def _joint(cause: Candidate) -> tuple[int | None, int | None]:
-    return cause.robot, cause.joint
+    return Lawful(with_rivals(searched, rivals), first, tuple(refined))
 
 
 @dataclass(frozen=True)
-class _Forms:
+class Forms:
     """Tells laws that only refine those of listed causes, and keeps them.
 
     Attributes:
@@ -164,7 +123,7 @@ class _Forms:
         return one is not None
 
 
-def _of_their_own(searched: Searched, forms: _Forms) -> Searched:
+def _of_their_own(searched: Searched, forms: Forms) -> Searched:
     """The search without laws that only refine those of the causes that were found beside them."""
     best = searched.best
     for index in best.free:
@@ -176,7 +135,7 @@ def _of_their_own(searched: Searched, forms: _Forms) -> Searched:
     return replace(searched, best=best, rivals=tuple(tuple(rivals.get(i, ())) for i in best.free))
 
 
-def _suffices(found: Hypothesis, named: Hypothesis) -> bool:
+def suffices(found: Hypothesis, named: Hypothesis) -> bool:
     """Whether a law, with what it goes with, is likelier than what was named and leaves noise, or holds all of that."""
     enough = (
         unlisted_nats(found) < rules.UNLISTED_NATS
@@ -185,7 +144,7 @@ def _suffices(found: Hypothesis, named: Hypothesis) -> bool:
     return enough and found.score >= named.score + rules.NAMED_NATS
 
 
-def _replaces(found: Hypothesis, searched: Searched) -> bool:
+def replaces(found: Hypothesis, searched: Searched) -> bool:
     """Whether a law takes the place of causes that leave noise: there are fewer, or it is likelier by far.
 
     No listed law is that of a real machine; what it is off by is no reason to take another (see ``parted``). Nor does
@@ -209,9 +168,9 @@ def located_in(searched: Searched, bench: Bench, say: Callable[[str], object]) -
     return located(searched.best.fit, bench, bench.places)
 
 
-def _with_one(
+def with_one(
     searched: Searched, bench: Bench, places: Sequence[Located], say: Callable[[str], object],
-    forms: _Forms,
+    forms: Forms,
 ) -> tuple[Searched, dict[tuple[object, ...], list[Rival]]] | None:  # fmt: skip
     """The search with one law more, and that law's rivals among laws; None where no law of its own pays and helps."""
     proposed = _proposals(searched, bench, places, say)
@@ -313,7 +272,7 @@ def _rivals(bench: Bench, proposed: Proposed) -> list[Rival]:
     return list(out.values())[: rules.LAW_RIVALS]
 
 
-def _with_rivals(searched: Searched, laws: dict[tuple[object, ...], list[Rival]]) -> Searched:
+def with_rivals(searched: Searched, laws: dict[tuple[object, ...], list[Rival]]) -> Searched:
     """The search with every law's rivals among laws, besides those of the catalogue."""
     out = []
     for cause, rivals in zip(searched.best.causes, searched.rivals, strict=True):

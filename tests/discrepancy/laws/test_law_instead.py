@@ -7,8 +7,9 @@ import pytest
 from discrepancy import rules
 from discrepancy.inference.search import Searched
 from discrepancy.law_doubt import LawDoubt
-from discrepancy.laws import search
-from discrepancy.laws.search import _crowded, _replaces, in_place_of_several
+from discrepancy.laws import instead, search
+from discrepancy.laws.instead import crowded, in_place_of_several
+from discrepancy.laws.search import replaces
 
 
 def hypothesis(score, *causes):
@@ -23,16 +24,16 @@ def named(*causes, score, rivals):
 
 
 def test_one_law_instead_of_several_causes():
-    assert _replaces(hypothesis(60.0, "law"), named("drive", "ripple", score=50.0, rivals=0.2))
+    assert replaces(hypothesis(60.0, "law"), named("drive", "ripple", score=50.0, rivals=0.2))
 
 
 @pytest.mark.parametrize("causes", [("law", "payload"), ("law", "law 2", "payload")])
 def test_a_law_beside_all_that_is_named_replaces_nothing(causes):
-    assert not _replaces(hypothesis(900.0, *causes), named("payload", score=50.0, rivals=0.2))
+    assert not replaces(hypothesis(900.0, *causes), named("payload", score=50.0, rivals=0.2))
 
 
 def test_more_causes_than_before_replace_nothing():
-    assert not _replaces(hypothesis(900.0, "law", "law 2"), named("payload", score=50.0, rivals=0.2))
+    assert not replaces(hypothesis(900.0, "law", "law 2"), named("payload", score=50.0, rivals=0.2))
 
 
 @pytest.mark.parametrize("rivals", [0.0, 0.2])
@@ -41,7 +42,7 @@ def test_one_for_one_only_beyond_the_doubt_in_laws(rivals):
     least = rules.NAMED_NATS * (9.0 if rivals else 1.0)
     for lead, wanted in ((1.05 * least, True), (0.95 * least, False)):
         assert (
-            _replaces(hypothesis(100.0 + lead, "law"), named("payload", score=100.0, rivals=rivals)) is wanted
+            replaces(hypothesis(100.0 + lead, "law"), named("payload", score=100.0, rivals=rivals)) is wanted
         )
 
 
@@ -50,18 +51,18 @@ def test_one_for_one_only_beyond_the_doubt_in_laws(rivals):
 def test_what_would_pass_for_noise_calls_for_no_law(causes, score, wanted):
     """Less than 60 nats over nothing are no sign of something unlisted, with a law or without."""
     assert rules.UNLISTED_NATS == 60.0
-    assert _replaces(hypothesis(score, "law"), named(*causes, score=5.0, rivals=0.2)) is wanted
+    assert replaces(hypothesis(score, "law"), named(*causes, score=5.0, rivals=0.2)) is wanted
 
 
 def at_joints(*joints):
     return SimpleNamespace(causes=[SimpleNamespace(robot=robot, joint=joint) for robot, joint in joints])
 
 
-def test_joints_with_several_causes_are_crowded():
+def test_joints_with_several_causes_arecrowded():
     """What sits at a robot or at the payload is beside nothing."""
     several = at_joints((1, 2), (2, 2), (None, None), (1, 2), (2, None), (2, None), (None, None))
-    assert _crowded(several) == [(1, 2)]
-    assert _crowded(at_joints()) == []
+    assert crowded(several) == [(1, 2)]
+    assert crowded(at_joints()) == []
 
 
 class Team:
@@ -95,9 +96,9 @@ def test_a_law_takes_the_place_of_several_causes_at_its_joint(monkeypatch, lead,
     places = [SimpleNamespace(robot=robot, joint=joint) for robot, joint in ((1, 3), (2, 1), (1, None))]
     rig = SimpleNamespace(bench=SimpleNamespace(places=places))
     start, where = [], []
-    monkeypatch.setattr(search, "exact", lambda rig, hypothesis, nothing: hypothesis)
-    monkeypatch.setattr(search, "located", lambda fit, bench, places: where.extend(places) or list(places))
-    monkeypatch.setattr(search, "likely_causes", lambda hypothesis: ())
+    monkeypatch.setattr(instead, "exact", lambda rig, hypothesis, nothing: hypothesis)
+    monkeypatch.setattr(instead, "located", lambda fit, bench, places: where.extend(places) or list(places))
+    monkeypatch.setattr(instead, "likely_causes", lambda hypothesis: ())
     monkeypatch.setattr(search, "unlisted_nats", lambda hypothesis: 0.0)
     monkeypatch.setattr(Team, "fit", None, raising=False)
 
@@ -105,7 +106,7 @@ def test_a_law_takes_the_place_of_several_causes_at_its_joint(monkeypatch, lead,
         start.append([cause.key for cause in searched.best.causes])
         return Searched(rig, nothing, lawful, ((), ())), {}
 
-    monkeypatch.setattr(search, "_with_one", with_one)
+    monkeypatch.setattr(instead, "with_one", with_one)
     nothing = SimpleNamespace(score=0.0)
     found = in_place_of_several(Searched(rig, nothing, best, ((), (), ())))
     assert start == [["friction"]]

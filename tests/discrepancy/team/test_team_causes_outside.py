@@ -175,27 +175,50 @@ def turning(motion, time):
     return np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
 
 
-def test_slosh(case, motion):
-    """A pendulum under a moving point, its equation integrated by Runge-Kutta; the columns take it near the centre."""
-    mass, at, shape = 0.4, COM + np.array([0.02, -0.03, 0.01]), {"length_m": 0.2, "damping_ratio": 0.05}
-    time, up = case.signals.time, np.array([0.0, 0.0, 1.0])
-    pivot = make_interp_spline(time, point(motion, at), k=5)
-    accel = pivot.derivative(2)
-    w = np.sqrt(DESIGN.gravity_mps2 / shape["length_m"])
-    across = np.array([1.0, 1.0, 0.0])
-    fixed = make_interp_spline(time, 0.2 * np.cross(up, turning(motion, time)), k=3)  # to the payload
+def swinging(time, accel, lengths_m, damping, fixed):
+    """Lagrange's equations of a mass on a bowl z(x, y), by Runge-Kutta: a sphere to fourth order, if lengths are alike.
 
-    def swung(t, x, v):
-        return -across * accel(t) - 2 * 0.05 * w * (v - fixed(t)) - w**2 * x
+    Args:
+        time: shape (Q,).
+        accel: of the bowl's lowest point along two level ways and upwards, by time, shape (3,).
+        lengths_m: radii of curvature along the ways.
+        damping: ratio of small swings.
+        fixed: speeds along the ways that the damper does not resist, by time, shape (2,).
+
+    Returns:
+        speeds and accelerations along the ways and upwards, shape (Q, 3) each.
+    """
+    lengths, mean = np.array(lengths_m), np.mean(lengths_m)
+    w = np.sqrt(DESIGN.gravity_mps2 / lengths)
+
+    def moved(t, q, v):
+        a, share = accel(t), 1.0 + np.sum(q**2 / lengths) / (2.0 * mean)
+        slope, own = q / lengths * share, q / lengths
+        bend = v @ (np.diag(share / lengths) + np.outer(own, own) / mean) @ v
+        pull = -a[:2] - slope * (DESIGN.gravity_mps2 + a[2] + bend) - 2.0 * damping * w * (v - fixed(t))
+        way = np.linalg.solve(np.eye(2) + np.outer(slope, slope), pull)
+        return np.append(v, slope @ v), np.append(way, slope @ way + bend)
 
     def rate(t, y):
-        return np.append(y[3:], swung(t, y[:3], y[3:]))
+        return np.append(y[2:], moved(t, y[:2], y[2:])[1][:2])
 
-    y = solve_ivp(rate, (0.0, time[-1]), np.zeros(6), t_eval=time, rtol=1e-9, atol=1e-12).y.T
-    force = -mass * swung(time, y[:, :3], y[:, 3:])
-    damped = np.cross(
-        [0.0, 0.0, -0.2], 2 * 0.05 * w * mass * (y[:, 3:] - fixed(time))
-    )  # it pulls at the mass
+    y = solve_ivp(rate, (0.0, time[-1]), np.zeros(4), t_eval=time, rtol=1e-9, atol=1e-12).y.T
+    each = [moved(t, q[:2], q[2:]) for t, q in zip(time, y, strict=True)]
+    return np.array([v for v, _ in each]), np.array([a for _, a in each])
+
+
+def test_slosh(case, motion):
+    """A pendulum under a moving point; the columns take it near the centre."""
+    mass, at, shape = 0.4, COM + np.array([0.02, -0.03, 0.01]), {"length_m": 0.2, "damping_ratio": 0.05}
+    time, up = case.signals.time, np.array([0.0, 0.0, 1.0])
+    accel = make_interp_spline(time, point(motion, at), k=5).derivative(2)
+    w = np.sqrt(DESIGN.gravity_mps2 / shape["length_m"])
+    # To the payload.
+    fixed = make_interp_spline(time, 0.2 * np.cross(up, turning(motion, time))[:, :2], k=3)
+    speed, swung = swinging(time, accel, (0.2, 0.2), 0.05, fixed)
+    force = -mass * swung
+    behind = np.column_stack([speed[:, :2] - fixed(time), np.zeros(len(time))])
+    damped = np.cross([0.0, 0.0, -0.2], 2 * 0.05 * w * mass * behind)  # it pulls at the mass
     values = np.append(mass, mass * (at - COM))
     moment = np.cross(motion[0] @ at, force) + damped
     check_wrench(case, motion, "slosh", 0, 0, shape, values, force, moment, 0.03)
@@ -278,7 +301,7 @@ def test_slosh_of_a_second_pendulum(case, motion, second_m, share):
 
 @pytest.mark.parametrize(("across_m", "heading"), [(0.08, 0.4), (0.45, -1.0)])
 def test_slosh_of_two_lengths(case, motion, across_m, heading):
-    """Along one level direction the mass hangs from one point, across from another below or above, Runge-Kutta again.
+    """Along one level direction the mass hangs from one point, across from another below or above.
 
     Its weight acts where both are; a mass that rides along rigidly at the first point is the payload's own.
     """
@@ -289,24 +312,24 @@ def test_slosh_of_two_lengths(case, motion, across_m, heading):
     along /= np.linalg.norm(along, axis=1)[:, None]
     across = np.cross([0.0, 0.0, 1.0], along)
     upper, gravity = make_interp_spline(time, point(motion, at), k=5).derivative(2)(time), DESIGN.gravity_mps2
-    force, moment = -mass * (0.0 * R[..., 0]), np.zeros((len(time), 3))
-    omega = turning(motion, time)
-    for way, own_m, below in ((along, length_m, 0.0), (across, across_m, length_m - across_m)):
-        own = at - [0.0, 0.0, below]
-        accel = np.sum(way * make_interp_spline(time, point(motion, own), k=5).derivative(2)(time), axis=1)
-        smooth, w = make_interp_spline(time, accel, k=3), np.sqrt(gravity / own_m)
-        about = np.cross(way, [0.0, 0.0, 1.0])
-        fixed = make_interp_spline(time, own_m * np.sum(about * omega, axis=1), k=3)
-
-        def rate(t, y, smooth=smooth, w=w, fixed=fixed):
-            return [y[1], -smooth(t) - 2 * damping * w * (y[1] - fixed(t)) - w**2 * y[0]]
-
-        x = solve_ivp(rate, (0.0, time[-1]), [0.0, 0.0], t_eval=time, rtol=1e-9, atol=1e-12).y
-        damper = 2 * damping * w * (x[1] - fixed(time))
-        moment += mass * own_m * damper[:, None] * about
-        pull = -mass * (-damper - w**2 * x[0])[:, None] * way  # swinging and carried along
+    omega, ways, lengths = turning(motion, time), (along, across), (length_m, across_m)
+    drops = (0.0, length_m - across_m)
+    accels, fixed = [], []
+    for way, own_m, below in zip(ways, lengths, drops, strict=True):
+        own = make_interp_spline(time, point(motion, at - [0.0, 0.0, below]), k=5).derivative(2)(time)
+        accels.append(np.sum(way * own, axis=1))
+        fixed.append(own_m * np.sum(np.cross(way, [0.0, 0.0, 1.0]) * omega, axis=1))
+    driven = make_interp_spline(time, np.column_stack([*accels, upper[:, 2]]), k=3)
+    held = make_interp_spline(time, np.column_stack(fixed), k=3)
+    speed, swung = swinging(time, driven, lengths, damping, held)
+    force = -mass * swung[:, 2:] * [0.0, 0.0, 1.0]
+    moment = np.cross(R @ at, force)
+    for k, (way, own_m, below) in enumerate(zip(ways, lengths, drops, strict=True)):
+        damper = 2 * damping * np.sqrt(gravity / own_m) * (speed[:, k] - fixed[k])
+        moment += mass * own_m * damper[:, None] * np.cross(way, [0.0, 0.0, 1.0])
+        pull = -mass * (swung[:, k] + accels[k])[:, None] * way  # swinging and carried along
         force = force + pull
-        moment += np.cross(R @ own, pull) + np.cross(
+        moment += np.cross(R @ (at - [0.0, 0.0, below]), pull) + np.cross(
             np.sum(R @ [0.0, 0.0, -below] * way, axis=1)[:, None] * way, [0.0, 0.0, -mass * gravity]
         )
     rigid = -mass * upper * [1.0, 1.0, 0.0]
