@@ -67,7 +67,7 @@ class Slosh(Cause):
     def columns(self, trial, robot, joint, shape):
         com = trial.shared.pi[1:4] / trial.shared.pi[0]
         R_b1, gravity = trial.data.R_bi[:, 0], trial.data.gravity_mps2
-        (*ways, up), wrench = alike(trial), np.zeros((len(R_b1), 6, 4))
+        (*ways, up), wrench = level_ways(trial), np.zeros((len(R_b1), 6, 4))
         if "across_length_m" in shape:
             drop_m = shape["length_m"] - shape["across_length_m"]
             along, across = _ways(R_b1, shape["heading_rad"])
@@ -151,16 +151,16 @@ class Way:
         return cls(pull, about, np.concatenate([at[:, None], further], axis=1), turned)
 
 
-_ALIKE: WeakKeyDictionary[TrialLinear, tuple[Way, Way, Way]] = WeakKeyDictionary()
+_LEVEL: WeakKeyDictionary[TrialLinear, tuple[Way, Way, Way]] = WeakKeyDictionary()
 
 
-def alike(trial: TrialLinear) -> tuple[Way, Way, Way]:
+def level_ways(trial: TrialLinear) -> tuple[Way, Way, Way]:
     """From the centre of mass two ways to tell swings of one length by, and upwards; for all shapes the same."""
-    if trial not in _ALIKE:
+    if trial not in _LEVEL:
         com, R_b1 = trial.shared.pi[1:4] / trial.shared.pi[0], trial.data.R_bi[:, 0]
         x, y, up = (Way.of(trial, R_b1[:, k], com) for k in range(3))
-        _ALIKE[trial] = x, y, up
-    return _ALIKE[trial]
+        _LEVEL[trial] = x, y, up
+    return _LEVEL[trial]
 
 
 def _second_modes(shape: Shape) -> list[Shape]:
