@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
-from arm.machine import RATE_HZ, ROTOR_KGM2, SECONDS, TIMESTEP_S, Torques, late
+from arm.machine import BEND, RATE_HZ, SECONDS, TIMESTEP_S, Torques, late
 
 GRAVITY = 9.81
 
@@ -224,6 +224,17 @@ def _tilt(form: Form, spec: mujoco.MjSpec) -> None:
     spec.option.gravity = np.asarray(spec.option.gravity) + GRAVITY * np.array([x, y, 0.0])
 
 
+def _yielding(form: Form, spec: mujoco.MjSpec) -> None:
+    """A spring between rotor and link, 5 ms of damping; the encoder sits at the motor, where the bearings rub."""
+    motor = spec.joints[form.at]
+    bend = motor.parent.add_joint()
+    bend.name = f"{BEND}{form.at + 1}"
+    bend.type, bend.axis, bend.pos = motor.type, motor.axis, motor.pos
+    bend.limited = mujoco.mjtLimited.mjLIMITED_FALSE
+    bend.stiffness = [1.0 / form.size, 0.0, 0.0]
+    bend.damping = [5e-3 / form.size, 0.0, 0.0]
+
+
 def _warm_offset(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
     torque[:, form.at] += form.size * (1.0 - 0.2 * np.exp(-time / 15.0))
 
@@ -252,20 +263,6 @@ def _zero(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load:
     q[:, form.at] += form.size * (1.0 + turned)
 
 
-def _yielding(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
-    """The encoder sits at the motor, the gear bends with 5 ms of damping, and a little less the more it is bent."""
-    from scipy.signal import lfilter
-
-    own = load[:, form.at]
-    much = 4.0 * np.sqrt(np.mean(own**2))
-    bend = form.size * own / (1.0 + np.abs(own) / much)
-    keep = np.exp(-1.0 / (RATE_HZ * 5e-3))
-    bend = bend[0] + lfilter([1.0 - keep], [1.0, -keep], bend - bend[0])
-    q[:, form.at] += bend
-    # The rotor turns with the encoder.
-    torque[:, form.at] += ROTOR_KGM2[form.at] * np.gradient(np.gradient(bend, time), time)
-
-
 def _weighing(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
     """Of no cause: a torque sensor that reads some of its neighbour's."""
     torque[:, form.at] += form.size * torque[:, form.at - 1]
@@ -281,9 +278,9 @@ TORQUES: dict[str, Callable[[Form, float], Torques]] = {
     "meshing": _meshing, "cogging": _cogging, "cable": _cable, "balancer": _balancer, "pair": _pair,
     "warming_friction": _weekly, "quadratic_drag": _drag,
 }  # fmt: skip
-CHANGES = {"rotor": _rotor, "load": _load, "tilt": _tilt}
+CHANGES = {"rotor": _rotor, "load": _load, "tilt": _tilt, "yielding": _yielding}
 READINGS = {
-    "warm_offset": _warm_offset, "gain": _gain, "slow_torque": _slow_torque, "zero": _zero, "yielding": _yielding,
+    "warm_offset": _warm_offset, "gain": _gain, "slow_torque": _slow_torque, "zero": _zero,
     "neighbour": _weighing, "eccentric": _disc,
 }  # fmt: skip
 

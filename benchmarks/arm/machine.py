@@ -28,6 +28,8 @@ STEP_RAD = 2.0 * np.pi / 2**17
 RATE_HZ, TIMESTEP_S, SECONDS = 500.0, 5e-4, 60.0
 BANDWIDTH_PER_S = 15.0
 """Of the controller, critically damped."""
+BEND = "bend"
+"""How names of joints begin that no motor moves."""
 
 INERTIA_SHARE, JOINT_SHARE, SCALE_SHARE = 0.1, 0.03, 0.02
 ZERO_RAD, LENGTH_M, DELAY_S, LEVEL_RAD = 2e-3, 1e-3, 5e-4, 5e-3
@@ -57,7 +59,8 @@ class Motion:
 
     Attributes:
         time: shape (n,).
-        q, dq, ddq: positions, velocities and accelerations of the joints, shape (n, 7).
+        q, dq, ddq: positions, velocities and accelerations of the joints (of a joint that bends, on the motor's side),
+            shape (n, 7).
         torque: of the drives, shape (n, 7).
         load: what of it goes through the gears to the links, rotors and friction left out, shape (n, 7).
     """
@@ -118,8 +121,8 @@ def healthy(rng: np.random.Generator, times: float = 1.0) -> Healthy:
 def moved(
     spec: mujoco.MjSpec,
     rng: np.random.Generator,
-    besides: Sequence[Torques],
-    force: Callable[[float], np.ndarray],
+    besides: Sequence[Torques] = (),
+    force: Callable[[float], np.ndarray] | None = None,
 ) -> Motion:
     """Let an arm follow sums of sines under a computed-torque controller.
 
@@ -127,14 +130,16 @@ def moved(
         spec: of the true arm.
         rng: of the motion.
         besides: what acts on its joints that MJCF does not say.
-        force: on the centre of mass of the last link [N], in the world, by time.
+        force: on the centre of mass of the last link [N], in the world, by time; None for none.
 
     Raises:
         RuntimeError: it did not stay near its reference.
     """
     spec.option.timestep, spec.option.integrator = TIMESTEP_S, mujoco.mjtIntegrator.mjINT_EULER
     model = spec.compile()
-    data, last, J = mujoco.MjData(model), model.nbody - 1, model.nv
+    data, last = mujoco.MjData(model), model.nbody - 1
+    motors = np.array([j for j in range(model.njnt) if not model.joint(j).name.startswith(BEND)])
+    J = len(motors)
     f = 0.07 + np.sort(rng.uniform(0.0, 0.6, (5, J)), axis=0)
     size, phase = rng.uniform(0.5, 1.0, (5, J)) / f, rng.uniform(0.0, 2.0 * np.pi, (5, J))
     # From the middle of its way, at rest.
@@ -142,40 +147,44 @@ def moved(
     way = (size * np.sin(2.0 * np.pi * f * span[:, None, None] + phase)).sum(axis=1)
     size *= HALF_WAY / np.abs(way).max(axis=0)
     w, every, steps = 2.0 * np.pi * f, round(1.0 / RATE_HZ / TIMESTEP_S), round(SECONDS / TIMESTEP_S)
-    log = np.empty((5, steps // every, J))
-    inertia = np.zeros((J, J))
+    time = TIMESTEP_S * np.arange(steps)
+    start = np.minimum(time / 2.0, 1.0)[:, None]
+    ease = start**3 * (10.0 - 15.0 * start + 6.0 * start**2)
+    ease1 = 30.0 * (start * (1.0 - start)) ** 2 / 2.0
+    ease2 = (60.0 * start - 180.0 * start**2 + 120.0 * start**3) / 4.0
+    x, x1, x2 = np.zeros((3, steps, J))
+    for rate, much, shift in zip(w, size, phase, strict=True):
+        s, c = np.sin(rate * time[:, None] + shift), np.cos(rate * time[:, None] + shift)
+        x, x1, x2 = x + much * s, x1 + much * rate * c, x2 - much * rate**2 * s
+    r, r1 = CENTRE + ease * x, ease * x1 + ease1 * x
+    ahead = ease * x2 + 2.0 * ease1 * x1 + ease2 * x + 2.0 * BANDWIDTH_PER_S * r1 + BANDWIDTH_PER_S**2 * r
+    data.qpos[motors] = r[0]
+    log, inertia = np.empty((5, steps // every, J)), np.zeros((model.nv, model.nv))
+    all_move, square = J == model.nv, np.ix_(motors, motors)
     for k in range(steps):
-        t = data.time
-        start = min(t / 2.0, 1.0)
-        ease, ease1, ease2 = (
-            start**3 * (10 - 15 * start + 6 * start**2),
-            30 * (start * (1 - start)) ** 2 / 2,
-            0.0,
-        )
-        ease2 = (60 * start - 180 * start**2 + 120 * start**3) / 4
-        s, c = np.sin(w * t + phase), np.cos(w * t + phase)
-        x, x1, x2 = (size * s).sum(0), (size * w * c).sum(0), -(size * w**2 * s).sum(0)
-        r, r1 = CENTRE + ease * x, ease * x1 + ease1 * x
-        r2 = ease * x2 + 2.0 * ease1 * x1 + ease2 * x
-        if not k:
-            data.qpos[:] = r
         mujoco.mj_step1(model, data)
         if k % 20 == 0:
             mujoco.mj_fullM(model, data, inertia)
-        wanted = r2 + 2.0 * BANDWIDTH_PER_S * (r1 - data.qvel) + BANDWIDTH_PER_S**2 * (r - data.qpos)
-        torque = inertia @ wanted + data.qfrc_bias
-        data.qfrc_applied[:] = torque
+            rigid = inertia[square]
+        q, v, bias = data.qpos, data.qvel, data.qfrc_bias
+        if not all_move:
+            q, v, bias = q[motors], v[motors], bias[motors]
+        wanted = ahead[k] - 2.0 * BANDWIDTH_PER_S * v - BANDWIDTH_PER_S**2 * q
+        torque = rigid @ wanted + bias
+        applied = torque
         for own in besides:
-            data.qfrc_applied += own(data.qpos, data.qvel, torque, t)
-        data.xfrc_applied[last, :3] = force(t)
+            applied = applied + own(q, v, torque, data.time)
+        data.qfrc_applied[motors] = applied
+        if force is not None:
+            data.xfrc_applied[last, :3] = force(data.time)
         here = k // every
         if k % every == 0:
-            log[0, here], log[1, here], log[3, here] = data.qpos, data.qvel, torque
+            log[0, here], log[1, here], log[3, here] = q, v, torque
         mujoco.mj_step2(model, data)
         if k % every == 0:
-            log[2, here] = data.qacc
+            log[2, here] = data.qacc[motors]
             gone = data.qfrc_passive + data.qfrc_constraint - model.dof_armature * data.qacc
-            log[4, here] = data.qfrc_applied + gone
+            log[4, here] = (data.qfrc_applied + gone)[motors]
     if not np.isfinite(log).all() or np.abs(log[0] - CENTRE).max() > 2.0:
         raise RuntimeError("the arm did not stay near its reference")
     return Motion(np.arange(len(log[0])) / RATE_HZ, *log)

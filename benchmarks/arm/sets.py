@@ -13,6 +13,7 @@ import numpy as np
 from arm import machine
 from arm.forms import CAUSE_OF, MOST, NOT_FIRST, NOWHERE, TYPICAL, Form
 from discrepancy.rules import inference
+from discrepancy.serial.logs import parts_of
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rig import SerialRig
 
@@ -93,7 +94,7 @@ def make(request: ArmSet, folder: Path) -> Made:
         RuntimeError: the arm with these effects did not follow its reference.
     """
     arm = machine.healthy(request.rng("arm"))
-    motion = machine.moved(arm.spec, request.rng("motion"), (), lambda t: np.zeros(3))
+    motion = machine.moved(arm.spec, request.rng("motion"))
     q, torque = _read(arm, (), motion)
     clean = machine.logged("clean", motion.time, q, torque, request.rng("noise"))
     rig = SerialRig.of(machine.nominal(folder), [clean])
@@ -101,7 +102,7 @@ def make(request: ArmSet, folder: Path) -> Made:
     sized, told = [], []
     sizes = request.rng("sizes")
     for k, form in enumerate(request.forms):
-        gain, tolerances = _shown(rig, ideal, _with(form, arm, motion), form)
+        gain, tolerances = _shown(rig, ideal, _with(form, arm, motion, request.rng("motion")), form)
         # What is not so far out of its tolerance is no fault.
         limit = form.size * max(np.sqrt(GAIN / gain), inference.LEAST_SLAB / max(tolerances, 1e-9))
         wanted = request.factor or SIZES[(request.seed + k) % len(SIZES)] * sizes.uniform(0.9, 1.1)
@@ -116,8 +117,12 @@ def make(request: ArmSet, folder: Path) -> Made:
         for form in sized:
             form.change(spec)
         besides = [t for form in sized if (t := form.torques()) is not None]
+        pushes = [form for form in sized if form.name == "half_sine_push"]
         motion = machine.moved(
-            spec, request.rng("motion"), besides, lambda t: np.sum([f.force(t) for f in sized], axis=0)
+            spec,
+            request.rng("motion"),
+            besides,
+            (lambda t: np.sum([f.force(t) for f in pushes], axis=0)) if pushes else None,
         )
         q, torque = _read(arm, sized, motion)
     log = machine.logged("log", motion.time, q, torque, request.rng("noise"))
@@ -133,8 +138,16 @@ def _read(
     return q, torque
 
 
-def _with(form: Form, arm: machine.Healthy, motion: machine.Motion) -> JointLog:
-    """The log of the same motion, if the form were there: drives give what it takes."""
+def _with(form: Form, arm: machine.Healthy, motion: machine.Motion, rng: np.random.Generator) -> JointLog:
+    """The log of the same motion, if the form were there: drives give what it takes.
+
+    Of the same reference, where a joint bends.
+    """
+    if form.name == "yielding":
+        spec = arm.spec.copy()
+        form.change(spec)
+        motion = machine.moved(spec, rng)
+        return machine.logged("form", motion.time, *_read(arm, (), motion), None)
     torque = motion.torque.copy()
     if (own := form.torques(1.0 / machine.RATE_HZ)) is not None:
         for k, t in enumerate(motion.time):
@@ -170,7 +183,8 @@ def _shown(rig: SerialRig, ideal: JointLog, changed: JointLog, form: Form) -> tu
 
     The latter is that of its cause's nearest values; infinite where that has no tolerance, or shapes to tell it by.
     """
-    rows = [SerialRig.of(rig.model, [log]).physical_residual([]) for log in (ideal, changed)]
+    logs = (parts_of(rig.model, [log], rig.motors)[0] for log in (ideal, changed))
+    rows = [replace(rig, parts=parts, _seen={}).physical_residual([]) for parts in logs]
     within = [c for c in rig.candidates() if all(p.tolerance > 0 for p in c.parameters)]
     columns = [rig.columns(c) for c in within]
     units = np.concatenate([[p.tolerance for p in c.parameters] for c in within])
