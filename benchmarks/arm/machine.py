@@ -160,7 +160,7 @@ def moved(
     ahead = ease * x2 + 2.0 * ease1 * x1 + ease2 * x + 2.0 * BANDWIDTH_PER_S * r1 + BANDWIDTH_PER_S**2 * r
     data.qpos[motors] = r[0]
     log, inertia = np.empty((5, steps // every, J)), np.zeros((model.nv, model.nv))
-    all_move, square = J == model.nv, np.ix_(motors, motors)
+    all_move, square = model.nv == J, np.ix_(motors, motors)
     for k in range(steps):
         mujoco.mj_step1(model, data)
         if k % 20 == 0:
