@@ -117,7 +117,7 @@ PLACES: dict[str, tuple[str, ...]] = {
 FORMULAS: dict[str, tuple[str, ...]] = {
     "cross_talk": ("linear",), "warming_scale": ("warming",), "warming_zero": ("warming",),
     "saturation": ("above", "beyond"), "quadratic_reading": ("square",), "angle_in_torque": ("sine",),
-    "torque_backlash": ("play",), "torque_hum": ("hum",), "eccentric_phi": ("sine",), "eccentric_theta": ("sine",),
+    "torque_hum": ("hum",), "eccentric_phi": ("sine",), "eccentric_theta": ("sine",),
     "cyclic_phi": ("sine",), "encoder_backlash": ("play",), "soft_encoder_mount": ("linear",),
     "slipping_zero": ("linear",), "cogging": ("sine",), "cubic_spring": ("cube",), "cable_spring": ("linear",),
     "door_closer": ("above",), "growing_push": ("linear",), "shaker": ("hum",), "gyroscope": ("constant",),
@@ -172,7 +172,7 @@ def _variable(law: Item, effect: Item) -> bool:
 
 VARIABLES: dict[str, tuple[set[str], ...]] = {
     "warming_scale": ({"time", "tau"},), "warming_zero": ({"time"},), "saturation": ({"tau"},),
-    "quadratic_reading": ({"tau"},), "angle_in_torque": ({"phi"},), "torque_backlash": ({"tau"},),
+    "quadratic_reading": ({"tau"},), "angle_in_torque": ({"phi"},),
     "torque_hum": ({"time"},), "eccentric_phi": ({"phi"},), "eccentric_theta": ({"theta"},), "cyclic_phi": ({"phi"},),
     "encoder_backlash": ({"phi"},), "soft_encoder_mount": ({"tau"},), "slipping_zero": ({"time"},),
     "cogging": ({"phi"},), "cubic_spring": ({"theta"},), "cable_spring": ({"theta"},), "door_closer": ({"phi_rate"},),

@@ -84,7 +84,6 @@ SHAPES: dict[str, Callable[[_Seen, Item], np.ndarray]] = {
     "saturation": lambda s, p: -p["lost_share"] * np.maximum(s.tau - p["knee_Nm"], 0.0),
     "quadratic_reading": lambda s, p: p["per_Nm"] * s.tau**2,
     "angle_in_torque": lambda s, p: p["amplitude_Nm"] * np.sin(p["times"] * s.phi + p["phase_rad"]),
-    "torque_backlash": lambda s, p: _behind(s.tau, p["half_width_Nm"]),
     "torque_hum": lambda s, p: p["amplitude_Nm"] * np.sin(2.0 * np.pi * p["frequency_hz"] * s.t),
     "eccentric_phi": lambda s, p: p["amplitude_rad"] * np.sin(s.phi + p["phase_rad"]),
     "eccentric_theta": lambda s, p: p["amplitude_rad"] * np.sin(s.theta + p["phase_rad"]),

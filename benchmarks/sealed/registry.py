@@ -66,7 +66,6 @@ UNLISTED: tuple[type[Form], ...] = (
     Saturation,
     QuadraticReading,
     AngleInTorque,
-    TorqueBacklash,
     TorqueHum,
     EccentricPhi,
     EccentricTheta,
@@ -86,6 +85,6 @@ UNLISTED: tuple[type[Form], ...] = (
 )
 OUTSIDE: tuple[type[Form], ...] = (ScratchedDisc, SoftSaturation, LooseBridge, FineInterpolation, SlackHose)
 """Unlisted ones whose formula the dictionary of laws does not have either."""
-KNOWN: tuple[type[Form], ...] = (QuadraticDrag,)
+KNOWN: tuple[type[Form], ...] = (QuadraticDrag, TorqueBacklash)
 """Listed ones whose law the catalogue has by now: hidden by name only."""
 FORMS: dict[str, type[Form]] = {form.cause: form for form in (*LISTED, *KNOWN, *UNLISTED, *OUTSIDE)}

@@ -13,7 +13,7 @@ SIZES: dict[str, dict[str, Any]] = {
     "link_length": {"proximal_m": 5e-4, "rod_m": 1e-3, "base_radius_m": 1e-3},
     "base_tilt": {"roll_rad": 0.01, "pitch_rad": -0.02},
     "base_creep": {"x_mps": 1e-6, "y_mps": -2e-6, "start_s": 0.0},
-    "base_compliance": {"compliance_m_per_N": 1e-6, "relaxation_s": 0.05},
+    "base_compliance": {"compliance_m_per_N": 1e-6, "relaxation_s": 0.05, "mass_kg": 0.0},
     "grasp_flex": {
         "compliance_m_per_N": 1e-6, "relaxation_s": 0.0, "turning_rad_per_N": 0.0, "offset_m": 0.0,
     },

@@ -144,12 +144,22 @@ class AngleInTorque(_Torque):
 
 @dataclass(frozen=True)
 class TorqueBacklash(Gap):
-    """It moves only once the torque has crossed a gap: a loose gauge."""
+    """It moves only once the torque has crossed a gap: a loose gauge, whose law is that of friction beside the spring.
 
+    Either reading stays behind the torque by a number whose sign is that of its change.
+    """
+
+    answer = "sea_hysteresis"
     channel = "tau"
     size = "half_width_Nm"
     ranges: ClassVar = {"half_width_Nm": (0.0, 5.0)}
     half_width_Nm: float
+
+    def known(self) -> dict[str, float]:
+        return {"friction_Nm": self.half_width_Nm}
+
+    def law(self) -> None:
+        return None
 
 
 @dataclass(frozen=True)

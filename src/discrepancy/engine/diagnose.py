@@ -86,10 +86,16 @@ def diagnose(
     located: tuple[Located, ...] = ()
     unsure = any(found.probability < rules.LAW_INSTEAD for found in explanation.found)
     lawful: Lawful | None = None
-    if laws == "always" or (laws == "auto" and (unsure or not explanation.clean)):
+    doubtful = unsure or not explanation.clean or explanation.unlisted_nats >= rules.DOUBT_NATS
+    if laws == "always" or (laws == "auto" and doubtful):
         lawful = with_laws(searched, most, say, always=laws == "always", instead=unsure)
-    elif laws == "auto":
-        lawful = in_place_of_several(searched, say)
+    if (
+        laws == "auto"
+        and explanation.clean
+        and not unsure
+        and (lawful is None or lawful.searched.best is searched.best)
+    ):
+        lawful = in_place_of_several(searched, say) or lawful
     if lawful is not None:
         searched, located = lawful.searched, lawful.places
         explanation = explain(searched)

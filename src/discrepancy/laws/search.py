@@ -46,6 +46,9 @@ def with_laws(
 ) -> Lawful:  # fmt: skip
     """Go on with a search until what is left is noise, or no law helps on trials that it was not fitted to.
 
+    What is left may pass for noise where healthy robots leave as much, and yet lie at one place: then a law has to pay
+    for all that noise may hide.
+
     Args:
         searched: what the catalogue can do.
         most: largest number of causes, laws among them.
@@ -59,20 +62,24 @@ def with_laws(
     rivals: dict[tuple[object, ...], list[Rival]] = {}
     refined: list[Refinement] = []
     for turn in range(rules.LAW_MOST if bench is not None else 0):
-        left = always or unlisted_nats(searched.best) >= rules.UNLISTED_NATS
+        assert bench is not None
+        unlisted, places = unlisted_nats(searched.best), None
+        left, least = always or unlisted >= rules.UNLISTED_NATS, rules.NAMED_NATS
+        if not left and unlisted >= rules.DOUBT_NATS:
+            places = located_in(searched, bench, say)
+            left, least = places[0].nats >= rules.UNLISTED_NATS, rules.UNLISTED_NATS
         replacing = bool(searched.best.free) and not turn
         if not (instead and replacing) and (not left or len(searched.best.free) >= most):
             break
-        assert bench is not None
         starts = [searched] if left else []
         if replacing:
             # Causes that were named may have stood for what nobody lists.
             starts.insert(0, Searched(searched.rig, searched.nothing, searched.nothing, ()))
         found, forms = [], Forms(bench, likely_causes(searched.best), refined)
         for start in starts:
-            places = located_in(start, bench, say)
-            first = first or tuple(places)
-            step = with_one(start, bench, places, say, forms)
+            here = places if start is searched and places is not None else located_in(start, bench, say)
+            first = first or tuple(here)
+            step = with_one(start, bench, here, say, forms)
             if step is not None:
                 # Beside noise it has to stand with all that it does not replace.
                 besides = rules.LAW_CAUSES if left else len(searched.best.free)
@@ -84,7 +91,7 @@ def with_laws(
         if not found:
             break
         best, more = max(found, key=lambda one: one[0].best.score)
-        if best.best.score < searched.best.score + rules.NAMED_NATS:
+        if best.best.score < searched.best.score + least:
             break
         if not left and not replaces(best.best, searched):
             break

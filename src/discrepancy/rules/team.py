@@ -139,6 +139,9 @@ RELAXATION_FINER = (0.5, 0.7, 0.85, 1.2, 1.4, 2.0)
 """Shares of such a time that are tried next. Chosen."""
 RELAXATION_RANGE_S = (0.001, 0.5)
 """Derived: a shorter one shifts a motion of 1 Hz by less than 0.6 % of itself; after a longer one, a base creeps."""
+BASE_INERTIA_SHARES, BASE_INERTIA_FINER = (0.06, 0.25, 1.0), (0.5, 0.7, 1.4, 2.0)
+"""Compliance times the mass that moves, over the square of the lag, tried where a base gives way: a quarter is damped
+critically; and shares of it tried next. Chosen."""
 GRASP_TURNS_M = (0.05, -0.05)
 """From the gimbal's centre to the point about which a grasp turns, along its axis, tried first. Chosen: a flange's
 thickness or a gripper's, on either side; what is along it is found by Gauss-Newton."""

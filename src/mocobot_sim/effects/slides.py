@@ -76,6 +76,14 @@ def base_slides(scene: TeamScene, robot: int, kind: str, **attributes: Any) -> l
     return slides
 
 
+def robot_mass_kg(scene: TeamScene, robot: int) -> float:
+    """Mass of one robot, without payload."""
+    chassis = scene.root.find("body", f"omnid{robot}/chassis")
+    bodies = [chassis, *chassis.find_all("body")]
+    own = (body.inertial for body in bodies if "payload" not in body.full_identifier)
+    return float(sum(inertial.mass for inertial in own if inertial is not None))
+
+
 def level_slides(chassis: Any) -> None:
     """Turn the slides under a chassis so that they stay horizontal when it is tilted."""
     if chassis.quat is not None:

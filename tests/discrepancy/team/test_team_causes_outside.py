@@ -460,14 +460,19 @@ def force_of(case, robot):
     return f, Rotation.from_euler("ZYX", case.signals.theta[:, robot]).apply(f)
 
 
-def following(case, force, relaxation_s):
+def following(case, force, relaxation_s, inertia_s2=0.0):
     """Where a spring of 1 N/m beside a damper is under a force (Q, 3), at rest before: integrated step by step."""
     time = case.signals.time
-    solved = solve_ivp(
-        lambda t, x: ([np.interp(t, time, f) for f in force.T] - x) / relaxation_s,
-        (time[0], time[-1]), force[0], t_eval=time, rtol=1e-6, atol=1e-4, max_step=0.02,
-    )  # fmt: skip
-    return solved.y.T
+
+    def rate(t, x):
+        left = [np.interp(t, time, f) for f in force.T] - x[:3]
+        if not inertia_s2:
+            return left / relaxation_s
+        return np.concatenate([x[3:], (left - relaxation_s * x[3:]) / inertia_s2])
+
+    start = np.concatenate([force[0], np.zeros(3 if inertia_s2 else 0)])
+    solved = solve_ivp(rate, (time[0], time[-1]), start, t_eval=time, rtol=1e-6, atol=1e-4, max_step=0.02)
+    return solved.y.T[:, :3]
 
 
 @pytest.mark.parametrize(("robot", "relaxation_s"), [(0, 0.03), (1, 0.03), (2, 0.2)])
@@ -539,8 +544,11 @@ def test_grasp_play(case, robot, contact_per_N):
     check_pose(case, signals, column, [play], 0.02, moment=np.cross(ahead @ R_1i.T, f @ R_1i.T))
 
 
-@pytest.mark.parametrize(("robot", "relaxation_s"), [(0, 0.2), (1, 0.01), (2, 0.03)])
-def test_base_compliance(case, robot, relaxation_s):
+@pytest.mark.parametrize(
+    ("robot", "relaxation_s", "inertia_s2"),
+    [(0, 0.2, 0.0), (1, 0.01, 0.0), (2, 0.03, 0.0), (0, 0.06, 1e-3), (1, 0.03, 2e-3)],
+)
+def test_base_compliance(case, robot, relaxation_s, inertia_s2):
     """The force on the base is what payload and arm's bodies do not keep for their own acceleration."""
     c = 1e-5
     phi = case.signals.phi[:, robot]
@@ -550,8 +558,9 @@ def test_base_compliance(case, robot, relaxation_s):
     moved = (DESIGN.wrist_mass_kg + 1.5 * DESIGN.rod_mass_kg) * legs.h
     moved = moved + (DESIGN.proximal_mass_kg * share + 0.5 * DESIGN.rod_mass_kg) * knees.sum(axis=1)
     on_base = -(force_of(case, robot)[1] + rate_of(rate_of(moved))) * [1.0, 1.0, 0.0]
-    signals = adapted(case, robot, -c * following(case, on_base, relaxation_s))
-    column = CAUSES["base_compliance"].columns(case.linear, robot, 0, {"relaxation_s": relaxation_s})
+    signals = adapted(case, robot, -c * following(case, on_base, relaxation_s, inertia_s2))
+    shape = {"relaxation_s": relaxation_s} | ({"inertia_s2": inertia_s2} if inertia_s2 else {})
+    column = CAUSES["base_compliance"].columns(case.linear, robot, 0, shape)
     # Twice differentiated, what the two know differently of the arm's own acceleration counts for more.
     check_pose(case, signals, column, [c], 0.03, 0.12)
 

@@ -240,6 +240,23 @@ def test_the_gimbal_keeps_its_mass_and_inertia(robot):
         np.testing.assert_allclose(inertia, clean.body(parts[0]).inertia, rtol=1e-12)
 
 
+@ROBOT
+@pytest.mark.parametrize(("given_kg", "moves_kg"), [(0.0, None), (90.0, 90.0)])
+def test_a_base_on_springs_moves_as_much_mass_as_it_is_said_to(robot, given_kg, moves_kg):
+    """The mass matrix of the slides, of a robot that holds nothing."""
+    effect = example("base_compliance", robot, compliance_m_per_N=1e-5, mass_kg=given_kg)
+    model = team_with("a", effect).compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    full = np.zeros((model.nv, model.nv))
+    mujoco.mj_fullM(model, data, full)
+    dof = model.jnt_dofadr[model.joint(f"omnid{robot}/compliance_x").id]
+    bodies = [k for k in range(model.nbody) if f"omnid{robot}/" in model.body(k).name]
+    own = sum(model.body_mass[k] for k in bodies if "payload" not in model.body(k).name)
+    payload = model.body_subtreemass[bodies[0]] - own  # on the flange of robot 1
+    assert full[dof, dof] - payload == pytest.approx(own + 1.0 if moves_kg is None else moves_kg, rel=1e-9)
+
+
 @pytest.mark.parametrize("compliance", [1e-7, 1e-5])
 def test_a_spring_follows_a_growing_force_as_late_as_its_row_says(compliance):
     """Behind a ramp it stays by its time constant, however much mass moves along."""

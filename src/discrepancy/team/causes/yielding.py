@@ -1,4 +1,4 @@
-"""What gives way to a force: a spring beside a damper, as Kelvin and Voigt have it."""
+"""What gives way to a force: a spring beside a damper, as Kelvin and Voigt have it, and the mass that moves along."""
 
 from typing import ClassVar, cast
 
@@ -14,8 +14,8 @@ from estimator.arrays import Array
 class Yielding(Cause):
     """Compliance times the force, behind a lag of first order: compliance times damping is its time constant.
 
-    A mass that moves along lags as well; of a critically damped one, first and second order differ little as long as
-    the lag is short beside the motion.
+    A mass that moves along lags as well. Where a shape has ``inertia_s2``, compliance times that mass, the lag is of
+    second order.
     """
 
     family = "compliance"
@@ -36,9 +36,9 @@ class Yielding(Cause):
 
 def lagging(force: Array, rate_hz: float, shape: Shape) -> Array:
     """A force (Q, 3) behind the lag, linear between samples, at rest before them."""
-    filtered = cast(
-        "tuple[Array, Array, float]",
-        cont2discrete(([1.0], [shape["relaxation_s"], 1.0]), 1.0 / rate_hz, method="foh"),
-    )
+    below = [shape["relaxation_s"], 1.0]
+    if inertia_s2 := shape.get("inertia_s2"):
+        below.insert(0, inertia_s2)
+    filtered = cast("tuple[Array, Array, float]", cont2discrete(([1.0], below), 1.0 / rate_hz, method="foh"))
     start = force[:1]
     return np.asarray(start + lfilter(np.ravel(filtered[0]), filtered[1], force - start, axis=0), dtype=float)
