@@ -14,10 +14,11 @@ from hidden.schedule import Schedule
 from mocobot.campaign.ground import gimbal_axes
 from mocobot_sim.effects import Effect, apply_effects, effect_to_dict
 from mocobot_sim.effects.grasp_flex import GraspFlex
+from mocobot_sim.effects.slides import robot_mass_kg
 from mocobot_sim.effects.torque_lag import TorqueLag
 from mocobot_sim.effects.torque_skew import TorqueSkew
 from mocobot_sim.scene.scene import TeamScene, build_team
-from mocobot_sim.scene.soft import row_relaxation_s
+from mocobot_sim.scene.soft import row_mass_kg, row_relaxation_s
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trial import run_trial
 from mocobot_sim.trial.truth import GroundTruth
@@ -220,8 +221,11 @@ def _told(effect: Effect, scene: TeamScene, background: Sequence[Effect]) -> dic
     else:
         cause, known, law = effect.cause, dict(told["parameters"]), None
         if cause in SPRINGS and known["relaxation_s"] < effect.inherent["relaxation_s"]:
-            row = SPRINGS[cause].format(robot=told["robot"])
-            known["relaxation_s"] = row_relaxation_s(scene.compile(), row)
+            row, model = SPRINGS[cause].format(robot=told["robot"]), scene.compile()
+            known["relaxation_s"] = row_relaxation_s(model, row)
+            if cause == "base_compliance":
+                armature = float(model.dof_armature[model.jnt_dofadr[model.equality(row).obj1id]][0])
+                known["mass_kg"] = robot_mass_kg(scene, told["robot"]) + armature + row_mass_kg(model, row)
     if "contact_m_per_N" in known:
         own = (e for e in background if isinstance(e, GraspFlex) and e.robot == told["robot"])
         known["contact_m_per_N"] += sum(flex.compliance_m_per_N for flex in own)

@@ -117,3 +117,10 @@ def row_relaxation_s(model: mujoco.MjModel, equality: str) -> float:
     """Time constant in which the spring of a row follows its load, read back from the model."""
     stiffness, damping = -model.eq_solref[model.equality(equality).id]
     return float(damping / stiffness)
+
+
+def row_mass_kg(model: mujoco.MjModel, equality: str) -> float:
+    """Mass that the spring of a row on a slide moves besides the bodies', read back from the model: its own inertia."""
+    row = model.equality(equality).id
+    impedance, dof = float(model.eq_solimp[row, 0]), model.jnt_dofadr[model.eq_obj1id[row]]
+    return float(impedance / ((1.0 - impedance) * model.dof_invweight0[dof]))

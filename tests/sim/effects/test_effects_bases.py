@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 from closed_loop import BASE_HEIGHT_M, ClosedLoop
 from effect_cases import example, team_with
 from mocobot_sim.scene.scene import build_team
-from mocobot_sim.scene.soft import row_relaxation_s, spring_parameters
+from mocobot_sim.scene.soft import row_mass_kg, row_relaxation_s, spring_parameters
 from mocobot_sim.trial.actors import Stage
 from mocobot_sim.trial.trajectories import random_vias
 from mocobot_sim.trial.trial import run_trial
@@ -275,3 +275,27 @@ def test_a_spring_follows_a_growing_force_as_late_as_its_row_says(compliance):
     late_s = data.time - data.qpos[0] / (compliance * grows_N_per_s)
     assert late_s > 5e-3
     assert row_relaxation_s(model, "spring") == pytest.approx(late_s, rel=0.1)
+
+
+def test_the_mass_of_a_row_is_what_it_moves_besides():
+    """Undamped, it swings with the period of both masses on its spring."""
+    mass_kg, compliance = 2.0, 1e-3
+    (s, _), impedance = spring_parameters(compliance, 1.0 / mass_kg)
+    model = mujoco.MjModel.from_xml_string(
+        f"""<mujoco><option timestep="0.0002" gravity="0 0 0" tolerance="0"/><worldbody><body>
+        <joint name="x" type="slide" axis="1 0 0"/><geom size="0.1" mass="{mass_kg}"/></body></worldbody>
+        <equality>
+        <joint name="spring" joint1="x" solref="{s} -1e-9" solimp="{" ".join(map(str, impedance))}"/>
+        </equality></mujoco>"""
+    )
+    data = mujoco.MjData(model)
+    data.qpos[0] = 1e-3
+    crossings, last = [], 1.0
+    for _ in range(20000):
+        mujoco.mj_step(model, data)
+        if last > 0.0 >= data.qpos[0]:
+            crossings.append(data.time)
+        last = data.qpos[0]
+    period_s = np.diff(crossings).mean()
+    moving_kg = (period_s / (2.0 * np.pi)) ** 2 / compliance
+    assert moving_kg - mass_kg == pytest.approx(row_mass_kg(model, "spring"), rel=0.02)
