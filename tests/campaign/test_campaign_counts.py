@@ -93,6 +93,24 @@ def test_what_a_simulation_has_of_its_own_is_no_error(hidden_s, deviations):
     assert score.deviations == pytest.approx(deviations)
 
 
+@pytest.mark.parametrize(
+    ("hidden_kg", "named_kg", "deviations"),
+    [(0.0, (70.0, 5.0), ()), (71.0, (70.0, 5.0), (-0.2,)), (71.0, (0.0, None), ())],
+)
+def test_the_mass_on_a_base_that_gives_way_counts_where_both_say_it(hidden_kg, named_kg, deviations):
+    """Less than the robot's own is not what moves; and none is said where none shows."""
+    known = {"compliance_m_per_N": 1e-5, "relaxation_s": 0.0, "mass_kg": hidden_kg}
+    item = named("base_compliance", 1, None, 0.9, compliance_m_per_N=(1.2e-5, 1e-6), mass_kg=named_kg)
+    answer = {"cause": "base_compliance", "robot": 1, "joint": None, "known": known}
+    truth = {
+        "effects": [{"cause": "base_compliance", "parameters": known, "answer": answer}],
+        "gimbal_axes_1": [],
+    }
+    (score,) = match([item], truth, [4.0]).scores
+    assert score.right
+    assert score.deviations == pytest.approx((2.0, *deviations))
+
+
 def test_brier_score_by_hand(summary):
     """Named: right at 0.95, wrong place at 0.6, right at 0.8 with a stranger at 0.95, a false alarm at 0.8."""
     brier = np.mean([0.05**2, 0.6**2, 0.2**2, 0.95**2, 0.8**2])

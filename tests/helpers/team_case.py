@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
@@ -69,3 +70,29 @@ def residual_of(case: Case, signals=None, shared=None, bases=None):
     return exact_residual(
         signals or case.signals, shared or case.shared, bases or case.bases, DESIGN, case.reduction
     )
+
+
+def rate_of(x):
+    """Rates of samples of such a recording, by a spline."""
+    time = np.arange(len(x)) / RATE_HZ
+    return make_interp_spline(time, x, k=5).derivative()(time)
+
+
+RATE_HZ = 100.0
+BLOCKS = (
+    ((0, 1, 2, 6, 7, 8), 1e-7),
+    ((3, 4, 5, 9, 10, 11), 1e-7),
+    ((12, 13, 14), 2e-4),
+    ((15, 16, 17), 2e-4),
+)
+
+
+def assert_close(got, expected, tolerance):
+    """Rms of the difference against the rms of what is expected, channels of each unit together."""
+    for block, floor in BLOCKS:
+        if block[-1] >= got.shape[1]:
+            continue
+        block = list(block)
+        size = np.sqrt(np.mean(expected[:, block] ** 2))
+        apart = np.sqrt(np.mean((got[:, block] - expected[:, block]) ** 2))
+        assert apart <= tolerance * size + floor, (block, apart, size)

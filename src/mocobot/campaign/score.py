@@ -157,6 +157,7 @@ def _errors(item: Item, effect: Item) -> tuple[float | None, tuple[float, ...]]:
     least = EFFECTS[cause].inherent if cause in EFFECTS else {}
     names = [name for name in named if name in known and not name.startswith(skipped)]
     names = [name for name in names if abs(known[name]) >= least.get(name, 0.0)]
+    names = [name for name in names if named[name]["value"] or name not in least]
     if not names:
         return None, ()
     away = np.array([named[name]["value"] - known[name] for name in names])

@@ -23,7 +23,7 @@ class BaseCompliance(Effect):
     """
 
     ranges: ClassVar = {"compliance_m_per_N": (0.0, 1e-2), "relaxation_s": (0.0, 10.0), "mass_kg": (0.0, 1e4)}
-    inherent: ClassVar = {"relaxation_s": 0.005}
+    inherent: ClassVar = {"relaxation_s": 0.005, "mass_kg": 35.0}
     robot: int
     compliance_m_per_N: float
     relaxation_s: float = 0.0

@@ -3,8 +3,14 @@
 import mujoco
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import make_interp_spline
 
 from discrepancy.causes.pendulum import Pendulum, swung
+from discrepancy.team.causes import CAUSES
+from outside_wrench import check_wrench, motion_of, point, reported
+from recorded_team import COM
+from team_case import DESIGN, exact
 
 MASS_KG, GRAVITY, STEP_S = 0.5, 9.81, 1e-3
 HEAVY = 1e6  # of what moves the payload: it goes its way, whatever hangs in it
@@ -109,3 +115,135 @@ def test_a_pendulum_swings_as_far_as_it_is_moved(moved_mps2, allowed, allowed_up
         (up, true[2], allowed_upwards),
     ):
         assert np.sqrt(np.mean((said - found) ** 2)) < most * np.sqrt(np.mean(found**2))
+
+
+@pytest.fixture(scope="module")
+def case():
+    return exact()
+
+
+@pytest.fixture(scope="module")
+def motion(case):
+    return motion_of(case)
+
+
+def turning(motion, time):
+    """Angular velocity of the payload in {b1}, its pose differentiated."""
+    R_dot = make_interp_spline(time, motion[0], k=5).derivative(1)(time)
+    turn = R_dot @ motion[0].swapaxes(1, 2)
+    return np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
+
+
+def swinging(time, accel, lengths_m, damping, fixed):
+    """Lagrange's equations of a mass on a bowl z(x, y), by Runge-Kutta: a sphere to fourth order, if lengths are alike.
+
+    Args:
+        time: shape (Q,).
+        accel: of the bowl's lowest point along two level ways and upwards, by time, shape (3,).
+        lengths_m: radii of curvature along the ways.
+        damping: ratio of small swings.
+        fixed: speeds along the ways that the damper does not resist, by time, shape (2,).
+
+    Returns:
+        speeds and accelerations along the ways and upwards, shape (Q, 3) each.
+    """
+    lengths, mean = np.array(lengths_m), np.mean(lengths_m)
+    w = np.sqrt(DESIGN.gravity_mps2 / lengths)
+
+    def moved(t, q, v):
+        a, share = accel(t), 1.0 + np.sum(q**2 / lengths) / (2.0 * mean)
+        slope, own = q / lengths * share, q / lengths
+        bend = v @ (np.diag(share / lengths) + np.outer(own, own) / mean) @ v
+        pull = -a[:2] - slope * (DESIGN.gravity_mps2 + a[2] + bend) - 2.0 * damping * w * (v - fixed(t))
+        way = np.linalg.solve(np.eye(2) + np.outer(slope, slope), pull)
+        return np.append(v, slope @ v), np.append(way, slope @ way + bend)
+
+    def rate(t, y):
+        return np.append(y[2:], moved(t, y[:2], y[2:])[1][:2])
+
+    y = solve_ivp(rate, (0.0, time[-1]), np.zeros(4), t_eval=time, rtol=1e-9, atol=1e-12).y.T
+    each = [moved(t, q[:2], q[2:]) for t, q in zip(time, y, strict=True)]
+    return np.array([v for v, _ in each]), np.array([a for _, a in each])
+
+
+def test_slosh(case, motion):
+    """A pendulum under a moving point; the columns take it near the centre."""
+    mass, at, shape = 0.4, COM + np.array([0.02, -0.03, 0.01]), {"length_m": 0.2, "damping_ratio": 0.05}
+    time, up = case.signals.time, np.array([0.0, 0.0, 1.0])
+    accel = make_interp_spline(time, point(motion, at), k=5).derivative(2)
+    w = np.sqrt(DESIGN.gravity_mps2 / shape["length_m"])
+    # To the payload.
+    fixed = make_interp_spline(time, 0.2 * np.cross(up, turning(motion, time))[:, :2], k=3)
+    speed, swung = swinging(time, accel, (0.2, 0.2), 0.05, fixed)
+    force = -mass * swung
+    behind = np.column_stack([speed[:, :2] - fixed(time), np.zeros(len(time))])
+    damped = np.cross([0.0, 0.0, -0.2], 2 * 0.05 * w * mass * behind)  # it pulls at the mass
+    values = np.append(mass, mass * (at - COM))
+    moment = np.cross(motion[0] @ at, force) + damped
+    check_wrench(case, motion, "slosh", 0, 0, shape, values, force, moment, 0.03)
+    physical = reported(case, "slosh", values, shape)
+    np.testing.assert_allclose([physical[f"point_{a}_m"] for a in "xyz"], at)
+    assert physical["mass_kg"] == mass
+
+
+@pytest.mark.parametrize(("second_m", "share"), [(0.08, 0.3), (0.5, 0.4)])
+def test_slosh_of_a_second_pendulum(case, motion, second_m, share):
+    """Beside the first: what two of one mode do, each with its share of the mass."""
+    mass, moments = 0.4, 0.4 * np.array([0.02, -0.03, 0.01])
+    plain = {"length_m": 0.2, "damping_ratio": 0.05}
+    values = np.append(mass, moments)
+
+    def of(shape):
+        return CAUSES["slosh"].columns(case.linear, 0, 0, shape) @ values
+
+    both = (1.0 - share) * of(plain) + share * of(plain | {"length_m": second_m})
+    np.testing.assert_allclose(
+        of(plain | {"second_length_m": second_m, "second_share": share}), both, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize(("across_m", "heading"), [(0.08, 0.4), (0.45, -1.0)])
+def test_slosh_of_two_lengths(case, motion, across_m, heading):
+    """Along one level direction the mass hangs from one point, across from another below or above.
+
+    Its weight acts where both are; a mass that rides along rigidly at the first point is the payload's own.
+    """
+    mass, length_m, damping = 0.4, 0.2, 0.05
+    at, time, R = COM + np.array([0.02, -0.03, 0.01]), case.signals.time, motion[0]
+    along = R @ [np.cos(heading), np.sin(heading), 0.0]
+    along[:, 2] = 0.0
+    along /= np.linalg.norm(along, axis=1)[:, None]
+    across = np.cross([0.0, 0.0, 1.0], along)
+    upper, gravity = make_interp_spline(time, point(motion, at), k=5).derivative(2)(time), DESIGN.gravity_mps2
+    omega, ways, lengths = turning(motion, time), (along, across), (length_m, across_m)
+    drops = (0.0, length_m - across_m)
+    accels, fixed = [], []
+    for way, own_m, below in zip(ways, lengths, drops, strict=True):
+        own = make_interp_spline(time, point(motion, at - [0.0, 0.0, below]), k=5).derivative(2)(time)
+        accels.append(np.sum(way * own, axis=1))
+        fixed.append(own_m * np.sum(np.cross(way, [0.0, 0.0, 1.0]) * omega, axis=1))
+    driven = make_interp_spline(time, np.column_stack([*accels, upper[:, 2]]), k=3)
+    held = make_interp_spline(time, np.column_stack(fixed), k=3)
+    speed, swung = swinging(time, driven, lengths, damping, held)
+    force = -mass * swung[:, 2:] * [0.0, 0.0, 1.0]
+    moment = np.cross(R @ at, force)
+    for k, (way, own_m, below) in enumerate(zip(ways, lengths, drops, strict=True)):
+        damper = 2 * damping * np.sqrt(gravity / own_m) * (speed[:, k] - fixed[k])
+        moment += mass * own_m * damper[:, None] * np.cross(way, [0.0, 0.0, 1.0])
+        pull = -mass * (swung[:, k] + accels[k])[:, None] * way  # swinging and carried along
+        force = force + pull
+        moment += np.cross(R @ (at - [0.0, 0.0, below]), pull) + np.cross(
+            np.sum(R @ [0.0, 0.0, -below] * way, axis=1)[:, None] * way, [0.0, 0.0, -mass * gravity]
+        )
+    rigid = -mass * upper * [1.0, 1.0, 0.0]
+    values = np.append(mass, mass * (at - COM))
+    shape = {
+        "length_m": length_m,
+        "damping_ratio": damping,
+        "across_length_m": across_m,
+        "heading_rad": heading,
+    }
+    check_wrench(
+        case, motion, "slosh", 0, 0, shape, values, force - rigid, moment - np.cross(R @ at, rigid), 0.04
+    )
+    assert reported(case, "slosh", values, shape)["across_length_m"] == across_m

@@ -24,7 +24,7 @@ from estimator.arm.delta import LEG_DIRECTIONS, forward_kinematics, jacobian
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.rigid_team.residual import Bases, Shared
 from mocobot_sim.effects.catalogue import EFFECTS, make_effect
-from team_case import DESIGN, exact, residual_of
+from team_case import DESIGN, assert_close, exact, rate_of, residual_of
 
 ROBOTS = (0, 2)
 RATE = 100.0
@@ -63,10 +63,6 @@ def lagged(x, constant):
     mean = np.concatenate([u[:1], 0.5 * (u[1:] + u[:-1])])
     y = lfilter([1.0 - decay], [1.0, -decay], mean, axis=0, zi=decay * u[:1])[0]
     return y[::100]
-
-
-def rate_of(x):
-    return make_interp_spline(np.arange(len(x)) / RATE, x, k=5).derivative()(np.arange(len(x)) / RATE)
 
 
 def hardened(tau, cubic):
@@ -172,23 +168,6 @@ TOLERANCE = {
 
 
 # Channels of one unit, with what filtering leaves: rotations, positions, force, moment.
-BLOCKS = (
-    ((0, 1, 2, 6, 7, 8), 1e-7),
-    ((3, 4, 5, 9, 10, 11), 1e-7),
-    ((12, 13, 14), 2e-4),
-    ((15, 16, 17), 2e-4),
-)
-
-
-def assert_close(got, expected, tolerance):
-    """Rms of the difference against the rms of what is expected, channels of each unit together."""
-    for block, floor in BLOCKS:
-        if block[-1] >= got.shape[1]:
-            continue
-        block = list(block)
-        size = np.sqrt(np.mean(expected[:, block] ** 2))
-        apart = np.sqrt(np.mean((got[:, block] - expected[:, block]) ** 2))
-        assert apart <= tolerance * size + floor, (block, apart, size)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)

@@ -25,10 +25,10 @@ class BaseCompliance(Yielding):
     )
 
     def sentence(self, n):
-        mass = f" as a mass of {n('mass_kg', 'kg')} does" if n.values.get("mass_kg") else ""
+        along = f", {n('mass_kg', 'kg')} moving along" if n.values.get("mass_kg") else ""
         return (
-            f"the base gives way horizontally, by {n('compliance_m_per_N', 'um/N', 1e6)}, and follows the force{mass} "
-            f"within {n('relaxation_s', 'ms', 1e3)}"
+            f"the base gives way horizontally, by {n('compliance_m_per_N', 'um/N', 1e6)}, and follows the force within "
+            f"{n('relaxation_s', 'ms', 1e3)}{along}"
         )
 
     def finer(self, shape):
@@ -47,9 +47,8 @@ class BaseCompliance(Yielding):
 
     def physical(self, values, context):
         given = super().physical(values, context)
-        if "inertia_s2" in given:
-            given["mass_kg"] = given.pop("inertia_s2") / given["compliance_m_per_N"]
-        return given
+        inertia_s2 = given.pop("inertia_s2", 0.0)
+        return {**given, "mass_kg": inertia_s2 / (given["compliance_m_per_N"] or np.inf)}
 
     def columns(self, trial, robot, joint, shape):
         design, s = trial.design, trial.s[:, robot]

@@ -1,0 +1,200 @@
+"""Wrenches on the payload from outside, put into an exact recording by hand."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import make_interp_spline
+from scipy.spatial.transform import Rotation
+
+from discrepancy.candidate import Transient
+from discrepancy.team.candidates import in_shapes
+from discrepancy.team.causes import CAUSES
+from estimator.arm.delta import forward_kinematics
+from estimator.inertia import inertia_parameters
+from outside_wrench import check_wrench, motion_of, point, relieved, reported
+from recorded_team import COM, GRASPS, HOME, STEP_S
+from team_case import DESIGN, assert_close, exact, rate_of, residual_of
+
+
+@pytest.fixture(scope="module")
+def case():
+    return exact()
+
+
+@pytest.fixture(scope="module")
+def motion(case):
+    return motion_of(case)
+
+
+@pytest.mark.parametrize("robot", [0, 1, 2])
+def test_tether(case, motion, robot):
+    stiffness, anchor = 30.0, np.array([0.1, -0.2, 0.9])  # in {b} of the robot
+    R_1i, p_1i = GRASPS[robot]
+    wrist = forward_kinematics(case.signals.phi[:, robot], DESIGN)
+    force = stiffness * (anchor - wrist) @ R_1i.T  # world
+    lever = motion[0] @ p_1i
+    values = np.append(stiffness * (anchor - HOME), stiffness)
+    check_wrench(case, motion, "tether", robot, 0, {}, values, force, np.cross(lever, force))
+    physical = reported(case, "tether", values)
+    assert physical["stiffness_N_per_m"] == stiffness
+    np.testing.assert_allclose([physical[f"anchor_{a}_m"] for a in "xyz"], anchor)
+
+
+@pytest.mark.parametrize("arm", [0.0, 0.15])
+def test_payload_tether(case, motion, arm):
+    """Tied to the centre of mass or beside it: its lever turns with the payload, and its stiffness acts there."""
+    stiffness, anchor = (30.0, np.array([0.1, -0.2, 0.9])) if not arm else (1.0, np.array([3.0, -6.0, 9.0]))
+    R_b1 = GRASPS[0][0]  # {b} of robot 1 is turned like {1} at rest
+    np.testing.assert_array_equal(R_b1, np.eye(3))
+    tied = COM + arm * np.array([0.6, 0.8, 0.0])
+    wrist = forward_kinematics(case.signals.phi[:, 0], DESIGN)
+    force = stiffness * (anchor - wrist - motion[0] @ tied)  # world
+    home = stiffness * (anchor - HOME - tied)
+    values = np.append(home, stiffness)
+    shape = dict(zip(("lever_x_m", "lever_y_m", "lever_z_m"), tied - COM, strict=True))
+    moment = np.cross(motion[0] @ tied, force)
+    check_wrench(case, motion, "payload_tether", 0, 0, shape, values, force, moment, 0.01)
+    physical = reported(case, "payload_tether", values, shape)
+    assert physical["stiffness_N_per_m"] == stiffness
+    np.testing.assert_allclose([physical[f"point_{a}_m"] for a in "xyz"], tied, atol=1e-9)
+    np.testing.assert_allclose([physical[f"anchor_{a}_m"] for a in "xyz"], anchor, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("along", "turning", "squares"),
+    [
+        (5.0, 0.0, None), (0.0, 3.0, None), (5.0, 3.0, None), (5.0, 3.0, (0.0, 0.0)), (0.0, 0.0, (40.0, 0.0)),
+        (1.0, 0.0, (0.0, 20.0)),
+    ],
+)  # fmt: skip
+def test_drag(case, motion, along, turning, squares):
+    """With the speeds, and with their squares where its shape has these."""
+    ahead, behind = (
+        Rotation.from_euler("xyz", case.path(case.signals.time + h)[:, :3]) for h in (STEP_S, -STEP_S)
+    )
+    omega = (ahead * behind.inv()).as_rotvec() / (2.0 * STEP_S)  # world
+    linear, turning_squared = squares or (0.0, 0.0)
+    speed, rate = (np.linalg.norm(x, axis=1)[:, None] for x in (motion[2], omega))
+    force = -(along + linear * speed) * motion[2]
+    moment = np.cross(motion[0] @ COM, force) - (turning + turning_squared * rate) * omega
+    shape = {} if squares is None else {"powers": 2.0}
+    values = [along, turning, linear, turning_squared]
+    check_wrench(case, motion, "drag", 0, 0, shape, values, force, moment)
+
+
+def test_push(case, motion):
+    """The window's edges fall into the filters: what counts is the force in between."""
+    time = case.signals.time
+    window = ((time >= 6.0) & (time < 9.0))[:, None]
+    applied, at = np.array([2.0, -1.0, 3.0]), np.array([0.8, 0.4, -0.1])
+    force = applied * window
+    moment = np.cross(motion[0] @ at, force)
+    samples = motion[0].swapaxes(1, 2)
+    shape = {"start_s": 5.995, "duration_s": 3.0}  # a sample stands for half of its time before it
+    columns = CAUSES["push"].columns(case.linear, 0, 0, shape)
+    changed = residual_of(case, relieved(case, motion, force, moment)) - case.linear.residual
+    # The moment columns are constant in {1}, the point is fixed there: the force turns a little in between.
+    in_1 = np.einsum("qij,qj->qi", samples, np.tile(applied, (len(time), 1)))
+    moments = np.cross(at, in_1)
+    values = np.append(applied, moments[(time >= 6.0) & (time < 9.0)].mean(axis=0))
+    assert_close(columns @ values, changed, 0.12)
+    np.testing.assert_allclose((columns @ values)[:, 12:15], changed[:, 12:15], atol=0.15)
+    # As far as the payload is level, the reported point lies on the line of action.
+    physical = reported(case, "push", np.append(applied, np.cross(at, applied)), shape, 2)
+    named = np.array([physical[f"point_{a}_m"] for a in "xyz"])
+    np.testing.assert_allclose(np.cross(named - at, applied), 0.0, atol=1e-9)
+    assert (named - COM) @ applied == pytest.approx(0.0, abs=1e-9)
+    assert (physical["trial"], physical["start_s"], physical["duration_s"]) == (2, 5.995, 3.0)
+    np.testing.assert_allclose([physical[f"force_{a}_N"] for a in "xyz"], applied)
+
+
+@pytest.mark.parametrize("ramp_s", [0.6, 1.5])
+def test_push_with_ramps(case, motion, ramp_s):
+    """A trapezium by its corners; with half its duration a triangle."""
+    time, corners = case.signals.time, [6.0, 6.0 + ramp_s, 9.0 - ramp_s, 9.0]
+    window = np.interp(time, corners, [0.0, 1.0, 1.0, 0.0])[:, None]
+    applied, at = np.array([2.0, -1.0, 3.0]), COM
+    force = applied * window
+    shape = Transient(0, 6.0, 3.0, ramp_s).shape
+    columns = CAUSES["push"].columns(case.linear, 0, 0, shape)
+    moment = np.cross(motion[0] @ at, force)
+    changed = residual_of(case, relieved(case, motion, force, moment)) - case.linear.residual
+    assert_close((columns[..., :3] @ applied)[:, :15], changed[:, :15], 0.02)
+    assert reported(case, "push", np.append(applied, np.cross(at, applied)), shape, 2)["ramp_s"] == ramp_s
+    assert reported(case, "push", np.ones(6), {"start_s": 6.0, "duration_s": 3.0}, 2)["ramp_s"] == 0.0
+
+
+@pytest.mark.parametrize("shape", [{"trial": 2.0, "last_trial": 0.0}, {"over_s": 60.0}])
+def test_payload_mass(case, motion, shape):
+    """A body that rides along: Newton at its centre, and Euler by its momentum, differentiated in the world."""
+    time, R = case.signals.time, motion[0]
+    mass, at = 0.8, COM + np.array([0.15, -0.1, 0.08])
+    own = np.array([[0.02, 0.003, 0.0], [0.003, 0.03, -0.002], [0.0, -0.002, 0.015]])  # of all of it
+    there = (time / 60.0 if "over_s" in shape else np.ones_like(time))[:, None]
+    accel = make_interp_spline(time, point(motion, at), k=5).derivative(2)(time)
+    R_dot = make_interp_spline(time, R, k=5).derivative(1)(time)
+    turn = R_dot @ R.swapaxes(1, 2)
+    omega = np.stack([turn[:, 2, 1], turn[:, 0, 2], turn[:, 1, 0]], axis=1)
+    spin = np.einsum("qij,jk,qlk,ql->qi", R, own, R, omega)
+    force = -mass * there * (accel + np.array([0.0, 0.0, DESIGN.gravity_mps2]))
+    moment = np.cross(R @ at, force) - there * make_interp_spline(time, spin, k=5).derivative(1)(time)
+    d = at - COM
+    of_points = d @ d * np.eye(3) - np.outer(d, d)  # what first moments about COM leave of the inertia
+    values = np.concatenate([[mass], mass * d, inertia_parameters(own + mass * of_points)])
+    check_wrench(case, motion, "payload_mass", 0, 0, shape, values, force, moment, 0.01)
+    physical = reported(case, "payload_mass", values, shape)
+    np.testing.assert_allclose([physical[f"point_{a}_m"] for a in "xyz"], at)
+    named = [physical[f"inertia_{ij}_m2"] for ij in ("xx", "xy", "xz", "yy", "yz", "zz")]
+    np.testing.assert_allclose(named, inertia_parameters(own) / mass, atol=1e-12)
+    size = (physical["mass_kg"], physical["rate_kgps"], physical["trial"])
+    assert size == ((0.0, mass / 60.0, 1) if "over_s" in shape else (mass, 0.0, 2))
+
+
+def test_a_mass_is_there_in_its_trials_only():
+    every = CAUSES["payload_mass"].candidate({}, {"trial": 2.0, "last_trial": 0.0})
+    drift = CAUSES["payload_mass"].candidate({}, CAUSES["payload_mass"].shapes[0])
+    assert [drift.acts_in(t) for t in range(3)] == [True] * 3
+    assert [every.acts_in(t) for t in range(4)] == [False, True, True, True]
+    assert every.of_trials
+    assert not drift.of_trials
+
+    def spans(trials):
+        shapes = [drift, *in_shapes(drift, CAUSES["payload_mass"].shapes, trials)]
+        return [tuple(s.acts_in(t) for t in range(trials)) for s in shapes]
+
+    assert spans(1) == [(True,)]
+    for trials in (2, 3, 4, 5):  # each span of trials that leaves out the first, once
+        first_and_last = [(a, b) for a in range(1, trials) for b in range(a, trials)]
+        expected = {tuple(a <= t <= b for t in range(trials)) for a, b in first_and_last}
+        assert sorted(spans(trials)[1:]) == sorted(expected)
+
+
+def test_a_mass_is_there_and_within_reach():
+    se = np.full(10, 1e-3)
+
+    def possible(mass, moment):
+        return CAUSES["payload_mass"].possible(np.array([mass, moment, *np.zeros(8)]), se, {})
+
+    assert possible(-0.02, 0.01)
+    assert not possible(1.5e-3, 0.0)
+    assert not possible(0.02, 0.05)  # 2.5 m from the centre
+
+
+@pytest.mark.parametrize("joint", [0, 1, 2])
+@pytest.mark.parametrize("robot", [0, 2])
+def test_gimbal_friction(case, motion, robot, joint):
+    """The moment on the payload has -torque about the rubbing axis and nothing about the other two."""
+    theta = case.signals.theta[:, robot]
+    rate = rate_of(theta[:, joint])
+    torque = 0.03 * np.clip(rate / 1e-3, -1, 1) + 0.2 * rate
+    turn_z = Rotation.from_euler("Z", theta[:, :1])
+    turn_zy = Rotation.from_euler("ZY", theta[:, :2])
+    ones = np.ones((len(theta), 1))
+    axes = np.stack(
+        [ones * [0.0, 0.0, 1.0], turn_z.apply([0.0, 1.0, 0.0]), turn_zy.apply([1.0, 0.0, 0.0])], axis=1
+    )  # in {b}
+    moment_b = np.linalg.solve(axes, -torque[:, None, None] * np.eye(3)[joint][:, None])[..., 0]
+    moment = moment_b @ GRASPS[robot][0].T
+    shape = {"slow_rad_per_s": 1e-3}
+    check_wrench(
+        case, motion, "gimbal_friction", robot, joint, shape, [0.03, 0.2], 0.0 * moment, moment, 0.05
+    )
