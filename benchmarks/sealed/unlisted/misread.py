@@ -65,7 +65,7 @@ class MisreadNow(Misread):
 class Gap(Misread):
     """It follows only once the truth has crossed a gap, ``size`` being half of its width."""
 
-    def law(self) -> dict[str, Any]:
+    def law(self) -> dict[str, Any] | None:
         unit = "N m" if self.channel == "tau" else "rad"
         return self._law([f"own {self.channel}, its history"], "play of half width a", unit)
 

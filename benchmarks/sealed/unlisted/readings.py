@@ -158,7 +158,7 @@ class TorqueBacklash(Gap):
     def known(self) -> dict[str, float]:
         return {"friction_Nm": self.half_width_Nm}
 
-    def law(self) -> None:
+    def law(self) -> dict[str, Any] | None:
         return None
 
 

@@ -11,8 +11,8 @@ from discrepancy.engine.gain import Gain, responses
 from discrepancy.engine.lawful import laws_of, refining, responding
 from discrepancy.engine.verdict import Verdict, verdict_of
 from discrepancy.inference.odds import check_odds
-from discrepancy.inference.search import Searched, search
-from discrepancy.laws.instead import in_place_of_several
+from discrepancy.inference.search import Searched, continued, search
+from discrepancy.laws.instead import LawFirst, in_place_of_several
 from discrepancy.laws.search import Lawful, with_laws
 from discrepancy.laws.where import Located
 from discrepancy.rig import Rig
@@ -79,12 +79,15 @@ def diagnose(
     Raises:
         InputError: the odds are none.
     """
+    first = LawFirst(say)
     if searched is None:
-        searched = search(rig, most, progress=say, odds=check_odds(odds))
+        searched = search(rig, most, say, check_odds(odds), None if laws == "never" else first)
+        searched = first.known_to(searched)
     explanation = listed = explain(searched)
     notes: list[str] = []
-    located: tuple[Located, ...] = ()
-    unsure = any(found.probability < rules.LAW_INSTEAD for found in explanation.found)
+    located = first.places
+    laws_there = laws_of(explanation)
+    unsure = any(f.probability < rules.LAW_INSTEAD for f in explanation.found if f not in laws_there)
     lawful: Lawful | None = None
     doubtful = unsure or not explanation.clean or explanation.unlisted_nats >= rules.DOUBT_NATS
     if laws == "always" or (laws == "auto" and doubtful):
@@ -97,15 +100,19 @@ def diagnose(
     ):
         lawful = in_place_of_several(searched, say) or lawful
     if lawful is not None:
-        searched, located = lawful.searched, lawful.places
+        searched, located = lawful.searched, located or lawful.places
         explanation = explain(searched)
         notes += refining(lawful.refinements, explanation)
     rig = searched.rig
     why_not = rig.can_resimulate() if closed_loop else "the closed loop was left out on request"
     if why_not is None and laws_of(explanation):
+        if first.cause is not None:
+            listed = explain(first.cause)
         if say:
             say("simulate")
         explanation, spoken = responding(rig, listed, explanation, jobs, simulated)
+        if spoken and first.cause is not None:
+            explanation = explain(continued(first.cause, most, say or (lambda what: None)))
         notes += spoken
     if odds != rules.PRIOR_ODDS:
         notes.append(

@@ -55,6 +55,7 @@ def search(
     most: int = rules.MOST_CAUSES,
     progress: Callable[[str], object] | None = None,
     odds: float = rules.PRIOR_ODDS,
+    first: Callable[[Searched], Searched | None] | None = None,
 ) -> Searched:
     """Find what is most probably there.
 
@@ -63,16 +64,20 @@ def search(
         most: largest number of causes.
         progress: called with what is being done.
         odds: of any cause being there before the data are seen.
+        first: what is to be there instead of the first cause, asked once it is found; None where that is to stay.
     """
     say = progress or (lambda what: None)
     rig, nothing = _based(rig, say)
     nothing = replace(nothing, learnt=replace(nothing.learnt, problem=replace(nothing.problem, odds=odds)))
     say("scan")
-    return continued(Searched(rig, nothing, nothing, ()), most, say)
+    return continued(Searched(rig, nothing, nothing, ()), most, say, first)
 
 
-def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Searched:
-    """Go on from what was found, until nothing pays."""
+def continued(
+    searched: Searched, most: int, say: Callable[[str], object],
+    first: Callable[[Searched], Searched | None] | None = None,
+) -> Searched:  # fmt: skip
+    """Go on from what was found, until nothing pays; ``first`` as of ``search``."""
     rig, nothing, best = searched.rig, searched.nothing, searched.best
     rivals = dict(zip(best.free, map(list, searched.rivals), strict=True))
     doubtful = 0
@@ -93,6 +98,15 @@ def continued(searched: Searched, most: int, say: Callable[[str], object]) -> Se
         if _gained(best, found) < _needed(best, found):
             break  # what pays where all is linear need not do so where it is exact
         best, rivals = found, beside
+        if first is not None and len(best.free) == 1:
+            instead = first(Searched(rig, nothing, best, (tuple(rivals.get(best.free[0], ())),)))
+            first = None
+            if instead is not None:
+                best, rivals = (
+                    instead.best,
+                    dict(zip(instead.best.free, map(list, instead.rivals), strict=True)),
+                )
+                continue
         last = best.free[-1] if best.free else None
         likely = last is None or _law_holds(rig, best, last)
         doubtful = doubtful + 1 if little and not likely else 0

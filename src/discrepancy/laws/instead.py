@@ -1,17 +1,60 @@
-"""One law in place of several causes at a joint: each, however sure, may stand for a part of it."""
+"""A law in place of causes: of the first that is found, if it leaves more than noise; or of several at a joint."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 
+from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.refit import exact
-from discrepancy.inference.search import Searched
+from discrepancy.inference.remainder import unlisted_nats
+from discrepancy.inference.search import Rival, Searched
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.forms import likely_causes
-from discrepancy.laws.search import Forms, Lawful, replaces, suffices, with_one, with_rivals
-from discrepancy.laws.where import located
+from discrepancy.laws.search import Forms, Lawful, located_in, replaces, suffices, with_one, with_rivals
+from discrepancy.laws.where import Located, located
+
+
+@dataclass(eq=False)
+class LawFirst:
+    """Asked once in a search, after its first cause.
+
+    Attributes:
+        progress: called with what is being done.
+        cause: the search with that cause, where a law took its place; otherwise None.
+        places: where the law was looked for, the likeliest first; empty where none was.
+        rivals: of the law, among laws.
+    """
+
+    progress: Callable[[str], object] | None = None
+    cause: Searched | None = None
+    places: tuple[Located, ...] = ()
+    rivals: dict[tuple[object, ...], list[Rival]] = field(default_factory=dict)
+
+    def __call__(self, searched: Searched) -> Searched | None:
+        """The search with a law in place of its only cause, if that law alone leaves noise, and the cause does not.
+
+        Where several things are there, each of them leaves more: then the search goes on as it would.
+        """
+        bench: Bench | None = searched.rig.bench
+        if bench is None or unlisted_nats(searched.best) < rules.UNLISTED_NATS:
+            return None
+        say = self.progress or (lambda what: None)
+        start = Searched(searched.rig, searched.nothing, searched.nothing, ())
+        places = located_in(start, bench, say)
+        step = with_one(start, bench, places, say, Forms(bench, likely_causes(searched.best), []))
+        if step is None or unlisted_nats(step[0].best) >= rules.UNLISTED_NATS:
+            return None
+        if step[0].best.score < searched.best.score + rules.UNLISTED_NATS:
+            return None
+        self.cause, self.places, self.rivals = searched, tuple(places), step[1]
+        return step[0]
+
+    def known_to(self, searched: Searched) -> Searched:
+        """The search with the law's rivals."""
+        return with_rivals(searched, self.rivals)
 
 
 def in_place_of_several(searched: Searched, progress: Callable[[str], object] | None = None) -> Lawful | None:
