@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
+import numpy as np
+
 from discrepancy.candidate import Candidate
 from discrepancy.law_doubt import LawDoubt
 from discrepancy.least_squares.patches import Patches
@@ -156,6 +158,10 @@ class Rig(ABC):
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
         """For every number of its shape that the data determine: a little less, a little more, and the difference."""
         return []
+
+    def inexact(self, candidate: Candidate) -> Array:
+        """Of the numbers that ``steps`` changes, those that the law's own error puts off, as it does sizes; else 0."""
+        return np.zeros(len(self.steps(candidate)))
 
     def undecidable(self) -> list[dict[str, Any]]:
         """What recordings of this rig cannot decide, whatever the data: statements with a reason and a remedy."""

@@ -67,6 +67,13 @@ def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]
     return steps
 
 
+def inexact_numbers(candidate: Candidate) -> Array:
+    """Numbers of the shape that the data determine, 0 where the law's own error puts none off; shape (s,)."""
+    cause = CAUSES[candidate.cause]
+    names = (name for name in cause.determined if name in candidate.shape)
+    return np.array([candidate.shape[name] if name in cause.inexact else 0.0 for name in names])
+
+
 def worst_events(
     reductions: Sequence[Reduction],
     remaining: Sequence[Array],

@@ -12,6 +12,7 @@ from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation
 from discrepancy.engine.gain import fit_to_simulate
 from discrepancy.laws.candidate import LawCandidate
+from discrepancy.team.candidates import inexact_numbers
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.closed_loop import (
@@ -66,6 +67,11 @@ class TeamRig(LawfulRows):
         if isinstance(candidate, LawCandidate):
             return super().effect_parameters(candidate, values, covariance)
         return CAUSES[candidate.cause].report(values, covariance, self._context(candidate))
+
+    def inexact(self, candidate: Candidate) -> Array:
+        if isinstance(candidate, LawCandidate):
+            return super().inexact(candidate)
+        return inexact_numbers(candidate)
 
     def _context(self, candidate: Candidate) -> Context:
         pi, at = self.linear[0].shared.pi, candidate.transient

@@ -426,3 +426,19 @@ def test_a_mass_swings_only_if_it_is_there_and_within_reach():
         assert near
         assert all(0.04 <= s["length_m"] <= 1.0 and s["damping_ratio"] <= 0.3 for s in near)
         shape = max(near, key=lambda s: (s["damping_ratio"], s["length_m"]))
+
+
+def test_a_law_puts_off_lags_as_it_does_sizes(case):
+    """Not the point about which a grasp turns, nor what does not give way."""
+    rig = team_of(case, 2)
+    for candidate in rig.candidates():
+        if candidate.cause == "base_compliance":
+            shape = {"relaxation_s": 0.08, "inertia_s2": 1e-3}
+        elif candidate.cause == "grasp_flex":
+            shape = {"relaxation_s": 0.02, "offset_m": 0.05}
+        else:
+            assert not rig.inexact(candidate).any()
+            continue
+        off = {"relaxation_s", "inertia_s2"}
+        wanted = [x if name in off else 0.0 for name, x in shape.items()]
+        np.testing.assert_array_equal(rig.inexact(candidate.in_shape(shape)), wanted)

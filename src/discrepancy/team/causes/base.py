@@ -49,6 +49,7 @@ class Cause(base.Cause):
         joints: those that it can sit at, from 1.
         shapes: alternatives of what changes the columns themselves; the first is the catalogue's.
         determined: numbers of the shape that the data determine, with what ``slope_step`` makes steps of.
+        inexact: those of them that what the law leaves out puts off by a share, as it does the size.
         clipped: the effect's parameters that are zero where the fit has them below.
         by_clocks: whether it shows in the robots' clocks alone, and so not where the motion set them.
         adjusted: whether it is a function of the readings, which are taken without their noise then.
@@ -58,6 +59,7 @@ class Cause(base.Cause):
     joints: ClassVar[tuple[int, ...]] = (1, 2, 3)
     shapes: ClassVar[tuple[Shape, ...]] = ({},)
     determined: ClassVar[Mapping[str, float]] = {}
+    inexact: ClassVar[tuple[str, ...]] = ()
     clipped: ClassVar[tuple[str, ...]] = ()
     by_clocks: ClassVar[bool] = False
     adjusted: ClassVar[bool] = False

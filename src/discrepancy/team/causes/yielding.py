@@ -24,6 +24,7 @@ class Yielding(Cause):
     positive = ("compliance_m_per_N",)
     shapes = tuple({"relaxation_s": time_s} for time_s in rules.RELAXATIONS_S)
     determined: ClassVar = {"relaxation_s": 0.1}
+    inexact = ("relaxation_s", "inertia_s2")
 
     def finer(self, shape):
         times_s = [shape["relaxation_s"] * share for share in rules.RELAXATION_FINER]
