@@ -67,7 +67,8 @@ def with_laws(
         left, least = always or unlisted >= rules.UNLISTED_NATS, rules.NAMED_NATS
         if not left and unlisted >= rules.DOUBT_NATS:
             places = located_in(searched, bench, say)
-            left, least = places[0].nats >= rules.UNLISTED_NATS, rules.UNLISTED_NATS
+            left = bool(places) and places[0].nats >= rules.UNLISTED_NATS
+            least = rules.UNLISTED_NATS
         # Beside what leaves as little as noise; in place of it only where that is unsure.
         replacing = bool(searched.best.free) and not turn and (instead or places is None)
         if not (instead and replacing) and (not left or len(searched.best.free) >= most):

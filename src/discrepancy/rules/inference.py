@@ -148,7 +148,7 @@ UNLISTED_NATS = 60.0
 """Of all such processes, from which what is left is not noise. Chosen."""
 DOUBT_NATS = 20.0
 """Of the same, from which it is looked whether one place explains it. Chosen: a third. Measured on tuning sets: six
-clean teams leave up to 28 and no place explains more than 14 nats of it; a play in an encoder of a team at ten times
+clean teams leave up to 34 and no place explains more than 14 nats of it; a play in an encoder of a team at ten times
 its tolerances left 50, and its place explained 909."""
 LAW_SHARE = 0.2
 """Standard deviation of what the law of a cause that is there leaves of its trace, in amplitude. Chosen."""
