@@ -44,6 +44,10 @@ class Form:
         """The joint from 0, the last where there is none."""
         return (self.joint or 7) - 1
 
+    def joint_of(self, spec: mujoco.MjSpec) -> mujoco.MjsJoint:
+        """The motor's joint there, whatever joints other forms have added."""
+        return spec.joint(f"joint{self.at + 1}")
+
     def change(self, spec: mujoco.MjSpec) -> None:
         """What MJCF can say."""
         if self.name in CHANGES:
@@ -69,14 +73,12 @@ class Form:
             self.size * way / np.linalg.norm(way) * (np.sin(np.pi * (t - start) / lasts) if inside else 0.0)
         )
 
-    def read(
-        self, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """What sensors make of positions and torques under the gears' loads, shape (n, 7) each."""
+    def read(self, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What sensors make of positions and torques, shape (n, 7) each."""
         if self.name not in READINGS:
             return q, torque
         q, torque = q.copy(), torque.copy()
-        READINGS[self.name](self, time, q, torque, load)
+        READINGS[self.name](self, time, q, torque)
         return q, torque
 
 
@@ -204,7 +206,7 @@ def _drag(form: Form, step_s: float) -> Torques:
 
 
 def _rotor(form: Form, spec: mujoco.MjSpec) -> None:
-    spec.joints[form.at].armature += form.size
+    form.joint_of(spec).armature += form.size
 
 
 def _load(form: Form, spec: mujoco.MjSpec) -> None:
@@ -226,7 +228,7 @@ def _tilt(form: Form, spec: mujoco.MjSpec) -> None:
 
 def _yielding(form: Form, spec: mujoco.MjSpec) -> None:
     """A spring between rotor and link, 5 ms of damping; the encoder sits at the motor, where the bearings rub."""
-    motor = spec.joints[form.at]
+    motor = form.joint_of(spec)
     bend = motor.parent.add_joint()
     bend.name = f"{BEND}{form.at + 1}"
     bend.type, bend.axis, bend.pos = motor.type, motor.axis, motor.pos
@@ -235,18 +237,18 @@ def _yielding(form: Form, spec: mujoco.MjSpec) -> None:
     bend.damping = [5e-3 / form.size, 0.0, 0.0]
 
 
-def _warm_offset(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
+def _warm_offset(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
     torque[:, form.at] += form.size * (1.0 - 0.2 * np.exp(-time / 15.0))
 
 
-def _gain(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
+def _gain(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
     """A torque constant, with iron that saturates a little."""
     own = torque[:, form.at]
     much = 3.0 * np.sqrt(np.mean(own**2))
     torque[:, form.at] = own + form.size * own / np.sqrt(1.0 + (own / much) ** 2)
 
 
-def _slow_torque(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
+def _slow_torque(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
     """Half of it a lag of first order, half of it transport."""
     from scipy.signal import lfilter
 
@@ -257,18 +259,18 @@ def _slow_torque(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray
     torque[:, form.at] = own[0] + lfilter([1.0 - keep], [1.0, -keep], own - own[0])
 
 
-def _zero(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
+def _zero(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
     """With the disc a little off its axis."""
     turned = 0.15 * np.sin(q[:, form.at] + form.rng.uniform(0.0, 2.0 * np.pi))
     q[:, form.at] += form.size * (1.0 + turned)
 
 
-def _weighing(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
+def _weighing(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
     """Of no cause: a torque sensor that reads some of its neighbour's."""
     torque[:, form.at] += form.size * torque[:, form.at - 1]
 
 
-def _disc(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray, load: np.ndarray) -> None:
+def _disc(form: Form, time: np.ndarray, q: np.ndarray, torque: np.ndarray) -> None:
     """Of no cause: an encoder's disc off its axis."""
     q[:, form.at] += form.size * np.sin(q[:, form.at] + form.rng.uniform(0.0, 2.0 * np.pi))
 

@@ -62,7 +62,6 @@ class Motion:
         q, dq, ddq: positions, velocities and accelerations of the joints (of a joint that bends, on the motor's side),
             shape (n, 7).
         torque: of the drives, shape (n, 7).
-        load: what of it goes through the gears to the links, rotors and friction left out, shape (n, 7).
     """
 
     time: np.ndarray
@@ -70,7 +69,6 @@ class Motion:
     dq: np.ndarray
     ddq: np.ndarray
     torque: np.ndarray
-    load: np.ndarray
 
 
 def model_spec() -> mujoco.MjSpec:
@@ -159,7 +157,7 @@ def moved(
     r, r1 = CENTRE + ease * x, ease * x1 + ease1 * x
     ahead = ease * x2 + 2.0 * ease1 * x1 + ease2 * x + 2.0 * BANDWIDTH_PER_S * r1 + BANDWIDTH_PER_S**2 * r
     data.qpos[motors] = r[0]
-    log, inertia = np.empty((5, steps // every, J)), np.zeros((model.nv, model.nv))
+    log, inertia = np.empty((4, steps // every, J)), np.zeros((model.nv, model.nv))
     all_move, square = model.nv == J, np.ix_(motors, motors)
     for k in range(steps):
         mujoco.mj_step1(model, data)
@@ -183,8 +181,6 @@ def moved(
         mujoco.mj_step2(model, data)
         if k % every == 0:
             log[2, here] = data.qacc[motors]
-            gone = data.qfrc_passive + data.qfrc_constraint - model.dof_armature * data.qacc
-            log[4, here] = (data.qfrc_applied + gone)[motors]
     if not np.isfinite(log).all() or np.abs(log[0] - CENTRE).max() > 2.0:
         raise RuntimeError("the arm did not stay near its reference")
     return Motion(np.arange(len(log[0])) / RATE_HZ, *log)

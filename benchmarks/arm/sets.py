@@ -134,7 +134,7 @@ def _read(
 ) -> tuple[np.ndarray, np.ndarray]:
     q, torque = motion.q + arm.zero, machine.late(motion.time, motion.torque * arm.scale, arm.delay_s)
     for form in forms:
-        q, torque = form.read(motion.time, q, torque, motion.load)
+        q, torque = form.read(motion.time, q, torque)
     return q, torque
 
 
