@@ -10,19 +10,9 @@ from discrepancy.team.candidates import in_shapes
 from discrepancy.team.causes import CAUSES
 from estimator.arm.delta import forward_kinematics
 from estimator.inertia import inertia_parameters
-from outside_wrench import check_wrench, motion_of, point, relieved, reported
+from outside_wrench import check_wrench, point, relieved, reported
 from recorded_team import COM, GRASPS, HOME, STEP_S
-from team_case import DESIGN, assert_close, exact, rate_of, residual_of
-
-
-@pytest.fixture(scope="module")
-def case():
-    return exact()
-
-
-@pytest.fixture(scope="module")
-def motion(case):
-    return motion_of(case)
+from team_case import DESIGN, assert_close, rate_of, residual_of
 
 
 @pytest.mark.parametrize("robot", [0, 1, 2])

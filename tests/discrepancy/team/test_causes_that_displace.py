@@ -15,13 +15,7 @@ from estimator.arm.delta import forward_kinematics, inverse_kinematics, jacobian
 from estimator.arm.dynamics import arm_torque
 from estimator.rigid_team.residual import balance
 from outside_wrench import reported
-from team_case import DESIGN, assert_close, exact, rate_of, residual_of
-
-
-@pytest.fixture(scope="module")
-def case():
-    return exact()
-
+from team_case import DESIGN, assert_close, rate_of, residual_of
 
 # Displaced frames: the payload moves as it does and feels the same forces; the robot's joints adapt.
 

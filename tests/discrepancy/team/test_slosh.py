@@ -8,9 +8,9 @@ from scipy.interpolate import make_interp_spline
 
 from discrepancy.causes.pendulum import Pendulum, swung
 from discrepancy.team.causes import CAUSES
-from outside_wrench import check_wrench, motion_of, point, reported
+from outside_wrench import check_wrench, point, reported
 from recorded_team import COM
-from team_case import DESIGN, exact
+from team_case import DESIGN
 
 MASS_KG, GRAVITY, STEP_S = 0.5, 9.81, 1e-3
 HEAVY = 1e6  # of what moves the payload: it goes its way, whatever hangs in it
@@ -115,16 +115,6 @@ def test_a_pendulum_swings_as_far_as_it_is_moved(moved_mps2, allowed, allowed_up
         (up, true[2], allowed_upwards),
     ):
         assert np.sqrt(np.mean((said - found) ** 2)) < most * np.sqrt(np.mean(found**2))
-
-
-@pytest.fixture(scope="module")
-def case():
-    return exact()
-
-
-@pytest.fixture(scope="module")
-def motion(case):
-    return motion_of(case)
 
 
 def turning(motion, time):
