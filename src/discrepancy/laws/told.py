@@ -22,6 +22,7 @@ class Beside:
         problem = fit.problem
         self._roots = [np.sqrt(weights).reshape(-1, 1) for weights in problem.weights]
         self._columns = np.append(fit.used, problem.width - 1)
+        self._models: dict[int, Array] = {}
 
     def rows(self, trial: int, columns: Array) -> Array:
         """Whitened columns (n, C, k) of one trial in the transform and over the noise, shape (n C, k)."""
@@ -31,9 +32,19 @@ class Beside:
     def edges(self, trial: int, rows: Array) -> tuple[Array, Array]:
         """Products of such rows with the model's columns, (used, k), and their score vector beside the fit, (k,)."""
         problem = self._fit.problem
-        weighted = (rows * self._roots[trial]).reshape(*problem.cells[trial].index.shape, -1)
-        edge = problem.products(trial, weighted)[self._columns]
+        if problem.columns[trial].is_single:  # too many to be held a second time
+            weighted = (rows * self._roots[trial]).reshape(*problem.cells[trial].index.shape, -1)
+            edge = problem.products(trial, weighted)[self._columns]
+        else:
+            edge = self._model(trial).T @ rows
         return edge[:-1], edge[-1] - self._fit.solution @ edge[:-1]
+
+    def _model(self, trial: int) -> Array:
+        """The model's columns and the residual as such rows, shape (n C, used + 1), made once."""
+        if trial not in self._models:
+            every = self._fit.problem.spectra_of(trial, slice(None)).reshape(len(self._roots[trial]), -1)
+            self._models[trial] = every[:, self._columns] * self._roots[trial]
+        return self._models[trial]
 
     def each(self, blocks: Sequence[Array], groups: Sequence[int]) -> list[tuple[Array, Array]]:
         """Information and score vector of every group of columns by itself.
