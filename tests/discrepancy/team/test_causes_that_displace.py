@@ -6,10 +6,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.signal import chirp
 from scipy.spatial.transform import Rotation
 
 from discrepancy.team.candidates import in_shapes, shape_steps
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes.yielding import lagging
 from discrepancy.team.linear.trial_linear import linearise
 from estimator.arm.delta import forward_kinematics, inverse_kinematics, jacobian, leg_geometry
 from estimator.arm.dynamics import arm_torque
@@ -110,9 +112,8 @@ def force_of(case, robot):
     return f, Rotation.from_euler("ZYX", case.signals.theta[:, robot]).apply(f)
 
 
-def following(case, force, relaxation_s, inertia_s2=0.0):
+def following(time, force, relaxation_s, inertia_s2=0.0):
     """Where a spring of 1 N/m beside a damper is under a force (Q, 3), at rest before: integrated step by step."""
-    time = case.signals.time
 
     def rate(t, x):
         left = [np.interp(t, time, f) for f in force.T] - x[:3]
@@ -125,6 +126,16 @@ def following(case, force, relaxation_s, inertia_s2=0.0):
     return solved.y.T[:, :3]
 
 
+@pytest.mark.parametrize(("relaxation_s", "inertia_s2"), [(0.03, 0.0), (0.06, 1e-3), (0.01, 4e-3)])
+def test_a_lag_follows_forces_as_fast_as_its_mass_swings(relaxation_s, inertia_s2):
+    """From 0.3 to 9 Hz: at 2.5 and 5 Hz the masses here swing by themselves."""
+    time = np.arange(0.0, 8.0, 0.01)
+    force = 3.0 + chirp(time[:, None] + [0.0, 0.3, 0.9], 0.3, 8.0, 9.0)
+    shape = {"relaxation_s": relaxation_s} | ({"inertia_s2": inertia_s2} if inertia_s2 else {})
+    expected = following(time, force, relaxation_s, inertia_s2)
+    np.testing.assert_allclose(lagging(force, 100.0, shape), expected, atol=5e-3)
+
+
 @pytest.mark.parametrize(("robot", "relaxation_s"), [(0, 0.03), (1, 0.03), (2, 0.2)])
 def test_grasp_flex(case, robot, relaxation_s):
     """The payload hangs back against the force on it, so the flange leads by compliance times force.
@@ -133,7 +144,7 @@ def test_grasp_flex(case, robot, relaxation_s):
     """
     c = 2e-6
     R = Rotation.from_euler("ZYX", case.signals.theta[:, robot])
-    signals = adapted(case, robot, c * R.apply(following(case, force_of(case, robot)[0], relaxation_s)))
+    signals = adapted(case, robot, c * R.apply(following(case.signals.time, force_of(case, robot)[0], relaxation_s)))
     column = CAUSES["grasp_flex"].columns(case.linear, robot, 0, {"relaxation_s": relaxation_s})
     check_pose(case, signals, column, [c, 0.0], 0.02)
 
@@ -143,7 +154,7 @@ def test_a_grasp_that_turns(case, robot, offset_m):
     """By turning times the moment of its force about a point beside the gimbal, which reads the flange's attitude."""
     turning, relaxation_s = 5e-4, 0.02
     R = Rotation.from_euler("ZYX", case.signals.theta[:, robot])
-    force = turning * R.apply(following(case, force_of(case, robot)[0], relaxation_s))
+    force = turning * R.apply(following(case.signals.time, force_of(case, robot)[0], relaxation_s))
     arm = R.apply([0.0, 0.0, -offset_m])  # from the point to where the force acts
     turned = Rotation.from_rotvec(-np.cross(arm, force))  # of the payload against the flange
     signals = adapted(case, robot, arm - turned.apply(arm))
@@ -208,7 +219,7 @@ def test_base_compliance(case, robot, relaxation_s, inertia_s2):
     moved = (DESIGN.wrist_mass_kg + 1.5 * DESIGN.rod_mass_kg) * legs.h
     moved = moved + (DESIGN.proximal_mass_kg * share + 0.5 * DESIGN.rod_mass_kg) * knees.sum(axis=1)
     on_base = -(force_of(case, robot)[1] + rate_of(rate_of(moved))) * [1.0, 1.0, 0.0]
-    signals = adapted(case, robot, -c * following(case, on_base, relaxation_s, inertia_s2))
+    signals = adapted(case, robot, -c * following(case.signals.time, on_base, relaxation_s, inertia_s2))
     shape = {"relaxation_s": relaxation_s} | ({"inertia_s2": inertia_s2} if inertia_s2 else {})
     column = CAUSES["base_compliance"].columns(case.linear, robot, 0, shape)
     # Twice differentiated, what the two know differently of the arm's own acceleration counts for more.
