@@ -229,6 +229,10 @@ def test_a_mass_is_right_in_its_trials_and_at_its_size():
     assert scored(leak, **drift).scores[0].error == pytest.approx(0.1)
     assert scored(leak, **drift).whole
     assert not scored(put_on, **drift).whole
+    effect = _effect("payload_mass", None, None, **put_on.known(), point_x_m=0.3)
+    away = _result([effect], [_named("payload_mass", None, None, **named, point_x_m=(0.1, 0.1))])
+    assert score(away).scores[0].error == pytest.approx(0.05)
+    assert score(away).scores[0].deviations == pytest.approx((1.0, -2.0))
 
 
 def test_of_two_effects_each_gets_its_own_and_a_stranger_is_an_extra():
