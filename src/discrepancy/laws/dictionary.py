@@ -25,6 +25,7 @@ PLAIN: dict[Kind, tuple[str, ...]] = {
     "velocity": ("linear", "signed_square", "absolute"),
     "tilt": ("linear",),
     "direction": (),
+    "vector": ("linear",),
 }
 """Functions without a number inside, by kind of signal."""
 
@@ -40,7 +41,10 @@ def terms_at(place: Place, variables: Sequence[Variable], spread: Callable[[Vari
     out = [Term("constant", TIME)] if not place.offset else []
     out += of_time()
     for variable in place.own:
-        out += of_own(variable, spread(variable))
+        if not variable.parts:
+            out += of_own(variable, spread(variable))
+        elif not place.units:  # otherwise its components are not one vector
+            out += of_vector(variable)
     torques = [v for v in place.own if v.kind == "torque"]
     for torque in torques:
         out += [Term("warming", TIME, {"time_s": t}, torque) for t in rules.LAW_WARMING_S]
@@ -103,14 +107,25 @@ def of_own(variable: Variable, values: Array) -> list[Term]:
         out += [Term(side, variable, {"knee": 0.0}) for side in ("above", "below")]
         out.append(Term("sign", variable, {"slow": variable.slow}))
     if variable.kind in ("acceleration", "tilt"):
-        out += [
-            Term("second_order", variable, {"frequency_hz": f, "damping": zeta})
-            for f in rules.LAW_RESONANCE_HZ
-            for zeta in rules.LAW_DAMPING
-        ]
+        out += on_springs(variable)
     if high > low and variable.kind != "direction":
         out.append(Term("spline", variable, knots_of(low, high)))
     return out
+
+
+def of_vector(variable: Variable) -> list[Term]:
+    """Functions of all components of a signal, in whatever direction each of them acts."""
+    plain = [Term(name, variable) for name in PLAIN["vector"]]
+    return plain + (on_springs(variable) if variable.parts[0].kind == "acceleration" else [])
+
+
+def on_springs(variable: Variable) -> list[Term]:
+    """What follows a signal on springs."""
+    return [
+        Term("second_order", variable, {"frequency_hz": f, "damping": zeta})
+        for f in rules.LAW_RESONANCE_HZ
+        for zeta in rules.LAW_DAMPING
+    ]
 
 
 def hums(frequencies_hz: Iterable[float]) -> list[Term]:

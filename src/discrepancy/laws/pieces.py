@@ -62,4 +62,5 @@ def _of_component(candidate: LawCandidate, target: str, columns: Array) -> Itera
             yield Piece(target, name, of, float(x), low + k * step, step, 0.0, times)
     else:
         number, second = [*inside, 0.0, 0.0][:2]
-        yield Piece(target, term.function, of, float(columns[0]), number, second, 0.0, times)
+        for part, x in zip(term.of.each, columns, strict=True):
+            yield Piece(target, term.function, part.name, float(x), number, second, 0.0, times)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from discrepancy.laws.functions import FUNCTIONS, Function
 from discrepancy.laws.variable import Variable
 from estimator.arrays import Array
@@ -32,13 +34,14 @@ class Term:
         return FUNCTIONS[self.function]
 
     def values(self, signal: Callable[[Variable], Array], rate_hz: float) -> Array:
-        """Values in one trial, shape (Q, k): one amplitude each.
+        """Values in one trial, shape (Q, k): one amplitude each; of a vector those of one component after the other.
 
         Args:
             signal: values of a variable in that trial, shape (Q,).
             rate_hz: their rate.
         """
-        out = self.law.of(signal(self.of), rate_hz, self.numbers)
+        each = [self.law.of(signal(part), rate_hz, self.numbers) for part in self.of.each]
+        out = np.concatenate(each, axis=1)
         return out if self.times is None else out * signal(self.times)[:, None]
 
     @property

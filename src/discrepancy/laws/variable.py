@@ -8,8 +8,8 @@ from typing import Literal
 from discrepancy import rules
 
 Kind = Literal[
-    "time", "angle", "travel", "rate", "acceleration", "torque", "direction", "position", "velocity", "tilt"
-]
+    "time", "angle", "travel", "rate", "acceleration", "torque", "direction", "position", "velocity", "tilt", "vector"
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -25,6 +25,7 @@ class Variable:
         slow: of a rate, below which its direction fades [``unit``].
         wave: of an angle or a travel, by which the phase of its slowest sine grows [rad per ``unit``]: once a turn, or
             once over the whole way.
+        parts: of a vector, its components; a law by all of them has no direction that was chosen beforehand.
     """
 
     name: str
@@ -34,6 +35,17 @@ class Variable:
     kind: Kind
     slow: float = rules.LAW_SLOW_RAD_PER_S
     wave: float = 1.0
+    parts: tuple[Variable, ...] = ()
+
+    @property
+    def each(self) -> tuple[Variable, ...]:
+        """Its components, or itself."""
+        return self.parts or (self,)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """Of a vector, what its components' names end with."""
+        return tuple(part.name.removeprefix(f"{self.name}_") for part in self.parts)
 
 
 TIME = Variable("time", "time", "t", "s", "time")

@@ -75,7 +75,7 @@ def test_amplitude_times_function_is_an_error_of_the_place(place):
         amplitudes = [1.0] * len(law.parameters)
         units = units_of(law, physical(law, np.array(amplitudes), term.numbers))
         for k, axis in enumerate(place.axes):
-            end = f"_{axis.replace(' ', '_')}" if axis else ""
+            end = f"_{axis.replace(' ', '_')}" if axis and not term.of.parts else ""
             error = place.units[k] if place.units else place.unit
             first = units.get(f"amplitude{end}", units.get(f"at_knot_1{end}"))
             function = [(term.of.unit, OWN.get(term.function, 0)), ("s", -1 if term.function == "lag" else 0)]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping
+
 from discrepancy.laws.candidate import LawCandidate
 
 _BY_FORM: dict[tuple[str, str, str], str] = {
@@ -105,9 +108,19 @@ _TELLS = {
 }
 
 
-def guess(candidate: LawCandidate) -> str:
-    """A physical reading of a law, or nothing where none is known."""
-    return _BY_FORM.get((candidate.at.name, candidate.term.function, _relation(candidate)), "")
+def guess(candidate: LawCandidate, values: Mapping[str, float]) -> str:
+    """A physical reading of a law, or nothing where none is known.
+
+    Args:
+        candidate: the law.
+        values: of ``numbers.report``.
+    """
+    term = candidate.term
+    known = _BY_FORM.get((candidate.at.name, term.function, _relation(candidate)), "")
+    if (candidate.at.name, term.function) == ("payload centre", "second_order") and term.of.parts:
+        # Under one m/s^2 a mass on a spring shifts by 1 / omega^2.
+        known += f", of {values['amplitude'] * (2.0 * math.pi * term.numbers['frequency_hz']) ** 2:.2g} kg"
+    return known
 
 
 def experiment(place: str) -> str:

@@ -36,6 +36,8 @@ def physical(candidate: LawCandidate, values: Array, numbers: Mapping[str, float
         numbers: inside the function.
     """
     out: dict[str, float] = {}
+    if candidate.term.of.parts:
+        return _of_vector(candidate, values) | {name: float(x) for name, x in numbers.items()}
     for axis, part in zip(candidate.at.axes, parts_of(candidate, values), strict=True):
         end = f"_{axis.replace(' ', '_')}" if axis else ""
         columns = part["columns"]
@@ -49,6 +51,19 @@ def physical(candidate: LawCandidate, values: Array, numbers: Mapping[str, float
         if len(part["offset"]):
             out[f"offset{end}"] = float(part["offset"][0])
     return out | {name: float(x) for name, x in numbers.items()}
+
+
+def _of_vector(candidate: LawCandidate, values: Array) -> dict[str, float]:
+    """By singular values: in which direction the error is largest, of the signal in which direction, and the next."""
+    matrix = np.stack([part["columns"] for part in parts_of(candidate, values)])
+    left, sizes, right = np.linalg.svd(matrix)
+    sign = np.sign(right[0, np.argmax(np.abs(right[0]))])
+    out = {"amplitude": float(sizes[0])}
+    for name, axes, vector in (
+        ("along", candidate.at.axes, left[:, 0]), ("by", candidate.term.of.axes, right[0])
+    ):  # fmt: skip
+        out |= {f"{name}_{axis}": float(sign * x) for axis, x in zip(axes, vector, strict=True)}
+    return out | {"beside": float(sizes[1])}
 
 
 def report(

@@ -35,7 +35,7 @@ def sentence(candidate: LawCandidate, values: Mapping[str, float], se: Mapping[s
         )
     else:
         said = f"{lead} is off by {_formula(candidate, values, se)}{_where(candidate)}"
-    because = guess(candidate)
+    because = guess(candidate, values)
     return f"{said}. A guess: {because}." if because else f"{said}."
 
 
@@ -46,6 +46,8 @@ def _is_share(candidate: LawCandidate) -> bool:
 
 
 def _formula(candidate: LawCandidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
+    if candidate.term.of.parts:
+        return _by_vector(candidate, values, se)
     ends = [f"_{axis.replace(' ', '_')}" if axis else "" for axis in candidate.at.axes]
     sizes = [_amplitude(candidate, values, se, end) for end in ends]
     if len(ends) == 1:
@@ -56,6 +58,17 @@ def _formula(candidate: LawCandidate, values: Mapping[str, float], se: Mapping[s
     strongest = max(ends, key=lambda end: abs(values[f"amplitude{end}"]))
     inside = _inside(candidate, _phase(values, strongest), se)
     return f"({', '.join(told)}) {inside}".strip()
+
+
+def _by_vector(candidate: LawCandidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
+    """The largest error and its direction, of the signal in its own, and how much there is across."""
+    along, by = (
+        ", ".join(f"{values[f'{name}_{axis}']:.2f}" for axis in axes)
+        for name, axes in (("along", candidate.at.axes), ("by", candidate.term.of.axes))
+    )
+    inside = _inside(candidate, "", se, f"{candidate.term.of.symbol} along ({by})")
+    across = 100.0 * abs(values["beside"]) / (abs(values["amplitude"]) or 1.0)
+    return f"{_amplitude(candidate, values, se, '')} along ({along}) {inside}, across by {across:.0f} % of it"
 
 
 def _amplitude(
@@ -71,9 +84,9 @@ def _phase(values: Mapping[str, float], end: str) -> str:
     return "" if phase is None else f"{'+' if phase >= 0 else '-'} {abs(phase):.2f}"
 
 
-def _inside(candidate: LawCandidate, phase: str, se: Mapping[str, float]) -> str:
+def _inside(candidate: LawCandidate, phase: str, se: Mapping[str, float], of: str = "") -> str:
     term = candidate.term
-    x, n = term.of.symbol, dict(term.numbers)
+    x, n = of or term.of.symbol, dict(term.numbers)
     number_ = {name: number(value, se.get(name), "") for name, value in n.items()}
     text = {
         "constant": "", "linear": x, "square": f"{x}^2", "cube": f"{x}^3", "absolute": f"|{x}|",

@@ -9,6 +9,7 @@ import numpy as np
 
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate
+from discrepancy.laws.said.numbers import physical
 from discrepancy.laws.where import Located
 from estimator.arrays import Array
 
@@ -47,7 +48,10 @@ def traces_of(
         zip(found.knots_s, found.errors, found.se, laws, strict=True)
     ):
         time = np.arange(bench.length(trial)) / bench.rate_hz(trial)
-        signal, rows = np.interp(knots, time, bench.signal(trial, candidate.term.of)), bench.row_times(trial)
+        signal, rows = (
+            np.interp(knots, time, _signal(bench, trial, candidate, values)),
+            bench.row_times(trial),
+        )
         seen = (knots >= rows.min()) & (knots <= rows.max())  # of the rest nothing is known
         out.append(
             {
@@ -59,6 +63,18 @@ def traces_of(
             }
         )
     return out
+
+
+def _signal(bench: Bench, trial: int, candidate: LawCandidate, values: Array) -> Array:
+    """What the law is a function of, shape (Q,); of a vector along the direction that counts most."""
+    of = candidate.term.of
+    if not of.parts:
+        return bench.signal(trial, of)
+    now = physical(candidate, values, candidate.term.numbers)
+    return np.sum(
+        [now[f"by_{axis}"] * bench.signal(trial, part) for axis, part in zip(of.axes, of.parts, strict=True)],
+        axis=0,
+    )
 
 
 def places_to_dict(located: Sequence[Located], most: int) -> list[dict[str, Any]]:

@@ -28,6 +28,8 @@ def _unit(candidate: LawCandidate, name: str) -> str:
     if name.startswith("phase_rad"):
         return "rad"
     place = candidate.at
+    if candidate.term.of.parts:
+        return "" if name.startswith(("along_", "by_")) else amplitude(place.unit, candidate)
     ends = [axis.replace(" ", "_") for axis in place.axes]
     own = next((k for k, end in enumerate(ends) if end and name.endswith(f"_{end}")), 0)
     unit = place.units[own] if place.units else place.unit

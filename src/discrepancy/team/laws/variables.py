@@ -46,6 +46,14 @@ def payload_variable(name: str, axis: str) -> Variable:
     return Variable(f"{name}_{axis}", words.format(axis=axis), f"{symbol}_{axis}", unit, kind)
 
 
+def payload_vector(name: str) -> Variable:
+    """All components of such a signal."""
+    words, symbol, unit, _ = _PAYLOAD[name]
+    said = words.partition(" along ")[0].rstrip(",")
+    parts = tuple(payload_variable(name, axis) for axis in "xyz")
+    return Variable(name, said, symbol, unit, "vector", parts=parts)
+
+
 def variables_of(robots: int) -> list[Variable]:
     """All signals of N robots and their payload."""
     each = [joint_variable(n, i + 1, j) for n in _JOINTS for i in range(robots) for j in (1, 2, 3)]
