@@ -66,7 +66,8 @@ def candidate_of(place: Place, term: Term, scale: float, among: int) -> LawCandi
     """
     count = rules.LAW_KNOTS if term.function == "spline" else 2 if term.function in ("sine", "hum") else 1
     parts = ["amplitude"] if count == 1 else [f"amplitude_{k + 1}" for k in range(count)]
-    parts = [f"amplitude_by_{axis}" for axis in term.of.axes] or parts
+    if term.of.parts:
+        parts = [f"amplitude_by_{part.name}" for part in term.of.each]
     if place.offset and term.function not in ("constant", "spline"):
         parts.append("offset")
     names = [f"{part}_{axis}".strip("_").replace(" ", "_") for part in parts for axis in place.axes]

@@ -26,6 +26,7 @@ class Variable:
         wave: of an angle or a travel, by which the phase of its slowest sine grows [rad per ``unit``]: once a turn, or
             once over the whole way.
         parts: of a vector, its components; a law by all of them has no direction that was chosen beforehand.
+        turns: of what is felt at the origin, the turn accelerations that change it elsewhere, component by component.
     """
 
     name: str
@@ -36,11 +37,12 @@ class Variable:
     slow: float = rules.LAW_SLOW_RAD_PER_S
     wave: float = 1.0
     parts: tuple[Variable, ...] = ()
+    turns: tuple[Variable, ...] = ()
 
     @property
     def each(self) -> tuple[Variable, ...]:
         """Its components, or itself."""
-        return self.parts or (self,)
+        return (*self.parts, *self.turns) or (self,)
 
     @property
     def axes(self) -> tuple[str, ...]:

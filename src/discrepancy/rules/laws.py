@@ -58,3 +58,6 @@ LAW_CAUSES = 2
 """Causes of the catalogue that are looked for at most after each law. Chosen: what was missed without it is little."""
 LAW_RIVALS = 6
 """Other laws that are kept as rivals of one, the likeliest. Chosen: what comes after has no part in a probability."""
+
+LAW_SHOWS = 1e-3
+"""Share of a vector law's largest size below which what it does in another direction is not simulated. Chosen."""

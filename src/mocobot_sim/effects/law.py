@@ -26,7 +26,8 @@ class Law(Effect):
     the payload's (``payload_force_x`` in robot 1's {b}, ``payload_moment_x``, ``payload_mass``,
     ``payload_first_moment_x``, ``payload_spin_x`` in {1}). ``of`` and ``times`` are signals: ``time``, ``phi_2_1``,
     ``phi_rate_2_1``, ``phi_acceleration_2_1``, the same of ``theta``, ``tau_2_1``, ``payload_position_x`` (and
-    ``velocity``, ``acceleration``, ``felt``, ``rate``, ``up``). All in SI; readings are as seen.
+    ``velocity``, ``acceleration``, ``felt``, ``rate``, ``turn``, which is an acceleration, ``up``). All in SI; readings
+    are as seen. A sum of signals is one, too: ``0.6*payload_felt_x + -0.8*payload_felt_y``.
 
     ``number``, ``second`` and ``phase_rad`` are what the function has inside: a knee, the periods a turn of a sine, a
     time constant, half the width of a play (docs/diagnosis/laws.md).
@@ -83,8 +84,6 @@ class Law(Effect):
         for robot in targets.robots_in(self.target, self.of, self.times):
             if robot > scene.robots:
                 raise InputError(f"law: there is no robot {robot}; the team has robots 1 .. {scene.robots}")
-        if not scene.carries and any(
-            name.startswith("payload") for name in (self.target, self.of, self.times)
-        ):
+        if not scene.carries and targets.is_about_payload(self.target, self.of, self.times):
             raise InputError("law: it is about a payload; robots of a free trial hold nothing")
         return targets.with_slide(scene, self.target)

@@ -13,7 +13,7 @@ from mocobot_sim.effects.base_creep import ARMATURE_KG, DAMPING_NS_PER_M, TOLERA
 from mocobot_sim.effects.slides import add_slides, grasp_body, level_slides, widened
 from mocobot_sim.effects.solver import precise
 from mocobot_sim.laws.functions import Step
-from mocobot_sim.laws.signals import Signals, is_signal, robot_of
+from mocobot_sim.laws.signals import Signals, cross, is_signal, parts_of, robots_of
 from mocobot_sim.trial.actors import Stage
 from mocobot_sim.trial.readings import RobotReadings
 
@@ -64,8 +64,7 @@ class Acts:
 
     def start(self, stage: Stage) -> None:
         """Find signals and target."""
-        names = [name for name in (self.of, self.times) if name]
-        payload = any(name.startswith("payload") for name in (*names, self.target))
+        payload = is_about_payload(self.target, self.of, self.times)
         self._signals = Signals(stage, carries=payload)
         self._x = self._signals.of(self.of)
         self._y = self._signals.of(self.times) if self.times else None
@@ -113,32 +112,30 @@ class Acts:
             # MuJoCo takes them at the centre of mass.
             com = self._signals.motion.com
             data.xfrc_applied[body, :3] += R @ force
-            data.xfrc_applied[body, 3:] += R @ (moment - np.cross(com, force))
+            data.xfrc_applied[body, 3:] += R @ (moment - cross(com, force))
 
     def _on_payload(self, value: float) -> tuple[np.ndarray, np.ndarray]:
         """Force and moment at the origin of {1}, in {1}."""
         motion, kind, none = self._signals.motion, self.target.removeprefix("payload_"), np.zeros(3)
         felt = motion.felt
         if kind == "mass":
-            lever = np.cross(motion.alpha, motion.com) + np.cross(
-                motion.omega, np.cross(motion.omega, motion.com)
-            )
-            return -value * (felt + lever), -value * np.cross(motion.com, felt + lever)
+            lever = cross(motion.alpha, motion.com) + cross(motion.omega, cross(motion.omega, motion.com))
+            return -value * (felt + lever), -value * cross(motion.com, felt + lever)
         kind, axis = kind.rsplit("_", 1)
         unit = value * np.eye(3)["xyz".index(axis)]
         if kind in ("force", "moment"):
             along = motion.R.T @ (motion.R_Wb1 @ unit)
-            return (along, np.cross(motion.com, along)) if kind == "force" else (none, along)
+            return (along, cross(motion.com, along)) if kind == "force" else (none, along)
         if kind == "spin":
-            return none, -np.cross(motion.omega, unit)
+            return none, -cross(motion.omega, unit)
         self._last = [*self._last[-2:], value]
         rates = np.diff(self._last) / self._dt
         axis_unit = np.eye(3)["xyz".index(axis)]
         rate = axis_unit * (rates[-1] if len(rates) else 0.0)
         change = axis_unit * ((rates[-1] - rates[-2]) / self._dt if len(rates) > 1 else 0.0)
-        inner = np.cross(motion.alpha, unit) + np.cross(motion.omega, np.cross(motion.omega, unit))
-        force = -(inner + 2.0 * np.cross(motion.omega, rate) + change)
-        return force, -np.cross(unit, felt) - np.cross(motion.com, change)
+        inner = cross(motion.alpha, unit) + cross(motion.omega, cross(motion.omega, unit))
+        force = -(inner + 2.0 * cross(motion.omega, rate) + change)
+        return force, -cross(unit, felt) - cross(motion.com, change)
 
 
 def joint_dofs(stage: Stage, target: str) -> list[int]:
@@ -175,5 +172,14 @@ def with_slide(scene: TeamScene, target: str) -> TeamScene:
 
 def robots_in(*names: str) -> list[int]:
     """Robots that targets and signals name."""
-    found = [target_robot(name) if not is_signal(name) else robot_of(name) for name in names if name]
-    return [robot for robot in found if robot is not None]
+    targets = (target_robot(name) for name in names if name and not is_signal(name))
+    return [
+        *(robot for robot in targets if robot is not None),
+        *(i for name in names for i in robots_of(name)),
+    ]
+
+
+def is_about_payload(*names: str) -> bool:
+    """Whether targets and signals name the payload."""
+    each = (part for name in names for part in (name, *(one for _, one in parts_of(name))))
+    return any(one.startswith("payload") for one in each)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from estimator.arrays import Array
@@ -26,6 +26,7 @@ class Stage:
         rate_hz: control rate [Hz].
         ticks: control ticks per logged sample.
         duration: control ticks of the whole trial.
+        shared: by name, what several actors keep of the trial together.
     """
 
     model: mujoco.MjModel
@@ -35,6 +36,7 @@ class Stage:
     rate_hz: float
     ticks: int
     duration: int
+    shared: dict[str, object] = field(default_factory=dict)
 
 
 class Actor(Protocol):

@@ -3,7 +3,11 @@
 import numpy as np
 import pytest
 
+from discrepancy.laws.candidate import candidate_of
+from discrepancy.laws.term import Term
+from discrepancy.team.laws.effects import effects_of
 from discrepancy.team.laws.places import twin_of
+from discrepancy.team.laws.variables import payload_felt
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import exact_residual
 from discrepancy.team.rig import TeamRig
@@ -55,3 +59,26 @@ def test_simulator_and_diagnosis_mean_the_same_error(rig, target):
     assert np.sum(column * change) / np.sum(column**2) == pytest.approx(1.0, abs=0.01)
     # Robot 1 holds the payload without a weld: the others' bend by 6 urad under the gimbal's 0.3 N m.
     assert np.linalg.norm(change - column) < 0.05 * np.linalg.norm(column)
+
+
+def test_a_load_on_a_spring_is_simulated_as_it_is_diagnosed(rig):
+    """By what is felt where it sits, beside robot 1's grasp: from the payload's turn acceleration, too."""
+    linear, bench = rig.linear[0], rig.bench
+    (place,) = (place for place in bench.places if place.name == "payload centre")
+    inside = {"frequency_hz": 1.2, "damping": 0.5}
+    law = candidate_of(place, Term("second_order", payload_felt(), inside), 1.0, 1)
+    along, point = np.array([0.6, -0.8, 0.0]), np.array([1.0, 0.8, 0.3])
+    drive = np.concatenate([along, np.cross(point, along)])
+    values = -5e-3 * np.outer(drive, along).ravel()
+    with_load = recorded(*effects_of(law, values))
+    moved = exact_residual(Signals.of(with_load), linear.shared, linear.bases, linear.arms, linear.reduction)
+    # The load moves the payload, and what it feels by that.
+    other = TeamRig.of([with_load], estimate_payload([with_load]), read_tolerances(None)).bench
+    columns = bench.white(0, bench.moved(0, bench.directions(0, place), other.values(0, law)))
+    column = columns @ values
+    change = bench.white(0, (moved - linear.residual)[..., None])[..., 0]
+    assert np.sum(column * change) / np.sum(column**2) == pytest.approx(1.0, abs=0.01)
+    assert np.linalg.norm(change - column) < 0.05 * np.linalg.norm(column)
+    turned = np.arange(9, 18)
+    alone = columns[..., turned] @ values[turned]
+    assert np.linalg.norm(alone) > 0.1 * np.linalg.norm(column), "the test would not see a turn"

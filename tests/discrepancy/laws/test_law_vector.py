@@ -12,32 +12,51 @@ from discrepancy.laws.said.numbers import physical, report
 from discrepancy.laws.said.sentence import sentence
 from discrepancy.laws.term import Term
 from discrepancy.team.laws.places import places_of
-from discrepancy.team.laws.variables import payload_vector, variables_of
+from discrepancy.team.laws.variables import payload_felt, variables_of
 from mocobot_sim.laws.functions import FUNCTIONS, Inside
 
 RATE_HZ, LOAD_KG, SPRING_HZ, DAMPING = 100.0, 0.45, 1.3, 0.7
 ALONG = np.array([0.6, -0.7, np.sqrt(1.0 - 0.36 - 0.49)])
+POINT = np.array([0.3, 0.5, -0.1])
 CENTRE = next(place for place in places_of(1) if place.name == "payload centre")
 INSIDE = {"frequency_hz": SPRING_HZ, "damping": DAMPING}
 
 
 @pytest.fixture(scope="module")
-def felt():
-    """At rest before, then shaken up to 3 Hz."""
+def signals():
+    """At rest before, then shaken and turned up to 3 Hz; at the origin of {1}, by name."""
     t = np.arange(0.0, 12.0, 1.0 / RATE_HZ)
-    shaken = chirp(t[:, None] + [0.0, 0.4, 0.9], 0.2, 12.0, 3.0) * [0.7, 0.4, 0.2]
-    return np.array([0.3, -0.2, 9.8]) + np.minimum(t, 1.0)[:, None] * shaken
+    shaken = chirp(t[:, None] + [0.0, 0.4, 0.9, 1.7, 2.6, 3.1], 0.2, 12.0, 3.0) * [
+        0.7,
+        0.4,
+        0.2,
+        0.8,
+        0.5,
+        0.6,
+    ]
+    both = np.array([0.3, -0.2, 9.8, 0.0, 0.0, 0.0]) + np.minimum(t, 1.0)[:, None] * shaken
+    names = [f"payload_{kind}_{axis}" for kind in ("felt", "turn") for axis in "xyz"]
+    return dict(zip(names, both.T, strict=True))
 
 
 @pytest.fixture(scope="module")
 def law():
-    return candidate_of(CENTRE, Term("second_order", payload_vector("payload_felt"), INSIDE), 1.0, 1)
+    return candidate_of(CENTRE, Term("second_order", payload_felt(), INSIDE), 1.0, 1)
 
 
-def shifted(felt):
-    """First moment of the load on its spring, integrated: it falls back behind what is felt."""
+@pytest.fixture(scope="module")
+def columns(law, signals):
+    return law.term.values(lambda variable: signals[variable.name], RATE_HZ)
+
+
+@pytest.fixture(scope="module")
+def shifted(signals):
+    """First moment of the load on its spring, integrated: it falls back behind what is felt where it sits."""
+    felt, turn = (
+        np.stack([signals[f"payload_{kind}_{axis}"] for axis in "xyz"], axis=1) for kind in ("felt", "turn")
+    )
     time, omega = np.arange(len(felt)) / RATE_HZ, 2.0 * np.pi * SPRING_HZ
-    drive = -felt @ ALONG
+    drive = -(felt + np.cross(turn, POINT)) @ ALONG
 
     def rate(t, x):
         return [x[1], np.interp(t, time, drive) - 2.0 * DAMPING * omega * x[1] - omega**2 * x[0]]
@@ -49,27 +68,27 @@ def shifted(felt):
 
 
 @pytest.fixture(scope="module")
-def values(law, felt):
+def values(columns, shifted):
     """As they come out of least squares over the three components of the error."""
-    columns = law.term.values(lambda variable: felt[:, "xyz".index(variable.name[-1])], RATE_HZ)
-    return np.linalg.lstsq(columns, shifted(felt), rcond=None)[0].ravel()
+    return np.linalg.lstsq(columns, shifted, rcond=None)[0].ravel()
 
 
-def test_a_load_on_a_spring_is_such_a_law(law, felt, values):
-    columns = law.term.values(lambda variable: felt[:, "xyz".index(variable.name[-1])], RATE_HZ)
-    wanted = shifted(felt)
-    np.testing.assert_allclose(columns @ values.reshape(-1, 3), wanted, atol=2e-3 * np.abs(wanted).max())
+def test_a_load_on_a_spring_is_such_a_law(columns, shifted, values):
+    np.testing.assert_allclose(columns @ values.reshape(-1, 3), shifted, atol=2e-3 * np.abs(shifted).max())
 
 
-def test_its_numbers_are_direction_and_size_of_the_load(law, values):
+def test_its_numbers_are_direction_size_and_place_of_the_load(law, values):
     names = [p.name for p in law.parameters]
-    assert names[:4] == ["amplitude_by_x_x", "amplitude_by_x_y", "amplitude_by_x_z", "amplitude_by_y_x"]
+    assert names[:2] == ["amplitude_by_payload_felt_x_x", "amplitude_by_payload_felt_x_y"]
+    assert names[-1] == "amplitude_by_payload_turn_z_z"
     found = physical(law, values, law.term.numbers)
     assert found["amplitude"] == pytest.approx(LOAD_KG / (2.0 * np.pi * SPRING_HZ) ** 2, rel=0.01)
     assert found["beside"] == pytest.approx(0.0, abs=0.01 * found["amplitude"])
     by = np.array([found[f"by_{axis}"] for axis in "xyz"])
     np.testing.assert_allclose(by, -ALONG, atol=0.01)  # the largest component is positive
     np.testing.assert_allclose([found[f"along_{axis}"] for axis in "xyz"], -by, atol=0.01)
+    across = POINT - ALONG * (ALONG @ POINT)  # along its way it may sit anywhere
+    np.testing.assert_allclose([found[f"lever_{axis}"] for axis in "xyz"], across, atol=0.01)
     assert {name: found[name] for name in INSIDE} == INSIDE
 
 
@@ -82,24 +101,25 @@ def test_it_is_said(law, values):
 
 
 def test_its_errors_are_those_of_many_noisy_ones(law, values):
-    """Of amplitude and directions, by Monte Carlo."""
-    rng = np.random.default_rng(5)
-    root = 2e-5 * rng.standard_normal((9, 9))
-    padded = np.zeros((9 + len(law.term.law.fitted),) * 2)
-    padded[:9, :9] = root @ root.T
+    """Of amplitude, directions and place, by Monte Carlo."""
+    rng, count = np.random.default_rng(5), len(values)
+    root = 2e-5 * rng.standard_normal((count, count))
+    padded = np.zeros((count + len(law.term.law.fitted),) * 2)
+    padded[:count, :count] = root @ root.T
     se = report(law, values, padded)[1]
-    drawn = [physical(law, values + root @ rng.standard_normal(9), law.term.numbers) for _ in range(4000)]
-    for name in ("amplitude", "along_x", "along_z", "by_y"):
+    drawn = [physical(law, values + root @ rng.standard_normal(count), law.term.numbers) for _ in range(4000)]
+    for name in ("amplitude", "along_x", "along_z", "by_y", "lever_x"):
         assert np.std([one[name] for one in drawn]) == pytest.approx(se[name], rel=0.08)
 
 
-def test_the_simulator_adds_up_the_same(law, felt, values):
-    columns = law.term.values(lambda variable: felt[:, "xyz".index(variable.name[-1])], RATE_HZ)
-    added = {target: np.zeros(len(felt)) for target in CENTRE.targets}
+def test_the_simulator_adds_up_the_same(law, signals, columns, values):
+    added = {target: 0.0 for target in CENTRE.targets}
     for piece in pieces_of(law, values):
         step = FUNCTIONS[piece.function](Inside(piece.number, piece.second, piece.phase_rad, 1.0 / RATE_HZ))
-        signal = felt[:, "xyz".index(piece.of.removeprefix("payload_felt_"))]
-        added[piece.target] += piece.amplitude * np.array([step(x) for x in signal])
+        parts = (part.split("*") for part in piece.of.split(" + "))
+        of = sum(float(factor) * signals[name] for factor, name in parts)
+        added[piece.target] += piece.amplitude * np.array([step(x) for x in of])
+    assert len(pieces_of(law, values)) == 3, "one direction of the error, of one sum of signals"
     wanted = columns @ values.reshape(-1, 3)
     simulated = np.stack(list(added.values()), axis=1)
     np.testing.assert_allclose(simulated, wanted, atol=0.03 * np.abs(wanted).max())
@@ -110,4 +130,4 @@ def test_where_it_is_tried():
     for place in places_of(1):
         terms = terms_at(place, variables_of(1), lambda variable: np.linspace(-1.0, 1.0, 50))
         tried = {term.function for term in terms if term.of.parts}
-        assert tried == ({"linear", "second_order"} if place is CENTRE or place == CENTRE else set())
+        assert tried == ({"linear", "second_order"} if place == CENTRE else set())

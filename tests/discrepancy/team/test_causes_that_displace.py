@@ -144,7 +144,9 @@ def test_grasp_flex(case, robot, relaxation_s):
     """
     c = 2e-6
     R = Rotation.from_euler("ZYX", case.signals.theta[:, robot])
-    signals = adapted(case, robot, c * R.apply(following(case.signals.time, force_of(case, robot)[0], relaxation_s)))
+    signals = adapted(
+        case, robot, c * R.apply(following(case.signals.time, force_of(case, robot)[0], relaxation_s))
+    )
     column = CAUSES["grasp_flex"].columns(case.linear, robot, 0, {"relaxation_s": relaxation_s})
     check_pose(case, signals, column, [c, 0.0], 0.02)
 

@@ -54,15 +54,22 @@ def physical(candidate: LawCandidate, values: Array, numbers: Mapping[str, float
 
 
 def _of_vector(candidate: LawCandidate, values: Array) -> dict[str, float]:
-    """By singular values: in which direction the error is largest, of the signal in which direction, and the next."""
+    """By singular values: in which direction the error is largest, of the signal in which direction, and the next.
+
+    What sits at p feels f + alpha x p, and n . (alpha x p) = alpha . (p x n): how far p is off across n follows.
+    """
+    of = candidate.term.of
     matrix = np.stack([part["columns"] for part in parts_of(candidate, values)])
-    left, sizes, right = np.linalg.svd(matrix)
+    count = len(of.parts)
+    left, sizes, right = np.linalg.svd(matrix[:, :count])
     sign = np.sign(right[0, np.argmax(np.abs(right[0]))])
+    along, by = sign * left[:, 0], sign * right[0]
     out = {"amplitude": float(sizes[0])}
-    for name, axes, vector in (
-        ("along", candidate.at.axes, left[:, 0]), ("by", candidate.term.of.axes, right[0])
-    ):  # fmt: skip
-        out |= {f"{name}_{axis}": float(sign * x) for axis, x in zip(axes, vector, strict=True)}
+    out |= {f"along_{axis}": float(x) for axis, x in zip(candidate.at.axes, along, strict=True)}
+    out |= {f"by_{axis}": float(x) for axis, x in zip(of.axes, by, strict=True)}
+    if of.turns:
+        lever = np.cross(by, along @ matrix[:, count:]) / max(sizes[0], 1e-300)
+        out |= {f"lever_{axis}": float(x) for axis, x in zip(of.axes, lever, strict=True)}
     return out | {"beside": float(sizes[1])}
 
 

@@ -29,7 +29,8 @@ def _unit(candidate: LawCandidate, name: str) -> str:
         return "rad"
     place = candidate.at
     if candidate.term.of.parts:
-        return "" if name.startswith(("along_", "by_")) else amplitude(place.unit, candidate)
+        known = {"along": "", "by": "", "lever": "m"}
+        return known.get(name.partition("_")[0], amplitude(place.unit, candidate))
     ends = [axis.replace(" ", "_") for axis in place.axes]
     own = next((k for k, end in enumerate(ends) if end and name.endswith(f"_{end}")), 0)
     unit = place.units[own] if place.units else place.unit

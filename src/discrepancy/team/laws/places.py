@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from discrepancy.laws.place import Place
 from discrepancy.laws.variable import Variable
-from discrepancy.team.laws.variables import joint_variable, payload_variable, payload_vector
+from discrepancy.team.laws.variables import joint_variable, payload_felt, payload_variable
 
 XYZ = ("x", "y", "z")
 READINGS = {"phi reading": "phi", "theta reading": "theta", "tau reading": "tau"}
@@ -38,7 +38,7 @@ def places_of(robots: int) -> list[Place]:
         for n in ("payload_felt", "payload_acceleration", "payload_rate", "payload_up")
         for a in XYZ
     )
-    inner += (payload_vector("payload_felt"),)
+    inner += (payload_felt(),)
     out += [
         _payload("force on payload", (*(f"payload_force_{a}" for a in XYZ), *(f"payload_moment_{a}" for a in XYZ)),
                  ("force x", "force y", "force z", "moment x", "moment y", "moment z"), "N",

@@ -29,6 +29,7 @@ _PAYLOAD: dict[str, tuple[str, str, str, Kind]] = {
         "acceleration that the payload feels, less gravity, along its {axis}", "f", "m/s^2", "acceleration",
     ),
     "payload_rate": ("turn rate of the payload about its {axis}", "omega", "rad/s", "rate"),
+    "payload_turn": ("turn acceleration of the payload about its {axis}", "alpha", "rad/s^2", "acceleration"),
     "payload_up": ("tilt of the payload, component of up along its {axis}", "up", "1", "tilt"),
 }  # fmt: skip
 
@@ -46,12 +47,13 @@ def payload_variable(name: str, axis: str) -> Variable:
     return Variable(f"{name}_{axis}", words.format(axis=axis), f"{symbol}_{axis}", unit, kind)
 
 
-def payload_vector(name: str) -> Variable:
-    """All components of such a signal."""
-    words, symbol, unit, _ = _PAYLOAD[name]
-    said = words.partition(" along ")[0].rstrip(",")
-    parts = tuple(payload_variable(name, axis) for axis in "xyz")
-    return Variable(name, said, symbol, unit, "vector", parts=parts)
+def payload_felt() -> Variable:
+    """What something in the payload feels, wherever it sits."""
+    parts, turns = (
+        tuple(payload_variable(n, axis) for axis in "xyz") for n in ("payload_felt", "payload_turn")
+    )
+    words = "acceleration felt in the payload, less gravity"
+    return Variable("payload_felt", words, "f", parts[0].unit, "vector", parts=parts, turns=turns)
 
 
 def variables_of(robots: int) -> list[Variable]:
@@ -75,6 +77,7 @@ def signals_of(linear: TrialLinear) -> dict[str, Array]:
         "payload_acceleration": motion.acceleration,
         "payload_felt": motion.acceleration + linear.data.gravity_mps2 * motion.up,
         "payload_rate": motion.omega,
+        "payload_turn": motion.alpha,
         "payload_up": motion.up,
     }
     for name, vector in vectors.items():
