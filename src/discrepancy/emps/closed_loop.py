@@ -11,7 +11,7 @@ from discrepancy.candidate import Candidate
 from discrepancy.emps.recording.axis_log import FIRST_GUESS_KG, LIMIT_V, AxisLog
 from discrepancy.emps.recording.signals import Signals
 from discrepancy.laws.candidate import CAUSE, LawCandidate
-from discrepancy.laws.pieces import pieces_of
+from discrepancy.laws.said.pieces import pieces_of
 from estimator.arrays import Array
 from mocobot_sim.emps.effects import AxisEffect, apply_effects
 from mocobot_sim.emps.loop import Start, run

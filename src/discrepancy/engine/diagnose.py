@@ -13,6 +13,7 @@ from discrepancy.engine.verdict import Verdict, verdict_of
 from discrepancy.inference.odds import check_odds
 from discrepancy.inference.search import Searched, continued, search
 from discrepancy.laws.instead import LawFirst, in_place_of_several
+from discrepancy.laws.lines import line_nats
 from discrepancy.laws.search import Lawful, with_laws
 from discrepancy.laws.where import Located
 from discrepancy.rig import Rig
@@ -90,6 +91,8 @@ def diagnose(
     unsure = any(f.probability < rules.LAW_INSTEAD for f in explanation.found if f not in laws_there)
     lawful: Lawful | None = None
     doubtful = unsure or not explanation.clean or explanation.unlisted_nats >= rules.DOUBT_NATS
+    if rig.bench is not None and not doubtful:
+        doubtful = line_nats(searched.best.fit, rig.bench) >= rules.UNLISTED_NATS
     if laws == "always" or (laws == "auto" and doubtful):
         lawful = with_laws(searched, most, say, always=laws == "always", instead=unsure)
     if (

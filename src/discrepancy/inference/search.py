@@ -64,7 +64,8 @@ def search(
         most: largest number of causes.
         progress: called with what is being done.
         odds: of any cause being there before the data are seen.
-        first: what is to be there instead of the first cause, asked once it is found; None where that is to stay.
+        first: what is to be there instead of the first step, a cause or one that healthy ones have, too; asked once it
+            is taken; None where that is to stay.
     """
     say = progress or (lambda what: None)
     rig, nothing = _based(rig, say)
@@ -92,14 +93,13 @@ def continued(
             found, beside = settled(rig, tolerated, nothing)
             if found.score - best.score < rules.SHAPE_NATS:
                 break
-            best, rivals = found, beside
-            continue
-        found, beside = settled(rig, added, nothing)
-        if _gained(best, found) < _needed(best, found):
-            break  # what pays where all is linear need not do so where it is exact
+        else:
+            found, beside = settled(rig, added, nothing)
+            if _gained(best, found) < _needed(best, found):
+                break  # what pays where all is linear need not do so where it is exact
         best, rivals = found, beside
-        if first is not None and len(best.free) == 1:
-            instead = first(Searched(rig, nothing, best, (tuple(rivals.get(best.free[0], ())),)))
+        if first is not None:
+            instead = first(Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free)))
             first = None
             if instead is not None:
                 best, rivals = (
@@ -107,6 +107,8 @@ def continued(
                     dict(zip(instead.best.free, map(list, instead.rivals), strict=True)),
                 )
                 continue
+        if tolerated:
+            continue
         last = best.free[-1] if best.free else None
         likely = last is None or _law_holds(rig, best, last)
         doubtful = doubtful + 1 if little and not likely else 0

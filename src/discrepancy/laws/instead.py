@@ -9,21 +9,21 @@ from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.refit import exact
-from discrepancy.inference.remainder import unlisted_nats
 from discrepancy.inference.search import Rival, Searched
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.forms import likely_causes
+from discrepancy.laws.lines import nats_beyond_noise
 from discrepancy.laws.search import Forms, Lawful, located_in, replaces, suffices, with_one, with_rivals
 from discrepancy.laws.where import Located, located
 
 
 @dataclass(eq=False)
 class LawFirst:
-    """Asked once in a search, after its first cause.
+    """Asked once in a search, after its first step: a cause, or one that healthy ones have, too.
 
     Attributes:
         progress: called with what is being done.
-        cause: the search with that cause, where a law took its place; otherwise None.
+        cause: the search with that step, where a law took its place; otherwise None.
         places: where the law was looked for, the likeliest first; empty where none was.
         rivals: of the law, among laws.
     """
@@ -34,18 +34,18 @@ class LawFirst:
     rivals: dict[tuple[object, ...], list[Rival]] = field(default_factory=dict)
 
     def __call__(self, searched: Searched) -> Searched | None:
-        """The search with a law in place of its only cause, if that law alone leaves noise, and the cause does not.
+        """The search with a law in place of its only step, if that law alone leaves noise, and the step does not.
 
         Where several things are there, each of them leaves more: then the search goes on as it would.
         """
         bench: Bench | None = searched.rig.bench
-        if bench is None or unlisted_nats(searched.best) < rules.UNLISTED_NATS:
+        if bench is None or nats_beyond_noise(searched.best, bench) < rules.UNLISTED_NATS:
             return None
         say = self.progress or (lambda what: None)
         start = Searched(searched.rig, searched.nothing, searched.nothing, ())
         places = located_in(start, bench, say)
         step = with_one(start, bench, places, say, Forms(bench, likely_causes(searched.best), []))
-        if step is None or unlisted_nats(step[0].best) >= rules.UNLISTED_NATS:
+        if step is None or nats_beyond_noise(step[0].best, bench) >= rules.UNLISTED_NATS:
             return None
         if step[0].best.score < searched.best.score + rules.UNLISTED_NATS:
             return None

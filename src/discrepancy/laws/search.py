@@ -20,6 +20,7 @@ from discrepancy.inference.search import Rival, Searched, continued, settled
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate, candidate_of
 from discrepancy.laws.forms import Refinement, form_of_named, gain_of, likely_causes, refinement
+from discrepancy.laws.lines import line_nats
 from discrepancy.laws.place import Place
 from discrepancy.laws.what import Judged, judged
 from discrepancy.laws.where import Located, located
@@ -65,6 +66,8 @@ def with_laws(
         assert bench is not None
         unlisted, places = unlisted_nats(searched.best), None
         left, least = always or unlisted >= rules.UNLISTED_NATS, rules.NAMED_NATS
+        if not left and line_nats(searched.best.fit, bench) >= rules.UNLISTED_NATS:
+            left, least = True, rules.UNLISTED_NATS
         if not left and unlisted >= rules.DOUBT_NATS:
             places = located_in(searched, bench, say)
             left = bool(places) and places[0].nats >= rules.UNLISTED_NATS

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
-from scipy.signal import find_peaks
 
 from discrepancy import rules
 from discrepancy.inference.scan import log_bayes_factor
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.dictionary import hums, terms_at
+from discrepancy.laws.lines import peaks_hz
 from discrepancy.laws.place import Place
 from discrepancy.laws.term import Term
 from discrepancy.laws.told import Beside
@@ -38,7 +37,7 @@ def judged(fit: Fit, bench: Bench, places: Sequence[Place]) -> list[Judged]:
     """Every formula at every one of some places, the likeliest first."""
     beside = Beside(fit)
     trials = fit.problem.trials
-    out, peaks = [], _peaks(fit, bench)
+    out, peaks = [], peaks_hz(fit, bench)
     for place in places:
         spread = lambda variable: np.concatenate([bench.signal(t, variable) for t in trials])  # noqa: E731
         terms = terms_at(place, bench.variables, spread) + hums(peaks)
@@ -81,21 +80,3 @@ def _nats(information: Array, score: Array) -> float:
     """Log Bayes factor, every column in units in which it is just seen."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
     return log_bayes_factor(information * np.outer(scale, scale), score * scale, 0.0)
-
-
-def _peaks(fit: Fit, bench: Bench) -> list[float]:
-    """Frequencies [Hz] at which most is left, of all trials and channels, over its surroundings."""
-    top = 0.5 * min(
-        fit.problem.cells[t].moving / max(bench.row_times(t)[-1], 1.0) for t in fit.problem.trials
-    )
-    grid = np.arange(rules.LAW_HUM_LEAST_HZ, max(top, 2.0 * rules.LAW_HUM_LEAST_HZ), rules.LAW_HUM_STEP_HZ)
-    power = np.zeros(len(grid))
-    for t in fit.problem.trials:
-        moving = fit.problem.cells[t].moving
-        if moving:
-            turned = np.exp(-2j * np.pi * grid[:, None] * bench.row_times(t)[:moving])
-            power += np.sum(np.abs(turned @ fit.remaining(t)[:moving]) ** 2, axis=1)
-    prominence = power / np.maximum(median_filter(power, size=41, mode="nearest"), 1e-300)
-    peaks, _ = find_peaks(prominence)
-    best = peaks[np.argsort(-prominence[peaks])][: rules.LAW_HUM_PEAKS]
-    return [float(f) for f in grid[best]]

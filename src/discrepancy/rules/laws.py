@@ -27,6 +27,8 @@ LAW_HUM_LEAST_HZ = 0.3
 """Below which a sine of time is not tried. Chosen: slower ones are what time and motion do anyhow."""
 LAW_HUM_PEAKS = 6
 """Peaks in the spectrum of what is left that are tried as a hum. Chosen."""
+LAW_LINE_SPAN = 41
+"""Frequencies around one that are its surroundings. Chosen: 0.4 Hz, ten times as wide as a line of a trial of 25 s."""
 LAW_PLACES = 6
 """At which formulas are tried: the likeliest. Chosen."""
 LAW_LEADERS = 16

@@ -35,6 +35,7 @@ def test_it_has_to_pay_for_all_that_noise_may_hide(monkeypatch, unlisted, at_one
     places = [SimpleNamespace(nats=at_one_place)]
     seen = []
     monkeypatch.setattr(search, "unlisted_nats", lambda found: unlisted if found is before else 0.0)
+    monkeypatch.setattr(search, "line_nats", lambda fit, bench: 0.0)
     monkeypatch.setattr(search, "likely_causes", lambda found: ())
     monkeypatch.setattr(search, "located", lambda fit, bench, where: seen.append(where) or places)
     monkeypatch.setattr(search, "continued", lambda searched, most, say: searched)

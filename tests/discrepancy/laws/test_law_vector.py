@@ -7,8 +7,8 @@ from scipy.signal import chirp
 
 from discrepancy.laws.candidate import candidate_of
 from discrepancy.laws.dictionary import terms_at
-from discrepancy.laws.pieces import pieces_of
 from discrepancy.laws.said.numbers import physical, report
+from discrepancy.laws.said.pieces import pieces_of
 from discrepancy.laws.said.sentence import sentence
 from discrepancy.laws.term import Term
 from discrepancy.team.laws.places import places_of

@@ -1,6 +1,7 @@
 """A formula at a place: its functions against closed forms, its trace in a trial against what it says."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -99,6 +100,14 @@ def test_a_torque_that_contains_its_neighbours():
     expected[:, 1, 0] = 0.04 * log.tau[:, 1, 2]
     np.testing.assert_allclose(reading.tau - log.tau, expected, atol=2e-4 * np.abs(log.tau).max())
     np.testing.assert_allclose(reading.phi, log.phi, atol=1e-9)
+
+
+def test_a_sum_of_signals_is_one():
+    log = run(Law("tau_2_1", "square", "0.5*tau_2_2 + -2e-1*tau_2_3", 0.04))
+    expected = 0.04 * (0.5 * log.tau[:, 1, 1] - 0.2 * log.tau[:, 1, 2]) ** 2
+    assert np.abs(expected).max() > 0.01
+    read = (predicted(log).tau - log.tau)[:, 1, 0]
+    np.testing.assert_allclose(read, expected, atol=2e-4 * np.abs(log.tau).max())
 
 
 def test_an_eccentric_gimbal_encoder():
@@ -208,6 +217,8 @@ def test_from_the_command_line():
         ({"target": "tau_1_4"}, "target is 'tau_1_4'"),
         ({"function": "exec"}, "function is 'exec'"),
         ({"of": "__import__"}, "of is '__import__'"),
+        ({"of": "0.5*phi_1_1 + 2*phi"}, "of is '0.5*phi_1_1 + 2*phi'"),
+        ({"of": "phi_1_1 + "}, "of is 'phi_1_1 + '"),
         ({"times": "phi"}, "times is 'phi'"),
         ({"function": "warming"}, "time_s and must be above 0"),
         ({"function": "hat"}, "second is 0.0"),
@@ -217,7 +228,7 @@ def test_from_the_command_line():
 )
 def test_wrong_laws_are_refused(changed, said):
     good = {"target": "tau_1_1", "function": "linear", "of": "time", "amplitude": 1.0}
-    with pytest.raises(InputError, match=said.replace("(", r"\(")):
+    with pytest.raises(InputError, match=re.escape(said)):
         Law(**(good | changed))
 
 
@@ -225,6 +236,8 @@ def test_wrong_laws_are_refused(changed, said):
 def test_a_robot_that_is_not_there_is_refused(target):
     with pytest.raises(InputError, match="no robot 4"):
         team_with("a", Law(target, "constant", "time", 1.0))
+    with pytest.raises(InputError, match="no robot 4"):
+        team_with("a", Law("tau_1_1", "linear", "time + 0.5*phi_4_2", 1.0))
 
 
 def test_every_function_that_is_named_runs():

@@ -10,7 +10,7 @@ from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Found
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.lawful import Lawful
-from discrepancy.laws.pieces import pieces_of
+from discrepancy.laws.said.pieces import pieces_of
 from discrepancy.serial.laws.bench import SerialBench
 from discrepancy.serial.rig import SerialRig
 from estimator.arrays import Array

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 
 from discrepancy.laws.candidate import LawCandidate
-from discrepancy.laws.pieces import pieces_of
+from discrepancy.laws.said.pieces import pieces_of
 from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.effects.base import Effect
