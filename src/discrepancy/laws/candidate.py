@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from discrepancy import rules
@@ -50,9 +51,9 @@ class LawCandidate(Candidate):
         by = "a constant" if self.term.function == "constant" else f"by {' and '.join(signals)}"
         return f"{self.where_it_is}, {by}"
 
-    def shaped(self, numbers: dict[str, float]) -> LawCandidate:
+    def in_shape(self, shape: Mapping[str, float]) -> LawCandidate:
         """The same with other numbers inside the function."""
-        return replace(self, term=replace(self.term, numbers=numbers), shape=numbers)
+        return replace(self, term=replace(self.term, numbers=dict(shape)), shape=dict(shape))
 
 
 def candidate_of(place: Place, term: Term, scale: float, among: int) -> LawCandidate:
@@ -80,7 +81,7 @@ def candidate_of(place: Place, term: Term, scale: float, among: int) -> LawCandi
 
 def refined(candidate: LawCandidate, *, finer: bool) -> list[Candidate]:
     """The law with other numbers inside its function; ``finer`` ones around its own."""
-    return [candidate.shaped(dict(term.numbers)) for term in nearby(candidate.term, finer=finer)]
+    return [candidate.in_shape(dict(term.numbers)) for term in nearby(candidate.term, finer=finer)]
 
 
 def law_steps(candidate: LawCandidate) -> list[tuple[Candidate, Candidate, float]]:
@@ -88,6 +89,6 @@ def law_steps(candidate: LawCandidate) -> list[tuple[Candidate, Candidate, float
     numbers, out = dict(candidate.term.numbers), []
     for name, share in candidate.term.law.fitted.items():
         value = numbers[name]
-        less, more = (candidate.shaped({**numbers, name: x * value}) for x in (1.0 - share, 1.0 + share))
+        less, more = (candidate.in_shape({**numbers, name: x * value}) for x in (1.0 - share, 1.0 + share))
         out.append((less, more, 2.0 * share * value))
     return out

@@ -131,3 +131,11 @@ def test_where_it_is_tried():
         terms = terms_at(place, variables_of(1), lambda variable: np.linspace(-1.0, 1.0, 50))
         tried = {term.function for term in terms if term.of.parts}
         assert tried == ({"linear", "second_order"} if place == CENTRE else set())
+
+
+def test_its_numbers_are_those_of_its_shape(law):
+    """A finer frequency had been written into the verdict, and the columns had kept the coarse one."""
+    finer = {"frequency_hz": 1.5, "damping": 0.65}
+    moved = law.in_shape(finer)
+    assert moved.shape == moved.term.numbers == finer
+    assert law.shape == law.term.numbers == INSIDE
