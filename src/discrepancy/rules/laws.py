@@ -63,3 +63,5 @@ LAW_RIVALS = 6
 
 LAW_SHOWS = 1e-3
 """Share of a vector law's largest size below which what it does in another direction is not simulated. Chosen."""
+LAW_KNOTS_MISS = 0.5
+"""Share of a law's variance between the knots of what was located, beyond which no picture of that is made. Chosen."""

@@ -1,5 +1,7 @@
 """A law by all components of a signal: a load that slides on a spring, in whatever direction, is one."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -10,7 +12,9 @@ from discrepancy.laws.dictionary import terms_at
 from discrepancy.laws.said.numbers import physical, report
 from discrepancy.laws.said.pieces import pieces_of
 from discrepancy.laws.said.sentence import sentence
+from discrepancy.laws.said.trace import traces_of
 from discrepancy.laws.term import Term
+from discrepancy.laws.where import Located
 from discrepancy.team.laws.places import places_of
 from discrepancy.team.laws.variables import payload_felt, variables_of
 from mocobot_sim.laws.functions import FUNCTIONS, Inside
@@ -139,3 +143,26 @@ def test_its_numbers_are_those_of_its_shape(law):
     moved = law.in_shape(finer)
     assert moved.shape == moved.term.numbers == finer
     assert law.shape == law.term.numbers == INSIDE
+
+
+@pytest.mark.parametrize(("apart_s", "shown"), [(0.1, True), (1.2, False)])
+def test_what_was_located_is_shown_where_its_knots_are_close_enough(law, signals, values, apart_s, shown):
+    """Shaken at 3 Hz, straight lines between knots of 1.2 s would be anything."""
+    samples = len(signals["payload_felt_x"])
+    knots = np.arange(0.0, samples / RATE_HZ, apart_s)
+    error = np.zeros((len(knots), 3))
+    located = Located(CENTRE, 100.0, (error,), (error + 1.0,), (knots,))
+    bench = SimpleNamespace(
+        length=lambda trial: samples, rate_hz=lambda trial: RATE_HZ,
+        row_times=lambda trial: np.array([0.0, samples / RATE_HZ]),
+        values=lambda trial, law: law.term.values(lambda v: signals[v.name], RATE_HZ),
+        signal=lambda trial, variable: signals[variable.name],
+    )  # fmt: skip
+    traces = traces_of(law, values, [located], bench)
+    assert bool(traces) == shown
+    if shown:
+        along = sum(
+            values * signals[f"payload_felt_{axis}"] for values, axis in zip(-ALONG, "xyz", strict=True)
+        )
+        wanted = np.interp(knots, np.arange(samples) / RATE_HZ, along)
+        np.testing.assert_allclose(traces[0]["signal"], wanted, atol=0.05)

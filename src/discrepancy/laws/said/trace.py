@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.said.numbers import physical
@@ -21,7 +22,7 @@ def traces_of(
 
     The error is what explains most at that place over time, found without any formula; it is determined up to what
     unknowns and tolerances can explain, such as a constant, and is shifted by a constant onto the law. None where the
-    place was not located.
+    place was not located, or with knots too far apart to show the law.
 
     Args:
         candidate: the law.
@@ -33,11 +34,18 @@ def traces_of(
     if found is None:
         return []
     table, out, offset = values.reshape(-1, len(candidate.at.axes)), [], np.zeros(len(candidate.at.axes))
-    laws = []
+    laws, all_, missed = [], 0.0, 0.0
     for trial, knots in enumerate(found.knots_s):
         time = np.arange(bench.length(trial)) / bench.rate_hz(trial)
         law = bench.values(trial, candidate) @ table
         laws.append(np.stack([np.interp(knots, time, x) for x in law.T], axis=1))
+        between = np.stack([np.interp(time, knots, x) for x in laws[-1].T], axis=1)
+        all_, missed = (
+            all_ + float(np.var(law, axis=0).sum()),
+            missed + float(np.mean((law - between) ** 2, axis=0).sum()),
+        )
+    if missed > rules.LAW_KNOTS_MISS * all_:
+        return []
     weights = [1.0 / np.maximum(se, 1e-300) ** 2 for se in found.se]
     total = np.sum([w.sum(axis=0) for w in weights], axis=0)
     offset = np.sum(
