@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from typing import cast
@@ -16,7 +17,7 @@ JOINT = re.compile(
     r"(phi|phi_rate|phi_acceleration|theta|theta_rate|theta_acceleration|tau)_([1-9][0-9]*)_([123])"
 )
 PAYLOAD = re.compile(r"payload_(position|velocity|acceleration|felt|rate|turn|up)_([xyz])")
-PART = re.compile(r"(?:(-?[0-9.]+(?:e-?[0-9]+)?)\*)?([a-z][a-z0-9_]*)")
+PART = re.compile(r"(?:(-?[0-9]+(?:\.[0-9]+)?(?:e-?[0-9]+)?)\*)?([a-z][a-z0-9_]*)")
 WORDS = (
     "time, phi_2_1 (robot, joint), phi_rate_2_1, phi_acceleration_2_1, same of theta, tau_2_1, payload_position_x, or "
     "a sum of such as 0.6*payload_felt_x + -0.8*payload_felt_y"
@@ -33,7 +34,10 @@ def parts_of(name: str) -> list[tuple[float, str]]:
     """Factors and names of the signals that a name adds up; empty if it is none."""
     matches = [PART.fullmatch(part) for part in name.split(" + ")]
     parts = [(float(match[1] or 1.0), match[2]) for match in matches if match is not None]
-    known = all(one == "time" or JOINT.fullmatch(one) or PAYLOAD.fullmatch(one) for _, one in parts)
+    known = all(
+        math.isfinite(factor) and (one == "time" or JOINT.fullmatch(one) or PAYLOAD.fullmatch(one))
+        for factor, one in parts
+    )
     return parts if known and len(parts) == len(matches) else []
 
 
