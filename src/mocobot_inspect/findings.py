@@ -8,7 +8,7 @@ import numpy as np
 
 from estimator.recording.checks import TORQUE_FACTOR
 from mocobot_inspect.inspection import FASTEST_HZ, MOSTLY, SLOWEST_HZ, Inspection, differs
-from mocobot_inspect.stream.channels import Channel, Stretch
+from mocobot_inspect.stream.channels import UNITS, Channel, Stretch
 from mocobot_inspect.stream.timing import Timing
 from mocobot_inspect.wiring.check import Found
 from mocobot_inspect.wiring.misfit import SUSPICIOUS, Misfit
@@ -136,6 +136,7 @@ def _of_samples(found: Inspection) -> Iterator[str]:
             yield from stands(who, c, duration)
     for kind in ("phi", "theta", "tau"):
         yield from _limits(kind, found)
+    yield from _oscillating(found)
 
 
 def stands(who: str, c: Channel, duration_s: float) -> Iterator[str]:
@@ -147,6 +148,26 @@ def stands(who: str, c: Channel, duration_s: float) -> Iterator[str]:
         yield f"{who} is stuck {_times(c.stuck, c.stuck_count)} while others move"
     if c.clipped:
         yield f"{who} is cut off at {c.clipped[0].value:.6g}: it stays there {_times(c.clipped, c.clipped_count)}"
+
+
+def _oscillating(found: Inspection) -> Iterator[str]:
+    """The effort that oscillates most, or else the angle, and what shakes with it."""
+    lines = [
+        (f"omnid{robot + 1}.{c.name}", UNITS[c.name[:3]], c.oscillation)
+        for robot, channels in enumerate(found.survey.channels)
+        for c in channels
+        if c.oscillation is not None
+    ]
+    if not lines:
+        return
+    lines.sort(key=lambda line: (line[1] in ("N m", "N"), line[2].amplitude), reverse=True)
+    (who, unit, most), *others = lines
+    with_it = [other for other, _, _ in others]
+    names = listed(with_it) if len(with_it) <= _NAMED else f"{len(with_it)} other channels"
+    yield (
+        f"{who} oscillates at {most.frequency_hz:.3g} Hz, or what folds to that, by up to +-{most.amplitude:.3g} "
+        f"{unit} for {most.duration_s:.3g} s{f', and {names} with it' if with_it else ''}: is a control loop unstable?"
+    )
 
 
 def _times(stretches: tuple[Stretch, ...], count: int) -> str:

@@ -5,11 +5,10 @@ import numpy as np
 from mocobot_inspect.findings import evidence, findings
 from mocobot_inspect.inspection import Inspection
 from mocobot_inspect.readiness import AXES, Readiness
-from mocobot_inspect.stream.channels import Channel
+from mocobot_inspect.stream.channels import UNITS, Channel
 from mocobot_inspect.wiring.mistakes import Mistake
 from mocobot_inspect.wiring.mistakes.base import listed
 
-UNITS = {"phi": "rad", "the": "rad", "tau": "N m", "h_x": "m", "h_y": "m", "h_z": "m", "for": "N", "ref": "m"}
 _HIDDEN = 6
 
 

@@ -47,6 +47,9 @@ MODEL_BELOW_HZ, MODEL_ABOVE = 2.5, 0.2
 and hardly anything from 4 Hz."""
 NOISE_ABOVE_HZ = 25.0
 """Where nothing moves, so that what is there is noise. Chosen."""
+NOISE_LINES, CHATTER_STEPS = 0.5, 10.0
+"""Share of the amplitude there that is between the lines, below which the lines are no noise: a joint that chatters.
+And over the torque's step, from which on that is worth a note. Chosen: healthy joints have no lines."""
 TEAM_SMOOTH_HZ = 12.0
 """Cut-off of signals when their rounding is drawn anew, and of rates that say where friction slides. Chosen."""
 SLOW_HZ, SMOOTHER_OCTAVES = 1.0, 3

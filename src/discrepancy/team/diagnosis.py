@@ -13,6 +13,7 @@ from discrepancy.team.checks import check_estimate, check_recordings
 from discrepancy.team.estimates import errors, estimates
 from discrepancy.team.long.choice import Choice
 from discrepancy.team.long.search import search_parts
+from discrepancy.team.loops import chattering
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.traces import traces
@@ -79,7 +80,8 @@ def diagnose_team(
     )  # fmt: skip
     assert isinstance(found.rig, TeamRig)
     payload, own = estimates(found.rig, found.explanation), partial(traces, found.rig, found.explanation)
-    found = replace(found, notes=(*found.notes, *choice.notes, *notes))
+    loops = chattering([linear.signals for linear in found.rig.linear], found.rig.noise.step)
+    found = replace(found, notes=(*found.notes, *choice.notes, *notes, *loops))
     return Diagnosed(found.rig, found, TeamWords(), own, payload)
 
 

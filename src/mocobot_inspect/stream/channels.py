@@ -9,8 +9,11 @@ from estimator.quantisation import quantisation_step
 from estimator.recording.sampling import SENSORS
 from mocobot_inspect.stream.frozen import Frozen, frozen
 from mocobot_inspect.stream.noise import noise_level
+from mocobot_inspect.stream.oscillation import Oscillation, joined, oscillation
 from mocobot_logs.log import NS, Stamps
 
+UNITS = {"phi": "rad", "the": "rad", "tau": "N m", "h_x": "m", "h_y": "m", "h_z": "m", "for": "N", "ref": "m"}
+"""Of a team's channels, by the first letters of their names."""
 LISTED = 100
 """So many stuck and clipped stretches of a channel are kept; all are counted."""
 
@@ -42,6 +45,7 @@ class Channel:
         noise: white noise of a sample; 0 where it is below the step.
         stuck, clipped: stretches in which it stands while others move, the first ``LISTED``.
         stuck_count, clipped_count: how many there are.
+        oscillation: the line that stands out of its noise, or None.
     """
 
     name: str
@@ -55,6 +59,7 @@ class Channel:
     clipped: tuple[Stretch, ...]
     stuck_count: int
     clipped_count: int
+    oscillation: Oscillation | None
 
     @property
     def white_noise(self) -> float:
@@ -73,6 +78,7 @@ class ChannelTally:
         self._nans, self._infinities = np.zeros(count, int), np.zeros(count, int)
         self._steps: list[list[float | None]] = [[] for _ in names]
         self._noise: list[list[float]] = [[] for _ in names]
+        self._lines: list[list[Oscillation]] = [[] for _ in names]
         self._frozen: dict[tuple[str, int], list[Stretch]] = {}
         self._counts: dict[tuple[str, int], int] = {}
 
@@ -94,6 +100,9 @@ class ChannelTally:
             x = values[finite[:, k], k]
             self._steps[k].append(quantisation_step(x) if len(x) else None)
             self._noise[k].append(noise_level(x))
+            line = oscillation(x, rate_hz) if rate_hz is not None and k < self._sensors else None
+            if line is not None:
+                self._lines[k].append(line)
         if rate_hz is not None and whole.any():
             kept = time_s[whole]
             # Commands stand when they please.
@@ -137,6 +146,7 @@ class ChannelTally:
                     clipped=tuple(self._frozen.get(("clipped", k), ())),
                     stuck_count=self._counts.get(("stuck", k), 0),
                     clipped_count=self._counts.get(("clipped", k), 0),
+                    oscillation=joined(self._lines[k]),
                 )
             )
         return tuple(channels)

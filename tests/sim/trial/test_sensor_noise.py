@@ -1,12 +1,15 @@
 """Resolution of the sensors from their recordings, and draws of their errors against really rounded signals."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from discrepancy.rules import MODEL_ABOVE, MODEL_BELOW_HZ, MODEL_PHI_RAD, MODEL_TAU_NM, MODEL_THETA_RAD
-from discrepancy.team.linear.noise import Noise
+from discrepancy.team.linear.noise import Noise, chatter
 from discrepancy.team.linear.signals import Signals
+from discrepancy.team.loops import chattering
 
 RATE = 100.0
 SAMPLES = 3000
@@ -169,6 +172,36 @@ def test_draws_of_continuous_channels_are_white(rng):
     x = errors.phi.reshape(SAMPLES, 6)
     assert np.max(np.abs(np.mean(x[1:] * x[:-1], axis=0))) < 0.1 * 0.01**2
     assert np.corrcoef(errors.phi.ravel(), errors.theta.ravel())[0, 1] == pytest.approx(0.0, abs=0.05)
+
+
+@pytest.mark.parametrize("hz", [29.7, 41.0])
+def test_a_joint_that_chatters_is_not_taken_for_a_noisy_sensor(rng, hz):
+    step = sigma = 0.01
+    calm = trial(rng, torque=(0.0, 0.0))
+    tau = calm.tau.copy()
+    tau[:, 1, 2] += 5.0 * np.sin(2 * np.pi * hz * TIME)
+    loud = Signals(TIME, calm.phi, calm.theta, read(tau, step, sigma, rng), RATE)
+    noise = Noise.of([loud])
+    # A periodic signal meets the grid at the same phases again: some of its rounding is in lines, too.
+    total = np.hypot(noise.sigma[2], noise.step[2] / np.sqrt(12))
+    np.testing.assert_allclose(total, np.hypot(sigma, step / np.sqrt(12)), rtol=0.15)
+    said = chatter(loud)
+    assert said[2, 1, 2] == pytest.approx(5.0 / np.sqrt(2), rel=0.01)
+    said[2, 1, 2] = 0.0
+    assert not said[2].any()
+
+
+def test_what_is_said_of_a_joint_that_chatters(rng):
+    calm = trial(rng, torque=(0.01, 0.01))
+    tau = calm.tau.copy()
+    tau[:, 0, 1] += 2.0 * np.sin(2 * np.pi * 35.0 * TIME)
+    loud = Signals(TIME, calm.phi, calm.theta, tau, RATE)
+    steps = np.full((3, 2, 3), 0.01)
+    assert chattering([calm], steps) == ()
+    (said,) = chattering([calm, loud], steps)
+    assert "driven joint 2 of robot 1 oscillates faster than 25 Hz, with 1.4 N m rms" in said
+    small = replace(loud, tau=calm.tau + 0.04 * (tau - calm.tau))
+    assert chattering([small], steps) == ()
 
 
 def test_channels_have_resolutions_of_their_own(rng):

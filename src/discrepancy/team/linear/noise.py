@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, periodogram, sosfiltfilt
 
 from discrepancy import rules
 from discrepancy.team.linear.signals import Signals
@@ -169,6 +169,17 @@ def _steps(signals: Signals) -> Array:
     return np.moveaxis(steps.reshape(len(steps), 3, 3), 1, 0)
 
 
+def chatter(signals: Signals) -> Array:
+    """Root mean square above 25 Hz where it is lines and no noise, otherwise 0, shape (3, N, 3): phi, theta, tau."""
+    high = min(rules.NOISE_ABOVE_HZ, 0.4 * min(signals.rate_hz, *_native_hz(signals)))
+    x = _columns(signals)
+    over_time, between_lines = _fast(high, x, signals.rate_hz)
+    frequency, density = periodogram(x, signals.rate_hz, window="hann", detrend="linear", axis=0)
+    lines = np.sqrt(density[frequency > high].sum(axis=0) * frequency[1])
+    lines[between_lines >= rules.NOISE_LINES * over_time] = 0.0
+    return np.moveaxis(lines.reshape(len(lines), 3, 3), 1, 0)
+
+
 def _white(signals: Signals) -> Array:
     """Standard deviation of white noise of a reading, from what lies above 25 Hz, shape (3, N, 3).
 
@@ -176,8 +187,7 @@ def _white(signals: Signals) -> Array:
     """
     rate_hz, x = signals.rate_hz, _columns(signals)
     high = min(rules.NOISE_ABOVE_HZ, 0.4 * min(rate_hz, *_native_hz(signals)))
-    band = butter(4, high, btype="high", fs=rate_hz, output="sos")
-    white = _spread(sosfiltfilt(band, x, axis=0))
+    white = _spread_above(high, x, rate_hz)
     if signals.sampling is None:
         white /= np.sqrt(1.0 - high / (rate_hz / 2.0))
     else:
@@ -185,10 +195,22 @@ def _white(signals: Signals) -> Array:
         for i, sampling in enumerate(signals.sampling):
             way = Resampling.of(sampling.later(float(signals.time[0])), rate_hz, len(x), rng)
             left = way(rng.standard_normal((len(way.instants), SENSORS)))
-            white[i] /= np.median(_spread(sosfiltfilt(band, left, axis=0)))
+            white[i] /= np.median(_spread_above(high, left, rate_hz))
     return np.moveaxis(white.reshape(len(white), 3, 3), 1, 0)
 
 
-def _spread(x: Array) -> Array:
-    """A robust root mean square along the first axis."""
-    return np.asarray(1.4826 * np.median(np.abs(x), axis=0), dtype=np.float64)
+def _spread_above(high: float, x: Array, rate_hz: float) -> Array:
+    """A root mean square above a frequency, robust against moments and against lines: a joint that chatters."""
+    over_time, between_lines = _fast(high, x, rate_hz)
+    return np.where(between_lines < rules.NOISE_LINES * over_time, between_lines, over_time)
+
+
+def _fast(high: float, x: Array, rate_hz: float) -> tuple[Array, Array]:
+    """Root mean squares above a frequency: with the lines there, robust against moments; and between the lines."""
+    band = butter(4, high, btype="high", fs=rate_hz, output="sos")
+    fast = np.asarray(sosfiltfilt(band, x, axis=0), dtype=np.float64)
+    over_time = 1.4826 * np.median(np.abs(fast), axis=0)
+    frequency, density = periodogram(fast, rate_hz, window="hann", axis=0)
+    # Powers of white noise are exponentially distributed: ln 2 of their mean is the median.
+    level = np.median(density[frequency > high], axis=0) / np.log(2.0)
+    return over_time, np.sqrt(level * (rate_hz / 2.0 - high))
