@@ -159,6 +159,10 @@ class Rig(ABC):
         """For every number of its shape that the data determine: a little less, a little more, and the difference."""
         return []
 
+    def bent(self, candidate: Candidate, values: Array) -> tuple[Sequence[Array], Sequence[Array]] | None:
+        """Of what is no multiple of its values, columns: its slopes there, and per unit from nought on; None of others."""
+        return None
+
     def inexact(self, candidate: Candidate) -> Array:
         """Of the numbers that ``steps`` changes, those that the law's own error puts off, as it does sizes; else 0."""
         return np.zeros(len(self.steps(candidate)))

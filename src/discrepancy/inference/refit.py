@@ -5,6 +5,7 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.rig import Rig
+from estimator.arrays import Array
 from estimator.errors import InputError
 
 
@@ -36,6 +37,10 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
             residual = rig.residual(-shared, [-x for x in local], active)
         except InputError:  # no such machine: the linear answer is the better one
             return linear
+        problem = fit.problem
+        for i, (cause, values) in zip(there, active, strict=True):
+            if (bent := rig.bent(cause, values)) is not None:
+                problem = problem.with_columns(i, cause, bent[0])
         # The problem counts total values, so what its columns stand for is added back.
         back = []
         for t, total in zip(trials, residual, strict=True):
@@ -44,8 +49,8 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
             total = total + fit.problem.local[t][..., :own] @ local[t]
             for i in there:
                 values[fit.problem.spans[i]] = fit.part(i)[0]
-            back.append(total + fit.problem.raw_times(t, values))
-        new = Hypothesis.of(fit.problem.with_residual(back), hypothesis.free, hypothesis.allowed)
+            back.append(total + problem.raw_times(t, values))
+        new = Hypothesis.of(problem.with_residual(back), hypothesis.free, hypothesis.allowed)
         if new.learnt.log_evidence < hypothesis.learnt.log_evidence - rules.DIVERGED_NATS:
             break  # it diverges: the linear answer is the better one
         se = np.sqrt(np.diag(new.fit.covariance))
@@ -58,4 +63,28 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         hypothesis, last = new, way
         if way < rules.SETTLED_SE:
             break
-    return hypothesis
+    return hypothesis if hypothesis is linear else _from_nought(rig, hypothesis)
+
+
+def _from_nought(rig: Rig, hypothesis: Hypothesis) -> Hypothesis:
+    """The same with columns that say what causes do that are no multiple of their values, from nought on to there."""
+    fit, problem = hypothesis.fit, hypothesis.problem
+    last = np.zeros(problem.width)
+    last[-1] = 1.0
+    residual: list[Array] | None = None
+    for i in hypothesis.free:
+        cause = problem.candidates[i]
+        values = fit.part(i)[0] * cause.units
+        bent = rig.bent(cause, values)
+        if bent is None:
+            continue
+        if residual is None:
+            residual = [problem.raw_times(t, last) for t in problem.trials]
+        here = np.zeros(problem.width)
+        here[problem.spans[i]] = fit.part(i)[0]
+        slopes = [problem.raw_times(t, here) for t in problem.trials]
+        residual = [r - old + new @ values for r, old, new in zip(residual, slopes, bent[1], strict=True)]
+        problem = problem.with_columns(i, cause, bent[1])
+    if residual is None:
+        return hypothesis
+    return Hypothesis.of(problem.with_residual(residual), hypothesis.free, hypothesis.allowed)

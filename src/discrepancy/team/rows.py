@@ -187,6 +187,9 @@ class TeamRows(Rig):
         """What one unit of each parameter adds to a trial's residual, shape (n, C, k)."""
         return CAUSES[candidate.cause].columns(self.linear[trial], *indices(candidate), candidate.shape)
 
+    def _is_adjusted(self, candidate: Candidate) -> bool:
+        return is_adjusted(candidate)
+
     def _undo(self, trial: int, candidate: Candidate, values: Array, signals: Signals) -> Signals | None:
         """A trial's signals as they would be without a cause, or None where it is not an error of the signals."""
         place, own = indices(candidate), self.beyond(candidate, values)
@@ -198,7 +201,7 @@ class TeamRows(Rig):
         """A trial's signals without causes that are errors of them, functions of them without noise; and others."""
         signals, others = self.linear[trial].signals, []
         for candidate, values in active:
-            x = noise if noise and is_adjusted(candidate) else None
+            x = noise if noise and self._is_adjusted(candidate) else None
             seen = signals.minus(x.phi, x.theta, x.tau) if x else signals
             true = self._undo(trial, candidate, values, seen)
             if true is None:
@@ -259,7 +262,7 @@ class TeamRows(Rig):
             acting = [(candidate, values) for candidate, values in active if candidate.acts_in(t)]
             unknowns = linear.shared.moved(shared), linear.bases.moved(x)
             signals, modelled = self._without(t, acting)
-            if any(is_adjusted(candidate) for candidate, _ in acting):
+            if any(self._is_adjusted(candidate) for candidate, _ in acting):
                 noise = noise_of(signals, *unknowns, linear, self.sensed.signals[t])
                 signals, _ = self._without(t, acting, noise)
             residual = exact_residual(signals, *unknowns, linear.arms, linear.reduction)

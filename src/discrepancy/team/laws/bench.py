@@ -14,9 +14,10 @@ from discrepancy.laws.variable import Variable
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.team.causes.base import one_joint, one_robot
 from discrepancy.team.laws.directions import directions_at
-from discrepancy.team.laws.places import READINGS, places_of, twin_of
+from discrepancy.team.laws.misreading import Misreading
+from discrepancy.team.laws.places import READINGS, indices_of, is_reading, own_reading, places_of, twin_of
 from discrepancy.team.laws.variables import signals_of, variables_of
-from discrepancy.team.linear.signals import with_rates
+from discrepancy.team.linear.signals import Signals, with_rates
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 
@@ -70,22 +71,58 @@ class TeamBench(Bench):
 
     def columns(self, trial: int, candidate: LawCandidate) -> Array:
         """What a law adds to the residual, one column an amplitude, components side by side, shape (n, C, k)."""
-        place = candidate.at
-        if place.name not in READINGS or not place.robot or not place.joint:
+        if not is_reading(candidate.at):
             return super().columns(trial, candidate)
-        linear, values = self._linear[trial], self.values(trial, candidate)
-        kind, joint, robot = READINGS[place.name], place.joint - 1, place.robot - 1
-        return np.stack([linear.of_signals(robot, **{kind: one_joint(x, joint)}) for x in values.T], axis=2)
+        return self._of_reading(trial, candidate.at, self.values(trial, candidate))
+
+    def _of_reading(self, trial: int, place: Place, errors: Array) -> Array:
+        """What errors (Q, k) of a reading add to the residual, shape (n, C, k)."""
+        linear, kind, robot, joint = self._linear[trial], READINGS[place.name], *indices_of(place)
+        return np.stack([linear.of_signals(robot, **{kind: one_joint(x, joint)}) for x in errors.T], axis=2)
+
+    def misreading(self, trial: int, candidate: LawCandidate, signals: Signals) -> Misreading:
+        """A law of what is read in a trial, out of such readings."""
+        place, (robot, joint) = candidate.at, indices_of(candidate.at)
+        read = with_rates(getattr(signals, READINGS[place.name])[:, robot, joint], signals.rate_hz)[0]
+
+        def values(true: Array) -> Array:
+            seen = {own_reading(place): true}
+            term = candidate.term.values(
+                lambda v: seen[v.name] if v.name in seen else self.signal(trial, v), self.rate_hz(trial)
+            )
+            return self.with_offset(place, candidate.term, term)
+
+        return Misreading(read, values)
 
     def reading_error(
-        self, trial: int, candidate: LawCandidate, amplitudes: Array
+        self, trial: int, candidate: LawCandidate, amplitudes: Array, signals: Signals
     ) -> dict[str, Array] | None:
-        """What a law of a reading adds to ``phi``, ``theta`` or ``tau``, shape (Q, N, 3); None of another place."""
+        """What a law of a reading adds to ``phi``, ``theta`` or ``tau``, shape (Q, N, 3); None of another place.
+
+        Args:
+            trial: from 0.
+            candidate: the law.
+            amplitudes: its values.
+            signals: what is read, without noise where that is known.
+        """
         place = candidate.at
-        if place.name not in READINGS or not place.robot or not place.joint:
+        if not is_reading(place):
             return None
-        error = one_joint(self.values(trial, candidate) @ amplitudes, place.joint - 1)
-        return {READINGS[place.name]: one_robot(error, self._linear[trial].robots, place.robot - 1)}
+        seen, (robot, joint) = self.misreading(trial, candidate, signals), indices_of(place)
+        error = one_joint(seen.read - seen.true(amplitudes), joint)
+        return {READINGS[place.name]: one_robot(error, self._linear[trial].robots, robot)}
+
+    def bent(self, trial: int, candidate: LawCandidate, amplitudes: Array) -> tuple[Array, Array] | None:
+        """Columns of a law of the very signal that is read, shape (n, C, k): its slopes, and per unit from nought on.
+
+        None of another law, which is a multiple of its amplitudes.
+        """
+        place = candidate.at
+        if not is_reading(place) or own_reading(place) not in candidate.term.variables:
+            return None
+        seen = self.misreading(trial, candidate, self._linear[trial].signals)
+        each = seen.slopes(amplitudes), seen.values(seen.true(amplitudes))
+        return self._of_reading(trial, place, each[0]), self._of_reading(trial, place, each[1])
 
     def directions(self, trial: int, place: Place) -> Array:
         return directions_at(self._linear[trial], place)

@@ -52,6 +52,23 @@ def places_of(robots: int) -> list[Place]:
     return out
 
 
+def is_reading(place: Place) -> bool:
+    """Whether it is what a sensor reads that is wrong."""
+    return place.name in READINGS
+
+
+def own_reading(place: Place) -> str:
+    """Name of the signal that is read there."""
+    return f"{READINGS[place.name]}_{place.robot}_{place.joint}"
+
+
+def indices_of(place: Place) -> tuple[int, int]:
+    """Robot and joint of a reading, from 0."""
+    assert place.robot is not None
+    assert place.joint is not None
+    return place.robot - 1, place.joint - 1
+
+
 def _joint(
     name: str, robot: int, joint: int, target: str, unit: str, title: str, own: tuple[Variable, ...], *,
     offset: bool = False, twin: str | None = None,
