@@ -70,3 +70,38 @@ def test_what_is_allowed_stays_allowed():
     assert exact(rig, allowed, nothing).allowed == {2: 7.0}
     assert allowed.score == pytest.approx(linear.score - 7.0)
     assert CATALOGUE[2] in linear.causes
+
+
+class Told(Bent):
+    """Cause 2 alone bends, and the rig says how."""
+
+    def residual(self, shared, local, active):
+        bends = [(c, bent(v, self.by) if c.key == CATALOGUE[2].key else v) for c, v in active]
+        return FakeRig.residual(self, shared, local, bends)
+
+    def bent(self, candidate, values):
+        if candidate.key != CATALOGUE[2].key:
+            return None
+        columns = self.columns(candidate)
+        return [c * (1.0 + 2.0 * self.by * values) for c in columns], [
+            c * (1.0 + self.by * values) for c in columns
+        ]
+
+
+@pytest.mark.parametrize("by", [0.02, -0.009])
+def test_what_bends_strongly_is_found_where_the_rig_says_how(by):
+    rig = Told({2: 25.0, 4: 11.0}, by=by)
+    linear, nothing = hypotheses(rig, [2, 4])
+    effect = linear.fit.part(2)[0][0]
+    expected = brentq(lambda v: bent(v, by) - effect, 0.0, 0.5 / abs(by) if by < 0 else 60.0)
+    found = exact(rig, linear, nothing)
+    assert found.fit.part(2)[0][0] == pytest.approx(expected, rel=2e-3)
+    assert found.fit.part(4)[0][0] == pytest.approx(linear.fit.part(4)[0][0], abs=0.05)
+    # Without the cause, the model sees what was measured: columns go from nought to where it is.
+    last = np.zeros(found.problem.width)
+    last[-1] = 1.0
+    for t in found.problem.trials:
+        np.testing.assert_allclose(
+            found.problem.raw_times(t, last), linear.problem.raw_times(t, last), atol=2e-3
+        )
+        np.testing.assert_allclose(found.fit.remaining(t), linear.fit.remaining(t), atol=0.05)
