@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import butter, sosfilt
 
 from array_log import ArrayLog, stream
 from mocobot_inspect.findings import findings
@@ -65,6 +66,17 @@ def test_a_part_of_the_trial() -> None:
 )
 def test_no_line(extra: np.ndarray | float) -> None:
     assert oscillation(read(extra), RATE) is None
+
+
+def test_a_hum_of_five_times_the_noise_of_a_fine_sensor() -> None:
+    assert oscillation(read(sine(30.0, 0.05), step=1e-6), RATE) is None
+    assert oscillation(read(sine(30.0, 0.2), step=1e-6), RATE) is not None
+
+
+def test_shaking_over_many_frequencies_is_no_line() -> None:
+    band = butter(4, (12.0, 25.0), btype="band", fs=RATE, output="sos")
+    shaking = sosfilt(band, np.random.default_rng(8).standard_normal(len(TIME)))
+    assert oscillation(read(3.0 * shaking), RATE) is None
 
 
 @pytest.mark.parametrize("rate", [0.02, 0.03, 0.07])
