@@ -16,7 +16,7 @@ NOISES = 10.0
 """Amplitude over the channel's noise from which on it is worth a word; a sensor's own line is below."""
 STEPS = 10.0
 """The same over its quantisation step: a slow joint climbs stairs of one."""
-SHARE = 0.5
+SHARE = 0.7
 """Least share of one line in all that is fast: a bump has none."""
 WINDOW_S = 2.5
 _WIDTH = 3  # frequencies on either side of a line that are its own, in a Hann window
