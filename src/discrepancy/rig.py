@@ -160,7 +160,7 @@ class Rig(ABC):
         return []
 
     def bent(self, candidate: Candidate, values: Array) -> tuple[Sequence[Array], Sequence[Array]] | None:
-        """Of what is no multiple of its values, columns: its slopes there, and per unit from nought on; None of others."""
+        """Columns of what is no multiple of its values: slopes there, and per unit from nought on; None of others."""
         return None
 
     def inexact(self, candidate: Candidate) -> Array:

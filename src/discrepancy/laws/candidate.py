@@ -52,8 +52,9 @@ class LawCandidate(Candidate):
         return f"{self.where_it_is}, {by}"
 
     def in_shape(self, shape: Mapping[str, float]) -> LawCandidate:
-        """The same with other numbers inside the function."""
-        return replace(self, term=replace(self.term, numbers=dict(shape)), shape=dict(shape))
+        """The same with other numbers inside the function, within what they may be."""
+        numbers = self.term.law.within(shape)
+        return replace(self, term=replace(self.term, numbers=numbers), shape=dict(numbers))
 
 
 def candidate_of(place: Place, term: Term, scale: float, among: int) -> LawCandidate:
@@ -90,5 +91,5 @@ def law_steps(candidate: LawCandidate) -> list[tuple[Candidate, Candidate, float
     for name, share in candidate.term.law.fitted.items():
         value = numbers[name]
         less, more = (candidate.in_shape({**numbers, name: x * value}) for x in (1.0 - share, 1.0 + share))
-        out.append((less, more, 2.0 * share * value))
+        out.append((less, more, more.shape[name] - less.shape[name]))
     return out

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.signal import lfilter, lfilter_zi
@@ -25,6 +25,7 @@ class Function:
         of: values at a rate [Hz]: signal (Q,), rate, numbers -> columns (Q, k), one amplitude each.
         formula: in words and symbols; ``a`` is the amplitude, in braces are the signal ``x`` and the numbers.
         fitted: which of the numbers the data determine, with the share by which to change them for slopes.
+        least: of numbers that mean something else, or nothing, where they are less.
     """
 
     name: str
@@ -32,6 +33,11 @@ class Function:
     of: Callable[[Array, float, Numbers], Array]
     formula: str
     fitted: Mapping[str, float]
+    least: Mapping[str, float] = field(default_factory=dict)
+
+    def within(self, numbers: Numbers) -> dict[str, float]:
+        """The numbers, none less than it may be."""
+        return {name: max(value, self.least.get(name, value)) for name, value in numbers.items()}
 
 
 def _plain(of: Callable[[Array], Array]) -> Callable[[Array, float, Numbers], Array]:
@@ -122,7 +128,10 @@ FUNCTIONS: dict[str, Function] = {
         Function("beyond", ("knee",), _beyond, "a {x} beyond +-{knee}", {}),
         Function("sine", ("times",), _sine, "a sin({times} {x} + {phase})", {}),
         Function("hum", ("frequency_hz",), _hum, "a sin(2 pi {frequency_hz} {x} + {phase})", {"frequency_hz": 2e-4}),
-        Function("warming", ("time_s",), _warming, "a (1 - exp(-{x} / {time_s}))", {"time_s": 0.02}),
+        Function(
+            "warming", ("time_s",), _warming, "a (1 - exp(-{x} / {time_s}))", {"time_s": 0.02},
+            {"time_s": rules.LAW_WARMING_S[0]},
+        ),
         Function("play", ("half_width",), _play, "play of {x}, half width {half_width}, amplitude a", {}),
         Function("lag", ("time_s",), _lag, "a times how far {x} lags with {time_s}, over that", {"time_s": 0.05}),
         Function(

@@ -9,7 +9,8 @@ LAW_PLAY_SHARES = (0.0003, 0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0)
 LAW_LAG_S = (0.01, 0.1, 1.0)
 """Time constants of a lag that are tried. Chosen."""
 LAW_WARMING_S = (2.0, 5.0, 10.0, 20.0, 50.0)
-"""Time constants of a warming that are tried. Chosen: from a moment to a trial."""
+"""Time constants of a warming that are tried. Chosen: from a moment to a trial. One shorter than the first is over when
+a trial's rows begin (``TEAM_TRIM_S``): a constant."""
 LAW_RESONANCE_HZ, LAW_DAMPING = (0.5, 0.8, 1.2, 2.0), (0.1, 0.7)
 """Frequencies and damping ratios of what follows a motion. Chosen."""
 LAW_MOST_TIMES = 32

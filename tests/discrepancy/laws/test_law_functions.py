@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from discrepancy.laws.candidate import candidate_of, law_steps, refined
 from discrepancy.laws.dictionary import nearby, of_own, terms_at
 from discrepancy.laws.functions import FUNCTIONS, knots_of
 from discrepancy.laws.place import Place
@@ -92,3 +93,17 @@ def test_nearby_numbers_stay_possible():
 
 def test_a_signal_that_stands_still_has_no_curve():
     assert "spline" not in {term.function for term in of_own(ANGLE, np.ones(100))}
+
+
+def test_a_warming_that_is_over_before_the_rows_begin_is_a_constant():
+    """Rows begin two seconds after a trial: of a time constant of 0.6 s a thirtieth is left to come."""
+    place = Place("tau reading", 1, 1, ("tau_1_1",), ("",), "N m", "reading")
+    law = candidate_of(place, Term("warming", TIME, {"time_s": 2.5}), 1.0, 1)
+    short = law.in_shape({"time_s": 0.6})
+    assert (short.term.numbers, short.shape) == ({"time_s": 2.0}, {"time_s": 2.0})
+    assert law.in_shape({"time_s": 7.0}).term.numbers == {"time_s": 7.0}
+    assert min(c.shape["time_s"] for c in refined(law, finer=False)) == 2.0
+    # At the least the slope is one-sided.
+    ((less, more, difference),) = law_steps(short)
+    assert (less.shape["time_s"], more.shape["time_s"]) == (2.0, pytest.approx(2.04))
+    assert difference == pytest.approx(0.04)
