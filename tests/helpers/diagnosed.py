@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from discrepancy.candidate import Candidate, Parameter
@@ -72,8 +74,12 @@ def check_schema(values: dict[str, Any], *, simulated: bool = True) -> None:
         assert all(value > 0.0 for value in values["foretold"].values())
     for entry in values["scatter"]:
         assert set(entry) == {
-            "cause", "kind", "family", "sentence", "factor", "places", "spread", "tolerance", "nats"
+            "cause", "kind", "family", "sentence", "factor", "places", "spread", "tolerance", "nats", "each"
         }  # fmt: skip
+        assert len(entry["each"]) <= entry["places"]
+        for place in entry["each"]:
+            assert set(place) == {"robot", "joint", "place", "parameters"}
+            assert set(place["parameters"]) == set(entry["spread"])
         assert entry["factor"] >= 3.0
         for name, size in entry["spread"].items():
             assert size == pytest.approx(entry["factor"] * entry["tolerance"][name])
@@ -150,7 +156,11 @@ def scattered() -> dict[str, Any]:
     zero = Candidate(
         "theta_zero", "gimbal_zero", 1, 1, (Parameter("zero_rad", 1e-4, 1e-4),), title="zero of {gimbal axis}"
     )
-    return scatter_to_dict(Scatter(zero, 52.0, 9, 140.0))
+    each = tuple(
+        (replace(zero, robot=robot, joint=joint), np.array([value]), np.array([2e-4]))
+        for robot, joint, value in ((2, 3, -9.1e-3), (1, 1, 7.2e-3), (3, 2, 4e-3), (1, 2, -1e-3))
+    )
+    return scatter_to_dict(Scatter(zero, 52.0, 9, 140.0, each))
 
 
 def small_diagnosis(verdict: str = "explained") -> dict[str, Any]:

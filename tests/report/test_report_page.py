@@ -524,3 +524,13 @@ def test_findings_of_a_calibration_come_first(tmp_path: Path, no_pictures: pytes
     assert "What speaks against these numbers" in text
     assert "The encoder of phi2 of robot 3 slipped by 1.2 deg." in text
     assert "Nothing speaks against" not in text
+
+
+def test_places_of_a_kind_that_scatters_are_told(tmp_path: Path) -> None:
+    folder = diagnosis_folder(tmp_path / "diagnosis", "miscalibrated")
+    write_report(folder, tmp_path / "page.html")
+    page = re.sub(r"<[^>]+>", "", (tmp_path / "page.html").read_text())
+    assert (
+        "Zero of a gimbal axis: farthest off are robot 2, joint 3 (−9.1 mrad), robot 1, joint 1 (7.2 mrad)"
+        in page
+    )

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
@@ -69,12 +70,14 @@ class Scatter:
         factor: their spread over the tolerance.
         places: how many there are.
         nats: by how much that is likelier than the tolerance.
+        each: every place, how far off it is and the standard errors, shape (k,) each; the farthest first.
     """
 
     candidate: Candidate
     factor: float
     places: int
     nats: float
+    each: tuple[tuple[Candidate, Array, Array], ...] = ()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -221,5 +224,19 @@ def scatter_of(hypothesis: Hypothesis) -> tuple[Scatter, ...]:
             # Numbers that a healthy one has none of, as its shape says nothing of them, are not said to scatter.
             shown = np.diag(problem.grams.sum(axis=0))[problem.spans[kinds[kind]]] > 0.0
             numbers = tuple(p for p, shows in zip(candidate.parameters, shown, strict=True) if shows)
-            out.append(Scatter(replace(candidate, parameters=numbers), factor, places, nats))
+            each = _each(hypothesis, kind, shown)
+            out.append(Scatter(replace(candidate, parameters=numbers), factor, places, nats, each))
     return tuple(sorted(out, key=lambda item: -item.factor))
+
+
+def _each(
+    hypothesis: Hypothesis, kind: str, shown: NDArray[np.bool_]
+) -> tuple[tuple[Candidate, Array, Array], ...]:
+    """Places of a kind that scatters, with the numbers that show and their errors, the farthest off first."""
+    out = []
+    for index, candidate in enumerate(hypothesis.problem.candidates):
+        if candidate.cause == kind and index not in hypothesis.free and hypothesis.fit.uses(index):
+            values, covariance = hypothesis.fit.part(index)
+            se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+            out.append((candidate, (values * candidate.units)[shown], (se * candidate.units)[shown]))
+    return tuple(sorted(out, key=lambda item: -float(np.abs(item[1]).max(initial=0.0))))

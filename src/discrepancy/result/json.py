@@ -36,6 +36,8 @@ scatter             kinds of which all places are off by more than the tolerance
     places                         how many there are
     spread, tolerance              {name: size} of every parameter, standard deviations over the places
     nats                           by how much the spread is likelier than the tolerance
+    each                           {robot, joint, place, parameters: {name: {value, se}}} of every place, the farthest
+                                   off first
 foretold            {as_designed, as_found}: chi2/n of trials left out, the machine as designed and as the other trials
                     find it; null where nothing scatters, or for a single trial
 evidence            the strongest candidates, see ``evidence_list``: {before, after} with nothing found and with what

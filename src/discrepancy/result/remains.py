@@ -9,6 +9,8 @@ from discrepancy.engine.explanation import Scatter
 from discrepancy.result.read import kind_of
 
 Values = Mapping[str, Any]
+FARTHEST = 3
+"""Places of a kind that are said."""
 
 
 def remedy(values: Values) -> str:
@@ -90,6 +92,18 @@ def scatter_to_dict(item: Scatter) -> dict[str, Any]:
         "spread": {name: item.factor * size for name, size in tolerance.items()},
         "tolerance": tolerance,
         "nats": float(item.nats),
+        "each": [
+            {
+                "robot": place.robot,
+                "joint": place.joint,
+                "place": place.place,
+                "parameters": {
+                    name: {"value": float(value), "se": float(error)}
+                    for name, value, error in zip(tolerance, sizes, errors, strict=True)
+                },
+            }
+            for place, sizes, errors in item.each
+        ],
     }
     return values | {"sentence": _sentence(values)}
 
@@ -102,13 +116,25 @@ def _sentence(entry: Values) -> str:
     )
 
 
+def farthest(entry: Values) -> str:
+    """The places that are farthest off, by how much, in words; empty where none is told."""
+    return ", ".join(
+        f"{place['place']} ({_sizes(entry, {n: p['value'] for n, p in place['parameters'].items()})})"
+        for place in entry.get("each", ())[:FARTHEST]
+    )
+
+
 def sizes_of(entry: Values, which: str) -> str:
     """``spread`` or ``tolerance`` of an entry in words; both in the unit that fits the spread."""
+    return _sizes(entry, entry[which])
+
+
+def _sizes(entry: Values, sizes: Mapping[str, float]) -> str:
     shown = one_each((parameter(name)[1], size) for name, size in entry["spread"].items())
     said = []
-    for name, size in entry[which].items():
+    for name, size in sizes.items():
         words, unit = parameter(name)
         unit, scale = shown[unit]
         number = f"{scale * size:.2g} {unit}".rstrip()
-        said.append(number if len(entry[which]) == 1 else f"{words} {number}")
+        said.append(number if len(sizes) == 1 else f"{words} {number}")
     return ", ".join(said)

@@ -8,7 +8,7 @@ from discrepancy import rules
 from discrepancy.causes.units import Shown, one_each, parameter
 from discrepancy.result.evidence_list import label
 from discrepancy.result.read import kind_of, name_of
-from discrepancy.result.remains import of_scatter, remains, remedy, sizes_of
+from discrepancy.result.remains import farthest, of_scatter, remains, remedy, sizes_of
 from discrepancy.result.text_gain import gain_lines
 from discrepancy.result.text_rollouts import rollout_lines
 
@@ -142,8 +142,13 @@ def _scatter(values: Values) -> Iterable[str]:
     for entry in values["scatter"]:
         yield from _wrapped(
             f"{entry['kind']} ({entry['cause']}): {sizes_of(entry, 'spread')}, {_times(entry['factor'])} times the "
-            f"tolerance; likelier than it by {entry['nats']:.0f} nats."
+            f"tolerance; likelier than it by {entry['nats']:.0f} nats.{_farthest(entry)}"
         )
+
+
+def _farthest(entry: Values) -> str:
+    said = farthest(entry)
+    return f" Farthest off: {said}." if said else ""
 
 
 def _times(factor: float) -> str:

@@ -4,11 +4,12 @@ from collections.abc import Mapping
 from typing import Any
 
 from discrepancy.result.evidence_list import label
-from discrepancy.result.remains import remedy, sizes_of
+from discrepancy.result.read import kind_of
+from discrepancy.result.remains import farthest, remedy, sizes_of
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import about
-from mocobot_report.blocks.prose import paragraph, tidy
+from mocobot_report.blocks.prose import bullets, paragraph, tidy
 from mocobot_report.blocks.sections import section
 from mocobot_report.blocks.tables import Entry, Num, table, value
 from mocobot_report.diagnosis.keys import cause_name, chance_of
@@ -21,7 +22,13 @@ def doubtful_sections(book: Book, values: Values) -> list[Node]:
     out = []
     if values["scatter"]:
         out.append(
-            section(book, "Off at all places alike", paragraph(tidy(remedy(values))), _scatter(values))
+            section(
+                book,
+                "Off at all places alike",
+                paragraph(tidy(remedy(values))),
+                _scatter(values),
+                _places(values),
+            )
         )
     if values["suspected"]:
         out.append(section(book, "Suspected", _suspected(values)))
@@ -45,6 +52,13 @@ def _scatter(values: Values) -> Node:
         ["cause", "spread", "tolerance", "factor", "places", "likelier by [nats]"], rows, stack=True,
         note="standard deviation over all places, learnt from the recordings",
     )  # fmt: skip
+
+
+def _places(values: Values) -> Node | None:
+    """The places of every kind that are farthest off."""
+    told = [(entry, farthest(entry)) for entry in values["scatter"]]
+    said = [f"{kind_of(entry)}: farthest off are {where}" for entry, where in told if where]
+    return bullets([tidy(f"{text[:1].upper()}{text[1:]}.") for text in said]) if said else None
 
 
 def _suspected(values: Values) -> Node:

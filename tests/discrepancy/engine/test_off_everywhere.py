@@ -58,6 +58,18 @@ def test_what_is_as_far_off_as_all_else_is_scatter_and_is_in_the_model(others):
     assert explanation.found == explanation.suspected == ()
     assert "loose" in {item.candidate.cause for item in explanation.scatter}
     assert explanation.clean
+    # By how much every place is off is told, the farthest first; within a tolerance each is off besides.
+    off = np.random.default_rng(17).choice([-1.2, -0.8, 0.8, 1.2], LOOSE)
+    kinds = {item.candidate.cause: item for item in explanation.scatter}
+    assert len(kinds) == KINDS + 1
+    for k in range(KINDS):
+        each = kinds[f"kind {k}"].each
+        sizes = [abs(value[0]) for _, value, _ in each]
+        assert sizes == sorted(sizes, reverse=True)
+        assert sorted(place.robot for place, _, _ in each) == [1, 2, 3]
+        for place, value, se in each:
+            assert value[0] == pytest.approx(10.0 * off[PLACES * k + place.robot - 1], abs=3.0 + 4.0 * se[0])
+            assert 0.0 < se[0] < 1.0
     # What they leave open is told by their law, though they are not named.
     assert {CATALOGUE[k].key for k in (LOOSE, *others)} <= set(explanation.problem.opened)
     value, covariance = explanation.fit.part(LOOSE)

@@ -6,7 +6,7 @@ import pytest
 
 from diagnosed import VERDICTS, scattered, small_diagnosis
 from discrepancy import rules
-from discrepancy.result.remains import remains
+from discrepancy.result.remains import farthest, remains
 from discrepancy.result.text import format_diagnosis
 from mocobot_report.diagnosis.part import KINDS
 
@@ -86,6 +86,18 @@ def test_what_is_off_everywhere_is_told_once(verdict: str) -> None:
         "zero of a gimbal axis (theta_zero): 5.2 mrad, 52 times the tolerance; likelier than it by 140 nats."
         in text
     )
+    assert farthest(values["scatter"][0]) in text
+
+
+def test_the_places_farthest_off_are_told() -> None:
+    """Three of four, in the unit of the spread; of a diagnosis that was written without them, none."""
+    entry = scattered()
+    said = "robot 2, joint 3 (-9.1 mrad), robot 1, joint 1 (7.2 mrad), robot 3, joint 2 (4 mrad)"
+    assert farthest(entry) == said
+    del entry["each"]
+    assert farthest(entry) == ""
+    values = small_diagnosis("miscalibrated") | {"scatter": [entry]}
+    assert "Farthest" not in format_diagnosis(values)
 
 
 def test_every_verdict_has_its_colour() -> None:
