@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from discrepancy.least_squares.cells import Cells
+from discrepancy.least_squares.cells import Cells, cosine_matrix
 from discrepancy.rules import CELL_BANDS
 from linear_problem import cosines
 
@@ -87,3 +87,14 @@ def test_white_noise_has_unit_power_in_every_cell(rng):
     left = cells.grams(cells.spectrum(x), cells.spectrum(x))[:, 0, 0]
     assert np.all(chi2.sf(left, cells.sizes) > 1e-4)
     assert np.all(chi2.cdf(left, cells.sizes) > 1e-4)
+
+
+@pytest.mark.parametrize("rows", [1, 2, 101, 226, 446, 450, 887, 907])
+def test_transforms_and_back_whatever_the_rows_are_divisible_by(rng, rows):
+    """Against its definition; of rows with a large prime factor it is a product with a matrix."""
+    assert (cosine_matrix(rows) is None) == (rows not in (101, 226, 446, 887))
+    cells, x = Cells.of(rows + 3, 2, moving=rows), rng.standard_normal((rows + 3, 2, 3))
+    y = cells.spectrum(x)
+    np.testing.assert_allclose(y[:rows], np.einsum("ki,icl->kcl", cosines(rows), x[:rows]), atol=1e-12)
+    np.testing.assert_array_equal(y[rows:], x[rows:])
+    np.testing.assert_allclose(cells.series(y), x, atol=1e-12)
