@@ -37,10 +37,10 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
             residual = rig.residual(-shared, [-x for x in local], active)
         except InputError:  # no such machine: the linear answer is the better one
             return linear
-        problem = fit.problem
+        problem, bends = fit.problem, False
         for i, (cause, values) in zip(there, active, strict=True):
             if (bent := rig.bent(cause, values)) is not None:
-                problem = problem.with_columns(i, cause, bent[0])
+                problem, bends = problem.with_columns(i, cause, bent[0]), True
         # The problem counts total values, so what its columns stand for is added back.
         back = []
         for t, total in zip(trials, residual, strict=True):
@@ -51,7 +51,8 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
                 values[fit.problem.spans[i]] = fit.part(i)[0]
             back.append(total + problem.raw_times(t, values))
         new = Hypothesis.of(problem.with_residual(back), hypothesis.free, hypothesis.allowed)
-        if new.learnt.log_evidence < hypothesis.learnt.log_evidence - rules.DIVERGED_NATS:
+        lost = hypothesis.learnt.log_evidence - new.learnt.log_evidence
+        if lost > (rules.BENT_NATS if bends and hypothesis is linear else rules.DIVERGED_NATS):
             break  # it diverges: the linear answer is the better one
         se = np.sqrt(np.diag(new.fit.covariance))
         step = (

@@ -171,11 +171,10 @@ def _steps(signals: Signals) -> Array:
 
 def chatter(signals: Signals) -> Array:
     """Root mean square above 25 Hz where it is lines and no noise, otherwise 0, shape (3, N, 3): phi, theta, tau."""
-    high = min(rules.NOISE_ABOVE_HZ, 0.4 * min(signals.rate_hz, *_native_hz(signals)))
-    x = _columns(signals)
-    over_time, between_lines = _fast(high, x, signals.rate_hz)
+    high, x = _high(signals), _columns(signals)
     frequency, density = periodogram(x, signals.rate_hz, window="hann", detrend="linear", axis=0)
     lines = np.sqrt(density[frequency > high].sum(axis=0) * frequency[1])
+    over_time, between_lines = _levels(signals)
     lines[between_lines >= rules.NOISE_LINES * over_time] = 0.0
     return np.moveaxis(lines.reshape(len(lines), 3, 3), 1, 0)
 
@@ -183,26 +182,35 @@ def chatter(signals: Signals) -> Array:
 def _white(signals: Signals) -> Array:
     """Standard deviation of white noise of a reading, from what lies above 25 Hz, shape (3, N, 3).
 
-    A conversion leaves less of it there; how much, it shows on noise of one.
+    Robust against moments, and against lines where these are most of it: a joint that chatters.
     """
-    rate_hz, x = signals.rate_hz, _columns(signals)
-    high = min(rules.NOISE_ABOVE_HZ, 0.4 * min(rate_hz, *_native_hz(signals)))
-    white = _spread_above(high, x, rate_hz)
-    if signals.sampling is None:
-        white /= np.sqrt(1.0 - high / (rate_hz / 2.0))
-    else:
-        rng = np.random.default_rng(rules.NOISE_SEED)
-        for i, sampling in enumerate(signals.sampling):
-            way = Resampling.of(sampling.later(float(signals.time[0])), rate_hz, len(x), rng)
-            left = way(rng.standard_normal((len(way.instants), SENSORS)))
-            white[i] /= np.median(_spread_above(high, left, rate_hz))
+    over_time, between_lines = _levels(signals)
+    white = np.where(between_lines < rules.NOISE_LINES * over_time, between_lines, over_time)
     return np.moveaxis(white.reshape(len(white), 3, 3), 1, 0)
 
 
-def _spread_above(high: float, x: Array, rate_hz: float) -> Array:
-    """A root mean square above a frequency, robust against moments and against lines: a joint that chatters."""
+def _high(signals: Signals) -> float:
+    """From where on there is noise alone [Hz]."""
+    return float(min(rules.NOISE_ABOVE_HZ, 0.4 * min(signals.rate_hz, *_native_hz(signals))))
+
+
+def _levels(signals: Signals) -> tuple[Array, Array]:
+    """White noise of a reading with the lines, and without, shape (N, 9) each.
+
+    A conversion leaves less of it there; how much, it shows on noise of one.
+    """
+    rate_hz, x, high = signals.rate_hz, _columns(signals), _high(signals)
     over_time, between_lines = _fast(high, x, rate_hz)
-    return np.where(between_lines < rules.NOISE_LINES * over_time, between_lines, over_time)
+    if signals.sampling is None:
+        share = np.sqrt(1.0 - high / (rate_hz / 2.0))
+        return over_time / share, between_lines / share
+    rng = np.random.default_rng(rules.NOISE_SEED)
+    for i, sampling in enumerate(signals.sampling):
+        way = Resampling.of(sampling.later(float(signals.time[0])), rate_hz, len(x), rng)
+        left = _fast(high, way(rng.standard_normal((len(way.instants), SENSORS))), rate_hz)
+        over_time[i] /= np.median(left[0])
+        between_lines[i] /= np.median(left[1])
+    return over_time, between_lines
 
 
 def _fast(high: float, x: Array, rate_hz: float) -> tuple[Array, Array]:
