@@ -495,20 +495,20 @@ def test_a_fault_of_one_of_two_kinds_with_one_trace_is_seen_in_both():
 class BentRig(FakeRig):
     """One cause leaves something else, in the square of its size, where it is exact."""
 
-    bent: str = ""
+    curls: str = ""
 
     def residual(self, shared, local, active):
         out = super().residual(shared, local, active)
         rng = np.random.default_rng(99)
         for x in out:
             pattern = rng.standard_normal(x.shape)
-            x += sum(values[0] ** 2 for c, values in active if c.cause == self.bent) * 2e-4 * pattern
+            x += sum(values[0] ** 2 for c, values in active if c.cause == self.curls) * 2e-4 * pattern
         return out
 
 
 @pytest.mark.parametrize(("wrong", "right"), [("cause 2", "cause 4"), ("cause 4", "cause 2")])
 def test_what_straight_columns_do_not_part_is_parted_where_it_is_exact(wrong, right):
-    rig = BentRig({2: 25.0}, twins={4: (2, 0.0)}, bent=wrong)
+    rig = BentRig({2: 25.0}, twins={4: (2, 0.0)}, curls=wrong)
     assert names(found_in(rig).found) == [right]
 
 
@@ -565,6 +565,6 @@ def test_a_scatter_of_another_kind_with_the_same_trace_does_not_hide_a_fault(ben
     """Which of the two kinds takes the scatter is by chance; which place is at fault, exact residuals tell."""
     twins = {3: (0, 0.0), 4: (1, 0.0), 5: (2, 0.0)}
     present = {3 if wanted == "lag" else 0: 17.0}
-    rig = BentRig(present, catalogue=(*SCATTERED[:3], *LAGS, *CATALOGUE), twins=twins, bent=bent)
+    rig = BentRig(present, catalogue=(*SCATTERED[:3], *LAGS, *CATALOGUE), twins=twins, curls=bent)
     (found,) = found_in(rig).found
     assert (found.candidate.cause, found.candidate.robot) == (wanted, 1)
