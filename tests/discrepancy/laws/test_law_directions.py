@@ -8,27 +8,12 @@ import pytest
 from discrepancy.laws.candidate import candidate_of
 from discrepancy.laws.term import Term
 from discrepancy.laws.variable import TIME, Variable
-from discrepancy.least_squares.whitening import Whitening
-from discrepancy.team.laws.bench import TeamBench
 from discrepancy.team.laws.places import places_of, twin_of
 from estimator.estimate.principal import inertia_parameters
 from estimator.rigid_team.residual import Bases
-from team_case import exact, residual_of
+from team_case import residual_of
 
 PLACES = {place.key: place for place in places_of(3)}
-
-
-@pytest.fixture(scope="module")
-def case():
-    return exact()
-
-
-@pytest.fixture(scope="module")
-def bench(case):
-    channels, moving = case.linear.channels, case.reduction.moving
-    eye = np.eye(channels)
-    white = Whitening(moving, eye, eye, np.zeros((channels, 0)), np.ones(channels), np.ones((1, channels)))
-    return TeamBench([case.linear], [white])
 
 
 def wave(case):

@@ -9,9 +9,7 @@ from discrepancy.engine.diagnose import diagnose
 from discrepancy.laws.candidate import LawCandidate, candidate_of
 from discrepancy.laws.term import Term
 from discrepancy.laws.variable import TIME
-from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rules import LAW_READING_LEAST
-from discrepancy.team.laws.bench import TeamBench
 from discrepancy.team.laws.misreading import Misreading
 from discrepancy.team.laws.places import places_of
 from discrepancy.team.laws.variables import joint_variable
@@ -26,7 +24,7 @@ from mocobot_sim.trial.readings import RobotReadings
 from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trajectories import random_vias, sphere_motion
 from mocobot_sim.trial.trial import run_trial
-from team_case import exact, residual_of
+from team_case import residual_of
 
 READ = np.linspace(0.5, 9.5, 50)
 PLACES = {place.key: place for place in places_of(3)}
@@ -72,19 +70,6 @@ def test_where_no_truth_fits_the_numbers_stay_finite() -> None:
     assert (slopes <= lost.true(np.array([-0.02])) ** 2 / LAW_READING_LEAST * 1.001).all()
     still = square(np.full(7, 3.0))
     np.testing.assert_allclose(still.true(np.array([0.1])), (np.sqrt(2.2) - 1.0) / 0.2, rtol=1e-9)
-
-
-@pytest.fixture(scope="module")
-def case():
-    return exact()
-
-
-@pytest.fixture(scope="module")
-def bench(case):
-    channels, moving = case.linear.channels, case.reduction.moving
-    eye = np.eye(channels)
-    white = Whitening(moving, eye, eye, np.zeros((channels, 0)), np.ones(channels), np.ones((1, channels)))
-    return TeamBench([case.linear], [white])
 
 
 def law_of(function: str, name: str, robot: int, joint: int, of: str = "") -> LawCandidate:
