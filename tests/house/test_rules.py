@@ -14,7 +14,7 @@ RULES = {"inference": 40, "team": 30, "axis": 40, "serial": 60, "laws": 20, "rol
 FREE = {
     "discrepancy.emps.recording.axis_log": {"FIRST_GUESS_KG", "LIMIT_V"},  # the nominal axis
     "discrepancy.emps.recording.whole": {"HEADER_BYTES", "TAG_BYTES"},  # of MATLAB's format
-    "discrepancy.result.remains": {"FARTHEST"},
+    "discrepancy.result.remains": {"FARTHEST"},  # of a text
     "discrepancy.result.evidence_list": {"CLOSELY", "MOST"},  # of a picture
     "discrepancy.result.json": {"MOST_PLACES"},
     "discrepancy.result.read": {"VERSION"},

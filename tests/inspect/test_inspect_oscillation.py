@@ -91,6 +91,17 @@ def test_too_short_and_too_slow(size: int, rate_hz: float) -> None:
     assert oscillation(read(sine(12.0, 5.0))[:size], rate_hz) is None
 
 
+def test_a_fast_log_is_looked_at_in_shorter_windows() -> None:
+    """Rows come 20,000 at a time: two seconds of 10 kHz."""
+    time = np.arange(20_000) / 10_000.0
+    hum = 0.5 * np.sin(2 * np.pi * 50.0 * time) + 0.01 * np.random.default_rng(2).standard_normal(len(time))
+    found = oscillation(hum, 10_000.0)
+    assert found is not None
+    assert found.frequency_hz == pytest.approx(50.0, abs=0.5)
+    assert found.amplitude == pytest.approx(0.5, rel=0.02)
+    assert found.duration_s == pytest.approx(2.0)
+
+
 def test_parts_are_joined() -> None:
     assert joined([]) is None
     parts = [Oscillation(30.0, 1.0, 2.5), Oscillation(29.0, 4.0, 5.0)]

@@ -233,10 +233,11 @@ def _each(
     hypothesis: Hypothesis, kind: str, shown: NDArray[np.bool_]
 ) -> tuple[tuple[Candidate, Array, Array], ...]:
     """Places of a kind that scatters, with the numbers that show and their errors, the farthest off first."""
-    out = []
+    out: list[tuple[float, tuple[Candidate, Array, Array]]] = []
     for index, candidate in enumerate(hypothesis.problem.candidates):
         if candidate.cause == kind and index not in hypothesis.free and hypothesis.fit.uses(index):
             values, covariance = hypothesis.fit.part(index)
             se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-            out.append((candidate, (values * candidate.units)[shown], (se * candidate.units)[shown]))
-    return tuple(sorted(out, key=lambda item: -float(np.abs(item[1]).max(initial=0.0))))
+            item = candidate, (values * candidate.units)[shown], (se * candidate.units)[shown]
+            out.append((float(np.abs(values[shown]).max(initial=0.0)), item))  # over the tolerance
+    return tuple(item for _, item in sorted(out, key=lambda pair: -pair[0]))

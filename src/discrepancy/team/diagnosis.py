@@ -9,11 +9,11 @@ from discrepancy import rules
 from discrepancy.engine.diagnose import When, diagnose
 from discrepancy.inference.odds import check_odds
 from discrepancy.result.diagnosed import Diagnosed
+from discrepancy.team.chattering import chattering
 from discrepancy.team.checks import check_estimate, check_recordings
 from discrepancy.team.estimates import errors, estimates
 from discrepancy.team.long.choice import Choice
 from discrepancy.team.long.search import search_parts
-from discrepancy.team.loops import chattering
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import read_tolerances
 from discrepancy.team.traces import traces

@@ -18,7 +18,8 @@ STEPS = 10.0
 """The same over its quantisation step: a slow joint climbs stairs of one."""
 SHARE = 0.7
 """Least share of one line in all that is fast: a bump has none."""
-WINDOW_S = 2.5
+WINDOW_S, WINDOW_ROWS = 2.5, 10_000
+"""Length of a window, and rows of one at most: half of what is looked at together."""
 _WIDTH = 3  # frequencies on either side of a line that are its own, in a Hann window
 
 
@@ -29,7 +30,7 @@ class Oscillation:
     Attributes:
         frequency_hz: where it is largest [Hz]; folded if it is above half the rate.
         amplitude: its largest [SI].
-        duration_s: for how long it is there, in windows of ``WINDOW_S`` [s].
+        duration_s: for how long it is there, in whole windows [s].
     """
 
     frequency_hz: float
@@ -44,7 +45,7 @@ def oscillation(x: Array, rate_hz: float) -> Oscillation | None:
         x: consecutive samples, finite, shape (q,).
         rate_hz: their rate [Hz].
     """
-    size = round(WINDOW_S * rate_hz)
+    size = min(round(WINDOW_S * rate_hz), WINDOW_ROWS)
     if len(x) < size or rate_hz < 4.0 * ABOVE_HZ:
         return None
     frequency, _, density = spectrogram(x, rate_hz, window="hann", nperseg=size, noverlap=0, detrend="linear")

@@ -105,3 +105,42 @@ def test_what_bends_strongly_is_found_where_the_rig_says_how(by):
             found.problem.raw_times(t, last), linear.problem.raw_times(t, last), atol=2e-3
         )
         np.testing.assert_allclose(found.fit.remaining(t), linear.fit.remaining(t), atol=0.05)
+
+
+@dataclass
+class Flattered(Told):
+    """Straight columns of cause 2 hold some of what is left in the data, as those made of adjusted signals do."""
+
+    flatter: float = 0.0
+
+    def columns(self, candidate):
+        plain = super().columns(candidate)
+        if candidate.key != CATALOGUE[2].key or not self.flatter:
+            return plain
+        left = np.random.default_rng(99)
+        return [c + self.flatter * left.standard_normal(c.shape) for c in plain]
+
+    def residual(self, shared, local, active):
+        flatter, self.flatter = self.flatter, 0.0
+        out = super().residual(shared, local, active)
+        self.flatter = flatter
+        return out
+
+    def bent(self, candidate, values):
+        flatter, self.flatter = self.flatter, 0.0
+        out = super().bent(candidate, values)
+        self.flatter = flatter
+        return out
+
+
+@pytest.mark.parametrize(("flatter", "taken"), [(0.02, True), (0.1, False)])
+def test_the_straight_answer_of_what_bends_may_flatter_it_a_little(flatter, taken):
+    rig = Flattered({2: 25.0}, by=0.004)
+    left = np.random.default_rng(99)
+    for t, (x, local, shared) in enumerate(rig.data):
+        noise = left.standard_normal((*x.shape, 1))[..., 0]
+        rig.data[t] = x + 25.0 * flatter * noise, local, shared
+    rig.flatter = flatter
+    linear, nothing = hypotheses(rig, [2])
+    found = exact(rig, linear, nothing)
+    assert (found is not linear) == taken

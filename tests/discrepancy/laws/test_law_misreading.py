@@ -10,6 +10,7 @@ from discrepancy.laws.candidate import LawCandidate, candidate_of
 from discrepancy.laws.term import Term
 from discrepancy.laws.variable import TIME
 from discrepancy.rules import LAW_READING_LEAST
+from discrepancy.team.causes.base import one_joint, one_robot
 from discrepancy.team.laws.misreading import Misreading
 from discrepancy.team.laws.places import places_of
 from discrepancy.team.laws.variables import joint_variable
@@ -79,11 +80,14 @@ def law_of(function: str, name: str, robot: int, joint: int, of: str = "") -> La
 
 @pytest.mark.parametrize("a", [-0.01, 0.02])
 def test_the_error_that_was_put_into_a_reading_comes_out(case, bench, a) -> None:
-    wrong = np.zeros_like(case.signals.tau)
-    wrong[:, 1, 2] = a * case.signals.tau[:, 1, 2] ** 2
-    read = case.signals.minus(tau=-wrong)
+    """Of a torque that is another than the one at which the bench is linear."""
+    true = 1.3 * case.signals.tau[:, 1, 2]
+    read = case.signals.minus(
+        tau=one_robot(one_joint(case.signals.tau[:, 1, 2] - true - a * true**2, 2), 3, 1)
+    )
     error = bench.reading_error(0, law_of("square", "tau", 2, 3), np.array([a]), read)["tau"]
-    np.testing.assert_allclose(error, wrong, atol=2e-3 * np.abs(wrong).max())
+    expected = one_robot(one_joint(a * true**2, 2), 3, 1)
+    np.testing.assert_allclose(error, expected, atol=2e-3 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("a", [-0.01, 0.02])
@@ -157,5 +161,4 @@ def test_the_size_of_a_square_in_a_team() -> None:
     assert isinstance(cause.candidate, LawCandidate)
     assert (cause.candidate.at.key, cause.candidate.term.function) == (("tau reading", 1, 2), "square")
     told = found.rig.effect_parameters(cause.candidate, cause.values, cause.covariance)
-    print(told)
     assert told[0]["amplitude"] == pytest.approx(PER_NM, rel=0.02)

@@ -7,9 +7,9 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from discrepancy.rules import MODEL_ABOVE, MODEL_BELOW_HZ, MODEL_PHI_RAD, MODEL_TAU_NM, MODEL_THETA_RAD
+from discrepancy.team.chattering import chattering
 from discrepancy.team.linear.noise import Noise, chatter
 from discrepancy.team.linear.signals import Signals
-from discrepancy.team.loops import chattering
 
 RATE = 100.0
 SAMPLES = 3000
