@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sealed.forms.base import Form
-from sealed.forms.cables import PayloadCable, RobotCable
+from sealed.forms.cables import PayloadCable, RobotCable, StiffeningStrap
 from sealed.forms.creep import LateCreep
 from sealed.forms.drags import PowerDrag, QuadraticDrag, TurningDrag
 from sealed.forms.friction import DrivenDahl, DrivenLugre, GimbalDahl, GimbalLugre
@@ -54,6 +54,7 @@ LISTED: tuple[type[Form], ...] = (
     SingleTorqueLag,
     PayloadCable,
     RobotCable,
+    StiffeningStrap,
     TurningDrag,
     PowerDrag,
     MassDrift,

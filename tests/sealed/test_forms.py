@@ -17,7 +17,7 @@ from mocobot_sim.trial.trial import run_trial
 from mocobot_sim.trial.truth import GroundTruth
 from sealed.draw import draw
 from sealed.forms.base import Form
-from sealed.forms.cables import PayloadCable, RobotCable
+from sealed.forms.cables import PayloadCable, RobotCable, StiffeningStrap
 from sealed.forms.creep import LateCreep
 from sealed.forms.drags import PowerDrag, QuadraticDrag
 from sealed.forms.grasps import SoftPlay, TurningGrasp
@@ -94,6 +94,14 @@ def test_a_cable_on_a_robot_pulls_at_its_wrist():
     )  # in {b}: the wrist is at (0, 0, 0.355)
     np.testing.assert_allclose(loop.data.qfrc_passive[loop.index.slide_dof[1]], pull, rtol=1e-6, atol=1e-9)
     assert np.abs(loop.data.qfrc_passive[loop.index.slide_dof[0]]).max() == 0.0
+
+
+def test_a_strap_is_twice_as_stiff_where_a_cable_is_not():
+    strap = StiffeningStrap(2, 40.0, 0.97, 0.6, 0.0, 1.155, doubled_m=0.015)
+    loop = ClosedLoop(team(strap))
+    mujoco.mj_forward(loop.model, loop.data)
+    pull = 40.0 * 0.03 * (1.0 + 0.03 / 0.015) * np.array([0.6, 0.0, 0.8])
+    np.testing.assert_allclose(loop.data.qfrc_passive[loop.index.slide_dof[1]], pull, rtol=1e-6, atol=1e-9)
 
 
 @pytest.mark.parametrize(

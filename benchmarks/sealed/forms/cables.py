@@ -25,6 +25,7 @@ class PayloadCable(Form):
 
     answer = "payload_tether"
     size = "stiffness_N_per_m"
+    size_is_known = True
     on_payload = True
     ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4), "length_m": (0.0, 100.0)}
     stiffness_N_per_m: float
@@ -62,6 +63,7 @@ class RobotCable(Form):
 
     answer = "tether"
     size = "stiffness_N_per_m"
+    size_is_known = True
     ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4), "length_m": (0.0, 100.0)}
     robot: int
     stiffness_N_per_m: float
@@ -81,4 +83,18 @@ class RobotCable(Form):
         site = add_site(platform, "cable", [0.0, 0.0, 0.0])
         anchor = scene.X_Wb[self.robot - 1].apply(self.xyz("anchor"))
         tie(scene, f"cable{self.robot}", site, anchor, self.stiffness_N_per_m, self.length_m)
+        return scene
+
+
+@dataclass(frozen=True)
+class StiffeningStrap(RobotCable):
+    """A cable that gets stiffer the more it is stretched: k e (1 + e / e_2), as woven straps do."""
+
+    size_is_known = False
+    doubled_m: float = 0.02
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        scene = super()._edit(scene)
+        tendon = scene.root.find("tendon", f"cable{self.robot}")
+        tendon.stiffness = [self.stiffness_N_per_m, self.stiffness_N_per_m / self.doubled_m]
         return scene

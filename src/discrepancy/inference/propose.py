@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -62,15 +63,9 @@ def proposals(
     open_: Hypothesis | None = None
     most = -np.inf  # score of that, tolerated
     scores: dict[tuple[object, ...], tuple[Candidate, float]] = {}
-    rough: Scanned | None = None  # of the best, as long as its shape is
-    offered = _hypotheses(rig, base, ranked, narrow=narrow)
-    while True:
-        item, new = next(offered, (None, None))
-        if new is None:
-            if rough is None or not (rig.refinements(rough.candidate) or rig.steps(rough.candidate)):
-                break
-            # Kinds that scatter are scanned as if they did not: where robots are off everywhere nothing else is near.
-            new, rough = sharpened(rig, base, rough, near=True), None
+    rough: list[tuple[Scanned, float]] = []  # what was not sharpened, and the score of the hypothesis with it
+    offered = chain(_hypotheses(rig, base, ranked, narrow=narrow), _sharper(rig, base, rough, scores))
+    for item, new in offered:
         new = beside_other_forms(rig, new, new.free[-1], base)
         last = new.causes[-1]
         which = (last.key, last.transient)
@@ -78,8 +73,10 @@ def proposals(
             continue
         if new.possible(rig, new.free[-1]) and not imitated(rig, base, new):
             scores[which] = last, new.score
+            if item is not None:
+                rough.append((item, new.score))
             if best is None or new.score > best.score:
-                best, rough = new, item
+                best = new
             if last.key in new.problem.opened and last.key not in base.problem.opened:
                 tolerated = new.tolerating(new.free[-1])
                 if tolerated is not None and tolerated.score > most:
@@ -98,6 +95,30 @@ def _hypotheses(
         yield None if near else item, sharpened(rig, base, item, near=near)
     if narrow:
         yield from ((None, new) for new in _with_kinds_narrow(rig, base))
+
+
+def _sharper(
+    rig: Rig,
+    base: Hypothesis,
+    rough: Sequence[tuple[Scanned, float]],
+    scores: Mapping[tuple[object, ...], tuple[Candidate, float]],
+) -> Iterator[tuple[None, Hypothesis]]:
+    """After all, what is rough and the likeliest, or might be if its shape were not.
+
+    Kinds that scatter are scanned as if they did not: where robots are off everywhere nothing else is near.
+
+    Args:
+        rig: for columns of other shapes.
+        base: what is there already.
+        rough: what was not sharpened, with scores.
+        scores: of all, to be asked when that is known.
+    """
+    most = max((score for _, score in scores.values()), default=base.score)
+    for item, score in list(rough):
+        coarse = item.candidate.cause in rig.coarse
+        reach = (1.0 - rules.COARSE_SHARE) * max(most - base.score, 0.0) if coarse else 0.0
+        if score >= most - reach and (rig.refinements(item.candidate) or rig.steps(item.candidate)):
+            yield None, sharpened(rig, base, item, near=True)
 
 
 def _with_kinds_held(base: Hypothesis) -> list[Scanned]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -143,3 +144,13 @@ def _per_row(whiten: Array, x: Array) -> Array:
     if not x.size:
         return np.array(x, dtype=np.float64)
     return (whiten @ x.reshape(*x.shape[:2], -1)).reshape(x.shape) if x.ndim > 2 else x @ whiten.T
+
+
+def whitened(whitening: Callable[[Array], Array], columns: Array) -> Array:
+    """A cause's columns whitened, shape (n, C, k): some of its shapes have fewer parameters than others."""
+    there = columns.any(axis=(0, 1))
+    if there.all():
+        return whitening(columns)
+    out = np.zeros(columns.shape)
+    out[..., there] = whitening(columns[..., there])
+    return out

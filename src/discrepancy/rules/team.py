@@ -134,6 +134,18 @@ Chosen: half of a payload, and so fine that a Gauss-Newton step does the rest.""
 TETHER_POINTS = 1000
 """Points of a payload that are told apart. Derived: every 0.1 m of a metre each way; near the limit they err by 0.05 m.
 Without it, a tether of the payload whose point is free would always explain what one at a grasp does."""
+CABLE_TURNS, CABLE_TURN_STEP = (-0.45, 0.45), 0.15
+"""Where a tether that pulls along itself alone comes from: slopes across each of six axes at which a search begins,
+24 ways in all and none further off than 30 deg; and over which slopes are taken. Chosen: as far as a Gauss-Newton
+step goes; with a third of that it stopped beside what it was after."""
+CABLE_STRETCHES_M, CABLE_STRETCH_STEP_M = (0.03, 0.0, 0.1), 0.015
+"""By how much it is stretched at home. Chosen: a carry moves by 0.05 m, so it is slack at times, half of the time, and
+never; steps as above."""
+CABLE_NEAR_PER_M, CABLE_NEAR_RANGE_PER_M, CABLE_NEAR_STEP_PER_M = 1.0, (0.05, 5.0), 0.4
+"""One over how far away it is tied: at first, at least and most, and over which slopes are taken. Chosen: a room."""
+CABLES, CABLE_LINES = 10_000, 100
+"""Cables that are told apart. Derived: ways 0.1 rad apart (4 pi / 0.01) times eight stretches; at the payload also
+lines 0.1 m apart across a metre each way."""
 RELAXATIONS_S = (0.02, 0.005, 0.06, 0.2)
 """Of what gives way to a force, tried first. Chosen: at most a factor of four apart, of which a Gauss-Newton step finds
 the rest; the first is that of a base of 60 kg that gives way by 1 to 3 um/N, critically damped. Of a grasp it is the

@@ -59,6 +59,7 @@ class TeamRig(LawfulRows):
     """Recordings of one payload, linearised around the best unknowns without any cause, and their simulator."""
 
     reshaped = ("sea_hysteresis", "grasp_flex")
+    coarse = ("tether", "payload_tether")
     behind = ("grasp_play",)
 
     def effect_parameters(

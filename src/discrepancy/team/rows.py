@@ -14,13 +14,14 @@ from discrepancy.causes.excluded import excluded_from
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.least_squares.patches import Patches
 from discrepancy.least_squares.stored import stored
-from discrepancy.least_squares.whitening import Whitening
+from discrepancy.least_squares.whitening import Whitening, whitened
 from discrepancy.rig import Channel, Rig, Rows
 from discrepancy.team.candidates import (
     every_candidate,
     in_shapes,
     indices,
     is_adjusted,
+    is_kept,
     shape_steps,
     worst_events,
 )
@@ -176,10 +177,9 @@ class TeamRows(Rig):
             return np.broadcast_to(0.0, (*linear.residual.shape, len(candidate.parameters)))
         if (key := (trial, *candidate.trace)) in self.kept:
             return self.kept[key]
-        columns = self.whitening[trial](self._unwhitened(trial, candidate))
+        columns = whitened(self.whitening[trial], self._unwhitened(trial, candidate))
         rested(linear)
-        shapes = CAUSES[candidate.cause].shapes if candidate.cause in CAUSES else ()
-        if candidate.transient is None and len(shapes) > 1 and candidate.shape in shapes:
+        if candidate.transient is None and is_kept(candidate):
             self.kept[key] = stored(columns) if is_filed(linear) else columns
         return columns
 

@@ -14,13 +14,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PayloadTether(Effect):
-    """A spring of rest length zero from a point of the payload, given in {1}, to a fixed point.
+    """A spring from a point of the payload, given in {1}, to a fixed point; a cable, if it has a length.
 
     A spatial tendon like that of ``Tether``. The anchor is given in robot 1's {b} as its floor mount has it [m].
     """
 
     on_payload = True
-    ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4)}
+    ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4), "length_m": (0.0, 100.0)}
     stiffness_N_per_m: float
     anchor_x_m: float
     anchor_y_m: float
@@ -28,6 +28,7 @@ class PayloadTether(Effect):
     point_x_m: float
     point_y_m: float
     point_z_m: float
+    length_m: float = 0.0
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         if not self.stiffness_N_per_m:
@@ -35,5 +36,5 @@ class PayloadTether(Effect):
         at = scene.X_Wb[0].apply([self.anchor_x_m, self.anchor_y_m, self.anchor_z_m])
         point = [self.point_x_m, self.point_y_m, self.point_z_m]
         site = add_site(scene.root.find("body", "omnid1/payload/payload"), "payload_tether", point)
-        tie(scene, "payload_tether", site, at, self.stiffness_N_per_m)
+        tie(scene, "payload_tether", site, at, self.stiffness_N_per_m, self.length_m)
         return scene

@@ -14,24 +14,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Tether(Effect):
-    """A spring of rest length zero from the payload's grasp at one robot to a fixed point.
+    """A spring from the payload's grasp at one robot to a fixed point; a cable, if it has a length.
 
-    A spatial tendon with ``stiffness`` and ``springlength`` 0 between the payload's site ``grasp{i}`` and a site of the
-    world. The anchor is given in the robot's {b} as its floor mount has it, without any tilt [m].
+    A spatial tendon with ``stiffness`` between the payload's site ``grasp{i}`` and a site of the world, slack below
+    ``length_m``; at a length of zero it pulls back on all axes alike. The anchor is given in the robot's {b} as its
+    floor mount has it, without any tilt [m].
     """
 
     on_payload = True
-    ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4)}
+    ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4), "length_m": (0.0, 100.0)}
     robot: int
     stiffness_N_per_m: float
     anchor_x_m: float
     anchor_y_m: float
     anchor_z_m: float
+    length_m: float = 0.0
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         if not self.stiffness_N_per_m:
             return scene
         at = scene.X_Wb[self.robot - 1].apply([self.anchor_x_m, self.anchor_y_m, self.anchor_z_m])
         grasp = scene.root.find("site", f"omnid1/payload/grasp{self.robot}")
-        tie(scene, f"tether{self.robot}", grasp, at, self.stiffness_N_per_m)
+        tie(scene, f"tether{self.robot}", grasp, at, self.stiffness_N_per_m, self.length_m)
         return scene

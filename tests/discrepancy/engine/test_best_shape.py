@@ -5,8 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from discrepancy import rules
 from discrepancy.engine.explanation import explain
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.propose import proposals
+from discrepancy.inference.scan import Scanned, score_with
 from discrepancy.inference.search import search
+from discrepancy.inference.shape.best_shape import best_shape
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from fake_rig import CATALOGUE, CHANNELS, RATE_HZ, ROWS, FakeRig, cause
@@ -89,3 +94,91 @@ def test_column_that_tells_nothing_gets_nothing():
     values, covariance = fit.solution_with(empty)
     np.testing.assert_allclose(values, [fit.solution_with(columns)[0][0], 0.0], rtol=1e-9)
     np.testing.assert_array_equal(covariance[1], 0.0)
+
+
+HALF = replace(cause("half", tolerance=0.0), shape={"side": 0.0, "from": 0.0})
+CREST, SIZE_HALF = 0.37, 8.0
+
+
+class Half(Wave):
+    """Something that acts on one side of a value alone; on the other it is nearly a straight line less that."""
+
+    coarse = ("half",)
+    low = -0.38  # where the search begins on the right side
+
+    def __post_init__(self):
+        FakeRig.__post_init__(self)
+        true = replace(HALF, shape={"side": 1.0, "from": CREST})
+        self.data = [
+            (x + SIZE_HALF * self.columns(true)[t][..., 0], *own) for t, (x, *own) in enumerate(self.data)
+        ]
+
+    def columns(self, candidate):
+        if candidate.cause != "half":
+            return FakeRig.columns(self, candidate)
+        time = np.arange(ROWS) / RATE_HZ
+        sign, begins = 1.0 - 2.0 * candidate.shape["side"], candidate.shape["from"]
+        waves = [
+            np.clip(sign * (np.sin(0.9 * time + t) - begins), 0.0, None) for t in range(len(self.trials))
+        ]
+        return [(wave[:, None] * PATTERN)[..., None] for wave in waves]
+
+    def refinements(self, candidate, *, finer=False):
+        return [] if finer else self.further(candidate)
+
+    def further(self, candidate):
+        begun = [{"side": 0.0, "from": 0.55}, {"side": 1.0, "from": self.low}]
+        return [replace(candidate, shape=shape) for shape in begun if candidate.cause == "half"]
+
+    def steps(self, candidate):
+        if candidate.cause != "half":
+            return []
+        ends = [candidate.shape | {"from": candidate.shape["from"] + x} for x in (-0.15, 0.15)]
+        return [(*(replace(candidate, shape=shape) for shape in ends), 0.3)]
+
+
+def nothing_in(rig):
+    """The hypothesis that nothing is there; all that is left is noise to it."""
+    return Hypothesis.of(Problem.of(rig.rows(rig.candidates()), rig.candidates()), ())
+
+
+def test_shapes_far_apart_are_each_followed_to_their_best():
+    """From the other side it looks better where the search begins; a single lead would stay there."""
+    rig = Half({}, catalogue=(*CATALOGUE, HALF), seed=1)
+    nothing = nothing_in(rig)
+    wrong, right = (score_with(nothing.fit, c, rig.columns(c)) for c in rig.further(HALF))
+    assert wrong > right > rules.COARSE_SHARE * wrong
+    item = Scanned(len(nothing.problem.candidates) - 1, HALF, 0.0)
+    best = best_shape(rig, nothing.problem, (), item)
+    assert best.shape["side"] == 1.0
+    assert best.shape["from"] == pytest.approx(CREST, abs=0.02)
+
+
+LINE = cause("line", tolerance=0.0)
+
+
+class HalfOrLine(Half):
+    """Beside it something that acts on both sides alike, which explains more than it does where a scan begins."""
+
+    low = -0.46
+
+    def columns(self, candidate):
+        if candidate.cause != "line":
+            return super().columns(candidate)
+        every = [
+            super(HalfOrLine, self).columns(replace(HALF, shape={"side": k, "from": 0.0})) for k in (1.0, 0.0)
+        ]
+        return [low - high for low, high in zip(*every, strict=True)]
+
+
+def test_what_is_coarse_is_sharpened_though_another_looks_likelier():
+    """Rough it explains less than another does; sharp it explains all."""
+    rig = HalfOrLine({}, catalogue=(*CATALOGUE, HALF, LINE), seed=1)
+    nothing = nothing_in(rig)
+    rough = [score_with(nothing.fit, c, rig.columns(c)) for c in (LINE, *rig.refinements(HALF))]
+    assert rough[0] > max(rough[1:]) + rules.CLOSE_NATS
+    best = proposals(rig, nothing).best
+    assert best is not None
+    assert best.causes[-1].cause == "half"
+    assert best.causes[-1].shape["side"] == 1.0
+    assert best.fit.part(best.free[-1])[0][0] == pytest.approx(SIZE_HALF, rel=0.1)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from discrepancy.least_squares.whitening import Whitening
+from discrepancy.least_squares.whitening import Whitening, whitened
 
 MIX = np.array([[2.0, 0.0, 0.0], [0.3, 0.7, 0.0], [0.0, -3.0, 20.0]])
 AR = (1.1, -0.4)  # x_t = 1.1 x_t-1 - 0.4 x_t-2 + e
@@ -59,6 +59,16 @@ def test_shapes_that_could_be_mixed_up(rng, rows, parameters):
     x = rng.standard_normal((rows, 3, parameters))
     for k in range(parameters):
         np.testing.assert_allclose(white(x)[..., k], white(x[..., k]), rtol=1e-12, atol=1e-13)
+
+
+def test_columns_that_a_shape_lacks_stay_nought(rng):
+    white = Whitening.of(noise(rng, 20, 100, 30), 100)
+    columns = rng.standard_normal((130, 3, 4))
+    for lacking in ([], [0, 2], [0, 1, 2, 3]):
+        columns[..., lacking] = 0.0
+        z = whitened(white, columns)
+        np.testing.assert_allclose(z, white(columns), rtol=1e-12, atol=1e-13)
+        np.testing.assert_array_equal(z[..., lacking], 0.0)
 
 
 def test_map_by_hand(rng):

@@ -1,13 +1,16 @@
 """Wrenches on the payload from outside, put into an exact recording by hand."""
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
+from discrepancy import rules
 from discrepancy.candidate import Transient
 from discrepancy.team.candidates import in_shapes
-from discrepancy.team.causes import CAUSES
+from discrepancy.team.causes import CAUSES, cable
 from estimator.arm.delta import forward_kinematics
 from estimator.inertia import inertia_parameters
 from outside_wrench import check_wrench, point, relieved, reported
@@ -47,6 +50,89 @@ def test_payload_tether(case, motion, arm):
     assert physical["stiffness_N_per_m"] == stiffness
     np.testing.assert_allclose([physical[f"point_{a}_m"] for a in "xyz"], tied, atol=1e-9)
     np.testing.assert_allclose([physical[f"anchor_{a}_m"] for a in "xyz"], anchor, atol=1e-9)
+
+
+def cable_shape(home, anchor, length_m):
+    """From where it is tied at home to where it ends, seen from the axis that it is nearest to."""
+    away = anchor - home
+    axis = int(np.argmax(np.abs(away)))
+    turns = np.roll(away, -axis)[1:] / np.abs(away[axis])
+    numbers = {"side": 2.0 * axis + (away[axis] < 0.0), "turn_1": turns[0], "turn_2": turns[1]}
+    distance = np.linalg.norm(away)
+    return numbers | {"stretch_m": distance - length_m, "near_per_m": 1.0 / distance}
+
+
+def cable_force(stiffness, length_m, tied, anchor):
+    """Hooke's law along the line between two points, none below its length; shape (Q, 3)."""
+    away = anchor - tied
+    distance = np.linalg.norm(away, axis=1, keepdims=True)
+    return stiffness * np.clip(distance - length_m, 0.0, None) * away / distance
+
+
+@pytest.mark.parametrize("toward", [*itertools.product((-1.0, 1.0), range(3))])
+@pytest.mark.parametrize("slack_m", [-0.3, 0.005])
+def test_cable_at_a_grasp(case, motion, toward, slack_m):
+    """From every side, always tight and slack at times; near enough that it turns as the grasp moves."""
+    sign, axis = toward
+    away = np.roll([sign * 0.4, 0.15, -0.2], axis)
+    anchor, length_m = HOME + away, np.linalg.norm(away) + slack_m
+    wrist = forward_kinematics(case.signals.phi[:, 1], DESIGN)
+    R_1i, p_1i = GRASPS[1]
+    force_b = cable_force(60.0, length_m, wrist, anchor)
+    tight = force_b.any(axis=1)
+    assert tight.all() if slack_m < 0.0 else tight.any() and not tight.all()
+    force, shape = force_b @ R_1i.T, cable_shape(HOME, anchor, length_m)
+    values, moment = [0.0, 0.0, 0.0, 60.0], np.cross(motion[0] @ p_1i, force)
+    # Where it becomes tight the force has a kink, and filters of torques and of forces differ.
+    check_wrench(case, motion, "tether", 1, 0, shape, values, force, moment, 0.01 if slack_m < 0.0 else 0.04)
+    physical = reported(case, "tether", values, shape)
+    assert physical["stiffness_N_per_m"] == 60.0
+    assert physical["length_m"] == pytest.approx(length_m)
+    np.testing.assert_allclose([physical[f"anchor_{a}_m"] for a in "xyz"], anchor, atol=1e-12)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_cable_of_the_payload(case, motion, axis):
+    """Tied beside its centre of mass, to the point of its line that is the nearest to that."""
+    away, stiffness = np.roll([-0.7, 0.2, 0.1], axis), 40.0
+    tied = COM + np.roll([0.0, 0.1, -0.2], axis)
+    anchor, length_m = HOME + tied + away, np.linalg.norm(away) - 0.02
+    wrist = forward_kinematics(case.signals.phi[:, 0], DESIGN)
+    force = cable_force(stiffness, length_m, wrist + motion[0] @ tied, anchor)  # world
+    shape = cable_shape(HOME + tied, anchor, length_m)
+    at_zero = np.roll(tied - COM - (tied - COM)[axis] / away[axis] * away, -axis)
+    shape |= dict(zip(("offset_1_m", "offset_2_m"), at_zero[1:], strict=True))
+    values, moment = [0.0, 0.0, 0.0, stiffness], np.cross(motion[0] @ tied, force)
+    check_wrench(case, motion, "payload_tether", 0, 0, shape, values, force, moment, 0.04)
+    physical = reported(case, "payload_tether", values, shape)
+    np.testing.assert_allclose([physical[f"point_{a}_m"] for a in "xyz"], tied, atol=1e-12)
+    np.testing.assert_allclose([physical[f"anchor_{a}_m"] for a in "xyz"], anchor, atol=1e-12)
+    assert physical["length_m"] == pytest.approx(length_m)
+
+
+def test_a_cable_that_is_tied_nowhere_near_or_behind_is_tied_within_a_room(case):
+    """What the data do not tell may go anywhere; the answer does not."""
+    shape = cable_shape(HOME, HOME + np.array([0.0, 0.0, 1.0]), 0.9)
+    for near in (-3.0, 0.0, 1e-9, 100.0):
+        physical = reported(case, "tether", [0.0, 0.0, 0.0, 5.0], shape | {"near_per_m": near})
+        assert HOME[2] + 0.1 < physical["anchor_z_m"] <= HOME[2] + 20.0
+        assert physical["length_m"] >= 0.0
+
+
+def test_ways_of_a_cable_begin_everywhere():
+    """No direction is further from one of them than 35 deg, and a tether's point is on the line of each."""
+    ways = [cable.direction(way) for way in cable.first_ways()]
+    rng = np.random.default_rng(3)
+    anywhere = rng.standard_normal((5000, 3))
+    nearest = np.max(anywhere @ np.transpose(ways), axis=1) / np.linalg.norm(anywhere, axis=1)
+    assert np.degrees(np.arccos(nearest.min())) < 35.0
+    at = np.array([0.3, -0.2, 0.1])
+    plain = dict(zip(("lever_x_m", "lever_y_m", "lever_z_m"), at, strict=True))
+    begun = CAUSES["payload_tether"].further(plain)
+    assert len(begun) == len(ways) * len(rules.CABLE_STRETCHES_M)
+    for shape in begun:
+        np.testing.assert_allclose(np.cross(at - cable.lever(shape), cable.direction(shape)), 0.0, atol=1e-12)
+        assert CAUSES["payload_tether"].alike(shape) > CAUSES["payload_tether"].alike(plain)
 
 
 @pytest.mark.parametrize(

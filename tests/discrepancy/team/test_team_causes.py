@@ -389,8 +389,10 @@ def test_standard_errors_of_derived_parameters():
     context = Context(np.zeros(3), 0.4, {}, None)
     physical, se = CAUSES["tether"].report(values, covariance, context)
     draws = [CAUSES["tether"].physical(values + root.T @ z, context) for z in rng.standard_normal((4000, 4))]
-    for name in physical:
+    for name in physical.keys() - {"length_m"}:
         assert se[name] == pytest.approx(np.std([d[name] for d in draws]), rel=0.06)
+    assert physical["length_m"] == 0.0
+    assert np.isnan(se["length_m"])  # a spring's was chosen
     assert physical["anchor_z_m"] == pytest.approx(5.0 / 20.0 + 0.4)
     _, se = CAUSES["slosh"].report(
         np.array([0.3, 0.0, 0.0, 0.0]), 1e-4 * np.eye(4), Context(np.zeros(3), 0.4, {"length_m": 0.2}, None)
@@ -403,6 +405,26 @@ def test_standard_errors_of_derived_parameters():
     assert se["length_m"] == pytest.approx(2e-3)
     assert se["damping_ratio"] == pytest.approx(3e-3)
     assert se["mass_kg"] == pytest.approx(0.01)
+
+
+def test_standard_errors_of_a_cable():
+    """Of anchor, length and point, with what its shape leaves open: delta method against draws."""
+    shape = dict(side=3.0, turn_1=0.3, turn_2=-0.2, stretch_m=0.02, near_per_m=1.2)
+    rng = np.random.default_rng(4)
+    for name, more in (("tether", {}), ("payload_tether", {"offset_1_m": 0.1, "offset_2_m": -0.2})):
+        cause, own = CAUSES[name], shape | more
+        root = 0.01 * rng.standard_normal((4 + len(own) - 1, 4 + len(own) - 1))
+        root[:, :3] = 0.0  # no force at home is a parameter of it
+        values, context = np.array([0.0, 0.0, 0.0, 6.0]), Context(np.array([0.1, 0.2, 0.0]), 0.4, own, None)
+        _, se = cause.report(values, root.T @ root, context)
+        draws = []
+        for z in rng.standard_normal((4000, len(root))):
+            step = root.T @ z
+            named = [n for n in cause.determined if n in own]
+            moved = own | {n: own[n] + x for n, x in zip(named, step[4:], strict=True)}
+            draws.append(cause.physical(values + step[:4], replace(context, shape=moved)))
+        for key, error in se.items():
+            assert error == pytest.approx(np.std([d[key] for d in draws]), rel=0.08), (name, key)
 
 
 def test_a_mass_swings_only_if_it_is_there_and_within_reach():

@@ -55,6 +55,31 @@ def test_a_tether_of_the_payload_pulls_with_stiffness_times_distance():
     np.testing.assert_allclose(total, 0, rtol=0, atol=5e-4 * weight[2])
 
 
+@pytest.mark.parametrize("name", ["tether", "payload_tether"])
+@pytest.mark.parametrize("stretch_m", [0.05, -0.05])
+def test_a_cable_pulls_by_what_it_is_longer_than_its_length_and_never_pushes(name, stretch_m):
+    """At rest the robots hold the weight less the pull."""
+    k, away = 200.0, np.array([0.5, -0.3, 0.4])
+    changes = {"stiffness_N_per_m": k, "length_m": float(np.linalg.norm(away)) - stretch_m}
+    home = build_team("b").wrist_home_b[0]
+    if name == "payload_tether":
+        changes |= {f"point_{a}_m": 0.1 for a in "xyz"}
+    anchor = home + away + (0.1 if name == "payload_tether" else 0.0)
+    changes |= {f"anchor_{a}_m": float(x) for a, x in zip("xyz", anchor, strict=True)}
+    loop = ClosedLoop(team_with("b", example(name, **changes)))
+    p_Wb, R_Wb = base_poses(loop.scene)
+    site = loop.index.payload_site[0]
+    point = 0.1 * np.ones(3) if name == "payload_tether" else np.zeros(3)
+    tied = loop.data.site_xpos[site] + loop.data.site_xmat[site].reshape(3, 3) @ point
+    now = p_Wb[0] + R_Wb[0] @ anchor - tied
+    distance = np.linalg.norm(now)
+    pull = k * max(distance - changes["length_m"], 0.0) * now / distance
+    assert (np.linalg.norm(pull) > 5.0) == (stretch_m > 0.0)
+    weight = np.array([0, 0, 9.81 * loop.model.body_mass[loop.index.payload_body]])
+    total = loop.forces_on_payload().sum(axis=0) + pull - weight
+    np.testing.assert_allclose(total, 0, rtol=0, atol=5e-4 * weight[2])
+
+
 def test_drag_resists_turning_with_minus_c_omega():
     """Its generalised force is that of a moment against MuJoCo's own angular velocity, and of no force."""
     c = 3.0

@@ -45,16 +45,50 @@ def best_shape(rig: Rig, problem: Problem, free: Sequence[int], item: Scanned) -
             shapes = rig.refinements(best, finer=True)
         return best, score
 
+    def polished(best: Candidate, score: float, rounds: int) -> tuple[Candidate, float]:
+        """By Gauss-Newton steps, as long as they make it likelier."""
+        for _ in range(rounds if rig.steps(best) else 0):
+            values = fit.solution_with([c * best.units for c in rig.columns(best)])[0] * best.units
+            nearer = nearest_shape(rig, fit, best, values)
+            judged = score_with(fit, nearer, rig.columns(nearer), spike)
+            if judged <= score:
+                break
+            best, score = nearer, judged
+        return best, score
+
     best, score = refined(shapes, best, score)
-    best, score = refined(rig.further(best), best, score)
-    for _ in range(rules.POLISH_ROUNDS if rig.steps(best) else 0):
-        values = fit.solution_with([c * best.units for c in rig.columns(best)])[0] * best.units
-        nearer = nearest_shape(rig, fit, best, values)
-        judged = score_with(fit, nearer, rig.columns(nearer), spike)
-        if judged <= score:
-            break
-        best, score = nearer, judged
-    return best
+    if start.cause not in rig.coarse:
+        return polished(*refined(rig.further(best), best, score), rules.POLISH_ROUNDS)[0]
+    each = [(shape, rig.columns(shape)) for shape in rig.further(best)]
+    least = rules.COARSE_SHARE * score if score > 0.0 else score
+    for lead, first in _leads(rig, [s for s, _ in each], scores_with(fit, each, spike)):
+        lead, first = polished(lead, first, rules.LEAD_ROUNDS) if first > least else (lead, first)
+        if first > score and _possible(rig, fit, lead):
+            best, score = lead, first
+    return polished(best, score, rules.LEAD_ROUNDS)[0]
+
+
+def _possible(rig: Rig, fit: Fit, candidate: Candidate) -> bool:
+    """Whether such values can be as a candidate would have beside what is there."""
+    values, covariance = fit.solution_with([c * candidate.units for c in rig.columns(candidate)])
+    units = candidate.units
+    return rig.possible(candidate, values * units, covariance * units[:, None] * units)
+
+
+def _leads(
+    rig: Rig, shapes: Sequence[Candidate], scores: Sequence[float]
+) -> Sequence[tuple[Candidate, float]]:
+    """Of some shapes the likeliest of every kind, the likeliest kinds first.
+
+    Kinds differ in numbers that the data do not determine: no steps lead from one to another.
+    """
+    leads: dict[tuple[object, ...], tuple[Candidate, float]] = {}
+    for shape, score in sorted(zip(shapes, scores, strict=True), key=lambda one: -one[1]):
+        numbers = shape.shape
+        steps = [less.shape for less, _, _ in rig.steps(shape)]
+        fixed = {name for name in numbers if all(numbers[name] == less[name] for less in steps)}
+        leads.setdefault(tuple(numbers[name] for name in sorted(fixed)), (shape, score))
+    return list(leads.values())[: rules.LEADS]
 
 
 def covariance_with_shape(rig: Rig, fit: Fit, index: int) -> Array:

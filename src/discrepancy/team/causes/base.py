@@ -52,6 +52,7 @@ class Cause(base.Cause):
         inexact: those of them that what the law leaves out puts off by a share, as it does the size.
         clipped: the effect's parameters that are zero where the fit has them below.
         by_clocks: whether it shows in the robots' clocks alone, and so not where the motion set them.
+        fleeting: whether it has so many shapes that their columns are made anew whenever they are asked for.
         adjusted: whether it is a function of the readings, which are taken without their noise then.
     """
 
@@ -62,6 +63,7 @@ class Cause(base.Cause):
     inexact: ClassVar[tuple[str, ...]] = ()
     clipped: ClassVar[tuple[str, ...]] = ()
     by_clocks: ClassVar[bool] = False
+    fleeting: ClassVar[bool] = False
     adjusted: ClassVar[bool] = False
 
     @property

@@ -1,20 +1,29 @@
 """A spring from the payload to a fixed point: a hose, a cable."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
 from discrepancy import rules
-from discrepancy.team.causes.base import Cause, stack
+from discrepancy.causes.base import Shape
+from discrepancy.team.causes import cable
+from discrepancy.team.causes.base import Cause
+from estimator.arrays import Array
 
 LEVERS = ("lever_x_m", "lever_y_m", "lever_z_m")
+
+
+def _at(lever: Array) -> Shape:
+    return dict(zip(LEVERS, lever.tolist(), strict=True))
 
 
 class PayloadTether(Cause):
     """Force k (anchor - point) on a point of the payload, anchor fixed in robot 1's {b}.
 
     The columns are the force at home and the stiffness; the point is the shape, seen from the centre of mass along the
-    axes of {1}.
+    axes of {1}. With ``stretch_m`` in its shape it is a cable, of which stiffness is all, and the point where its line
+    is at home.
     """
 
     title = "tether of the payload"
@@ -23,32 +32,44 @@ class PayloadTether(Cause):
     scales = (0.1, 0.1, 0.1, 1.0)
     at = "payload"
     among = rules.TETHER_POINTS
-    shapes = tuple(
-        dict(zip(LEVERS, map(float, lever), strict=True))
-        for lever in (
-            np.zeros(3),
-            *(sign * rules.TETHER_LEVER_M * e for e in np.eye(3) for sign in (1.0, -1.0)),
-        )
+    shapes: ClassVar[tuple[Shape, ...]] = (
+        dict.fromkeys(LEVERS, 0.0),
+        *(_at(sign * rules.TETHER_LEVER_M * e) for e in np.eye(3) for sign in (1.0, -1.0)),
+        *(cable.through(np.zeros(3), way) for way in cable.first_ways()),
     )
-    determined: ClassVar = dict.fromkeys(LEVERS, rules.TETHER_STEP_M)
+    fleeting = True
+    determined: ClassVar[Mapping[str, float]] = {
+        **dict.fromkeys(LEVERS, rules.TETHER_STEP_M),
+        **cable.SLOPE_STEPS,
+    }
     positive = ("stiffness_N_per_m",)
     separate = "A run without payload, or a second payload at the same place, separates an outside force from a sensor."
 
     def sentence(self, n):
         return (
             f"something like a cable pulls at the payload's point {n.vector('point', 'm')} in {{1}} with "
-            f"{n('stiffness_N_per_m', 'N/m')} towards {n.vector('anchor', 'm')} in robot 1's base frame"
+            f"{n('stiffness_N_per_m', 'N/m')} towards {n.vector('anchor', 'm')} in robot 1's base frame{cable.slack(n)}"
         )
 
     def columns(self, trial, robot, joint, shape):
         R, p = trial.data.R_bi[:, 0], trial.data.p_bi[:, 0]  # {1} in {b1}
         point = trial.shared.pi[1:4] / trial.shared.pi[0] + _lever(shape)
-        away = np.array([0.0, 0.0, trial.design.home_height_m]) + point - (p + R @ point)
-        forces = [np.einsum("qji,j->qi", R, axis) for axis in np.eye(3)] + [np.einsum("qji,qj->qi", R, away)]
-        return stack([trial.of_wrench(force, np.cross(point, force)) for force in forces])
+        moved = p + R @ point - (np.array([0.0, 0.0, trial.design.home_height_m]) + point)
+        if cable.is_cable(shape):
+            forces_b = [cable.pull(shape, moved)]
+        else:
+            forces_b = [*(np.broadcast_to(axis, p.shape) for axis in np.eye(3)), -moved]
+        forces = [np.einsum("qji,qj->qi", R, force_b) for force_b in forces_b]
+        return cable.beside_force([trial.of_wrench(force, np.cross(point, force)) for force in forces])
+
+    def further(self, shape):
+        at = _lever(shape)
+        return [cable.through(at, way) for way in cable.every_way()]
 
     def finer(self, shape):
         """Nearer to the best; a tether is tied within the payload's reach."""
+        if cable.is_cable(shape):
+            return []  # slopes tell
         moved = [
             dict(shape) | {name: shape[name] + step}
             for name in LEVERS
@@ -56,6 +77,9 @@ class PayloadTether(Cause):
             for step in (far, -far)
         ]
         return [other for other in moved if np.linalg.norm(_lever(other)) <= rules.SLOSH_REACH_M]
+
+    def alike(self, shape):
+        return rules.CABLES * rules.CABLE_LINES if cable.is_cable(shape) else self.among
 
     def slope_step(self, name, number):
         return self.determined[name]
@@ -68,16 +92,15 @@ class PayloadTether(Cause):
         return bool(values[3] > rules.PULL_SE * se[3])
 
     def physical(self, values, context):
-        force, k = values[:3], values[3] if abs(values[3]) > 1e-6 else 1e-6
         point = context.p_1c + _lever(context.shape)
-        anchor = force / k + np.array([0.0, 0.0, context.home_height_m]) + point
-        return (
-            {"stiffness_N_per_m": float(k)}
-            | {f"anchor_{axis}_m": float(x) for axis, x in zip("xyz", anchor, strict=True)}
-            | {f"point_{axis}_m": float(x) for axis, x in zip("xyz", point, strict=True)}
-        )
+        home = np.array([0.0, 0.0, context.home_height_m]) + point
+        return cable.tied(values, context.shape, home) | {
+            f"point_{axis}_m": float(x) for axis, x in zip("xyz", point, strict=True)
+        }
 
 
 def _lever(shape):
     """From the centre of mass to where it is tied, in {1} [m], shape (3,)."""
+    if cable.is_cable(shape):
+        return cable.lever(shape)
     return np.array([shape[name] for name in LEVERS])

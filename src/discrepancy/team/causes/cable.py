@@ -1,0 +1,119 @@
+"""A cable: a spring that pulls along itself alone, and not at all where it is slack."""
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+
+import numpy as np
+
+from discrepancy import rules
+from discrepancy.causes.base import Shape
+from discrepancy.causes.numbers import Numbers
+from estimator.arrays import Array
+
+TURNS, OFFSETS = ("turn_1", "turn_2"), ("offset_1_m", "offset_2_m")
+"""Numbers of its shape: where it comes from, as slopes across an axis; where its line passes the centre of mass, along
+the other two axes."""
+STRETCH, NEAR = "stretch_m", "near_per_m"
+"""By how much it is stretched at home; one over how far away it is tied."""
+SLOPE_STEPS: Mapping[str, float] = (
+    dict.fromkeys(TURNS, rules.CABLE_TURN_STEP)
+    | dict.fromkeys(OFFSETS, rules.TETHER_STEP_M)
+    | {STRETCH: rules.CABLE_STRETCH_STEP_M, NEAR: rules.CABLE_NEAR_STEP_PER_M}
+)
+
+
+def is_cable(shape: Shape) -> bool:
+    """Whether a tether's shape is that of a cable."""
+    return STRETCH in shape
+
+
+def pull(shape: Shape, moved: Array) -> Array:
+    """Force per stiffness on the point that it is tied to [m], along the axes of {b}, shape (Q, 3).
+
+    Stretched to e at home and tied at a distance D along the unit vector u, k (|D u - x| - D + e) along D u - x, and
+    none where that is negative; x is how far the point has moved.
+
+    Args:
+        shape: a cable's.
+        moved: the point from where it is at home [m], in {b}, shape (Q, 3).
+    """
+    near = _near(shape)
+    away = direction(shape) - near * moved
+    length = np.linalg.norm(away, axis=1)
+    longer = (near * np.sum(moved**2, axis=1) - 2.0 * moved @ direction(shape)) / (length + 1.0)
+    stretched: Array = np.maximum(shape[STRETCH] + longer, 0.0)
+    return (stretched / length)[:, None] * away
+
+
+def direction(shape: Shape) -> Array:
+    """From the point at home to where it is tied, a unit vector in {b}, shape (3,)."""
+    across = np.roll(np.array([np.nan, *(shape[name] for name in TURNS)]), _axis(shape))
+    across[_axis(shape)] = 1.0 - 2.0 * (shape["side"] % 2)
+    return across / np.linalg.norm(across)
+
+
+def lever(shape: Shape) -> Array:
+    """From the centre of mass to the nearest point of its line at home [m], along the axes of {1}, shape (3,)."""
+    u, to = direction(shape), np.roll(np.array([0.0, *(shape[name] for name in OFFSETS)]), _axis(shape))
+    return np.asarray(to - to @ u * u, dtype=np.float64)
+
+
+def tied(values: Array, shape: Shape, home: Array) -> dict[str, float]:
+    """The effect's parameters: how stiff, to where, and below which length it is slack.
+
+    Args:
+        values: of a tether's columns, shape (4,).
+        shape: its shape, a cable's or not.
+        home: where it is tied to the payload, at home [m], in {b}, shape (3,).
+    """
+    stiffness = values[3] if abs(values[3]) > 1e-6 else 1e-6
+    away, length_m = values[:3] / stiffness, 0.0
+    if is_cable(shape):
+        away = direction(shape) / _near(shape)
+        length_m = max(1.0 / _near(shape) - shape[STRETCH], 0.0)
+    anchor = {f"anchor_{axis}_m": float(x) for axis, x in zip("xyz", home + away, strict=True)}
+    return {"stiffness_N_per_m": float(stiffness)} | anchor | {"length_m": length_m}
+
+
+def beside_force(columns: Sequence[Array]) -> Array:
+    """A tether's columns, shape (n, C, 4): of the force at home, which a cable has none of, and of the stiffness."""
+    out = np.zeros((*columns[0].shape, 4))
+    out[..., 4 - len(columns) :] = np.stack(columns, axis=-1)
+    return out
+
+
+def slack(n: Numbers) -> str:
+    """What a sentence about a tether says of its length."""
+    return (
+        f", along itself alone, and is slack below {n('length_m', 'm')}" if n.values.get("length_m") else ""
+    )
+
+
+def every_way(stretches_m: Sequence[float] = rules.CABLE_STRETCHES_M) -> list[Shape]:
+    """From every side, stretched by so much each."""
+    ways = product(range(6), rules.CABLE_TURNS, rules.CABLE_TURNS, stretches_m)
+    return [
+        {"side": float(side), TURNS[0]: one, TURNS[1]: two, STRETCH: e, NEAR: rules.CABLE_NEAR_PER_M}
+        for side, one, two, e in ways
+    ]
+
+
+def first_ways() -> list[Shape]:
+    """Those that are tried first."""
+    return every_way(rules.CABLE_STRETCHES_M[:1])
+
+
+def through(at: Array, shape: Shape) -> Shape:
+    """With its line through a point of the payload, seen from the centre of mass in {1} [m], shape (3,)."""
+    u, axis = direction(shape), _axis(shape)
+    _, *offsets = np.roll(at - at[axis] / u[axis] * u, -axis)
+    return {**shape, **dict(zip(OFFSETS, map(float, offsets), strict=True))}
+
+
+def _axis(shape: Shape) -> int:
+    return int(shape["side"]) // 2
+
+
+def _near(shape: Shape) -> float:
+    """Within what a room has: one that the data do not tell must not be behind the point."""
+    return float(np.clip(shape[NEAR], *rules.CABLE_NEAR_RANGE_PER_M))
