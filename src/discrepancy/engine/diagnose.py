@@ -12,7 +12,7 @@ from discrepancy.engine.lawful import laws_of, refining, responding
 from discrepancy.engine.verdict import Verdict, verdict_of
 from discrepancy.inference.odds import check_odds
 from discrepancy.inference.search import Searched, continued, search
-from discrepancy.laws.instead import LawFirst, in_place_of_several
+from discrepancy.laws.instead import LawFirst, in_place
 from discrepancy.laws.lines import line_nats
 from discrepancy.laws.search import Lawful, with_laws
 from discrepancy.laws.where import Located
@@ -101,7 +101,7 @@ def diagnose(
         and not unsure
         and (lawful is None or lawful.searched.best is searched.best)
     ):
-        lawful = in_place_of_several(searched, say) or lawful
+        lawful = in_place(searched, say) or lawful
     if lawful is not None:
         searched, located = lawful.searched, located or lawful.places
         explanation = explain(searched)

@@ -1,20 +1,26 @@
-"""A law in place of causes: of the first that is found, if it leaves more than noise; or of several at a joint."""
+"""A law in place of causes: of the first that is found, if it leaves more than noise; or of what leaves noise."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.refit import exact
+from discrepancy.inference.scan import score_of
 from discrepancy.inference.search import Rival, Searched
 from discrepancy.laws.bench import Bench
+from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.forms import likely_causes
 from discrepancy.laws.lines import nats_beyond_noise
+from discrepancy.laws.place import Place
 from discrepancy.laws.search import Forms, Lawful, located_in, replaces, suffices, with_one, with_rivals
 from discrepancy.laws.where import Located, located
+from discrepancy.least_squares.problem import Key
 
 
 @dataclass(eq=False)
@@ -57,8 +63,11 @@ class LawFirst:
         return with_rivals(searched, self.rivals)
 
 
-def in_place_of_several(searched: Searched, progress: Callable[[str], object] | None = None) -> Lawful | None:
-    """One law in place of several causes at one joint, as if each stood for a part of it; None where there is none.
+def in_place(searched: Searched, progress: Callable[[str], object] | None = None) -> Lawful | None:
+    """One law in place of what was named at one site; None where there is none.
+
+    Causes that leave noise may be wrong all the same: several at a joint as if each stood for a part of a law, and one
+    because it is the nearest that the catalogue has. In its place the law has to be likelier by ``LAW_LEAD_NATS``.
 
     Args:
         searched: what the catalogue can do; it leaves noise.
@@ -66,28 +75,61 @@ def in_place_of_several(searched: Searched, progress: Callable[[str], object] | 
     """
     bench: Bench | None = searched.rig.bench
     found: Lawful | None = None
-    for joint in crowded(searched.best) if bench is not None else ():
+    for site in sites(searched) if bench is not None else ():
         assert bench is not None
         less = searched.best
         for index in less.free:
-            if _joint(less.problem.candidates[index]) == joint:
+            if less.problem.candidates[index].key in site:
                 less = less.without(index)
         start = Searched(searched.rig, searched.nothing, exact(searched.rig, less, searched.nothing), ())
-        here = [place for place in bench.places if (place.robot, place.joint) == joint]
-        places = located(start.best.fit, bench, here)
+        cause = next(cause for cause in searched.best.causes if cause.key in site)
+        places = located(start.best.fit, bench, [place for place in bench.places if _at(cause, place)])
         forms = Forms(bench, likely_causes(searched.best), [])
-        step = with_one(start, bench, places, progress or (lambda what: None), forms)
-        if step is not None and suffices(step[0].best, searched.best) and replaces(step[0].best, searched):
+        say, lead, least = progress or (lambda what: None), rules.NAMED_NATS, -np.inf
+        if len(site) == 1:
+            # What is listed in its place explains at first sight, too, if it is what is there.
+            lead = rules.LAW_LEAD_NATS
+            least = max(lead, *(score_of(start.best.fit, index) for index in _of(start.best, cause)))
+        step = with_one(start, bench, places, say, forms, least)
+        if step is None or step[0].best.score < searched.best.score + lead:
+            continue
+        if suffices(step[0].best, searched.best) and replaces(step[0].best, searched):
             searched = with_rivals(*step)
             found = Lawful(searched, tuple(places))
     return found
 
 
-def crowded(hypothesis: Hypothesis) -> list[tuple[int | None, int | None]]:
-    """Joints with several causes."""
-    joints = [_joint(cause) for cause in hypothesis.causes if cause.joint is not None]
-    return [joint for joint in dict.fromkeys(joints) if joints.count(joint) > 1]
+def sites(searched: Searched) -> list[set[Key]]:
+    """Causes of which one law may take the place: all at a joint; or one alone, where no doubt about its law says more.
+
+    Of any robot listed laws are off by more than what parts them from others.
+    """
+    at: dict[object, list[Candidate]] = {}
+    for cause in searched.best.causes:
+        at.setdefault(_joint(cause) or cause.key, []).append(cause)
+    return [
+        {cause.key for cause in causes}
+        for causes in at.values()
+        if len(causes) > 1 or _alone(searched, causes[0])
+    ]
 
 
-def _joint(cause: Candidate) -> tuple[int | None, int | None]:
-    return cause.robot, cause.joint
+def _alone(searched: Searched, cause: Candidate) -> bool:
+    lasting = cause.transient is None and not isinstance(cause, LawCandidate)
+    return lasting and not searched.rig.law_doubt(cause).towards_rivals
+
+
+def _of(hypothesis: Hypothesis, cause: Candidate) -> list[int]:
+    """Which candidates of a hypothesis a cause is."""
+    return [index for index, other in enumerate(hypothesis.problem.candidates) if other.key == cause.key]
+
+
+def _at(cause: Candidate, place: Place) -> bool:
+    """Whether a law at a place could be taken for a cause: at its joint, or at its robot or the payload."""
+    if cause.joint is not None:
+        return (place.robot, place.joint) == (cause.robot, cause.joint)
+    return place.robot in (None, cause.robot)
+
+
+def _joint(cause: Candidate) -> tuple[int | None, int] | None:
+    return None if cause.joint is None else (cause.robot, cause.joint)

@@ -182,10 +182,19 @@ def located_in(searched: Searched, bench: Bench, say: Callable[[str], object]) -
 
 def with_one(
     searched: Searched, bench: Bench, places: Sequence[Located], say: Callable[[str], object],
-    forms: Forms,
+    forms: Forms, least: float = -np.inf,
 ) -> tuple[Searched, dict[tuple[object, ...], list[Rival]]] | None:  # fmt: skip
-    """The search with one law more, and that law's rivals among laws; None where no law of its own pays and helps."""
-    proposed = _proposals(searched, bench, places, say)
+    """The search with one law more, and that law's rivals among laws; None where no law of its own pays and helps.
+
+    Args:
+        searched: what is there.
+        bench: of the rig.
+        places: where to look.
+        say: called with what is being done.
+        forms: of what is named.
+        least: nats that the likeliest formula must have at first sight to be looked at closely.
+    """
+    proposed = _proposals(searched, bench, places, say, least)
     added = proposed.best
     if added is None or added.score - searched.best.score < rules.NAMED_NATS:
         return None
@@ -215,14 +224,14 @@ def helps(hypothesis: Hypothesis, index: int) -> bool:
 
 
 def _proposals(
-    searched: Searched, bench: Bench, places: Sequence[Located], say: Callable[[str], object]
+    searched: Searched, bench: Bench, places: Sequence[Located], say: Callable[[str], object], least: float
 ) -> Proposed:
     """Hypotheses with one law more, each with the best numbers inside."""
     base = searched.best
     say("try formulas")
     ranked = judged(base.fit, bench, _tried(places))
     best, scores = None, []
-    leaders = _leaders(ranked, base)
+    leaders = _leaders(ranked, base) if ranked and ranked[0].nats >= least else []
     for item in leaders:
         candidate = _candidate(item, bench)
         scanned = Scanned(None, candidate, item.nats, tuple(searched.rig.columns(candidate)))
