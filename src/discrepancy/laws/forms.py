@@ -11,6 +11,7 @@ from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.probability import probability
+from discrepancy.inference.propose import Proposed
 from discrepancy.inference.remainder import form_share_of, share_left
 from discrepancy.law_doubt import LawDoubt
 from discrepancy.laws.bench import Bench
@@ -125,3 +126,34 @@ def gain_of(hypothesis: Hypothesis, index: int) -> float:
     nothing = np.zeros(len(problem.candidates[index].parameters))
     without = Fit.of(problem, others, fixed=(index, nothing))
     return sum(without.held_out(t) - hypothesis.fit.held_out(t) for t in problem.trials)
+
+
+@dataclass(frozen=True)
+class Forms:
+    """Tells laws that only refine those of listed causes, and keeps them.
+
+    Attributes:
+        bench: of the rig.
+        named: causes that are named without the laws.
+        found: such laws.
+    """
+
+    bench: Bench
+    named: tuple[Candidate, ...]
+    found: list[Refinement]
+
+    def refined_by(self, hypothesis: Hypothesis, index: int) -> bool:
+        """Whether a law of a hypothesis is such a one."""
+        one = refinement(hypothesis, index, self.bench, {cause.key for cause in self.named})
+        if one is not None:
+            self.found.append(one)
+        return one is not None
+
+    def among(self, proposed: Proposed) -> bool:
+        """Whether the likeliest law, or one that the rows cannot tell from it, is a named cause in another form."""
+        top = proposed.scores[0][1]
+        alike = [c for c, score in proposed.scores if top - score < rules.AMBIGUOUS_NATS]
+        one = form_of_named((c for c in alike if isinstance(c, LawCandidate)), self.named, self.bench)
+        if one is not None:
+            self.found.append(one)
+        return one is not None

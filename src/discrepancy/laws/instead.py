@@ -15,10 +15,10 @@ from discrepancy.inference.scan import score_of
 from discrepancy.inference.search import Rival, Searched
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate
-from discrepancy.laws.forms import likely_causes
+from discrepancy.laws.forms import Forms, likely_causes
 from discrepancy.laws.lines import nats_beyond_noise
 from discrepancy.laws.place import Place
-from discrepancy.laws.search import Forms, Lawful, located_in, replaces, suffices, with_one, with_rivals
+from discrepancy.laws.search import Lawful, located_in, replaces, suffices, with_one, with_rivals
 from discrepancy.laws.where import Located, located
 from discrepancy.least_squares.problem import Key
 

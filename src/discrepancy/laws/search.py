@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from discrepancy import rules
-from discrepancy.candidate import Candidate
 from discrepancy.engine.held_out import held_out_gains
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.probability import parted
@@ -19,7 +18,7 @@ from discrepancy.inference.scan import Scanned
 from discrepancy.inference.search import Rival, Searched, continued, settled
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate, candidate_of
-from discrepancy.laws.forms import Refinement, form_of_named, gain_of, likely_causes, refinement
+from discrepancy.laws.forms import Forms, Refinement, gain_of, likely_causes
 from discrepancy.laws.lines import line_nats
 from discrepancy.laws.place import Place
 from discrepancy.laws.what import Judged, judged
@@ -102,37 +101,6 @@ def with_laws(
             break
         searched, rivals = best, rivals | more
     return Lawful(with_rivals(searched, rivals), first, tuple(refined))
-
-
-@dataclass(frozen=True)
-class Forms:
-    """Tells laws that only refine those of listed causes, and keeps them.
-
-    Attributes:
-        bench: of the rig.
-        named: causes that are named without the laws.
-        found: such laws.
-    """
-
-    bench: Bench
-    named: tuple[Candidate, ...]
-    found: list[Refinement]
-
-    def refined_by(self, hypothesis: Hypothesis, index: int) -> bool:
-        """Whether a law of a hypothesis is such a one."""
-        one = refinement(hypothesis, index, self.bench, {cause.key for cause in self.named})
-        if one is not None:
-            self.found.append(one)
-        return one is not None
-
-    def among(self, proposed: Proposed) -> bool:
-        """Whether the likeliest law, or one that the rows cannot tell from it, is a named cause in another form."""
-        top = proposed.scores[0][1]
-        alike = [c for c, score in proposed.scores if top - score < rules.AMBIGUOUS_NATS]
-        one = form_of_named((c for c in alike if isinstance(c, LawCandidate)), self.named, self.bench)
-        if one is not None:
-            self.found.append(one)
-        return one is not None
 
 
 def _of_their_own(searched: Searched, forms: Forms) -> Searched:
