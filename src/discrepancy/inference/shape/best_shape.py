@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
-from discrepancy.inference.scan import Scanned, score_with, scores_with
+from discrepancy.inference.scan import Scanned, scores_with
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
@@ -17,78 +18,103 @@ from estimator.arrays import Array
 
 def best_shape(rig: Rig, problem: Problem, free: Sequence[int], item: Scanned) -> Candidate:
     """The shape that the data make likeliest beside what is there, ever finer around the best."""
+    start = item.candidate
+    shapes = rig.refinements(start)
+    if not shapes and not rig.further(start):
+        return start
     fit, spike = Fit.of(problem, free), 0.0
     if item.index is not None and problem.has_tolerance(item.index):
         # What it would add to a model without it: no need to build the problem anew for every shape.
         # Held against none at all: a kind that scatters for want of the right shape would hide that in any.
-        fit = Fit.of(problem, free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
-    start = item.candidate
+        fit = Fit.of(problem, free, fixed=(item.index, np.zeros(len(start.parameters))))
     if start.transient and start.parameters[0].tolerance:
         spike = 1.0
-    shapes = [*rig.refinements(start)]
-    if not shapes and not rig.further(start):
-        return start
-    best, score = start, score_with(fit, start, rig.columns(start), spike)
+    search = _Search(rig, fit, spike)
+    best = search.refined(shapes, *search.scored([start]))
+    if start.cause in rig.coarse:
+        return search.of_far_apart(*best)[0]
+    best = search.refined(rig.further(best[0]), best)
+    return search.polished(*best, rules.POLISH_ROUNDS)[0]
 
-    def refined(shapes: Sequence[Candidate], best: Candidate, score: float) -> tuple[Candidate, float]:
+
+_Scored = tuple[Candidate, float]
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    """Goes from shape to shape of a candidate.
+
+    Attributes:
+        rig: for columns of other shapes.
+        fit: without the candidate.
+        spike: spread of a healthy one, in tolerances.
+    """
+
+    rig: Rig
+    fit: Fit
+    spike: float
+
+    def scored(self, shapes: Sequence[Candidate]) -> list[_Scored]:
+        """Shapes, and how likely each is [nats]."""
+        each = [(shape, self.rig.columns(shape)) for shape in shapes]
+        return list(zip(shapes, scores_with(self.fit, each, self.spike), strict=True))
+
+    def refined(self, shapes: Sequence[Candidate], start: _Scored) -> _Scored:
         """A better one among some shapes, or among finer ones around it."""
+        best = start
         for _ in range(rules.FINER_ROUNDS + 1):
             if not shapes:
                 break
-            last = best
-            each = [(shape, rig.columns(shape)) for shape in shapes]
-            for (shape, _), judged in zip(each, scores_with(fit, each, spike), strict=True):
-                if judged > score:
-                    best, score = shape, judged
+            last, best = best, max((best, *self.scored(shapes)), key=_score)
             if best is last and best is not start:
                 break
-            shapes = rig.refinements(best, finer=True)
-        return best, score
+            shapes = self.rig.refinements(best[0], finer=True)
+        return best
 
-    def polished(best: Candidate, score: float, rounds: int) -> tuple[Candidate, float]:
+    def polished(self, best: Candidate, score: float, rounds: int) -> _Scored:
         """By Gauss-Newton steps, as long as they make it likelier."""
-        for _ in range(rounds if rig.steps(best) else 0):
-            values = fit.solution_with([c * best.units for c in rig.columns(best)])[0] * best.units
-            nearer = nearest_shape(rig, fit, best, values)
-            judged = score_with(fit, nearer, rig.columns(nearer), spike)
+        for _ in range(rounds if self.rig.steps(best) else 0):
+            values = self._solution(best)[0] * best.units
+            ((nearer, judged),) = self.scored([nearest_shape(self.rig, self.fit, best, values)])
             if judged <= score:
                 break
             best, score = nearer, judged
         return best, score
 
-    best, score = refined(shapes, best, score)
-    if start.cause not in rig.coarse:
-        return polished(*refined(rig.further(best), best, score), rules.POLISH_ROUNDS)[0]
-    each = [(shape, rig.columns(shape)) for shape in rig.further(best)]
-    least = rules.COARSE_SHARE * score if score > 0.0 else score
-    for lead, first in _leads(rig, [s for s, _ in each], scores_with(fit, each, spike)):
-        lead, first = polished(lead, first, rules.LEAD_ROUNDS) if first > least else (lead, first)
-        if first > score and _possible(rig, fit, lead):
-            best, score = lead, first
-    return polished(best, score, rules.LEAD_ROUNDS)[0]
+    def of_far_apart(self, best: Candidate, score: float) -> _Scored:
+        """The likeliest that steps lead to from any of the shapes that are far apart."""
+        least = rules.COARSE_SHARE * score if score > 0.0 else score
+        for lead, first in self._leads(self.scored(self.rig.further(best))):
+            if first <= least:
+                break
+            lead, first = self.polished(lead, first, rules.LEAD_ROUNDS)
+            if first > score and self._possible(lead):
+                best, score = lead, first
+        return self.polished(best, score, rules.LEAD_ROUNDS)
+
+    def _leads(self, shapes: Sequence[_Scored]) -> list[_Scored]:
+        """The likeliest of every kind, the likeliest kinds first.
+
+        Kinds differ in numbers that the data do not determine: no steps lead from one to another.
+        """
+        leads: dict[tuple[float, ...], _Scored] = {}
+        for shape, score in sorted(shapes, key=_score, reverse=True):
+            numbers, steps = shape.shape, [less.shape for less, _, _ in self.rig.steps(shape)]
+            fixed = [name for name in sorted(numbers) if all(numbers[name] == less[name] for less in steps)]
+            leads.setdefault(tuple(numbers[name] for name in fixed), (shape, score))
+        return list(leads.values())[: rules.LEADS]
+
+    def _possible(self, candidate: Candidate) -> bool:
+        """Whether its values can be."""
+        (values, covariance), units = self._solution(candidate), candidate.units
+        return self.rig.possible(candidate, values * units, covariance * units[:, None] * units)
+
+    def _solution(self, candidate: Candidate) -> tuple[Array, Array]:
+        return self.fit.solution_with([c * candidate.units for c in self.rig.columns(candidate)])
 
 
-def _possible(rig: Rig, fit: Fit, candidate: Candidate) -> bool:
-    """Whether such values can be as a candidate would have beside what is there."""
-    values, covariance = fit.solution_with([c * candidate.units for c in rig.columns(candidate)])
-    units = candidate.units
-    return rig.possible(candidate, values * units, covariance * units[:, None] * units)
-
-
-def _leads(
-    rig: Rig, shapes: Sequence[Candidate], scores: Sequence[float]
-) -> Sequence[tuple[Candidate, float]]:
-    """Of some shapes the likeliest of every kind, the likeliest kinds first.
-
-    Kinds differ in numbers that the data do not determine: no steps lead from one to another.
-    """
-    leads: dict[tuple[object, ...], tuple[Candidate, float]] = {}
-    for shape, score in sorted(zip(shapes, scores, strict=True), key=lambda one: -one[1]):
-        numbers = shape.shape
-        steps = [less.shape for less, _, _ in rig.steps(shape)]
-        fixed = {name for name in numbers if all(numbers[name] == less[name] for less in steps)}
-        leads.setdefault(tuple(numbers[name] for name in sorted(fixed)), (shape, score))
-    return list(leads.values())[: rules.LEADS]
+def _score(one: _Scored) -> float:
+    return one[1]
 
 
 def covariance_with_shape(rig: Rig, fit: Fit, index: int) -> Array:
