@@ -29,6 +29,8 @@ MOST_CAUSES = 12
 """Of one verdict. Chosen: no more than a guard; the benchmark's first axis takes eight."""
 LEADERS = 8
 """Candidates of a scan that are looked at closely, and as many more that are the likeliest of their cause. Chosen."""
+SHAPES_AT_A_TIME = 24
+"""Of which columns are there together. Chosen: memory; as many as a pendulum has."""
 FINER_ROUNDS = 4
 """Refinements of a shape around the best so far. Chosen."""
 POLISH_ROUNDS = 3

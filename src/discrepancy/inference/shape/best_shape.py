@@ -56,8 +56,12 @@ class _Search:
 
     def scored(self, shapes: Sequence[Candidate]) -> list[_Scored]:
         """Shapes, and how likely each is [nats]."""
-        each = [(shape, self.rig.columns(shape)) for shape in shapes]
-        return list(zip(shapes, scores_with(self.fit, each, self.spike), strict=True))
+        found: list[_Scored] = []
+        for first in range(0, len(shapes), rules.SHAPES_AT_A_TIME):
+            some = shapes[first : first + rules.SHAPES_AT_A_TIME]
+            each = [(shape, self.rig.columns(shape)) for shape in some]
+            found += zip(some, scores_with(self.fit, each, self.spike), strict=True)
+        return found
 
     def refined(self, shapes: Sequence[Candidate], start: _Scored) -> _Scored:
         """A better one among some shapes, or among finer ones around it."""
