@@ -11,11 +11,12 @@ from discrepancy import rules
 from discrepancy.engine.held_out import held_out_gains
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.probability import parted
-from discrepancy.inference.propose import Proposed, sharpened
+from discrepancy.inference.propose import Proposed
 from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import unlisted_nats
 from discrepancy.inference.scan import Scanned
 from discrepancy.inference.search import Rival, Searched, continued, settled
+from discrepancy.inference.shape.sharpen import sharpened
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate, candidate_of
 from discrepancy.laws.forms import Forms, Refinement, gain_of, likely_causes

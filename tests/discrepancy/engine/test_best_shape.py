@@ -182,3 +182,44 @@ def test_what_is_coarse_is_sharpened_though_another_looks_likelier():
     assert best.causes[-1].cause == "half"
     assert best.causes[-1].shape["side"] == 1.0
     assert best.fit.part(best.free[-1])[0][0] == pytest.approx(SIZE_HALF, rel=0.1)
+
+
+THREE = tuple(replace(cause("drift", robot), shape={"from": 0.0}) for robot in (1, 2, 3))
+
+
+class Drift(FakeRig):
+    """A kind of three places of which only differences show, each with a shape that it may have."""
+
+    def __post_init__(self):
+        super().__post_init__()
+        late = replace(THREE[2], shape={"from": 0.6})  # something small that looks like it
+        fault = [60.0 * c + 3.0 * d for c, d in zip(self.columns(THREE[2]), self.columns(late), strict=True)]
+        self.data = [(x + fault[t][..., 0], *own) for t, (x, *own) in enumerate(self.data)]
+
+    def columns(self, candidate):
+        if candidate.cause != "drift":
+            return super().columns(candidate)
+        time = np.arange(ROWS) / RATE_HZ
+        ramp = np.clip(time / time[-1] - candidate.shape["from"], 0.0, None)
+        apart = PATTERN if candidate.robot == 1 else PATTERN[::-1]
+        along = -2.0 * (PATTERN + PATTERN[::-1]) / 2.0 if candidate.robot == 3 else apart
+        return [0.3 * (ramp[:, None] * along)[..., None] for _ in self.trials]
+
+    def refinements(self, candidate, *, finer=False):
+        if candidate.cause != "drift" or finer:
+            return []
+        shapes = ({"from": x} for x in (0.0, 0.3, 0.6, 0.9))
+        return [replace(candidate, shape=s) for s in shapes if s != candidate.shape]
+
+
+def test_a_fault_that_its_kind_would_explain_keeps_its_shape():
+    """Where the others of its kind scatter to make up for it, no shape of it explains a thing."""
+    rig = Drift({}, catalogue=(*CATALOGUE, *THREE), seed=2)
+    nothing = nothing_in(rig)
+    index = [c.key for c in nothing.problem.candidates].index(THREE[2].key)
+    assert nothing.problem.spread[nothing.problem.columns_of(index)][0] > 10.0
+    best = proposals(rig, nothing).best
+    assert best is not None
+    assert best.causes[-1].key == THREE[2].key
+    assert best.causes[-1].shape == {"from": 0.0}
+    assert best.fit.part(best.free[-1])[0][0] == pytest.approx(60.0, abs=5.0)
