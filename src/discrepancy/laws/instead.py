@@ -89,7 +89,7 @@ def in_place(searched: Searched, progress: Callable[[str], object] | None = None
         if len(site) == 1:
             # What is listed in its place explains at first sight, too, if it is what is there.
             lead = rules.LAW_LEAD_NATS
-            least = max(lead, *(score_of(start.best.fit, index) for index in _of(start.best, cause)))
+            least = max([lead, *(score_of(start.best.fit, index) for index in _of(start.best, cause))])
         step = with_one(start, bench, places, say, forms, least)
         if step is None or step[0].best.score < searched.best.score + lead:
             continue
