@@ -77,12 +77,14 @@ def in_place(searched: Searched, progress: Callable[[str], object] | None = None
     found: Lawful | None = None
     for site in sites(searched) if bench is not None else ():
         assert bench is not None
+        cause = next((cause for cause in searched.best.causes if cause.key in site), None)
+        if cause is None:  # gone with another, for a law that is there by now
+            continue
         less = searched.best
         for index in less.free:
             if less.problem.candidates[index].key in site:
                 less = less.without(index)
         start = Searched(searched.rig, searched.nothing, exact(searched.rig, less, searched.nothing), ())
-        cause = next(cause for cause in searched.best.causes if cause.key in site)
         places = located(start.best.fit, bench, [place for place in bench.places if _at(cause, place)])
         forms = Forms(bench, likely_causes(searched.best), [])
         say, lead, least = progress or (lambda what: None), rules.NAMED_NATS, -np.inf
@@ -104,14 +106,12 @@ def sites(searched: Searched) -> list[set[Key]]:
 
     Of any robot listed laws are off by more than what parts them from others.
     """
-    at: dict[object, list[Candidate]] = {}
+    joints: dict[tuple[int | None, int], list[Candidate]] = {}
     for cause in searched.best.causes:
-        at.setdefault(_joint(cause) or cause.key, []).append(cause)
-    return [
-        {cause.key for cause in causes}
-        for causes in at.values()
-        if len(causes) > 1 or _alone(searched, causes[0])
-    ]
+        if cause.joint is not None:
+            joints.setdefault((cause.robot, cause.joint), []).append(cause)
+    each = [*joints.values(), *([cause] for cause in searched.best.causes if cause.joint is None)]
+    return [{c.key for c in causes} for causes in each if len(causes) > 1 or _alone(searched, causes[0])]
 
 
 def _alone(searched: Searched, cause: Candidate) -> bool:
@@ -129,7 +129,3 @@ def _at(cause: Candidate, place: Place) -> bool:
     if cause.joint is not None:
         return (place.robot, place.joint) == (cause.robot, cause.joint)
     return place.robot in (None, cause.robot)
-
-
-def _joint(cause: Candidate) -> tuple[int | None, int] | None:
-    return None if cause.joint is None else (cause.robot, cause.joint)

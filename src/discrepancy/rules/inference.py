@@ -30,7 +30,7 @@ MOST_CAUSES = 12
 LEADERS = 8
 """Candidates of a scan that are looked at closely, and as many more that are the likeliest of their cause. Chosen."""
 SHAPES_AT_A_TIME = 24
-"""Of which columns are there together. Chosen: memory; as many as a pendulum has."""
+"""Of which columns are there together. Chosen: memory; about as many as a pendulum has."""
 FINER_ROUNDS = 4
 """Refinements of a shape around the best so far. Chosen."""
 POLISH_ROUNDS = 3
@@ -63,7 +63,7 @@ CLOSE_NATS = 20.0
 """Shapes are sharpened of candidates that a scan puts closer to its likeliest. Chosen: it costs time."""
 COARSE_SHARE = 0.4
 """Of what the likeliest is worth, from which causes are sharpened whose shapes are far apart in a scan. Measured: of
-three cables it sees 0.46 to 0.60."""
+two cables it sees 0.46 and 0.60."""
 AMBIGUOUS_NATS = CLOSE_NATS / 4.0
 """Rivals that the rows put closer are simulated; what the closed loop does not part either cannot be told apart.
 Chosen."""

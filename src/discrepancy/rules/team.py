@@ -136,7 +136,7 @@ TETHER_POINTS = 1000
 Without it, a tether of the payload whose point is free would always explain what one at a grasp does."""
 CABLE_TURNS, CABLE_TURN_STEP = (-0.45, 0.45), 0.15
 """Where a tether that pulls along itself alone comes from: slopes across each of six axes at which a search begins,
-24 ways in all and none further off than 30 deg; and over which slopes are taken. Chosen: as far as a Gauss-Newton
+24 ways in all, no direction further off than 33 deg; and over which slopes are taken. Chosen: as far as a Gauss-Newton
 step goes; with a third of that it stopped beside what it was after."""
 CABLE_STRETCHES_M, CABLE_STRETCH_STEP_M = (0.03, 0.0, 0.1), 0.015
 """By how much it is stretched at home. Chosen: a carry moves by 0.05 m, so it is slack at times, half of the time, and

@@ -202,7 +202,7 @@ class Drift(FakeRig):
         time = np.arange(ROWS) / RATE_HZ
         ramp = np.clip(time / time[-1] - candidate.shape["from"], 0.0, None)
         apart = PATTERN if candidate.robot == 1 else PATTERN[::-1]
-        along = -2.0 * (PATTERN + PATTERN[::-1]) / 2.0 if candidate.robot == 3 else apart
+        along = -(PATTERN + PATTERN[::-1]) if candidate.robot == 3 else apart
         return [0.3 * (ramp[:, None] * along)[..., None] for _ in self.trials]
 
     def refinements(self, candidate, *, finer=False):

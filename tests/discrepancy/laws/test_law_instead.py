@@ -73,6 +73,7 @@ def test_sites_are_joints_with_all_their_causes_and_every_other_cause_alone():
     causes = (
         listed("bias", 1, 2), listed("friction", 2, 2), listed("mass", None, None), listed("scale", 1, 2),
         listed("tilt", 2, None), listed("lag", 2, None), listed("push", None, None, Transient(0, 1.0, 1.0)), law,
+        listed("push", None, None, Transient(1, 5.0, 1.0)),
     )  # fmt: skip
     assert sites(of(*causes)) == [{"bias", "scale"}, {"friction"}, {"mass"}, {"tilt"}, {"lag"}]
     assert sites(of(*causes, rivals=0.2)) == [{"bias", "scale"}]
@@ -164,3 +165,13 @@ def test_a_law_takes_the_place_of_one_cause_only_if_it_is_likelier_by_far(
     assert asked == [max(own, 20.0)]  # at first sight it explains more than the cause does
     assert where == [places]
     assert (found is not None) == taken
+
+
+def test_a_cause_that_went_with_another_is_no_site_any_more(replaced):
+    """The first law takes the place of both: what is left of the second's site is looked at no more."""
+    best = Team({2: 100.0, 1: 20.0}, [listed("one", 1, 3), listed("two", 2, 1)])
+    lawful = Team({1: 200.0, 0: 0.0}, [listed("law", 1, 3)])
+    found, start, *_ = replaced(best, lawful)
+    assert start == [["two"]]
+    assert found is not None
+    assert found.searched.best is lawful

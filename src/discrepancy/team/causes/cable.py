@@ -30,7 +30,7 @@ def is_cable(shape: Shape) -> bool:
 def pull(shape: Shape, moved: Array) -> Array:
     """Force per stiffness on the point that it is tied to [m], along the axes of {b}, shape (Q, 3).
 
-    Stretched to e at home and tied at a distance D along the unit vector u, k (|D u - x| - D + e) along D u - x, and
+    Stretched to e at home and tied at a distance D along the unit vector u, |D u - x| - D + e along D u - x, and
     none where that is negative; x is how far the point has moved.
 
     Args:
