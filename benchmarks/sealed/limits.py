@@ -32,6 +32,7 @@ _LISTED = {
     "payload_cable": (0.44, 0.50, 0.52, 0.48),
     "robot_cable": (0.44, 0.50, 0.52, 0.48),
     "stiffening_strap": (0.37, 0.40, 0.49, 0.49),
+    "rubber_cord": (0.44, 0.50, 0.52, 0.48),  # payload_cable's
     "turning_drag": (0.58, 1.32, 3.36, 0.58),
     "quadratic_drag": (3.0, 7.6, 21.4, 3.0),
     "power_drag": (0.77, 2.03, 6.6, 0.77),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from sealed.forms.base import Form
-from sealed.forms.cables import PayloadCable, RobotCable, StiffeningStrap
+from sealed.forms.cables import PayloadCable, RobotCable, RubberCord, StiffeningStrap
 from sealed.forms.creep import LateCreep
 from sealed.forms.drags import PowerDrag, QuadraticDrag, TurningDrag
 from sealed.forms.friction import DrivenDahl, DrivenLugre, GimbalDahl, GimbalLugre
@@ -55,6 +55,7 @@ LISTED: tuple[type[Form], ...] = (
     PayloadCable,
     RobotCable,
     StiffeningStrap,
+    RubberCord,
     TurningDrag,
     PowerDrag,
     MassDrift,

@@ -156,6 +156,10 @@ class Rig(ABC):
         """The same candidate in shapes that have more to them, to try once its own is the best of its kind."""
         return []
 
+    def grown(self, candidate: Candidate) -> list[Candidate]:
+        """The same candidate with a number more to its shape, nought so far, where it may have one."""
+        return []
+
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
         """For every number of its shape that the data determine: a little less, a little more, and the difference."""
         return []

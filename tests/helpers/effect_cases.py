@@ -28,10 +28,14 @@ SIZES: dict[str, dict[str, Any]] = {
     "torque_lag": {"time_constant_s": 0.003},
     "sensor_lag": {"time_constant_s": 0.003},
     "clock_delay": {"delay_s": -0.0015},
-    "tether": {"stiffness_N_per_m": 5.0, "anchor_x_m": 0.1, "anchor_y_m": 0.0, "anchor_z_m": 0.8, "length_m": 0.0},
+    "tether": {
+        "stiffness_N_per_m": 5.0, "anchor_x_m": 0.1, "anchor_y_m": 0.0, "anchor_z_m": 0.8, "length_m": 0.0,
+        "stiffening_N_per_m2": 0.0,
+    },
     "payload_tether": {
         "stiffness_N_per_m": 5.0, "anchor_x_m": 0.1, "anchor_y_m": 0.0, "anchor_z_m": 0.8,
         "point_x_m": 0.05, "point_y_m": 0.0, "point_z_m": 0.02, "length_m": 0.0,
+        "stiffening_N_per_m2": 0.0,
     },
     "push": {
         "trial": 1, "start_s": 1.0, "duration_s": 0.5, "force_x_N": 3.0, "force_y_N": 0.0, "force_z_N": 1.0,

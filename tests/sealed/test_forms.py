@@ -17,7 +17,7 @@ from mocobot_sim.trial.trial import run_trial
 from mocobot_sim.trial.truth import GroundTruth
 from sealed.draw import draw
 from sealed.forms.base import Form
-from sealed.forms.cables import PayloadCable, RobotCable, StiffeningStrap
+from sealed.forms.cables import PayloadCable, RobotCable, RubberCord, StiffeningStrap
 from sealed.forms.creep import LateCreep
 from sealed.forms.drags import PowerDrag, QuadraticDrag
 from sealed.forms.grasps import SoftPlay, TurningGrasp
@@ -102,6 +102,18 @@ def test_a_strap_is_twice_as_stiff_where_a_cable_is_not():
     mujoco.mj_forward(loop.model, loop.data)
     pull = 40.0 * 0.03 * (1.0 + 0.03 / 0.015) * np.array([0.6, 0.0, 0.8])
     np.testing.assert_allclose(loop.data.qfrc_passive[loop.index.slide_dof[1]], pull, rtol=1e-6, atol=1e-9)
+
+
+def test_a_rubber_cord_gets_softer_and_then_stiffer():
+    """At rest the robots hold the weight less the pull: of a stretch of 0.02 m 0.85, of 0.06 m 2.05 of Hooke's."""
+    for stretch, share in ((0.02, 0.85), (0.06, 2.05)):
+        cord = RubberCord(100.0, 1.0 - stretch, 0.1, 0.1, 0.1, 0.7, 0.1, 0.9)
+        loop = ClosedLoop(team(cord))
+        weight = np.array([0.0, 0.0, 9.81 * loop.model.body_mass[loop.index.payload_body]])
+        pull = weight - loop.forces_on_payload().sum(axis=0)
+        np.testing.assert_allclose(
+            pull, 100.0 * stretch * share * np.array([0.6, 0.0, 0.8]), rtol=0.0, atol=5e-4 * weight[2]
+        )
 
 
 @pytest.mark.parametrize(

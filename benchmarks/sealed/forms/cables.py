@@ -98,3 +98,18 @@ class StiffeningStrap(RobotCable):
         tendon = scene.root.find("tendon", f"cable{self.robot}")
         tendon.stiffness = [self.stiffness_N_per_m, self.stiffness_N_per_m / self.doubled_m]
         return scene
+
+
+@dataclass(frozen=True)
+class RubberCord(PayloadCable):
+    """A cable that gets softer and then stiffer, k e (1 - e / e_1 + (e / e_2)^2), as rubber does."""
+
+    size_is_known = False
+    softer_m: float = 0.05
+    stiffer_m: float = 0.04
+
+    def _edit(self, scene: TeamScene) -> TeamScene:
+        scene = super()._edit(scene)
+        k, tendon = self.stiffness_N_per_m, scene.root.find("tendon", "payload_cable")
+        tendon.stiffness = [k, -k / self.softer_m, k / self.stiffer_m**2]
+        return scene

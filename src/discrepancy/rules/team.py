@@ -146,6 +146,10 @@ CABLE_NEAR_PER_M, CABLE_NEAR_RANGE_PER_M, CABLE_NEAR_STEP_PER_M = 1.0, (0.05, 5.
 CABLES, CABLE_LINES = 10_000, 100
 """Cables that are told apart. Derived: ways 0.1 rad apart (4 pi / 0.01) times eight stretches; at the payload also
 lines 0.1 m apart across a metre each way."""
+CABLE_STIFFENS_RANGE_PER_M, CABLE_STIFFENS_STEP_PER_M, STRAPS = (-3.0, 1000.0), 20.0, 20
+"""By which share of its stiffness a strap is stiffer per metre of stretch: at least and most, over which slopes are
+taken, and how many are told apart. Chosen: a webbing twice as stiff at 0.02 m has 50 per m; rubber gets softer, not by
+more than 0.3 in 0.1 m."""
 RELAXATIONS_S = (0.02, 0.005, 0.06, 0.2)
 """Of what gives way to a force, tried first. Chosen: at most a factor of four apart, of which a Gauss-Newton step finds
 the rest; the first is that of a base of 60 kg that gives way by 1 to 3 um/N, critically damped. Of a grasp it is the

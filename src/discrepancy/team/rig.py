@@ -12,7 +12,7 @@ from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation
 from discrepancy.engine.gain import fit_to_simulate
 from discrepancy.laws.candidate import LawCandidate
-from discrepancy.team.candidates import inexact_numbers
+from discrepancy.team.candidates import in_shapes, inexact_numbers
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.closed_loop import (
@@ -68,6 +68,11 @@ class TeamRig(LawfulRows):
         if isinstance(candidate, LawCandidate):
             return super().effect_parameters(candidate, values, covariance)
         return CAUSES[candidate.cause].report(values, covariance, self._context(candidate))
+
+    def grown(self, candidate: Candidate) -> list[Candidate]:
+        if candidate.transient or candidate.cause not in CAUSES:
+            return []
+        return in_shapes(candidate, CAUSES[candidate.cause].grown(candidate.shape), len(self.linear))
 
     def inexact(self, candidate: Candidate) -> Array:
         if isinstance(candidate, LawCandidate):

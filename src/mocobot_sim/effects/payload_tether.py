@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 from mocobot_sim.effects.base import Effect
-from mocobot_sim.effects.spring import add_site, tie
+from mocobot_sim.effects.spring import SPRING_RANGES, add_site, tie
 
 if TYPE_CHECKING:
     from mocobot_sim.scene.scene import TeamScene
@@ -20,7 +20,7 @@ class PayloadTether(Effect):
     """
 
     on_payload = True
-    ranges: ClassVar = {"stiffness_N_per_m": (0.0, 1e4), "length_m": (0.0, 100.0)}
+    ranges: ClassVar = SPRING_RANGES
     stiffness_N_per_m: float
     anchor_x_m: float
     anchor_y_m: float
@@ -29,6 +29,7 @@ class PayloadTether(Effect):
     point_y_m: float
     point_z_m: float
     length_m: float = 0.0
+    stiffening_N_per_m2: float = 0.0
 
     def _edit(self, scene: TeamScene) -> TeamScene:
         if not self.stiffness_N_per_m:
@@ -36,5 +37,6 @@ class PayloadTether(Effect):
         at = scene.X_Wb[0].apply([self.anchor_x_m, self.anchor_y_m, self.anchor_z_m])
         point = [self.point_x_m, self.point_y_m, self.point_z_m]
         site = add_site(scene.root.find("body", "omnid1/payload/payload"), "payload_tether", point)
-        tie(scene, "payload_tether", site, at, self.stiffness_N_per_m, self.length_m)
+        strength = self.stiffness_N_per_m, self.length_m, self.stiffening_N_per_m2
+        tie(scene, "payload_tether", site, at, *strength)
         return scene

@@ -11,6 +11,12 @@ if TYPE_CHECKING:
 
 SITE_M, WIDTH_M = 0.006, 0.002
 """Sizes of what is drawn of it."""
+SPRING_RANGES = {
+    "stiffness_N_per_m": (0.0, 1e4),
+    "length_m": (0.0, 100.0),
+    "stiffening_N_per_m2": (-1e4, 1e6),
+}
+"""Of what says how strong one is."""
 
 
 def add_site(body: Any, name: str, at: Array | list[float]) -> Any:
@@ -19,12 +25,23 @@ def add_site(body: Any, name: str, at: Array | list[float]) -> Any:
 
 
 def tie(
-    scene: TeamScene, name: str, site: Any, anchor_W: Array, stiffness_N_per_m: float, length_m: float = 0.0
+    scene: TeamScene,
+    name: str,
+    site: Any,
+    anchor_W: Array,
+    stiffness_N_per_m: float,
+    length_m: float = 0.0,
+    stiffening_N_per_m2: float = 0.0,
 ) -> None:
-    """Tie a site to a fixed point of the world [m], shape (3,), by a spatial tendon: slack below its length."""
+    """Tie a site to a fixed point of the world [m], shape (3,), by a spatial tendon: slack below its length.
+
+    Stretched by d beyond it, it pulls with k d + s d^2: MuJoCo's stiffness is a polynomial.
+    """
     anchor = add_site(scene.root.worldbody, name, anchor_W)
     tendon = scene.root.tendon.add(
         "spatial", name=name, stiffness=stiffness_N_per_m, springlength=[0.0, length_m], width=WIDTH_M
     )
+    if stiffening_N_per_m2:
+        tendon.stiffness = [stiffness_N_per_m, stiffening_N_per_m2]
     tendon.add("site", site=site)
     tendon.add("site", site=anchor)

@@ -27,6 +27,25 @@ def hidden(effect):
 
 
 @pytest.mark.slow
+def test_a_strap_that_stiffens_is_one_cause_with_its_numbers(tmp_path):
+    """Not two cables of other lengths; it is simulated with what it stiffens by."""
+    home = build_team("b").wrist_home_b[0]
+    numbers = {"stiffness_N_per_m": 10.0, "length_m": LENGTH_M - 0.01, "stiffening_N_per_m2": 800.0}
+    numbers |= {f"anchor_{a}_m": float(x) for a, x in zip("xyz", home + AWAY_M, strict=True)}
+    found = diagnose_team(hidden(make_effect("tether", numbers, 1)), closed_loop=False)
+    (cause,) = found.to_dict()["causes"]
+    assert (cause["cause"], cause["robot"]) == ("tether", 1)
+    assert cause["probability"] > 0.99
+    told = cause["parameters"]["stiffening_N_per_m2"]
+    assert told["value"] == pytest.approx(800.0, rel=0.2)
+    assert abs(told["value"] - 800.0) < 3.0 * told["se"]
+    assert "and stiffens by" in cause["sentence"]
+    found.rig.write_extended(found.diagnosis.explanation, tmp_path / "model")
+    (added,) = load_extended(tmp_path / "model").effects
+    assert added.stiffening_N_per_m2 == pytest.approx(told["value"])
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tether", "payload_tether"])
 def test_a_cable_that_is_slack_at_times_is_named_with_its_length(tmp_path, name):
     home, point = build_team("b").wrist_home_b[0], np.array([0.4, 0.1, 0.1])

@@ -62,32 +62,36 @@ def cable_shape(home, anchor, length_m):
     return numbers | {"stretch_m": distance - length_m, "near_per_m": 1.0 / distance}
 
 
-def cable_force(stiffness, length_m, tied, anchor):
-    """Hooke's law along the line between two points, none below its length; shape (Q, 3)."""
+def cable_force(stiffness, length_m, tied, anchor, stiffening=0.0):
+    """Hooke's law along the line between two points, and the square of the stretch, none below its length; (Q, 3)."""
     away = anchor - tied
     distance = np.linalg.norm(away, axis=1, keepdims=True)
-    return stiffness * np.clip(distance - length_m, 0.0, None) * away / distance
+    longer = np.clip(distance - length_m, 0.0, None)
+    return (stiffness * longer + stiffening * longer**2) * away / distance
 
 
 @pytest.mark.parametrize("toward", [*itertools.product((-1.0, 1.0), range(3))])
 @pytest.mark.parametrize("slack_m", [-0.3, 0.005])
-def test_cable_at_a_grasp(case, motion, toward, slack_m):
-    """From every side, always tight and slack at times; near enough that it turns as the grasp moves."""
+@pytest.mark.parametrize("stiffening", [None, 900.0])
+def test_cable_at_a_grasp(case, motion, toward, slack_m, stiffening):
+    """From every side, always tight and slack at times; near enough that it turns as the grasp moves; and a strap."""
     sign, axis = toward
     away = np.roll([sign * 0.4, 0.15, -0.2], axis)
     anchor, length_m = HOME + away, np.linalg.norm(away) + slack_m
     wrist = forward_kinematics(case.signals.phi[:, 1], DESIGN)
     R_1i, p_1i = GRASPS[1]
-    force_b = cable_force(60.0, length_m, wrist, anchor)
+    force_b = cable_force(60.0, length_m, wrist, anchor, stiffening or 0.0)
     tight = force_b.any(axis=1)
     assert tight.all() if slack_m < 0.0 else tight.any() and not tight.all()
     force, shape = force_b @ R_1i.T, cable_shape(HOME, anchor, length_m)
+    shape |= {"stiffens_per_m": stiffening / 60.0} if stiffening else {}
     values, moment = [0.0, 0.0, 0.0, 60.0], np.cross(motion[0] @ p_1i, force)
     # Where it becomes tight the force has a kink, and filters of torques and of forces differ.
     check_wrench(case, motion, "tether", 1, 0, shape, values, force, moment, 0.01 if slack_m < 0.0 else 0.04)
     physical = reported(case, "tether", values, shape)
     assert physical["stiffness_N_per_m"] == 60.0
     assert physical["length_m"] == pytest.approx(length_m)
+    assert physical["stiffening_N_per_m2"] == pytest.approx(stiffening or 0.0)
     np.testing.assert_allclose([physical[f"anchor_{a}_m"] for a in "xyz"], anchor, atol=1e-12)
 
 
@@ -117,6 +121,19 @@ def test_a_cable_that_is_tied_nowhere_near_or_behind_is_tied_within_a_room(case)
         physical = reported(case, "tether", [0.0, 0.0, 0.0, 5.0], shape | {"near_per_m": near})
         assert HOME[2] + 0.1 < physical["anchor_z_m"] <= HOME[2] + 20.0
         assert physical["length_m"] >= 0.0
+
+
+@pytest.mark.parametrize("name", ["tether", "payload_tether"])
+def test_a_cable_may_grow_into_a_strap_and_a_strap_or_a_spring_into_nothing(name):
+    """As it grows it is the same cable; and it pays for what it may be."""
+    cause, plain = CAUSES[name], CAUSES[name].shapes[0]
+    begun = cause.further(plain)[0]
+    (strap,) = cause.grown(begun)
+    moved = np.array([[0.01, -0.02, 0.03], [-0.04, 0.01, 0.0]])
+    np.testing.assert_array_equal(cable.pull(strap, moved), cable.pull(begun, moved))
+    assert not cause.grown(strap)
+    assert not cause.grown(plain)
+    assert cause.alike(strap) > cause.alike(begun)
 
 
 def test_ways_of_a_cable_begin_everywhere():

@@ -389,7 +389,7 @@ def test_standard_errors_of_derived_parameters():
     context = Context(np.zeros(3), 0.4, {}, None)
     physical, se = CAUSES["tether"].report(values, covariance, context)
     draws = [CAUSES["tether"].physical(values + root.T @ z, context) for z in rng.standard_normal((4000, 4))]
-    for name in physical.keys() - {"length_m"}:
+    for name in physical.keys() - {"length_m", "stiffening_N_per_m2"}:
         assert se[name] == pytest.approx(np.std([d[name] for d in draws]), rel=0.06)
     assert physical["length_m"] == 0.0
     assert np.isnan(se["length_m"])  # a spring's was chosen
@@ -411,7 +411,10 @@ def test_standard_errors_of_a_cable():
     """Of anchor, length and point, with what its shape leaves open: delta method against draws."""
     shape = dict(side=3.0, turn_1=0.3, turn_2=-0.2, stretch_m=0.02, near_per_m=1.2)
     rng = np.random.default_rng(4)
-    for name, more in (("tether", {}), ("payload_tether", {"offset_1_m": 0.1, "offset_2_m": -0.2})):
+    for name, more in (
+        ("tether", {"stiffens_per_m": 20.0}),
+        ("payload_tether", {"offset_1_m": 0.1, "offset_2_m": -0.2, "stiffens_per_m": 4.0}),
+    ):
         cause, own = CAUSES[name], shape | more
         root = 0.01 * rng.standard_normal((4 + len(own) - 1, 4 + len(own) - 1))
         root[:, :3] = 0.0  # no force at home is a parameter of it

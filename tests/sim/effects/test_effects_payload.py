@@ -57,10 +57,12 @@ def test_a_tether_of_the_payload_pulls_with_stiffness_times_distance():
 
 @pytest.mark.parametrize("name", ["tether", "payload_tether"])
 @pytest.mark.parametrize("stretch_m", [0.05, -0.05])
-def test_a_cable_pulls_by_what_it_is_longer_than_its_length_and_never_pushes(name, stretch_m):
+@pytest.mark.parametrize("stiffening", [0.0, 3000.0])
+def test_a_cable_pulls_by_what_it_is_longer_than_its_length_and_never_pushes(name, stretch_m, stiffening):
     """At rest the robots hold the weight less the pull."""
     k, away = 200.0, np.array([0.5, -0.3, 0.4])
     changes = {"stiffness_N_per_m": k, "length_m": float(np.linalg.norm(away)) - stretch_m}
+    changes["stiffening_N_per_m2"] = stiffening
     home = build_team("b").wrist_home_b[0]
     if name == "payload_tether":
         changes |= {f"point_{a}_m": 0.1 for a in "xyz"}
@@ -73,7 +75,8 @@ def test_a_cable_pulls_by_what_it_is_longer_than_its_length_and_never_pushes(nam
     tied = loop.data.site_xpos[site] + loop.data.site_xmat[site].reshape(3, 3) @ point
     now = p_Wb[0] + R_Wb[0] @ anchor - tied
     distance = np.linalg.norm(now)
-    pull = k * max(distance - changes["length_m"], 0.0) * now / distance
+    longer = max(distance - changes["length_m"], 0.0)
+    pull = (k * longer + stiffening * longer**2) * now / distance
     assert (np.linalg.norm(pull) > 5.0) == (stretch_m > 0.0)
     weight = np.array([0, 0, 9.81 * loop.model.body_mass[loop.index.payload_body]])
     total = loop.forces_on_payload().sum(axis=0) + pull - weight

@@ -91,10 +91,20 @@ class _Search:
         for lead, first in self._leads(self.scored(self.rig.further(best))):
             if first <= least:
                 break
-            lead, first = self.polished(lead, first, rules.LEAD_ROUNDS)
-            if first > score and self._possible(lead):
-                best, score = lead, first
-        return self.polished(best, score, rules.LEAD_ROUNDS)
+            ends = [self.polished(lead, first, rules.LEAD_ROUNDS)]
+            if others := self.scored(self.rig.refinements(ends[0][0], finer=True)):
+                ends.append(self.polished(*max(others, key=_score), rules.LEAD_ROUNDS))
+            best, score = self._likelier(ends, best, score)
+        best, score = self.polished(best, score, rules.LEAD_ROUNDS)
+        ends = [self.polished(grown, score, rules.LEAD_ROUNDS) for grown in self.rig.grown(best)]
+        return self._likelier(ends, best, score)
+
+    def _likelier(self, ends: Sequence[_Scored], best: Candidate, score: float) -> _Scored:
+        """The best so far, or one of some others where that is likelier and can be."""
+        for other, judged in ends:
+            if judged > score and self._possible(other):
+                best, score = other, judged
+        return best, score
 
     def _leads(self, shapes: Sequence[_Scored]) -> list[_Scored]:
         """The likeliest of every kind, the likeliest kinds first.

@@ -97,6 +97,10 @@ class Cause(base.Cause):
         """Shapes that have more to them, to be tried once the best of the plain ones is found."""
         return []
 
+    def grown(self, shape: Shape) -> Sequence[Shape]:
+        """The same shape with a number more that the data determine, nought so far; none where that is all."""
+        return []
+
     def alike(self, shape: Shape) -> int:
         """Of how many, told apart by their shapes alone, one of a shape is one; 0 where places are listed."""
         return self.among

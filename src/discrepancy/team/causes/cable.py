@@ -1,4 +1,4 @@
-"""A cable: a spring that pulls along itself alone, and not at all where it is slack."""
+"""A cable: a spring that pulls along itself alone, and not at all where it is slack; a strap also stiffens."""
 
 from collections.abc import Mapping, Sequence
 from itertools import product
@@ -13,12 +13,13 @@ from estimator.arrays import Array
 TURNS, OFFSETS = ("turn_1", "turn_2"), ("offset_1_m", "offset_2_m")
 """Numbers of its shape: where it comes from, as slopes across an axis; where its line passes the centre of mass, along
 the other two axes."""
-STRETCH, NEAR = "stretch_m", "near_per_m"
-"""By how much it is stretched at home; one over how far away it is tied."""
+STRETCH, NEAR, STIFFENS = "stretch_m", "near_per_m", "stiffens_per_m"
+"""By how much it is stretched at home; one over how far away it is tied; by which share it is stiffer per stretch."""
 SLOPE_STEPS: Mapping[str, float] = (
     dict.fromkeys(TURNS, rules.CABLE_TURN_STEP)
     | dict.fromkeys(OFFSETS, rules.TETHER_STEP_M)
     | {STRETCH: rules.CABLE_STRETCH_STEP_M, NEAR: rules.CABLE_NEAR_STEP_PER_M}
+    | {STIFFENS: rules.CABLE_STIFFENS_STEP_PER_M}
 )
 
 
@@ -31,7 +32,7 @@ def pull(shape: Shape, moved: Array) -> Array:
     """Force per stiffness on the point that it is tied to [m], along the axes of {b}, shape (Q, 3).
 
     Stretched to e at home and tied at a distance D along the unit vector u, |D u - x| - D + e along D u - x, and
-    none where that is negative; x is how far the point has moved.
+    none where that is negative; x is how far the point has moved. Stretched by d, a strap pulls with d + s d^2.
 
     Args:
         shape: a cable's.
@@ -42,7 +43,8 @@ def pull(shape: Shape, moved: Array) -> Array:
     length = np.linalg.norm(away, axis=1)
     longer = (near * np.sum(moved**2, axis=1) - 2.0 * moved @ direction(shape)) / (length + 1.0)
     stretched: Array = np.maximum(shape[STRETCH] + longer, 0.0)
-    return (stretched / length)[:, None] * away
+    pulled = stretched * (1.0 + _stiffens(shape) * stretched)
+    return (pulled / length)[:, None] * away
 
 
 def direction(shape: Shape) -> Array:
@@ -72,7 +74,8 @@ def tied(values: Array, shape: Shape, home: Array) -> dict[str, float]:
         away = direction(shape) / _near(shape)
         length_m = max(1.0 / _near(shape) - shape[STRETCH], 0.0)
     anchor = {f"anchor_{axis}_m": float(x) for axis, x in zip("xyz", home + away, strict=True)}
-    return {"stiffness_N_per_m": float(stiffness)} | anchor | {"length_m": length_m}
+    strength = {"length_m": length_m, "stiffening_N_per_m2": float(stiffness) * _stiffens(shape)}
+    return {"stiffness_N_per_m": float(stiffness)} | anchor | strength
 
 
 def beside_force(columns: Sequence[Array]) -> Array:
@@ -83,10 +86,13 @@ def beside_force(columns: Sequence[Array]) -> Array:
 
 
 def slack(n: Numbers) -> str:
-    """What a sentence about a tether says of its length."""
-    return (
-        f", along itself alone, and is slack below {n('length_m', 'm')}" if n.values.get("length_m") else ""
-    )
+    """What a sentence about a tether says of its length, and of how it stiffens."""
+    if not n.values.get("length_m"):
+        return ""
+    below = n("length_m", "m")
+    if not n.values["stiffening_N_per_m2"]:
+        return f", along itself alone, and is slack below {below}"
+    return f", along itself alone, is slack below {below} and stiffens by {n('stiffening_N_per_m2', 'N/m^2')}"
 
 
 def every_way(stretches_m: Sequence[float] = rules.CABLE_STRETCHES_M) -> list[Shape]:
@@ -103,6 +109,21 @@ def first_ways() -> list[Shape]:
     return every_way(rules.CABLE_STRETCHES_M[:1])
 
 
+def otherwise_slack(shape: Shape) -> list[Shape]:
+    """The same cable, slack at other times: no steps lead from one that never is to one that is."""
+    return [{**shape, STRETCH: e} for e in rules.CABLE_STRETCHES_M] if is_cable(shape) else []
+
+
+def strap(shape: Shape) -> list[Shape]:
+    """A cable that may also stiffen."""
+    return [{**shape, STIFFENS: 0.0}] if is_cable(shape) and STIFFENS not in shape else []
+
+
+def alike(shape: Shape) -> int:
+    """Of how many cables, told apart by their shapes alone, one is one."""
+    return rules.CABLES * (rules.STRAPS if STIFFENS in shape else 1)
+
+
 def through(at: Array, shape: Shape) -> Shape:
     """With its line through a point of the payload, seen from the centre of mass in {1} [m], shape (3,)."""
     u, axis = direction(shape), _axis(shape)
@@ -117,3 +138,7 @@ def _axis(shape: Shape) -> int:
 def _near(shape: Shape) -> float:
     """Within what a room has: one that the data do not tell must not be behind the point."""
     return float(np.clip(shape[NEAR], *rules.CABLE_NEAR_RANGE_PER_M))
+
+
+def _stiffens(shape: Shape) -> float:
+    return float(np.clip(shape.get(STIFFENS, 0.0), *rules.CABLE_STIFFENS_RANGE_PER_M))

@@ -69,7 +69,7 @@ class PayloadTether(Cause):
     def finer(self, shape):
         """Nearer to the best; a tether is tied within the payload's reach."""
         if cable.is_cable(shape):
-            return []  # slopes tell
+            return cable.otherwise_slack(shape)  # slopes tell the rest
         moved = [
             dict(shape) | {name: shape[name] + step}
             for name in LEVERS
@@ -78,8 +78,11 @@ class PayloadTether(Cause):
         ]
         return [other for other in moved if np.linalg.norm(_lever(other)) <= rules.SLOSH_REACH_M]
 
+    def grown(self, shape):
+        return cable.strap(shape)
+
     def alike(self, shape):
-        return rules.CABLES * rules.CABLE_LINES if cable.is_cable(shape) else self.among
+        return cable.alike(shape) * rules.CABLE_LINES if cable.is_cable(shape) else self.among
 
     def slope_step(self, name, number):
         return self.determined[name]

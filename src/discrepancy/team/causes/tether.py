@@ -5,7 +5,6 @@ from typing import ClassVar
 
 import numpy as np
 
-from discrepancy import rules
 from discrepancy.team.causes import cable
 from discrepancy.team.causes.base import Cause
 
@@ -51,8 +50,14 @@ class Tether(Cause):
     def further(self, shape):
         return cable.every_way()
 
+    def grown(self, shape):
+        return cable.strap(shape)
+
+    def finer(self, shape):
+        return cable.otherwise_slack(shape)
+
     def alike(self, shape):
-        return rules.CABLES if cable.is_cable(shape) else self.among
+        return cable.alike(shape) if cable.is_cable(shape) else self.among
 
     def slope_step(self, name, number):
         return self.determined[name]
