@@ -8,6 +8,9 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import ClassVar
 
+import numpy as np
+
+from discrepancy import rules
 from discrepancy.candidate import Candidate, Parameter, Transient
 from discrepancy.causes.numbers import Numbers, number
 from estimator.arrays import Array
@@ -80,8 +83,10 @@ class Cause(ABC):
         return replace(self.candidate(given, when.shape), transient=when)
 
     def never_negative(self, values: Array, se: Array) -> bool:
-        """Whether nothing that must be positive is negative beyond two standard errors."""
-        return all(values[k] >= -2.0 * se[k] for k, n in enumerate(self.parameters) if n in self.positive)
+        """Whether nothing that must be positive is negative beyond chance, and what its law leaves of the others."""
+        told = float(np.max(np.abs(values) / np.maximum(se, 1e-300)))
+        least = -max(rules.NEGATIVE_SE, rules.LAW_SHARE * told) * se
+        return all(values[k] >= least[k] for k, n in enumerate(self.parameters) if n in self.positive)
 
     def place(self, candidate: Candidate) -> str:
         """Where it is, as a sentence begins."""

@@ -183,6 +183,10 @@ LAW_ERROR_SHARE = 0.02
 LEAST_PROBABILITY = WRONG_NAME_COST / (1.0 + WRONG_NAME_COST)
 """From which a cause is named, one half; below, it is a suspicion. Derived: named, it costs the share of wrong
 names; not named, that of right ones."""
+NEGATIVE_SE = 3.0
+"""Standard errors beyond which what must be positive is not. Derived: of a coupled drive that has one of three numbers
+beside two of nought one in 370 is lost, with two standard errors one in 22 (one of 246 nats was). Where another number
+of the cause stands out by more, what its law leaves of that (``LAW_SHARE``) may pass for a negative one as well."""
 SCATTER_FACTOR = 3.0
 """Spread of a kind over its tolerance, from which a team is said to be off in it. Chosen."""
 CONTRADICTED = 0.5

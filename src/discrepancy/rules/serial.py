@@ -86,6 +86,9 @@ STRIBECK_PER_S = 0.1
 not on how fast a joint was moved; slow logs must not hide it."""
 EXPONENTS = (0.5, 0.3, 0.7)
 """Of the speed in friction that grows more slowly than it. Chosen: between Coulomb (0) and viscous (1)."""
+THINS_SHARES, THINS_FINER, LINE_NODES = (0.0, 0.3, 1.0), (0.6, 1.5), 40
+"""Of the typical speed, below which such friction is viscous: those tried, factors that are tried next, and points at
+which its straight line is taken. Chosen: what is faster than the typical speed is a straight line in a log."""
 WARMING_SHARES, WARMING_RANGE = (0.3, 1.0, 0.1), (0.05, 1.0)
 """Time over which friction fades as a joint warms up, over the longest log's: those tried, and the range. Chosen: what
 takes longer is a straight line in a log, as the longest nearly is; what is faster is the first stroke."""
@@ -135,8 +138,12 @@ MOST_ZERO_RAD, MOST_LENGTH_M = 0.2, 0.02
 """Beyond which a zero or a length is not off but that of another pose or model. Chosen: 11 degrees, 2 cm."""
 DELAY_S = 5e-4
 """By which torques are late or early. Chosen: half a period of a drive's loop at 1 kHz."""
-MOST_SCALE = 0.5
-"""From which a scale is none, but a wrong unit or gear. Chosen."""
+SCALE_BENDS, SCALE_BEND_STEP = (-0.2, 0.2), 0.1
+"""Of an error of a torque's scale, by which share it is larger at twice the typical load: those tried, and over which
+slopes are taken. Chosen: iron saturates by some percent; what is left is found by steps."""
+MOST_SCALE = 0.75
+"""From which a scale is none, but a wrong unit or gear. Chosen: those are factors of two and more. With 0.5 a drive
+whose iron saturates, off by 60 % at rest, was friction and a counterbalance."""
 
 # Servos.
 

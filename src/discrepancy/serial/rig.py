@@ -186,7 +186,7 @@ class SerialRig(SerialRows, Rig):
         return shapes.others(candidate, self.hints, finer=finer)
 
     rigid = ("payload",)
-    shaped = ("friction", "warming")
+    shaped = ("friction", "warming", "torque_scale")
     curved = True
     layered = True
     normal = True

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
+from scipy.special import hyp2f1
 
 from estimator.arrays import Array
 from mocobot_sim.serial.state import direction
@@ -98,9 +100,21 @@ def _stribeck(e: RobotEffect, v: float, load: float, time: float) -> float:
 def _sublinear(e: RobotEffect, v: float, load: float, time: float) -> float:
     # A power of the speed less its own best straight line between 0 and twice the typical speed: with moments
     # a = 2^(n+1)/(n+1) and b = 2^(n+2)/(n+2), that line is 2 a - 3 b / 2 + (3 b / 2 - 3 a / 2) u.
-    n, u = e.number("exponent"), abs(v) / e.number("typical")
-    a, b = 2.0 ** (n + 1.0) / (n + 1.0), 2.0 ** (n + 2.0) / (n + 2.0)
-    return e.number("bend") * (u**n - (2.0 * a - 1.5 * b) - (1.5 * b - 1.5 * a) * u)
+    # Below the speed w it is viscous: u (u^2 + w^2)^((n - 1) / 2).
+    n, typical = e.number("exponent"), e.number("typical")
+    u, w = abs(v) / typical, e.number("thins") / typical
+    a, b = _moments(n, w)
+    power = u * (u * u + w * w) ** (0.5 * (n - 1.0)) if u else 0.0
+    return e.number("bend") * (power - (2.0 * a - 1.5 * b) - (1.5 * b - 1.5 * a) * u)
+
+
+@lru_cache
+def _moments(n: float, w: float) -> tuple[float, float]:
+    """Integrals from 0 to 2 of u^k (u^2 + w^2)^((n - 1) / 2), k = 1 and 2 (Gradshteyn and Ryzhik, 3.194.1)."""
+    if not w:
+        return 2.0 ** (n + 1.0) / (n + 1.0), 2.0 ** (n + 2.0) / (n + 2.0)
+    first = ((4.0 + w * w) ** (0.5 * (n + 1.0)) - w ** (n + 1.0)) / (n + 1.0)
+    return first, 8.0 / 3.0 * w ** (n - 1.0) * float(hyp2f1(0.5 * (1.0 - n), 1.5, 2.5, -4.0 / (w * w)))
 
 
 def _load_friction(e: RobotEffect, v: float, load: float, time: float) -> float:

@@ -240,13 +240,19 @@ def test_a_joint_that_is_half_a_turn_off_has_diverged(tmp_path: Path) -> None:
 def test_errors_of_the_log_are_taken_out_of_its_torques() -> None:
     read_wrong = [
         RobotEffect("torque_offset", 1, None, {"offset_Nm": 0.3}),
-        RobotEffect("torque_scale", 1, None, {"scale": 0.1}),
+        RobotEffect("torque_scale", 1, None, {"scale": 0.1, "bend": 0.0, "typical_load": 2.0}),
         RobotEffect("back_emf", 1, None, {"braking_Nms_per_rad": 0.05}),
     ]
     readings = Readings.of(read_wrong, 1)
     # 2 N m at standstill, read as 1.1 times that plus 0.3 N m.
     assert readings.real(np.array([2.5]), np.zeros(1), 1.0) == pytest.approx(2.0)
     assert readings.real(np.array([2.5]), np.array([4.0]), 1.0) == pytest.approx(1.8)
+    # Of what saturates: 1.3 times it at 4 N m, 20 % less of the 0.3 at twice that.
+    bent = Readings.of(
+        [RobotEffect("torque_scale", 1, None, {"scale": 0.3, "bend": -0.2, "typical_load": 4.0})], 1
+    )
+    for real, told in ((4.0, 4.0 * 1.3), (-8.0, -8.0 * 1.24), (0.0, 0.0)):
+        assert bent.real(np.array([told]), np.zeros(1), 1.0) == pytest.approx(real)
     late = Readings.of([RobotEffect("torque_delay", 1, None, {"delay_s": 0.02})], 1)
     log = turning()
     assert log.torque is not None

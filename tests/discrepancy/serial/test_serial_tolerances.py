@@ -115,6 +115,14 @@ def test_what_no_contact_can_do(rig: SerialRig, cause: str, values: list[float])
     assert CAUSES[cause].possible(rig.tree, 2, np.abs(values), se)
 
 
+def test_what_is_hardly_negative_beside_much_is_nought(rig: SerialRig) -> None:
+    """By chance up to three standard errors; by the law's own error up to a fifth of what stands out."""
+    pair, se = CAUSES["coupled_drive"], np.array([0.01, 0.02, 0.001])
+    for rotor, much, can in ((-2.9, 5.0, True), (-3.1, 5.0, False), (-9.0, 50.0, True), (-11.0, 50.0, False)):
+        assert pair.possible(rig.tree, 2, se * [much, 0.0, rotor], se) is can
+    assert not pair.possible(rig.tree, 2, se * [-50.0, 0.0, 0.0], se)
+
+
 def test_fading_over_all_speeds_is_no_stribeck_friction() -> None:
     near = [{"fade_per_s": fade, "typical_per_s": 2.0} for fade in (0.17, 0.1)]
     fades = [[s["fade_per_s"] for s in CAUSES["stribeck"].finer(shape)] for shape in near]

@@ -1,11 +1,16 @@
 """The torque's reading is off in scale."""
 
+import numpy as np
+
 from discrepancy.rules import serial as rules
 from discrepancy.serial.causes.base import Cause, at_joint
 
 
 class TorqueScale(Cause):
-    """The torque reads ``1 + scale`` times what it is, such as by a torque constant that is off."""
+    """The torque reads ``1 + scale`` times what it is, such as by a torque constant that is off.
+
+    Where iron saturates, that depends on the load: 1 + scale (1 + bend (|torque| / typical load - 1)).
+    """
 
     title = "scale of the torque of {joint}"
     family = "torque_scale"
@@ -14,7 +19,21 @@ class TorqueScale(Cause):
     separate = "A known weight on the arm."
 
     def sentence(self, n):
-        return f"the torque reads {n('scale', '%', 100.0)} {n.either('scale', 'too much', 'too little')}"
+        said = f"the torque reads {n('scale', '%', 100.0)} {n.either('scale', 'too much', 'too little')}"
+        if not n.values["bend"]:
+            return said
+        return (
+            f"{said} at its typical load of {n('typical_load', 'N m')}, and at twice as much by "
+            f"{n('bend', '%', 100.0)} of that {n.either('bend', 'more', 'less')}, as where iron saturates"
+        )
+
+    def shapes(self, hints, at):
+        load = float(hints.load[at])
+        bends = rules.SCALE_BENDS if load > 0.0 else ()
+        return [{"bend": bend, "typical_load": load} for bend in (0.0, *bends)]
+
+    def steps(self, shape):
+        return {"bend": rules.SCALE_BEND_STEP} if shape["bend"] else {}
 
     def possible(self, tree, at, values, se):
         return abs(values[0]) < self.most(tree, at)[0]
@@ -24,4 +43,7 @@ class TorqueScale(Cause):
 
     def columns(self, signals, at, shape):
         # The model's torque, not the measured one: that would explain itself. What it lacks of friction counts as read.
-        return at_joint(signals, at, signals.asked[:, at])
+        asked = signals.asked[:, at]
+        if shape["bend"]:
+            asked = asked * (1.0 + shape["bend"] * (np.abs(asked) / shape["typical_load"] - 1.0))
+        return at_joint(signals, at, asked)

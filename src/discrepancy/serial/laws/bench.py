@@ -29,7 +29,10 @@ _BENT = {
     (function, signal) for function in ("linear", "cube", "beyond", "spline") for signal in ("load", "torque")
 }
 _RUBS = ("friction", "stribeck", "sublinear_friction", "load_friction", "warming")
-_FORMS = dict.fromkeys(_RUBS, _DRY) | {"torque_scale": _BENT}
+_FORMS = dict.fromkeys(_RUBS, _DRY) | {
+    "sublinear_friction": _DRY | {("spline", "dq")},
+    "torque_scale": _BENT,
+}
 """Functions and signals of a joint's own torque that are a listed cause in another form."""
 
 

@@ -17,31 +17,37 @@ KNOWN = ("torque_offset", "torque_scale", "torque_delay", "back_emf")
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """A logged torque is ``scale`` times the joint's, plus ``offset``, so much late; all shape (J,).
+    """A logged torque is ``scale`` times the joint's and ``squared`` times its square, plus ``offset``, so much late.
+
+    All of shape (J,). The square has the torque's sign: a scale may depend on the load.
 
     Attributes:
         offset: [N m or N].
-        scale: 1 where it is right.
+        scale: 1 where it is right, at no load.
+        squared: by which it grows per load [1/(N m) or 1/N].
         delay_s: by which it comes late.
         braking: torque lost to the speed while the drive is on [N m s/rad or N s/m].
     """
 
     offset: Array
     scale: Array
+    squared: Array
     delay_s: Array
     braking: Array
 
     @classmethod
     def of(cls, effects: Sequence[RobotEffect], joints: int) -> Readings:
         """Of causes in ``KNOWN``, joints counted from 1."""
-        out = cls(np.zeros(joints), np.ones(joints), np.zeros(joints), np.zeros(joints))
+        out = cls(np.zeros(joints), np.ones(joints), *np.zeros((3, joints)))
         for effect in effects:
             assert effect.joint is not None
             j = effect.joint - 1
             if effect.cause == "torque_offset":
                 out.offset[j] += effect.number("offset")
             elif effect.cause == "torque_scale":
-                out.scale[j] += effect.number("scale")
+                scale, bend = effect.number("scale"), effect.number("bend")
+                out.scale[j] += scale * (1.0 - bend)
+                out.squared[j] += scale * bend / effect.number("typical_load") if bend else 0.0
             elif effect.cause == "torque_delay":
                 out.delay_s[j] += effect.number("delay")
             else:
@@ -50,7 +56,10 @@ class Readings:
 
     def real(self, told: Array, dq: Array, on: float) -> Array:
         """Torques at the joints (J,) by those that the log would have, velocities, and whether the drives are on."""
-        return np.asarray((told - self.offset * on) / self.scale - on * self.braking * dq)
+        read = told - self.offset * on
+        # The root of squared x^2 + scale x = |read|, in a form that has no nought below it.
+        root = np.sqrt(np.maximum(self.scale**2 + 4.0 * self.squared * np.abs(read), 0.0))
+        return np.asarray(2.0 * read / (self.scale + root) - on * self.braking * dq)
 
 
 @dataclass(frozen=True, eq=False)
