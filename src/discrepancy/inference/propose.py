@@ -63,7 +63,7 @@ def proposals(
     most = -np.inf  # score of that, tolerated
     scores: dict[tuple[object, ...], tuple[Candidate, float]] = {}
     rough: list[tuple[Scanned, float]] = []  # what was not sharpened, and the score of the hypothesis with it
-    offered = chain(_hypotheses(rig, base, ranked, narrow=narrow), _sharper(rig, base, rough, scores))
+    offered = chain(_hypotheses(rig, base, ranked, narrow=narrow), _sharper(rig, base, ranked, rough, scores))
     for item, new in offered:
         new = beside_other_forms(rig, new, new.free[-1], base)
         last = new.causes[-1]
@@ -99,6 +99,7 @@ def _hypotheses(
 def _sharper(
     rig: Rig,
     base: Hypothesis,
+    ranked: Sequence[Scanned],
     rough: Sequence[tuple[Scanned, float]],
     scores: Mapping[tuple[object, ...], tuple[Candidate, float]],
 ) -> Iterator[tuple[None, Hypothesis]]:
@@ -109,14 +110,21 @@ def _sharper(
     Args:
         rig: for columns of other shapes.
         base: what is there already.
+        ranked: the scan.
         rough: what was not sharpened, with scores.
         scores: of all, to be asked when that is known.
     """
-    most = max((score for _, score in scores.values()), default=base.score)
+    best, most = max(scores.values(), key=lambda one: one[1], default=(None, base.score))
+    # One whose shapes are far apart, once it has the best, is no measure for others that have not: their scans are.
+    least = np.inf
+    if best is not None and best.cause in rig.coarse:
+        seen = max((item.score for item in ranked if item.candidate.key == best.key), default=np.inf)
+        least = rules.COARSE_SHARE * seen if seen > 0.0 else seen
     for item, score in list(rough):
         coarse = item.candidate.cause in rig.coarse
         reach = (1.0 - rules.COARSE_SHARE) * max(most - base.score, 0.0) if coarse else 0.0
-        if score >= most - reach and (rig.refinements(item.candidate) or rig.steps(item.candidate)):
+        near = score >= most - reach or (coarse and item.score >= least)
+        if near and (rig.refinements(item.candidate) or rig.steps(item.candidate)):
             yield None, sharpened(rig, base, item, near=True)
 
 

@@ -138,12 +138,14 @@ MOST_ZERO_RAD, MOST_LENGTH_M = 0.2, 0.02
 """Beyond which a zero or a length is not off but that of another pose or model. Chosen: 11 degrees, 2 cm."""
 DELAY_S = 5e-4
 """By which torques are late or early. Chosen: half a period of a drive's loop at 1 kHz."""
-SCALE_BENDS, SCALE_BEND_STEP = (-0.2, 0.2), 0.1
-"""Of an error of a torque's scale, by which share it is larger at twice the typical load: those tried, and over which
-slopes are taken. Chosen: iron saturates by some percent; what is left is found by steps."""
-MOST_SCALE = 0.75
-"""From which a scale is none, but a wrong unit or gear. Chosen: those are factors of two and more. With 0.5 a drive
-whose iron saturates, off by 60 % at rest, was friction and a counterbalance."""
+SCALE_BENDS, SCALE_BEND_STEP, MOST_BEND = (-0.1, 0.1), 0.1, 0.3
+"""Of an error of a torque's scale, by which share it is larger at twice the typical load: those tried, over which
+slopes are taken, and from which it is not the scale that is off. Chosen: iron saturates by some percent; steps find the
+rest."""
+LEAST_SCALE, MOST_SCALE = 2.0 * SCALE_SHARE, 0.75
+"""Up to which a scale is none that stands out, and from which it is a wrong unit or gear. Chosen: friction that grows
+with the load was a scale of 2 % that bends; units and gears are factors of two and more. With 0.5 a drive whose iron
+saturates, off by 60 % at rest, was friction and a counterbalance."""
 
 # Servos.
 

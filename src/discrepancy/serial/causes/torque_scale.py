@@ -33,10 +33,10 @@ class TorqueScale(Cause):
         return [{"bend": bend, "typical_load": load} for bend in (0.0, *bends)]
 
     def steps(self, shape):
-        return {"bend": rules.SCALE_BEND_STEP} if shape["bend"] else {}
+        return {"bend": rules.SCALE_BEND_STEP} if 0.0 < abs(shape["bend"]) < rules.MOST_BEND else {}
 
     def possible(self, tree, at, values, se):
-        return abs(values[0]) < self.most(tree, at)[0]
+        return rules.LEAST_SCALE < abs(values[0]) < self.most(tree, at)[0]
 
     def most(self, tree, at):
         return [rules.MOST_SCALE]
