@@ -184,6 +184,106 @@ def test_what_is_coarse_is_sharpened_though_another_looks_likelier():
     assert best.fit.part(best.free[-1])[0][0] == pytest.approx(SIZE_HALF, rel=0.1)
 
 
+TWO = tuple(replace(cause("half", tolerance=0.0, robot=robot), shape=HALF.shape) for robot in (1, 2))
+
+
+class TwoHalves(Half):
+    """The same at two places whose traces are nearly alike; a scan begins nearer to the truth at the wrong one."""
+
+    begun = (-0.38, -0.2)
+
+    def columns(self, candidate):
+        columns = super().columns(candidate)
+        if candidate.cause != "half" or candidate.robot != 2:
+            return columns
+        return [c * np.array([1.0, 1.0, 1.2, 0.9])[:, None] for c in columns]
+
+    def further(self, candidate):
+        if candidate.cause != "half":
+            return []
+        return [replace(candidate, shape={"side": 1.0, "from": self.begun[(candidate.robot or 1) - 1]})]
+
+
+def test_one_that_has_its_best_shape_is_no_measure_for_those_that_have_not():
+    """Sharp, the wrong place explains far more than the right one where a scan begins; their scans are alike."""
+    rig = TwoHalves({}, catalogue=(*CATALOGUE, *TWO), seed=1)
+    nothing = nothing_in(rig)
+    rough = [score_with(nothing.fit, c, rig.columns(c)) for one in TWO for c in rig.further(one)]
+    assert rough[1] > rough[0] + rules.CLOSE_NATS
+    assert rough[0] > rules.COARSE_SHARE * rough[1]
+    found = proposals(rig, nothing)
+    best, gained = (
+        found.best,
+        {c.robot: score - nothing.score for c, score in found.scores if c.cause == "half"},
+    )
+    assert best is not None
+    assert (best.causes[-1].cause, best.causes[-1].robot) == ("half", 1)
+    assert best.causes[-1].shape["from"] == pytest.approx(CREST, abs=0.02)
+    assert gained[2] * rules.COARSE_SHARE > rough[0]
+
+
+class Bent(Half):
+    """It may grow with a power of its distance, and a search by steps alone stays where another crest is."""
+
+    def columns(self, candidate):
+        if candidate.cause != "half":
+            return super().columns(candidate)
+        plain = super().columns(candidate)
+        return [c * (1.0 + candidate.shape.get("bend", 0.0) * np.abs(c)) for c in plain]
+
+    def __post_init__(self):
+        FakeRig.__post_init__(self)
+        true = replace(HALF, shape={"side": 1.0, "from": CREST, "bend": 0.8})
+        self.data = [
+            (x + SIZE_HALF * self.columns(true)[t][..., 0], *own) for t, (x, *own) in enumerate(self.data)
+        ]
+
+    def grown(self, candidate):
+        if candidate.cause != "half" or "bend" in candidate.shape:
+            return []
+        return [replace(candidate, shape={**candidate.shape, "bend": 0.0})]
+
+    def steps(self, candidate):
+        found = super().steps(candidate)
+        if "bend" not in candidate.shape:
+            return found
+        ends = [candidate.shape | {"bend": candidate.shape["bend"] + x} for x in (-0.2, 0.2)]
+        return [*found, (*(replace(candidate, shape=shape) for shape in ends), 0.4)]
+
+
+def test_a_shape_grows_where_that_is_likelier():
+    rig = Bent({}, catalogue=(*CATALOGUE, HALF), seed=1)
+    nothing = nothing_in(rig)
+    item = Scanned(len(nothing.problem.candidates) - 1, HALF, 0.0)
+    best = best_shape(rig, nothing.problem, (), item)
+    assert best.shape["bend"] == pytest.approx(0.8, abs=0.1)
+    assert best.shape["from"] == pytest.approx(CREST, abs=0.02)
+
+
+class Apart(Half):
+    """Steps from where a search begins lead away; another start of the same kind is offered at the end of the lead."""
+
+    low = -0.41
+
+    def refinements(self, candidate, *, finer=False):
+        if candidate.cause == "half" and finer:
+            return [replace(candidate, shape=candidate.shape | {"from": 0.1})]
+        return super().refinements(candidate, finer=finer)
+
+    def steps(self, candidate):
+        # Below it nothing leads up: as of a cable that is never slack.
+        return [] if candidate.shape.get("from", 0.0) < -0.4 else super().steps(candidate)
+
+
+def test_a_lead_is_followed_from_elsewhere_too():
+    rig = Apart({}, catalogue=(*CATALOGUE, HALF), seed=1)
+    nothing = nothing_in(rig)
+    item = Scanned(len(nothing.problem.candidates) - 1, HALF, 0.0)
+    best = best_shape(rig, nothing.problem, (), item)
+    assert best.shape["side"] == 1.0
+    assert best.shape["from"] == pytest.approx(CREST, abs=0.02)
+
+
 THREE = tuple(replace(cause("drift", robot), shape={"from": 0.0}) for robot in (1, 2, 3))
 
 
