@@ -160,6 +160,10 @@ class Rig(ABC):
         """The same candidate with a number more to its shape, nought so far, where it may have one."""
         return []
 
+    def recentred(self, candidate: Candidate, values: Array) -> Candidate:
+        """The same candidate with the columns of such values, where these are no straight lines all the way."""
+        return candidate
+
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
         """For every number of its shape that the data determine: a little less, a little more, and the difference."""
         return []

@@ -221,3 +221,12 @@ diagnoses if windows were normal, and by that factor. Derived: Student's t of th
 comparisons; the factor is chosen: what moves otherwise leaves otherwise. Measured: an hour of a random motion, 0.8."""
 ODD_NAMED = 3
 """Of such parts that were not searched all the same, how many are named. Chosen."""
+SWING_ROUNDS, SWING_FIRST_ROUNDS, SWING_SETTLED = 20, 1, 1e-4
+"""Times a pendulum that swings far is swung again, the same while shapes are only looked through, and the change from
+which it is enough. Chosen: sizes are told to a percent."""
+SWING_CALM, SWING_WEIGHT, SWING_LEAST_WEIGHT = 0.5, 0.7, 0.3
+"""Change of a round over that of the last, from which rounds go to and fro; by which a new one counts less then, and
+how much at least. Chosen."""
+SWING_MOST, SWING_START, SWING_EASED = 0.95, 0.9, 0.6
+"""How far it swings at most, over its length, the same while it is sought, and by which share its restoring force is
+less at most. Chosen: a mass beside its pivot is no pendulum."""

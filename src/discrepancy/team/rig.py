@@ -74,6 +74,11 @@ class TeamRig(LawfulRows):
             return []
         return in_shapes(candidate, CAUSES[candidate.cause].grown(candidate.shape), len(self.linear))
 
+    def recentred(self, candidate: Candidate, values: Array) -> Candidate:
+        if candidate.transient or candidate.cause not in CAUSES:
+            return candidate
+        return replace(candidate, shape=dict(CAUSES[candidate.cause].recentred(values, candidate.shape)))
+
     def inexact(self, candidate: Candidate) -> Array:
         if isinstance(candidate, LawCandidate):
             return super().inexact(candidate)

@@ -160,7 +160,8 @@ def nearest_shape(rig: Rig, without: Fit, candidate: Candidate, values: Array) -
         candidate: with a shape that is nearly the best.
         values: its parameters, in their own units.
     """
-    found = without.solution_with(_with_slopes(rig, candidate, values))[0][len(values) :]
+    solution = without.solution_with(_with_slopes(rig, candidate, values))[0]
+    found = solution[len(values) :]
     shape = dict(candidate.shape)
     for (less, more, difference), step in zip(rig.steps(candidate), found, strict=True):
         (name,) = (n for n in shape if less.shape[n] != more.shape[n])
@@ -172,7 +173,7 @@ def nearest_shape(rig: Rig, without: Fit, candidate: Candidate, values: Array) -
         shape["ramp_s"] = min(
             max(shape["ramp_s"], 0.5 * candidate.shape["ramp_s"]), 0.5 * shape["duration_s"]
         )
-    return candidate.in_shape(shape)
+    return rig.recentred(candidate.in_shape(shape), solution[: len(values)])
 
 
 def _with_slopes(rig: Rig, candidate: Candidate, values: Array) -> Sequence[Array]:

@@ -60,7 +60,7 @@ def _in_best_shape(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis, index:
 
 def settled_shape(rig: Rig, new: Hypothesis, index: int) -> Hypothesis:
     """One of the causes in the shape that suits the noise left with it; without it, all misfit counted as noise."""
-    for _ in range(rules.POLISH_ROUNDS if rig.steps(new.problem.candidates[index]) else 0):
+    for _ in range(rules.SETTLE_ROUNDS if rig.steps(new.problem.candidates[index]) else 0):
         values, candidate = new.fit.part(index)[0], new.problem.candidates[index]
         others = [i for i in new.free if i != index]
         without = Fit.of(new.problem, others, fixed=(index, np.zeros(len(values))))
@@ -68,7 +68,9 @@ def settled_shape(rig: Rig, new: Hypothesis, index: int) -> Hypothesis:
         other = in_shape(rig, new, index, moved)
         if other.score <= new.score:
             break
-        new = other
+        gained, new = other.score - new.score, other
+        if gained < rules.SETTLED_NATS:
+            break
     return new
 
 

@@ -101,6 +101,10 @@ class Cause(base.Cause):
         """The same shape with a number more that the data determine, nought so far; none where that is all."""
         return []
 
+    def recentred(self, values: Array, shape: Shape) -> Shape:
+        """The shape for columns of such values, where these are straight lines in a part of them only."""
+        return shape
+
     def alike(self, shape: Shape) -> int:
         """Of how many, told apart by their shapes alone, one of a shape is one; 0 where places are listed."""
         return self.among

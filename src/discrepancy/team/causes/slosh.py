@@ -16,6 +16,9 @@ from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 from estimator.so3 import skew
 
+OFF = ("off_x_m", "off_y_m", "off_z_m")
+"""Numbers of a shape: from the centre of mass to where it hangs for the columns, in {1}; any place nearby will do."""
+
 
 class Slosh(Cause):
     """A pendulum that hangs from a point of the payload; what it does beyond riding along rigidly.
@@ -65,26 +68,31 @@ class Slosh(Cause):
         )
 
     def columns(self, trial, robot, joint, shape):
-        com = trial.shared.pi[1:4] / trial.shared.pi[0]
+        off = _off(shape)
+        point = trial.shared.pi[1:4] / trial.shared.pi[0] + off
         R_b1, gravity = trial.data.R_bi[:, 0], trial.data.gravity_mps2
-        (*ways, up), wrench = level_ways(trial), np.zeros((len(R_b1), 6, 4))
+        (*ways, up), wrench = _level_ways(trial, point), np.zeros((len(R_b1), 6, 4))
+        rounds = rules.SWING_ROUNDS if set(OFF) & set(shape) else rules.SWING_FIRST_ROUNDS
         if "across_length_m" in shape:
             drop_m = shape["length_m"] - shape["across_length_m"]
             along, across = _ways(R_b1, shape["heading_rad"])
-            ways = [Way.of(trial, along, com), Way.of(trial, across, com - [0.0, 0.0, drop_m])]
+            ways = [Way.of(trial, along, point), Way.of(trial, across, point - [0.0, 0.0, drop_m])]
             # Its weight and rigid part are not where the payload's own parameters have it.
-            for way, sign in (ways[1], -1.0), (Way.of(trial, across, com), 1.0):
+            for way, sign in (ways[1], -1.0), (Way.of(trial, across, point), 1.0):
                 wrench += sign * way.pull[:, :, None] * way.drive[:, None]
             wrench[:, 3:, 0] += drop_m * gravity * np.cross(across[:, 2:] * across, R_b1[:, 2])
         for share, lengths_m in _modes(shape):
             own = [Pendulum(x, shape["damping_ratio"], gravity, trial.signals.rate_hz) for x in lengths_m]
             drives, turned = [way.drive for way in ways], [way.turned for way in ways]
-            swings, damped, rising = swung(drives, turned, up.drive[:, 0], own)
+            swings, damped, rising = swung(drives, turned, up.drive[:, 0], own, rounds)
             for way, swing, moment in zip(ways, swings, damped, strict=True):
                 wrench -= share * way.pull[:, :, None] * swing[:, None]
                 wrench[:, 3:] += share * way.about[:, :, None] * moment[:, None]
             wrench[..., 0] -= share * up.pull * rising[:, None]
         wrench[:, 3:, 1:] -= skew(wrench[:, :3, 0])  # moving the point by r moves the force: r x f = -f x r
+        wrench[..., 0] -= (
+            wrench[..., 1:] @ off
+        )  # its moments are about the centre of mass, wherever it was swung
         return trial.of_wrench(wrench[:, :3], wrench[:, 3:])
 
     def finer(self, shape):
@@ -95,16 +103,21 @@ class Slosh(Cause):
         near += [
             {"length_m": length * x, "damping_ratio": damping * y} for x in (0.98, 1.0, 1.02) for y in more
         ]
-        near += _nearer_mode(shape) if len(shape) > 2 else []
+        near += _nearer_mode(shape) if _has_two(shape) else []
         return [other for other in ({**shape, **moved} for moved in near) if _tried(other)]
 
     def further(self, shape):
-        return [
-            x for x in ({**shape, **more} for more in _second_modes(shape)) if len(shape) == 2 and _tried(x)
-        ]
+        more = [] if _has_two(shape) else _second_modes(shape)
+        return [x for x in ({**shape, **two} for two in more) if _tried(x)]
 
     def alike(self, shape):
-        return rules.SLOSH_SECONDS if len(shape) > 2 else self.among
+        return rules.SLOSH_SECONDS if _has_two(shape) else self.among
+
+    def recentred(self, values, shape):
+        """Swung about where it is found to hang."""
+        reach = rules.SLOSH_REACH_M
+        at = np.clip(values[1:] / max(values[0], 1e-6), -reach, reach)
+        return {**shape, **dict(zip(OFF, at.tolist(), strict=True))}
 
     def slope_step(self, name, number):
         return self.determined[name] if name == "heading_rad" else super().slope_step(name, number)
@@ -119,7 +132,8 @@ class Slosh(Cause):
         mass = values[0] if abs(values[0]) > 1e-6 else 1e-6
         point = context.p_1c + values[1:] / mass
         plain = {"across_length_m": 0.0, "heading_rad": 0.0, "second_length_m": 0.0, "second_share": 0.0}
-        return {"mass_kg": float(mass), **plain, **context.shape} | {
+        told = {name: x for name, x in context.shape.items() if name not in OFF}
+        return {"mass_kg": float(mass), **plain, **told} | {
             f"point_{axis}_m": float(x) for axis, x in zip("xyz", point, strict=True)
         }
 
@@ -151,16 +165,25 @@ class Way:
         return cls(pull, about, np.concatenate([at[:, None], further], axis=1), turned)
 
 
-_LEVEL: WeakKeyDictionary[TrialLinear, tuple[Way, Way, Way]] = WeakKeyDictionary()
+_LEVEL: WeakKeyDictionary[TrialLinear, tuple[Array, tuple[Way, Way, Way]]] = WeakKeyDictionary()
 
 
-def level_ways(trial: TrialLinear) -> tuple[Way, Way, Way]:
-    """From the centre of mass two ways to tell swings of one length by, and upwards; for all shapes the same."""
-    if trial not in _LEVEL:
-        com, R_b1 = trial.shared.pi[1:4] / trial.shared.pi[0], trial.data.R_bi[:, 0]
-        x, y, up = (Way.of(trial, R_b1[:, k], com) for k in range(3))
-        _LEVEL[trial] = x, y, up
-    return _LEVEL[trial]
+def _level_ways(trial: TrialLinear, point: Array) -> tuple[Way, Way, Way]:
+    """From a point in {1} two ways to tell swings of one length by, and upwards; the last ones are kept."""
+    if trial not in _LEVEL or not np.array_equal(_LEVEL[trial][0], point):
+        R_b1 = trial.data.R_bi[:, 0]
+        x, y, up = (Way.of(trial, R_b1[:, k], point) for k in range(3))
+        _LEVEL[trial] = point, (x, y, up)
+    return _LEVEL[trial][1]
+
+
+def _off(shape: Shape) -> Array:
+    return np.array([shape.get(name, 0.0) for name in OFF])
+
+
+def _has_two(shape: Shape) -> bool:
+    """Whether it has a second mode."""
+    return "across_length_m" in shape or "second_length_m" in shape
 
 
 def _second_modes(shape: Shape) -> list[Shape]:
