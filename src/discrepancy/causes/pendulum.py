@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import cast
 
 import numpy as np
 from scipy.signal import cont2discrete, lfilter
@@ -191,7 +192,8 @@ def _filters(pendulum: Pendulum) -> tuple[list[Array], Array]:
     rates = np.array([[0.0, 1.0], [-(w**2), -2.0 * pendulum.damping_ratio * w]])  # of displacement and speed
     out = np.array([rates[1], [0.0, 1.0], [1.0, 0.0]])
     system = rates, np.array([[0.0], [-1.0]]), out, np.array([[-1.0], [0.0], [0.0]])
-    A, B, C, D, _ = cont2discrete(system, 1.0 / pendulum.rate_hz, method="foh")
+    discrete = cont2discrete(system, 1.0 / pendulum.rate_hz, method="foh")
+    A, B, C, D, _ = cast("tuple[Array, Array, Array, Array, float]", discrete)
     trace, det = np.trace(A), A[0, 0] * A[1, 1] - A[0, 1] * A[1, 0]
     # C (z - A)^-1 B + D: (z - A)^-1 is (z + A - trace) over the denominator.
     ends = C @ (A - trace * np.eye(2)) @ B + D * det
