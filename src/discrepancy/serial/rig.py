@@ -157,6 +157,8 @@ class SerialRig(SerialRows, Rig):
         """Whether such values can be: no negative mass, moments of inertia, compliance or play beyond the errors."""
         se = np.sqrt(np.maximum(np.diag(covariance), 0.0))
         cause, tree, at = CAUSES[candidate.cause], self.tree, place_of(candidate)
+        if not cause.stands_out(values, candidate.shape):
+            return False
         gone = bool(self.common) and cause.reversible and cause.possible(tree, at, -values, se)
         return gone or cause.possible(tree, at, values, se)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -74,6 +75,19 @@ def test_a_bent_scale_is_what_it_says(rig: SerialRig) -> None:
     np.testing.assert_allclose(bent, straight * (1.0 - 0.3 * (np.abs(straight) / load - 1.0)))
     assert not cause.steps(plain)
     assert set(cause.steps(plain | {"bend": 0.2})) == {"bend"}
+
+
+def test_a_scale_within_two_tolerances_does_not_bend(rig: SerialRig) -> None:
+    """A plain one may be as small as the data tell."""
+    (plain,) = (c for c in rig.candidates() if (c.cause, c.joint) == ("torque_scale", 2))
+    bent = replace(plain, shape=plain.shape | {"bend": 0.2})
+    for scale, one, can in (
+        (0.02, plain, True),
+        (0.02, bent, False),
+        (-0.05, bent, True),
+        (0.8, bent, False),
+    ):
+        assert rig.possible(one, np.array([scale]), np.eye(1) * 1e-6) is can
 
 
 @pytest.mark.slow

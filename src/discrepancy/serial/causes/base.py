@@ -122,6 +122,10 @@ class Cause(base.Cause):
         """Whether such values can be, beyond two standard errors."""
         return self.never_negative(values, se)
 
+    def stands_out(self, values: Array, shape: Shape) -> bool:
+        """Whether it is more in such a shape than what every robot has."""
+        return True
+
     def at(
         self,
         tree: Tree,

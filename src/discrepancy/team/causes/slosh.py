@@ -23,7 +23,7 @@ OFF = ("off_x_m", "off_y_m", "off_z_m")
 class Slosh(Cause):
     """A pendulum that hangs from a point of the payload; what it does beyond riding along rigidly.
 
-    Swings x relative to the point obey x'' + 2 zeta w (x' - v) + w^2 x = -a with w^2 = g / length, and to third order
+    Small swings x relative to the point obey x'' + 2 zeta w (x' - v) + w^2 x = -a with w^2 = g / length, far ones
     what ``discrepancy.causes.pendulum`` says; v is how fast it would swing if it turned with the payload, to which its
     damper is fixed. The payload feels -mass x'' at the point, upwards what raises the mass, and, as the damper pulls
     where the mass is, the moment of 2 zeta w mass (x' - v) a length below. Its weight and rigid part are in the
@@ -90,9 +90,8 @@ class Slosh(Cause):
                 wrench[:, 3:] += share * way.about[:, :, None] * moment[:, None]
             wrench[..., 0] -= share * up.pull * rising[:, None]
         wrench[:, 3:, 1:] -= skew(wrench[:, :3, 0])  # moving the point by r moves the force: r x f = -f x r
-        wrench[..., 0] -= (
-            wrench[..., 1:] @ off
-        )  # its moments are about the centre of mass, wherever it was swung
+        # Its moments are about the centre of mass, wherever it was swung.
+        wrench[..., 0] -= wrench[..., 1:] @ off
         return trial.of_wrench(wrench[:, :3], wrench[:, 3:])
 
     def finer(self, shape):
