@@ -143,9 +143,9 @@ SCALE_BENDS, SCALE_BEND_STEP, MOST_BEND = (-0.1, 0.1), 0.1, 0.3
 slopes are taken, and from which it is not the scale that is off. Chosen: iron saturates by some percent; steps find the
 rest."""
 LEAST_SCALE, MOST_SCALE = 2.0 * SCALE_SHARE, 0.75
-"""Up to which a scale that bends is none that stands out, and from which it is a wrong unit or gear. Chosen: friction that grows
-with the load was a scale of 2 % that bends; units and gears are factors of two and more. With 0.5 a drive whose iron
-saturates, off by 60 % at rest, was friction and a counterbalance."""
+"""Up to which a scale that bends is none that stands out, and from which it is a wrong unit or gear. Chosen: friction
+that grows with the load was a scale of 2 % that bends; units and gears are factors of two and more. With 0.5 a drive
+whose iron saturates, off by 60 % at rest, was friction and a counterbalance."""
 
 # Servos.
 

@@ -36,10 +36,10 @@ class TorqueScale(Cause):
         return {"bend": rules.SCALE_BEND_STEP} if 0.0 < abs(shape["bend"]) < rules.MOST_BEND else {}
 
     def possible(self, tree, at, values, se):
-        return abs(values[0]) < self.most(tree, at)[0]
+        return bool(abs(values[0]) < self.most(tree, at)[0])
 
     def stands_out(self, values, shape):
-        return not shape["bend"] or abs(values[0]) > rules.LEAST_SCALE
+        return not shape["bend"] or bool(abs(values[0]) > rules.LEAST_SCALE)
 
     def most(self, tree, at):
         return [rules.MOST_SCALE]
