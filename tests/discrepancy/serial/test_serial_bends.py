@@ -77,6 +77,14 @@ def test_a_bent_scale_is_what_it_says(rig: SerialRig) -> None:
     assert set(cause.steps(plain | {"bend": 0.2})) == {"bend"}
 
 
+def test_what_a_volt_is_worth_does_not_bend(rig: SerialRig) -> None:
+    """It was fitted to the loads that would say so."""
+    told = rig.hints
+    fitted = replace(told, unscaled=np.arange(len(told.load)) == 1)
+    assert len(CAUSES["torque_scale"].shapes(told, 1)) > 1
+    assert len(CAUSES["torque_scale"].shapes(fitted, 1)) == 1
+
+
 def test_a_scale_within_two_tolerances_does_not_bend(rig: SerialRig) -> None:
     """A plain one may be as small as the data tell."""
     (plain,) = (c for c in rig.candidates() if (c.cause, c.joint) == ("torque_scale", 2))

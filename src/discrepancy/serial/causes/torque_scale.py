@@ -29,7 +29,8 @@ class TorqueScale(Cause):
 
     def shapes(self, hints, at):
         load = float(hints.load[at])
-        bends = rules.SCALE_BENDS if load > 0.0 else ()
+        # What a volt or an ampere is worth was fitted to these very loads: how it bends is what else the gear does.
+        bends = rules.SCALE_BENDS if load > 0.0 and not hints.unscaled[at] else ()
         return [{"bend": bend, "typical_load": load} for bend in (0.0, *bends)]
 
     def steps(self, shape):
