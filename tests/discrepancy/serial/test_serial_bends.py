@@ -83,6 +83,7 @@ def test_what_a_volt_is_worth_does_not_bend(rig: SerialRig) -> None:
     fitted = replace(told, unscaled=np.arange(len(told.load)) == 1)
     assert len(CAUSES["torque_scale"].shapes(told, 1)) > 1
     assert len(CAUSES["torque_scale"].shapes(fitted, 1)) == 1
+    assert {s["thins_per_s"] for s in CAUSES["sublinear_friction"].shapes(fitted, 1)} == {0.0}
 
 
 def test_a_scale_within_two_tolerances_does_not_bend(rig: SerialRig) -> None:

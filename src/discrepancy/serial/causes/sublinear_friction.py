@@ -44,9 +44,11 @@ class SublinearFriction(Cause):
 
     def shapes(self, hints, at):
         typical = float(hints.typical[at])
+        # Of a drive that tells no torque rows are too slow for that: how a gear sticks would pass for it.
+        shares = (0.0,) if hints.unscaled[at] else rules.THINS_SHARES
         return [
             {"exponent": e, "thins_per_s": share * typical, "typical_per_s": typical}
-            for share in rules.THINS_SHARES
+            for share in shares
             for e in rules.EXPONENTS
         ]
 
