@@ -83,10 +83,11 @@ class Cause(ABC):
         return replace(self.candidate(given, when.shape), transient=when)
 
     def never_negative(self, values: Array, se: Array) -> bool:
-        """Whether nothing that must be positive is negative beyond chance, and what its law leaves of the others."""
-        told = float(np.max(np.abs(values) / np.maximum(se, 1e-300)))
-        least = -max(rules.NEGATIVE_SE, rules.LAW_SHARE * told) * se
-        return all(values[k] >= least[k] for k, n in enumerate(self.parameters) if n in self.positive)
+        """Whether nothing that must be positive is negative beyond chance, or what laws leave of others that must."""
+        positive = [k for k, name in enumerate(self.parameters) if name in self.positive]
+        over_se = values[positive] / np.maximum(se[positive], 1e-300)
+        told = float(np.max(over_se, initial=0.0))
+        return bool(np.all(over_se >= -max(rules.NEGATIVE_SE, rules.LAW_SHARE * told)))
 
     def place(self, candidate: Candidate) -> str:
         """Where it is, as a sentence begins."""

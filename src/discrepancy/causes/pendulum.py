@@ -1,4 +1,4 @@
-"""A pendulum that hangs from a point which is moved: how it swings, however far."""
+"""A pendulum that hangs from a point which is moved: how it swings, up to 0.3 rad rms."""
 
 from __future__ import annotations
 
@@ -67,7 +67,8 @@ def swung(
 
     and y alike; a and b are the point's acceleration along the way and upwards, and z_x is the slope of z, which is
     x / length where it is small. Solved by rounds: what the last swing leaves of the straight line nearest to its
-    restoring force (Krylov and Bogoliubov's equivalent linearisation) is put beside the drive.
+    restoring force (Krylov and Bogoliubov's equivalent linearisation) is put beside the drive. Rounds settle up to some
+    0.3 rad rms (0.8 rad at most); beyond, what is returned is finite and not told how wrong.
 
     Args:
         drives: acceleration of the point along each level way, then by how much more per unit of something, (Q, k).

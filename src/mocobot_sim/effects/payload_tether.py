@@ -32,7 +32,7 @@ class PayloadTether(Effect):
     stiffening_N_per_m2: float = 0.0
 
     def _edit(self, scene: TeamScene) -> TeamScene:
-        if not self.stiffness_N_per_m:
+        if not (self.stiffness_N_per_m or self.stiffening_N_per_m2):
             return scene
         at = scene.X_Wb[0].apply([self.anchor_x_m, self.anchor_y_m, self.anchor_z_m])
         point = [self.point_x_m, self.point_y_m, self.point_z_m]

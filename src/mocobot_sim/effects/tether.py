@@ -33,7 +33,7 @@ class Tether(Effect):
     stiffening_N_per_m2: float = 0.0
 
     def _edit(self, scene: TeamScene) -> TeamScene:
-        if not self.stiffness_N_per_m:
+        if not (self.stiffness_N_per_m or self.stiffening_N_per_m2):
             return scene
         at = scene.X_Wb[self.robot - 1].apply([self.anchor_x_m, self.anchor_y_m, self.anchor_z_m])
         grasp = scene.root.find("site", f"omnid1/payload/grasp{self.robot}")

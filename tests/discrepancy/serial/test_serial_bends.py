@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from discrepancy.causes.numbers import Numbers
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.sublinear_friction import line_of, thinning
 from discrepancy.serial.diagnosis import diagnose_serial
@@ -101,7 +102,7 @@ def test_a_scale_within_two_tolerances_does_not_bend(rig: SerialRig) -> None:
 
 @pytest.mark.slow
 def test_a_drive_that_saturates_is_a_scale_that_bends(tmp_path: Path) -> None:
-    """Read as if its constant were what it is at rest; a fourth of the torque is missing in part when it is large."""
+    """Its reading is a fourth too large at rest, and less so the larger the torque."""
     hidden = a_little_off(spec(), np.random.default_rng(120)).compile()
 
     def read(q: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -117,4 +118,13 @@ def test_a_drive_that_saturates_is_a_scale_that_bends(tmp_path: Path) -> None:
     load = cause["parameters"]["typical_load"]["value"]
     told = cause["parameters"]["scale"]
     assert abs(told["value"] - 2.0 * np.tanh(load / 8.0) / load) < 0.06
-    assert "as where iron saturates" in cause["sentence"]
+    assert "as where a reading saturates" in cause["sentence"]
+
+
+def test_what_saturates_is_told_from_the_sign() -> None:
+    """Iron that saturates gives less than a current says: what is read over what is there grows with the load."""
+    cause = CAUSES["torque_scale"]
+    for scale, bend, what in ((0.2, 0.1, "iron"), (-0.2, -0.1, "iron"), (0.2, -0.1, "a reading")):
+        said = cause.sentence(Numbers({"scale": scale, "bend": bend, "typical_load": 4.0}, {}))
+        assert f"as where {what} saturates" in said
+    assert "saturates" not in cause.sentence(Numbers({"scale": 0.2, "bend": 0.0, "typical_load": 4.0}, {}))

@@ -123,6 +123,13 @@ def test_a_cable_that_is_tied_nowhere_near_or_behind_is_tied_within_a_room(case)
         assert physical["length_m"] >= 0.0
 
 
+def test_what_may_have_any_sign_excuses_no_negative_number():
+    """A constant force at a grasp that gets less the farther it is pulled is no tether."""
+    tether, se = CAUSES["tether"], np.full(4, 0.1)
+    assert tether.possible(se * [100.0, 0.0, 0.0, -2.0], se, {})
+    assert not tether.possible(se * [100.0, 0.0, 0.0, -10.0], se, {})
+
+
 @pytest.mark.parametrize("name", ["tether", "payload_tether"])
 def test_a_cable_may_grow_into_a_strap_and_a_strap_or_a_spring_into_nothing(name):
     """As it grows it is the same cable; and it pays for what it may be."""

@@ -9,7 +9,8 @@ from discrepancy.serial.causes.base import Cause, at_joint
 class TorqueScale(Cause):
     """The torque reads ``1 + scale`` times what it is, such as by a torque constant that is off.
 
-    Where iron saturates, that depends on the load: 1 + scale (1 + bend (|torque| / typical load - 1)).
+    It may depend on the load: 1 + scale (1 + bend (|torque| / typical load - 1)). Where iron saturates a current gives
+    less torque than is told, so that the factor grows with the load; where a reading saturates it falls.
     """
 
     title = "scale of the torque of {joint}"
@@ -22,9 +23,10 @@ class TorqueScale(Cause):
         said = f"the torque reads {n('scale', '%', 100.0)} {n.either('scale', 'too much', 'too little')}"
         if not n.values["bend"]:
             return said
+        what = "iron" if n.values["scale"] * n.values["bend"] > 0.0 else "a reading"
         return (
-            f"{said} at its typical load of {n('typical_load', 'N m')}, and at twice as much by "
-            f"{n('bend', '%', 100.0)} of that {n.either('bend', 'more', 'less')}, as where iron saturates"
+            f"{said} at its typical load of {n('typical_load', 'N m')}, at twice the load "
+            f"{n('bend', '%', 100.0)} of that {n.either('bend', 'more', 'less')}, as where {what} saturates"
         )
 
     def shapes(self, hints, at):
