@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import chain
 
 import numpy as np
@@ -31,17 +31,20 @@ class Proposed:
         other: the likeliest whose added cause is not the one that is known; None without one.
         open: the one that would be likeliest if its added cause were as far off as its kind scatters, of those that
             leave something open; None without one.
+        shapes: lasting causes whose shapes were sought to the end, in these.
     """
 
     best: Hypothesis | None
     scores: tuple[tuple[Candidate, float], ...]
     other: Hypothesis | None = None
     open: Hypothesis | None = None
+    shapes: Mapping[Key, Candidate] = field(default_factory=dict)
 
 
 def proposals(
-    rig: Rig, base: Hypothesis, *, events: bool = True, narrow: bool = True, known: Candidate | None = None
-) -> Proposed:
+    rig: Rig, base: Hypothesis, *, events: bool = True, narrow: bool = True, known: Candidate | None = None,
+    shapes: Mapping[Key, Candidate] | None = None,
+) -> Proposed:  # fmt: skip
     """Hypotheses with one cause more.
 
     Args:
@@ -50,8 +53,9 @@ def proposals(
         events: whether to look for what acts for a while, too.
         narrow: whether to look with kinds that scatter held within their tolerance, too.
         known: a cause that others are to be held against.
+        shapes: what was found beside the same causes before, to begin with; None for nothing.
     """
-    fit = base.fit
+    fit, shapes = base.fit, shapes or {}
     scanned = _with_kinds_held(base)
     loud = {item.candidate.joint for item in scanned if item.score > rules.LOOKED_AT_NATS}
     ranked = [_in_best_shape(rig, fit, item, loud) for item in scanned]
@@ -63,7 +67,11 @@ def proposals(
     most = -np.inf  # score of that, tolerated
     scores: dict[tuple[object, ...], tuple[Candidate, float]] = {}
     rough: list[tuple[Scanned, float]] = []  # what was not sharpened, and the score of the hypothesis with it
-    offered = chain(_hypotheses(rig, base, ranked, narrow=narrow), _sharper(rig, base, ranked, rough, scores))
+    sought: dict[Key, Candidate] = {}
+    offered = chain(
+        _hypotheses(rig, base, ranked, shapes, narrow=narrow),
+        _sharper(rig, base, ranked, shapes, rough, scores),
+    )
     for item, new in offered:
         new = beside_other_forms(rig, new, new.free[-1], base)
         last = new.causes[-1]
@@ -74,6 +82,8 @@ def proposals(
             scores[which] = last, new.score
             if item is not None:
                 rough.append((item, new.score))
+            elif last.transient is None:
+                sought[last.key] = last
             if best is None or new.score > best.score:
                 best = new
             if last.key in new.problem.opened and last.key not in base.problem.opened:
@@ -82,16 +92,19 @@ def proposals(
                     open_, most = new, tolerated.score
             if known is not None and last.key != known.key and (other is None or new.score > other.score):
                 other = new
-    return Proposed(best, tuple(sorted(scores.values(), key=lambda one: -one[1])), other, open_)
+    return Proposed(best, tuple(sorted(scores.values(), key=lambda one: -one[1])), other, open_, sought)
 
 
 def _hypotheses(
-    rig: Rig, base: Hypothesis, ranked: Sequence[Scanned], *, narrow: bool
+    rig: Rig, base: Hypothesis, ranked: Sequence[Scanned], shapes: Mapping[Key, Candidate], *, narrow: bool
 ) -> Iterator[tuple[Scanned | None, Hypothesis]]:
     """One after the other, each with one cause more, and its item where its shape has not been sharpened."""
     for item in _chosen(ranked, rules.LEADERS, base.problem.opened):
         near = item.loud or item.score > ranked[0].score - rules.CLOSE_NATS
-        yield None if near else item, sharpened(rig, base, item, near=near)
+        yield (
+            None if near else item,
+            sharpened(rig, base, item, near=near, shape=shapes.get(item.candidate.key)),
+        )
     if narrow:
         yield from ((None, new) for new in _with_kinds_narrow(rig, base))
 
@@ -100,6 +113,7 @@ def _sharper(
     rig: Rig,
     base: Hypothesis,
     ranked: Sequence[Scanned],
+    shapes: Mapping[Key, Candidate],
     rough: Sequence[tuple[Scanned, float]],
     scores: Mapping[tuple[object, ...], tuple[Candidate, float]],
 ) -> Iterator[tuple[None, Hypothesis]]:
@@ -111,6 +125,7 @@ def _sharper(
         rig: for columns of other shapes.
         base: what is there already.
         ranked: the scan.
+        shapes: as of ``proposals``.
         rough: what was not sharpened, with scores.
         scores: of all, to be asked when that is known.
     """
@@ -125,7 +140,7 @@ def _sharper(
         reach = (1.0 - rules.COARSE_SHARE) * max(most - base.score, 0.0) if coarse else 0.0
         near = score >= most - reach or (coarse and item.score >= least)
         if near and (rig.refinements(item.candidate) or rig.steps(item.candidate)):
-            yield None, sharpened(rig, base, item, near=True)
+            yield None, sharpened(rig, base, item, near=True, shape=shapes.get(item.candidate.key))
 
 
 def _with_kinds_held(base: Hypothesis) -> list[Scanned]:

@@ -60,6 +60,7 @@ class TeamRig(LawfulRows):
 
     reshaped = ("sea_hysteresis", "grasp_flex")
     coarse = ("tether", "payload_tether")
+    plain_first = ("slosh",)
     behind = ("grasp_play",)
 
     def effect_parameters(

@@ -88,7 +88,7 @@ def test_it_is_asked_after_a_first_step_that_healthy_ones_have_too(monkeypatch):
         steps.append(added)
         return added if len(steps) == 1 else None
 
-    monkeypatch.setattr(inference, "_tolerated", tolerated)
+    monkeypatch.setattr(inference, "tolerated", tolerated)
     search(FakeRig({2: 25.0, 4: 30.0}), first=lambda searched: asked.append(len(steps)))
     assert asked == [1]
     assert len(steps) > 1

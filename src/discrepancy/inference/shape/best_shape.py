@@ -33,8 +33,11 @@ def best_shape(rig: Rig, problem: Problem, free: Sequence[int], item: Scanned) -
     best = search.refined(shapes, *search.scored([start]))
     if start.cause in rig.coarse:
         return search.of_far_apart(*best)[0]
-    best = search.refined(rig.further(best[0]), best)
-    return search.polished(*best, rules.POLISH_ROUNDS)[0]
+    best = search.polished(*best, rules.POLISH_ROUNDS)
+    if start.cause in rig.plain_first and best[1] <= 0.0:
+        return best[0]
+    further = rig.further(best[0])
+    return search.polished(*search.refined(further, best), rules.POLISH_ROUNDS)[0] if further else best[0]
 
 
 _Scored = tuple[Candidate, float]
@@ -66,13 +69,14 @@ class _Search:
     def refined(self, shapes: Sequence[Candidate], start: _Scored) -> _Scored:
         """A better one among some shapes, or among finer ones around it."""
         best = start
+        around: _Scored | None = None  # whose finer ones are looked at
         for _ in range(rules.FINER_ROUNDS + 1):
             if not shapes:
                 break
-            last, best = best, max((best, *self.scored(shapes)), key=_score)
-            if best is last and best is not start:
+            best = max((best, *self.scored(shapes)), key=_score)
+            if best is around:
                 break
-            shapes = self.rig.refinements(best[0], finer=True)
+            around, shapes = best, self.rig.refinements(best[0], finer=True)
         return best
 
     def polished(self, best: Candidate, score: float, rounds: int) -> _Scored:

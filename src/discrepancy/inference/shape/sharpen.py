@@ -15,8 +15,9 @@ from discrepancy.rig import Rig
 
 
 def sharpened(
-    rig: Rig, base: Hypothesis, item: Scanned, *, near: bool, start: Problem | None = None
-) -> Hypothesis:
+    rig: Rig, base: Hypothesis, item: Scanned, *, near: bool, start: Problem | None = None,
+    shape: Candidate | None = None,
+) -> Hypothesis:  # fmt: skip
     """A candidate beside what is there, in its best shape where it is near the likeliest, and with what it opens.
 
     Args:
@@ -25,13 +26,19 @@ def sharpened(
         item: the candidate.
         near: whether it is near the likeliest.
         start: the problem with the spreads and powers from which those with the candidate are learnt; None for base's.
+        shape: near which its best shape is, where that is known; otherwise None.
     """
     start = base.problem if start is None else start
     if near and item.candidate.transient and rig.steps(item.candidate):
         new = event_in_shape(rig, base, start, item.candidate)
         return _beyond_tolerance(base, new.problem, new)
-    tried = [best_shape(rig, start, base.free, item)] if near else [item.candidate]
-    if near and (held := _with_kind_held(start, item)) is not None:
+    known = near and shape is not None
+    tried = (
+        [best_shape(rig, start, base.free, item)]
+        if near and not known
+        else [shape if known else item.candidate]
+    )
+    if near and not known and (held := _with_kind_held(start, item)) is not None:
         # The others of a kind that scatters to explain this one take its shape from it.
         tried.append(best_shape(rig, held, base.free, item))
     new = max((_in_shape(rig, base, start, item, shape, near) for shape in tried), key=lambda one: one.score)
