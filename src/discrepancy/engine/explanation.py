@@ -160,7 +160,7 @@ def explain(searched: Searched) -> Explanation:
         found=tuple(found),
         suspected=tuple(suspected),
         scatter=scatter,
-        foretold=foretold(problem, best.free) if scatter else None,
+        foretold=foretold(_with_unit_power(best.problem), best.free) if scatter else None,
         hypothesis=best,
         nothing=nothing,
         nominal=Fit.of(nothing.problem.as_whitened, background=False).misfit,
@@ -171,6 +171,11 @@ def explain(searched: Searched) -> Explanation:
         shared=-best.fit.shared,
         local=tuple(-best.fit.local(t)[: rig.local_unknowns] for t in best.problem.trials),
     )
+
+
+def _with_unit_power(problem: Problem) -> Problem:
+    """With noise as whitened, and kinds that scatter as they were learnt to."""
+    return problem.with_noise([np.ones_like(p) for p in problem.power], problem.spread)
 
 
 def _found(rig: Rig, best: Hypothesis, index: int, rivals: Sequence[Rival]) -> Found:

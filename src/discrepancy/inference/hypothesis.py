@@ -62,7 +62,9 @@ class Hypothesis:
     def without(self, index: int) -> Hypothesis:
         """The hypothesis that one of the causes is not there."""
         keys = set(self.problem.opened) - {self.problem.candidates[index].key}
-        return Hypothesis.of(self.problem.without_unknowns(keys), self._others(index), self.allowed)
+        return Hypothesis.of(
+            self.problem.without_unknowns(keys), self._others(index), self._allowed_but(index)
+        )
 
     def tolerating(self, index: int) -> Hypothesis | None:
         """The hypothesis that one of the causes is there by its law, but no farther off than its kind scatters.
@@ -71,8 +73,10 @@ class Hypothesis:
         """
         if not self.problem.has_tolerance(index):
             return None
-        allowed = {i: nats for i, nats in self.allowed.items() if i != index}
-        return Hypothesis.of(self.problem, self._others(index), allowed)
+        return Hypothesis.of(self.problem, self._others(index), self._allowed_but(index))
+
+    def _allowed_but(self, index: int) -> dict[int, float]:
+        return {i: nats for i, nats in self.allowed.items() if i != index}
 
     def _others(self, index: int) -> list[int]:
         return [i for i in self.free if i != index]

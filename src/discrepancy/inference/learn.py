@@ -222,7 +222,7 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
     both = np.zeros((2, count, count))
     both[0], both[1, :-1, :-1] = np.outer(x, x), covariance
     both *= 2.0 - np.eye(count)  # what is below the diagonal counts, too
-    left, spent = (parts.grams @ both[:, *parts.upper].T).T
+    left, spent = (parts.grams @ one[parts.upper] for one in both)
     spent = spent / power
     power_next = (left + rules.POWER_NUMBERS) / (np.maximum(parts.sizes - spent, 1.0) + rules.POWER_NUMBERS)
     # Next spreads: squares over the numbers that the data determine.

@@ -43,7 +43,9 @@ def peaks_hz(fit: Fit, bench: Bench) -> list[float]:
 def _spectra(fit: Fit, bench: Bench) -> tuple[Array, Array, Array]:
     """Frequencies [Hz], shape (F,), the power there over its surroundings, (trials, F), and its numbers, (trials,)."""
     moving = {t: fit.problem.cells[t].moving for t in fit.problem.trials if fit.problem.cells[t].moving}
-    top = 0.5 * min((n / max(bench.row_times(t)[-1], 1.0) for t, n in moving.items()), default=0.0)
+    # Rows that stand alone, such as holds, follow at times of their own.
+    steps = [float(np.median(np.diff(bench.row_times(t)[:n]))) for t, n in moving.items() if n > 1]
+    top = 0.5 / max(steps, default=np.inf)
     grid = np.arange(rules.LAW_HUM_LEAST_HZ, max(top, 2.0 * rules.LAW_HUM_LEAST_HZ), rules.LAW_HUM_STEP_HZ)
     over, numbers = [], []
     for t, n in moving.items():

@@ -37,7 +37,8 @@ def with_errors(explanation: Explanation, rows_per_block: int) -> Explanation:
             len(item.covariance) > k
         ):  # numbers of its shape are fitted, too: their errors grow as those of the values do
             plain = np.diag(fit.part(item.index)[1]) * item.candidate.units**2
-            growth = np.maximum(np.sqrt(np.diag(part) / plain), 1.0)
+            # What nothing tells has no error that could grow.
+            growth = np.sqrt(np.divide(np.diag(part), plain, out=np.ones(k), where=plain > 0.0)).clip(1.0)
             each = np.concatenate([growth, np.full(len(item.covariance) - k, growth.max())])
             part = item.covariance * np.outer(each, each)
         found.append(replace(item, covariance=part))

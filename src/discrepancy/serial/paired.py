@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation
+from discrepancy.law_doubt import LawDoubt
 from discrepancy.rig import Channel, Rig, Rows
 from discrepancy.serial.rig import SerialRig
 from estimator.arrays import Array
@@ -41,9 +43,19 @@ class PairedRig(Rig):
         reference = list(range(changed, count))
         return [trial, *(reference[trial::changed] or [reference[trial % len(reference)]])]
 
+    @cached_property
+    def _weights(self) -> Array:
+        """Of every block's rows: one that serves several times tells once, shape (blocks,)."""
+        served = [k for t in range(self.inner.changed) for k in self.blocks_of(t)]
+        times = np.bincount(served, minlength=len(self.inner.trials))
+        return np.asarray(1.0 / np.sqrt(np.maximum(times, 1)))
+
     def merged(self, blocks: Sequence[Array]) -> list[Array]:
         """Rows of every trial from those of the blocks."""
-        return [np.concatenate([blocks[k] for k in self.blocks_of(t)]) for t in range(self.inner.changed)]
+        return [
+            np.concatenate([self._weights[k] * blocks[k] for k in self.blocks_of(t)])
+            for t in range(self.inner.changed)
+        ]
 
     @property
     def trials(self) -> Sequence[str]:
@@ -66,9 +78,14 @@ class PairedRig(Rig):
 
     def rows(self, candidates: Sequence[Candidate]) -> list[Rows]:
         blocks = list(self.inner.rows(candidates))
-        return [self._together([blocks[k] for k in self.blocks_of(t)]) for t in range(self.inner.changed)]
+        return [self._together(blocks, self.blocks_of(t)) for t in range(self.inner.changed)]
 
-    def _together(self, blocks: Sequence[Rows]) -> Rows:
+    def _together(self, every: Sequence[Rows], which: Sequence[int]) -> Rows:
+        blocks, weights = [every[k] for k in which], self._weights[list(which)]
+
+        def stacked(parts: Sequence[Array]) -> Array:
+            return np.concatenate([w * part for w, part in zip(weights, parts, strict=True)])
+
         counts = [block.local.shape[2] for block in blocks]
         starts = np.cumsum([0, *counts])
         local = []
@@ -78,11 +95,12 @@ class PairedRig(Rig):
             local.append(wide)
         return Rows(
             blocks[0].name,
-            np.concatenate([block.residual for block in blocks]),
-            np.concatenate(local),
-            np.concatenate([block.shared for block in blocks]),
-            [np.concatenate(own) for own in zip(*(block.causes for block in blocks), strict=True)],
+            stacked([block.residual for block in blocks]),
+            stacked(local),
+            stacked([block.shared for block in blocks]),
+            [stacked(own) for own in zip(*(block.causes for block in blocks), strict=True)],
             np.concatenate([block.time for block in blocks]),
+            groups=blocks[0].groups,
         )
 
     def columns(self, candidate: Candidate) -> list[Array]:
@@ -95,6 +113,15 @@ class PairedRig(Rig):
 
     def candidates(self) -> list[Candidate]:
         return self.inner.candidates()
+
+    def law_doubt(self, candidate: Candidate) -> LawDoubt:
+        return self.inner.law_doubt(candidate)
+
+    def other_forms(
+        self, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]]
+    ) -> list[Array]:
+        forms = self.inner.other_forms(candidate, values, there)
+        return self.merged(forms) if forms else []
 
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         return self.inner.possible(candidate, values, covariance)

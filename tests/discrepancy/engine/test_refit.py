@@ -69,6 +69,10 @@ def test_what_is_allowed_stays_allowed():
     allowed = Hypothesis(linear.learnt, {2: 7.0})
     assert exact(rig, allowed, nothing).allowed == {2: 7.0}
     assert allowed.score == pytest.approx(linear.score - 7.0)
+    assert (
+        allowed.without(2).allowed == {}
+    )  # found again, it would be charged for what it had been beside once
+
     assert CATALOGUE[2] in linear.causes
 
 

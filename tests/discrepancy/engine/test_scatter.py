@@ -1,15 +1,17 @@
 """What is said to scatter."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from discrepancy import rules
 from discrepancy.candidate import Parameter
-from discrepancy.engine.explanation import scatter_of
+from discrepancy.engine.explanation import explain, scatter_of
 from discrepancy.engine.held_out import foretold
 from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.search import Searched
 from discrepancy.least_squares.problem import Problem
 from linear_problem import CANDIDATES, brute, random_rows
 
@@ -61,6 +63,30 @@ def test_what_knowing_the_machine_is_worth_is_that_of_trials_left_out():
     assert told is not None
     np.testing.assert_allclose((told.as_designed, told.as_found), expected / problem.samples, rtol=1e-8)
     assert told.as_found < 2.0 < 50.0 < told.as_designed
+
+
+def test_kinds_that_scatter_foretell_with_the_spread_that_was_learnt():
+    """Against one dense least squares whose tolerances are as wide; they had been held to those given."""
+    rows, places = off_everywhere(np.random.default_rng(23), times=10.0)
+    places = places[:4]
+    rows = [
+        replace(row, residual=row.residual - row.causes[4][..., 0], causes=row.causes[:4]) for row in rows
+    ]
+    best = Hypothesis.of(Problem.of(rows, places), ())
+    spread = best.problem.spread
+    assert spread[0] > rules.SCATTER_FACTOR
+    rig = SimpleNamespace(local_unknowns=rows[0].local.shape[2])
+    told = explain(Searched(rig, best, best, ())).foretold
+    expected = 0.0
+    for t, row in enumerate(rows):
+        found = brute(rows, places, [], [s for s in range(3) if s != t], spread=spread)
+        left = row.residual - row.shared @ found.shared
+        for index, values in found.causes.items():
+            left = left - row.causes[index] @ (places[index].units * np.array(values))
+        own, left = row.local.reshape(left.size, -1), left.ravel()
+        expected += np.sum((left - own @ np.linalg.lstsq(own, left, rcond=None)[0]) ** 2)
+    assert told is not None
+    assert told.as_found == pytest.approx(expected / best.problem.samples, rel=1e-8)
 
 
 def test_one_trial_foretells_nothing():

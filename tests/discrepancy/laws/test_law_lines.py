@@ -1,5 +1,6 @@
 """A line in the spectrum of what is left, against the power that a sine has in white noise."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -44,3 +45,19 @@ def test_what_one_trial_shows_alone_is_its_motion():
 
 def test_white_noise_has_no_line():
     assert max(line_nats(left(seed, 0.0), BENCH) for seed in range(30)) < 20.0
+
+
+@pytest.mark.parametrize("last_s", [50.0, 300.0])
+def test_holds_after_the_motion_do_not_move_the_highest_frequency(last_s):
+    """Their times had been taken for the rows': a hum was sought among aliases, or not up to what rows can show."""
+    moving = 300
+    times = np.concatenate([np.arange(moving) / RATE_HZ, np.linspace(40.0, last_s, ROWS - moving)])
+    bench = SimpleNamespace(row_times=lambda trial: times)
+    rows = random_rows(np.random.default_rng(4), n=ROWS)
+    fast_hz = 0.93 * 0.5 * RATE_HZ
+    for t, row in enumerate(rows):
+        row.residual[:moving] += 0.6 * np.sin(2.0 * np.pi * fast_hz * times[:moving] + t)[:, None]
+    fit = Fit.of(Problem.of([replace(row, moving=moving) for row in rows], CANDIDATES))
+    peaks = peaks_hz(fit, bench)
+    assert peaks[0] == pytest.approx(fast_hz, abs=rules.LAW_HUM_STEP_HZ)
+    assert max(peaks) <= 0.5 * RATE_HZ
