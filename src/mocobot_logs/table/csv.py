@@ -13,7 +13,7 @@ import pyarrow.csv as pcsv
 from estimator.errors import InputError
 from mocobot_logs.faults import detail_of, readable
 from mocobot_logs.map.log_map import CsvMap
-from mocobot_logs.table.comments import WithoutComments
+from mocobot_logs.table.comments import line_blocks
 from mocobot_logs.table.dates import TextClock, is_date
 from mocobot_logs.table.table import Block, Table, Wanted
 
@@ -93,28 +93,42 @@ class CsvTable(Table):
         try:
             with self._path.open("rb") as source:
                 source.seek(self._start)
-                for batch in pcsv.open_csv(
-                    pa.PythonFile(WithoutComments(source), mode="r"),
-                    read_options=pcsv.ReadOptions(
-                        use_threads=False,
-                        block_size=BLOCK_BYTES,
-                        column_names=[f"{k}" for k in range(len(self._names))],
-                    ),
-                    parse_options=pcsv.ParseOptions(delimiter=self._delimiter),
-                    convert_options=pcsv.ConvertOptions(
-                        column_types=types,
-                        include_columns=list(types),
-                        null_values=EMPTY,
-                        strings_can_be_null=True,
-                        quoted_strings_can_be_null=True,
-                        decimal_point=self._decimal,
-                    ),
-                ):
-                    yield batch, source.tell()
-                    rows += batch.num_rows
+                for lines in line_blocks(source, BLOCK_BYTES):
+                    if (batch := self._parsed(lines, types)).num_rows:
+                        yield batch, source.tell()
+                        rows += batch.num_rows
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             numbers = [int(column) for column, kind in types.items() if kind == pa.float64()]
             raise InputError(f"{self.name}: {self._first_fault(numbers, rows) or _plain(error)}") from error
+
+    def _parsed(self, lines: bytes, types: Mapping[str, pa.DataType]) -> pa.RecordBatch:
+        """Some columns of whole lines.
+
+        Every block is a file to pyarrow. Its streaming reader reads ahead in a thread: left at a fault, or at the rows
+        that are enough, it hangs or aborts the process when this ends (pyarrow 26).
+
+        Raises:
+            pa.ArrowException: a row does not fit the header, or a cell is no number.
+        """
+        table = pcsv.read_csv(
+            pa.BufferReader(lines),
+            read_options=pcsv.ReadOptions(
+                use_threads=False,
+                block_size=len(lines) + 1,
+                column_names=[f"{k}" for k in range(len(self._names))],
+            ),
+            parse_options=pcsv.ParseOptions(delimiter=self._delimiter),
+            convert_options=pcsv.ConvertOptions(
+                column_types=types,
+                include_columns=list(types),
+                null_values=EMPTY,
+                strings_can_be_null=True,
+                quoted_strings_can_be_null=True,
+                decimal_point=self._decimal,
+            ),
+        )
+        columns = [column.combine_chunks() for column in table.columns]
+        return pa.RecordBatch.from_arrays(columns, names=table.column_names)
 
     def _first_fault(self, numbers: list[int], good: int) -> str:
         """The first row that does not fit the header or has no number where one must be, after so many good rows."""
