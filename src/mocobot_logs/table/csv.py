@@ -28,6 +28,10 @@ _NUMBER = re.compile(
 """As pyarrow reads them."""
 
 
+class BrokenRowsError(InputError):
+    """Rows that do not fit the header: nothing can be read, whatever the column."""
+
+
 class CsvTable(Table):
     """A CSV file as a ``Table``: UTF-8, a header line, any of ``DELIMITERS``.
 
@@ -99,7 +103,8 @@ class CsvTable(Table):
                         rows += batch.num_rows
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             numbers = [int(column) for column, kind in types.items() if kind == pa.float64()]
-            raise InputError(f"{self.name}: {self._first_fault(numbers, rows) or _plain(error)}") from error
+            self._refuse_first_fault(numbers, rows)
+            raise InputError(f"{self.name}: {_plain(error)}") from error
 
     def _parsed(self, lines: bytes, types: Mapping[str, pa.DataType]) -> pa.RecordBatch:
         """Some columns of whole lines.
@@ -130,26 +135,33 @@ class CsvTable(Table):
         columns = [column.combine_chunks() for column in table.columns]
         return pa.RecordBatch.from_arrays(columns, names=table.column_names)
 
-    def _first_fault(self, numbers: list[int], good: int) -> str:
-        """The first row that does not fit the header or has no number where one must be, after so many good rows."""
+    def _refuse_first_fault(self, numbers: list[int], good: int) -> None:
+        """Refuse the first row that does not fit the header or lacks a number, after so many good rows."""
         with contextlib.suppress(OSError), self._path.open("rb") as file:
             for line, content in enumerate(iter(lambda: file.readline(BLOCK_BYTES + 1), b""), 1):
                 if len(content) > BLOCK_BYTES:
-                    return f"a row is longer than {BLOCK_BYTES >> 20} MiB; this is no table of samples"
+                    longest = f"{BLOCK_BYTES >> 20} MiB"
+                    raise BrokenRowsError(
+                        f"{self.name}: a row is longer than {longest}; this is no table of samples"
+                    )
                 text = content.decode(errors="replace").strip("\r\n")
                 if line <= self._lines_before or not text or text.lstrip().startswith("#"):
                     continue
                 good -= 1
                 cells = _cut(text, self._delimiter, strict=False) if good < 0 else self._names
                 if len(cells) != (count := len(self._names)):
-                    return f"{len(cells)} cells in line {line}; every row must have {count}, like the header"
+                    raise BrokenRowsError(
+                        f"{self.name}: {len(cells)} cell{'s' * (len(cells) != 1)} in line {line}; every row must "
+                        f"have {count}, like the header"
+                    )
                 for k in numbers if good < 0 else ():
                     if cells[k] not in EMPTY and not _is_number(cells[k], self._decimal):
-                        column, cell = self._names[k], cells[k]
-                        return (
-                            f"column {column!r:.80} holds {cell!r:.60} in line {line}; it must hold numbers"
+                        comma = self._decimal == "." and _is_number(cells[k], ",")
+                        hint = ' (for a decimal comma, decimal = "," in the map\'s [csv])' if comma else ""
+                        raise InputError(
+                            f"{self.name}: column {self._names[k]!r:.80} holds {cells[k]!r:.60} in line {line}; "
+                            f"it must hold numbers{hint}"
                         )
-        return ""
 
     def _index(self, name: str) -> int:
         if (count := self._names.count(name)) > 1:
