@@ -86,7 +86,11 @@ def of_stream(t: Timing) -> Iterator[str]:
     if t.duplicates:
         yield f"a stamp is repeated {_count(t.duplicates, 'time')}"
     if t.backwards:
-        yield f"time runs backwards {_count(t.backwards, 'time')}"
+        most = ", at most" * (t.backwards > 1)
+        yield (
+            f"time runs backwards {_count(t.backwards, 'time')}{most} by {t.farthest_back_s:.3g} s after "
+            f"{t.farthest_back_at_s:.2f} s"
+        )
     if t.jitter_rms_s * t.rate_hz > JITTERY:
         yield (
             f"samples come unevenly: intervals are {1e3 * t.jitter_rms_s:.3g} ms rms from their period of "
