@@ -25,6 +25,8 @@ EARLY_S = 1.0
 RECORDER_S = 1.0
 """Spread of the recorder's lead over the stamps from which on two clocks are mixed."""
 _NAMED = 4  # channels of a sentence
+_TURN = 2 * np.pi
+_ONE_TURN = 0.01  # angles that cover a full turn to this share of it are an encoder's that starts again there
 _TIME_UNITS = ((1e-3, "milliseconds"), (1e-6, "microseconds"), (1e-9, "nanoseconds"))
 
 
@@ -84,7 +86,11 @@ def of_stream(t: Timing) -> Iterator[str]:
     if t.duplicates:
         yield f"a stamp is repeated {_count(t.duplicates, 'time')}"
     if t.backwards:
-        yield f"time runs backwards {_count(t.backwards, 'time')}"
+        most = ", at most" * (t.backwards > 1)
+        yield (
+            f"time runs backwards {_count(t.backwards, 'time')}{most} by {t.farthest_back_s:.3g} s after "
+            f"{t.farthest_back_at_s:.2f} s"
+        )
     if t.jitter_rms_s * t.rate_hz > JITTERY:
         yield (
             f"samples come unevenly: intervals are {1e3 * t.jitter_rms_s:.3g} ms rms from their period of "
@@ -186,7 +192,7 @@ def _limits(kind: str, found: Inspection) -> Iterator[str]:
     }[kind]
     known = found.wiring.found if found.wiring is not None else ()
     blamed = {(robot, name) for f in known for robot in f.mistake.robots for name in f.mistake.channels}
-    beyond, extremes = [], []
+    beyond, extremes, spans = [], [], []
     for robot, channels in enumerate(found.survey.channels):
         for c in channels:
             if not c.name.startswith(kind) or c.lowest is None or c.highest is None:
@@ -194,7 +200,12 @@ def _limits(kind: str, found: Inspection) -> Iterator[str]:
             if (c.lowest < low or c.highest > high) and (robot, c.name) not in blamed:
                 beyond.append(f"omnid{robot + 1}.{c.name}")
                 extremes += [c.lowest, c.highest]
+                spans.append(c.highest - c.lowest)
     if beyond:
+        wraps = kind != "tau" and any(abs(span / _TURN - 1.0) < _ONE_TURN for span in spans)
+        turn = (
+            ": do they jump by a full turn, which has to be taken out before (numpy.unwrap)?" if wraps else ""
+        )
         names = (
             listed(beyond)
             if len(beyond) <= _NAMED
@@ -202,7 +213,7 @@ def _limits(kind: str, found: Inspection) -> Iterator[str]:
         )
         yield (
             f"{names} reach{'es' * (len(beyond) == 1)} {min(extremes):.4g} to {max(extremes):.4g} {unit}, beyond the "
-            f"range of {low:.4g} to {high:.4g}"
+            f"range of {low:.4g} to {high:.4g}" + turn
         )
 
 

@@ -28,6 +28,8 @@ OFFSET_S = 2e-4
 SIGMAS = 5.0
 MOSTLY = 0.5
 """A channel that stands for more than this share of its log is wrong as a whole."""
+_LEAST_NOISE = 1e-9
+"""No channel is known better [rad, m, N m, N]: where nothing moves at all, rounding errors would pass for motion."""
 
 
 @dataclass(frozen=True)
@@ -202,6 +204,7 @@ def _motion(
             segments=segments(result.level, parts, result.design),
         )
     noise = np.array([[c.white_noise for c in of_robot[:9]] for of_robot in result.survey.channels])
+    noise = np.maximum(noise, _LEAST_NOISE)
     samples = [part for _, part in parts]
     wiring = check_wiring(signals_of(result.level, samples, noise), result.arms, advance)
     undone = None

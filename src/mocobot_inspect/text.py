@@ -8,6 +8,7 @@ from mocobot_inspect.readiness import AXES, Readiness
 from mocobot_inspect.stream.channels import UNITS, Channel
 from mocobot_inspect.wiring.mistakes import Mistake
 from mocobot_inspect.wiring.mistakes.base import listed
+from mocobot_logs.resample.log import MAX_GAP_S
 
 _HIDDEN = 6
 
@@ -171,6 +172,32 @@ def hidden_words(mistakes: tuple[Mistake, ...]) -> list[str]:
 
 def ready_line(found: Inspection) -> str:
     """The verdict; an estimate takes all of a log, so stretches in which a channel stands spoil it."""
+    line = _ready(found)
+    return (
+        line
+        if line.startswith("ready for: nothing (")
+        else line + "".join(f"; {what}" for what in _first(found))
+    )
+
+
+def _first(found: Inspection) -> list[str]:
+    """What has to be done before, or a conversion and an estimate refuse the log."""
+    timing, channels = found.survey.timing, [c for of_robot in found.survey.channels for c in of_robot]
+    return [
+        what
+        for what, needed in (
+            ("time that runs back to be mended", any(t.backwards for t in timing)),
+            ("infinite values to be left out (convert --drop)", any(c.infinities for c in channels)),
+            (
+                "the parts between gaps to be taken (convert --split-at-gaps)",
+                any(t.rate_hz is not None and t.longest_gap_s > MAX_GAP_S + 1 / t.rate_hz for t in timing),
+            ),
+        )
+        if needed
+    ]
+
+
+def _ready(found: Inspection) -> str:
     if found.unchecked is not None or not (found.free or (found.ready and found.wiring)):
         return f"ready for: nothing ({found.unchecked})"
     clocks = "; clocks to be corrected" if found.skewed else ""

@@ -131,3 +131,31 @@ def test_the_page_is_opened(
 def test_names_of_recordings_are_told_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     files = [tmp_path / "a" / "trial.parquet", tmp_path / "b" / "trial.parquet"]
     assert "trial is the name of two recordings" in refused(capsys, "watch", *files)
+
+
+def test_a_log_with_a_hole_is_cut_and_one_that_cannot_be_used_left_out(
+    trial: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], no_diagnosis: list[dict[str, Any]]
+) -> None:
+    """One hole or one stamp that runs back had ended the command for all files."""
+    columns, out = read_recording(trial).columns(), tmp_path / "seen"
+    time = columns["time"]
+    hole, back = tmp_path / "hole.csv", tmp_path / "back.csv"
+    write_text(hole, {name: x[(time < 2.0) | (time > 2.5)] for name, x in columns.items()})
+    time = time.copy()
+    time[500] -= 0.015
+    write_text(back, columns | {"time": time})
+    code, said, _ = run(capsys, "watch", hole, back, "--out", out)
+    text = " ".join(said.split())
+    assert code == 0
+    assert (
+        f"{hole}: ready for: grasps yes, mass yes, centre of mass yes, inertia yes (the part of it between"
+        in text
+    )
+    assert (
+        f"{back}: left out, it cannot be used as it is: {back}: robot 1: time runs back by 0.005 s in row"
+        in text
+    )
+    assert "Payload: 11.6" in text
+    assert len(no_diagnosis[0]["recordings"]) == 1
+    kept = read_recording(out / "recordings" / "hole.part1.parquet")
+    assert kept.time[-1] - kept.time[0] == pytest.approx(time[-1] - 2.51, abs=0.02)

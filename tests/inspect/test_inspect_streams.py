@@ -81,6 +81,7 @@ def test_time_that_runs_backwards_and_a_recorder_that_hangs() -> None:
     samples = stream(time, np.zeros((3000, 9)), log_ns=log_ns)
     t = survey(ArrayLog([samples])).timing[0]
     assert t.backwards == 1
+    assert (t.farthest_back_s, t.farthest_back_at_s) == pytest.approx((1.99, 14.99))
     assert t.recorder_s == pytest.approx((0.002, 5.002))
 
 

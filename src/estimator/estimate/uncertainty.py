@@ -101,7 +101,7 @@ def norm_se(vector: Array, covariance: Array) -> float:
     if length == 0:
         return float(np.sqrt(np.trace(covariance)))
     u = vector / length
-    return float(np.sqrt(u @ covariance @ u))
+    return float(np.sqrt(max(u @ covariance @ u, 0.0)))  # rounding may leave less than nothing
 
 
 def standard_errors(covariance: Array) -> Array:

@@ -16,6 +16,8 @@ SPACING_TOLERANCE = 0.5  # of one sample period: a time stamp may jitter by so m
 TORQUE_FACTOR = 2.0  # of torque_limit_Nm: no spring reads beyond, so it is another unit or a spike
 RATE_TOLERANCE = 1e-3  # of rate_hz: enters accelerations, and so inertia, twice
 
+_MOST = 0.9  # of the rows: the few that a filter drew through a jump by a full turn lie anywhere
+
 
 def check_recording(recording: Recording) -> None:
     """Check number of rows, finiteness, time axis, joint ranges, torques and leg geometry of a recording.
@@ -134,8 +136,18 @@ def _check_range(recording: Recording, suffixes: tuple[str, ...], low: float, hi
             raise InputError(
                 f"{recording.name}: {_called(recording, name)} reaches {worst:.6g} rad (outside in {len(bad)} of "
                 f"{len(values)} rows, first in row {bad[0]}); its range is {low:.6g} to {high:.6g} rad"
-                + (" - the values look like degrees" if in_degrees else "")
+                + _looks_like(values, low, high, in_degrees=in_degrees)
             )
+
+
+def _looks_like(values: Array, low: float, high: float, *, in_degrees: bool) -> str:
+    """What angles [rad] beyond their range seem to be, for the end of a sentence."""
+    middle, half = (low + high) / 2, (high - low) / 2
+    turns = np.rint((values - middle) / (2 * np.pi))
+    inside = np.abs(values - 2 * np.pi * turns - middle) <= half
+    if np.mean(inside) > _MOST and len(np.unique(turns[inside])) > 1:
+        return " - the values jump by a full turn, which has to be taken out before (numpy.unwrap)"
+    return " - the values look like degrees" if in_degrees else ""
 
 
 def _called(recording: Recording, name: str) -> str:

@@ -17,7 +17,7 @@ from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
 from mocobot.api.calibration import Calibration, calibrate
-from mocobot.api.conversion import convert
+from mocobot.api.conversion import convert, convert_parts
 from mocobot.api.diagnosis import Diagnosis, diagnose
 from mocobot.api.estimation import Estimate, estimate
 from mocobot.api.inspection import inspect
@@ -109,22 +109,46 @@ def _read(seen: _Seen, options: Watch, say: Say) -> None:
         found = inspect(path, map=options.map)
         ready = found.ready_for
         if ready.startswith("ready for: nothing"):
-            why = " ".join(finding.sentence for finding in found.findings)
-            seen.lines.append(f"{path}: left out, {ready}. {why}".rstrip())
+            why = "; ".join(finding.sentence for finding in found.findings)
+            seen.lines.append(f"{path}: left out, {ready}{f': {why}' if why else ''}.")
             continue
         is_log = log_kind(path) != "parquet" or not is_recording(path)
         if is_log or found.skewed:
             say(f"converting {path.name}")
-            done = convert(
-                path, map=options.map if is_log else None, clock="correct" if found.skewed else "keep"
+        try:
+            recordings, done = _used(
+                path, options.map if is_log else None, is_log=is_log, skewed=found.skewed
             )
-            recording = done.recording
-            seen.converted.append(path.stem)
-            ready += f" (converted{', clocks corrected' * bool(found.skewed)})"
-        else:
-            recording = read(path)
-        seen.recordings[path.stem] = recording
+        except InputError as error:
+            seen.lines.append(f"{path}: left out, it cannot be used as it is: {error}.")
+            continue
+        seen.recordings |= recordings
+        if done:
+            seen.converted += recordings
+            ready += f" ({done})"
         seen.lines.append(f"{path}: {ready}.")
+
+
+def _used(path: Path, log_map: str | None, *, is_log: bool, skewed: bool) -> tuple[dict[str, Recording], str]:
+    """What can be used of a file, by names, and what was done for it, empty if nothing.
+
+    Raises:
+        InputError: it cannot be converted, not even the parts of it between gaps.
+    """
+    clock, corrected = ("correct", ", clocks corrected") if skewed else ("keep", "")
+    try:
+        if not is_log and not skewed:
+            return {path.stem: read(path)}, ""
+        recording = convert(path, map=log_map, clock=clock).recording
+        return {path.stem: recording}, f"converted{corrected}"
+    except InputError as error:
+        try:
+            parts = convert_parts(path, map=log_map, clock=clock)
+        except InputError:
+            raise error from None
+        many = "the part of it" if len(parts) == 1 else f"the {len(parts)} parts of it"
+        named = {f"{path.stem}.part{k}": part.recording for k, part in enumerate(parts, 1)}
+        return named, f"{many} between gaps converted{corrected}"
 
 
 def _conclude(seen: _Seen, jobs: int, say: Say, simulated: Callable[[int], object]) -> None:

@@ -26,6 +26,7 @@ class Timing:
         longest_gap_s, longest_gap_at_s: longest such interval, and when it begins after the first stamp [s].
         duplicates: stamps that repeat the one before.
         backwards: stamps earlier than the one before.
+        farthest_back_s, farthest_back_at_s: by how much at most, and when the one before is, after the first [s].
         recorder_s: smallest and largest lead of the recorder's time over the stamps [s], or None.
     """
 
@@ -41,6 +42,8 @@ class Timing:
     longest_gap_at_s: float
     duplicates: int
     backwards: int
+    farthest_back_s: float
+    farthest_back_at_s: float
     recorder_s: tuple[float, float] | None
 
     @property
@@ -58,6 +61,7 @@ class TimingTally:
         self._first_ns: int | None = None
         self._last_ns: int | None = None
         self._period_s: float | None = None
+        self._back = self._back_at = 0.0
         self._regular_s = self._squares = self._worst = self._longest = self._longest_at = 0.0
         self._early: list[NDArray] = []
         self._recorder: tuple[float, float] | None = None
@@ -93,6 +97,9 @@ class TimingTally:
             self._period_s = float(np.median(intervals[forward]))
         self._duplicates += int(np.sum(intervals == 0))
         self._backwards += int(np.sum(intervals < 0))
+        if len(intervals) and -np.min(intervals) > self._back:
+            k = int(np.argmin(intervals))
+            self._back, self._back_at = -float(intervals[k]), float(at[k])
         if self._period_s is None:
             return
         regular = forward & (intervals <= GAP * self._period_s)
@@ -126,5 +133,7 @@ class TimingTally:
             longest_gap_at_s=self._longest_at,
             duplicates=self._duplicates,
             backwards=self._backwards,
+            farthest_back_s=self._back,
+            farthest_back_at_s=self._back_at,
             recorder_s=self._recorder,
         )

@@ -7,6 +7,7 @@ import numpy as np
 from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_logs.draft.reading import JOINED, Reading, read_name
+from mocobot_logs.table.csv import BrokenRowsError
 from mocobot_logs.table.table import Table, Wanted
 
 ROWS = 200_000
@@ -62,6 +63,10 @@ def of_table(table: Table) -> list[Candidate]:
                     places[column, (robot, k)] = f"{column}[{robot}, {k}]"
                     readings[column, (robot, k)] = _of_robots(column, robot, k)
     found = {place: reading for place, reading in readings.items() if reading is not None}
+    if not found and places:
+        _values(
+            table, [next(iter(places))]
+        )  # names of nothing: is the header none, with other rows below it?
     values = _values(table, [place for place, reading in found.items() if reading.group != "time"])
     for place, reading in found.items():
         if reading.group == "time":
@@ -86,9 +91,15 @@ def _of_robots(column: str, robot: int, k: int) -> Reading | None:
 
 
 def _values(table: Table, places: list[Place]) -> dict[Place, Array]:
-    """First values of some places; nothing of columns that hold no numbers."""
+    """First values of some places; nothing of columns that hold no numbers.
+
+    Raises:
+        BrokenRowsError: no column can be read.
+    """
     try:
         return _read(table, places)
+    except BrokenRowsError:
+        raise
     except InputError:
         found: dict[Place, Array] = {}
         for place in places:  # one of them: which?

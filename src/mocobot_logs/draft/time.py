@@ -32,9 +32,10 @@ def time_lines(table: Table, candidates: Sequence[Candidate], robots: Robots) ->
         said = "by the intervals"
         doubts += [doubt] if doubt else []
     elif column.values is None or not len(column.values):
-        if not _has_dates(table, column.name):
+        dates = _has_dates(table, column.name)
+        if not dates:
             doubts.append("its values cannot be read")
-        unit = DATES if unit is None else unit
+        unit = unit or (DATES if dates else "s")
     comment = f"  # {DOUBTFUL}{'; '.join(doubts)}" if doubts else f"  # {said}" if said else ""
     return [
         "[time]",

@@ -13,6 +13,8 @@ _SMALLER = {"angle": "deg", "torque": "mNm", "length": "mm", "force": "mN"}
 _SI = {"angle": "rad", "torque": "Nm", "length": "m", "force": "N"}
 _COUNTS = 400.0
 """Whole numbers beyond are no degrees."""
+_ONE_TURN = 0.01
+"""Angles that cover a full turn to this share of it are those of an encoder that starts again there."""
 _RATES_HZ = (10.0, 20_000.0)
 
 
@@ -24,6 +26,8 @@ def guess_unit(channel: str, values: Array) -> tuple[str, str | None]:
         return COUNTS, "counts_per_turn must be filled in"
     if largest == 0.0:
         return _SI[kind], "it is zero throughout: which unit?"
+    if kind == "angle" and abs(float(np.ptp(values)) / (2 * np.pi) - 1.0) < _ONE_TURN:
+        return _SI[kind], "rad that jump by a full turn, which has to be taken out before? or deg?"
     si_up_to, smaller_from = _SURE[kind]
     if largest <= si_up_to:
         return _SI[kind], None

@@ -1,41 +1,31 @@
-"""A text file without the lines that begin with ``#``."""
+"""A text file in blocks of whole lines, without the lines that begin with ``#``."""
 
 import re
+from collections.abc import Iterator
 from typing import BinaryIO
 
 _COMMENT = re.compile(rb"^[ \t]*#.*\n?", re.MULTILINE)
-_BLOCK_BYTES = 1 << 20
-_LONGEST_LINE = 8 << 20
-"""A longer line is handed on as it is, for the reader to refuse."""
 
 
-class WithoutComments:
-    """What ``pyarrow`` reads of a file: its bytes without the lines whose first character but blanks is ``#``."""
+def line_blocks(file: BinaryIO, size: int) -> Iterator[bytes]:
+    """Blocks of whole lines, none of them empty, without those whose first character but blanks is ``#``.
 
-    def __init__(self, file: BinaryIO) -> None:
-        """Take the file where a line begins."""
-        self._file = file
-        self._ready, self._open = b"", b""
-        self.closed = False
+    Args:
+        file: read from where it is, where a line begins.
+        size: about how long blocks are [bytes]; a line of more than twice this is cut where it is so long.
+    """
+    rest = b""
+    while block := file.read(size):
+        lines = rest + block
+        end = lines.rfind(b"\n") + 1
+        if not end and len(lines) > 2 * size:
+            end = len(lines)
+        if ready := _without_comments(lines[:end]):
+            yield ready
+        rest = lines[end:]
+    if ready := _without_comments(rest):
+        yield ready
 
-    def read(self, size: int) -> bytes:
-        """At most so many bytes, none at the end."""
-        while not self._ready:
-            block = self._file.read(_BLOCK_BYTES)
-            lines = self._open + block
-            end = lines.rfind(b"\n") + 1 if block and len(lines) < _LONGEST_LINE else len(lines)
-            self._ready, self._open = lines[:end], lines[end:]
-            if b"#" in self._ready:
-                self._ready = _COMMENT.sub(b"", self._ready)
-            if not block:
-                break
-        given, self._ready = self._ready[:size], self._ready[size:]
-        return given
 
-    def tell(self) -> int:
-        """How far the file is read."""
-        return self._file.tell()
-
-    def close(self) -> None:
-        """The file is its owner's to close."""
-        self.closed = True
+def _without_comments(lines: bytes) -> bytes:
+    return _COMMENT.sub(b"", lines) if b"#" in lines else lines

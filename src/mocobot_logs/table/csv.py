@@ -13,7 +13,7 @@ import pyarrow.csv as pcsv
 from estimator.errors import InputError
 from mocobot_logs.faults import detail_of, readable
 from mocobot_logs.map.log_map import CsvMap
-from mocobot_logs.table.comments import WithoutComments
+from mocobot_logs.table.comments import line_blocks
 from mocobot_logs.table.dates import TextClock, is_date
 from mocobot_logs.table.table import Block, Table, Wanted
 
@@ -26,6 +26,10 @@ _NUMBER = re.compile(
     r"[+-]?((\d+\.?\d*|\.\d+)(e[+-]?\d+)?|inf(inity)?|nan(\(\w*\))?)", re.ASCII | re.IGNORECASE
 )
 """As pyarrow reads them."""
+
+
+class BrokenRowsError(InputError):
+    """Rows that do not fit the header: nothing can be read, whatever the column."""
 
 
 class CsvTable(Table):
@@ -93,49 +97,71 @@ class CsvTable(Table):
         try:
             with self._path.open("rb") as source:
                 source.seek(self._start)
-                for batch in pcsv.open_csv(
-                    pa.PythonFile(WithoutComments(source), mode="r"),
-                    read_options=pcsv.ReadOptions(
-                        use_threads=False,
-                        block_size=BLOCK_BYTES,
-                        column_names=[f"{k}" for k in range(len(self._names))],
-                    ),
-                    parse_options=pcsv.ParseOptions(delimiter=self._delimiter),
-                    convert_options=pcsv.ConvertOptions(
-                        column_types=types,
-                        include_columns=list(types),
-                        null_values=EMPTY,
-                        strings_can_be_null=True,
-                        quoted_strings_can_be_null=True,
-                        decimal_point=self._decimal,
-                    ),
-                ):
-                    yield batch, source.tell()
-                    rows += batch.num_rows
+                for lines in line_blocks(source, BLOCK_BYTES):
+                    if (batch := self._parsed(lines, types)).num_rows:
+                        yield batch, source.tell()
+                        rows += batch.num_rows
         except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
             numbers = [int(column) for column, kind in types.items() if kind == pa.float64()]
-            raise InputError(f"{self.name}: {self._first_fault(numbers, rows) or _plain(error)}") from error
+            self._refuse_first_fault(numbers, rows)
+            raise InputError(f"{self.name}: {_plain(error)}") from error
 
-    def _first_fault(self, numbers: list[int], good: int) -> str:
-        """The first row that does not fit the header or has no number where one must be, after so many good rows."""
+    def _parsed(self, lines: bytes, types: Mapping[str, pa.DataType]) -> pa.RecordBatch:
+        """Some columns of whole lines.
+
+        Every block is a file to pyarrow. Its streaming reader reads ahead in a thread: left at a fault, or at the rows
+        that are enough, it hangs or aborts the process when this ends (pyarrow 26).
+
+        Raises:
+            pa.ArrowException: a row does not fit the header, or a cell is no number.
+        """
+        table = pcsv.read_csv(
+            pa.BufferReader(lines),
+            read_options=pcsv.ReadOptions(
+                use_threads=False,
+                block_size=len(lines) + 1,
+                column_names=[f"{k}" for k in range(len(self._names))],
+            ),
+            parse_options=pcsv.ParseOptions(delimiter=self._delimiter),
+            convert_options=pcsv.ConvertOptions(
+                column_types=types,
+                include_columns=list(types),
+                null_values=EMPTY,
+                strings_can_be_null=True,
+                quoted_strings_can_be_null=True,
+                decimal_point=self._decimal,
+            ),
+        )
+        columns = [column.combine_chunks() for column in table.columns]
+        return pa.RecordBatch.from_arrays(columns, names=table.column_names)
+
+    def _refuse_first_fault(self, numbers: list[int], good: int) -> None:
+        """Refuse the first row that does not fit the header or lacks a number, after so many good rows."""
         with contextlib.suppress(OSError), self._path.open("rb") as file:
             for line, content in enumerate(iter(lambda: file.readline(BLOCK_BYTES + 1), b""), 1):
                 if len(content) > BLOCK_BYTES:
-                    return f"a row is longer than {BLOCK_BYTES >> 20} MiB; this is no table of samples"
+                    longest = f"{BLOCK_BYTES >> 20} MiB"
+                    raise BrokenRowsError(
+                        f"{self.name}: a row is longer than {longest}; this is no table of samples"
+                    )
                 text = content.decode(errors="replace").strip("\r\n")
                 if line <= self._lines_before or not text or text.lstrip().startswith("#"):
                     continue
                 good -= 1
                 cells = _cut(text, self._delimiter, strict=False) if good < 0 else self._names
                 if len(cells) != (count := len(self._names)):
-                    return f"{len(cells)} cells in line {line}; every row must have {count}, like the header"
+                    raise BrokenRowsError(
+                        f"{self.name}: {len(cells)} cell{'s' * (len(cells) != 1)} in line {line}; every row must "
+                        f"have {count}, like the header"
+                    )
                 for k in numbers if good < 0 else ():
                     if cells[k] not in EMPTY and not _is_number(cells[k], self._decimal):
-                        column, cell = self._names[k], cells[k]
-                        return (
-                            f"column {column!r:.80} holds {cell!r:.60} in line {line}; it must hold numbers"
+                        comma = self._decimal == "." and _is_number(cells[k], ",")
+                        hint = ' (for a decimal comma, decimal = "," in the map\'s [csv])' if comma else ""
+                        raise InputError(
+                            f"{self.name}: column {self._names[k]!r:.80} holds {cells[k]!r:.60} in line {line}; "
+                            f"it must hold numbers{hint}"
                         )
-        return ""
 
     def _index(self, name: str) -> int:
         if (count := self._names.count(name)) > 1:

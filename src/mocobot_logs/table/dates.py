@@ -17,6 +17,7 @@ _PATTERN = rf"(?P<date>{_DATE})[Tt ](?P<time>{_TIME})(?:[.,](?P<fraction>[0-9]{{
 _ISO = re.compile(_PATTERN)
 _S = 1_000_000_000
 EXAMPLE = "2026-03-01T12:00:00.000000001Z"
+_MUST = f"a time must be a date like {EXAMPLE}"
 
 
 def is_date(text: str) -> bool:
@@ -46,18 +47,22 @@ class TextClock:
         Raises:
             InputError: a time is neither a number nor a date, of another form than the first one, or out of range.
         """
+        values = pc.call_function("utf8_trim_whitespace", [values])
         if self._form is None and values.null_count < len(values):
-            self._form = _form(values.drop_null()[0].as_py())
+            first = values.drop_null()[0].as_py()
+            self._form = _form(first)
+            if self._unit_ns is None and self._form == "number" and not _is_number(first):
+                self._refuse(values, values.is_valid().to_numpy(zero_copy_only=False), row, _MUST)
         if self._form in (None, "number"):
             return from_text(values, self._unit_ns, self._where, row)
-        return self._dates(pc.call_function("utf8_trim_whitespace", [values]), row)
+        return self._dates(values, row)
 
     def _dates(self, values: pa.Array, row: int) -> tuple[Stamps, Given]:
         given = values.is_valid().to_numpy(zero_copy_only=False)
         parts = pc.call_function("extract_regex", [values], pc.ExtractRegexOptions(f"^(?:{_PATTERN})$"))
         no_date = given & ~parts.is_valid().to_numpy(zero_copy_only=False)
         if no_date.any():
-            self._refuse(values, no_date, row, f"a time must be a date like {EXAMPLE}, as the first one is")
+            self._refuse(values, no_date, row, f"{_MUST}, as the first one is")
         zone = _part(parts, "zone", "")
         zoned = pc.call_function("not_equal", [zone, pa.scalar("")]).to_numpy(zero_copy_only=False)
         if (other := given & (zoned != (self._form == "zone"))).any():
@@ -92,6 +97,14 @@ def _form(text: str) -> str:
     """Whether a time is a number, or a date with or without a zone."""
     found = _ISO.fullmatch(text.strip())
     return "number" if found is None else "zone" if found["zone"] else "local"
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _part(parts: pa.Array, name: str, default: str) -> pa.Array:

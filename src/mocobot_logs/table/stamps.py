@@ -70,7 +70,10 @@ def from_text(values: pa.Array, unit_ns: int | None, where: str, row: int = 0) -
         # The first count of texts that do not cast ends with the one that is no number.
         bad = bisect_left(range(1, len(values)), True, key=lambda count: not _casts(values[:count], exact))
         text = values[bad].as_py()
-        raise InputError(f"{where} is {text!r:.60} in row {row + bad}; a time must be a number") from None
+        or_date = "" if row + bad else " or a date of ISO 8601, such as 2026-03-01T12:00:00.5Z"
+        raise InputError(
+            f"{where} is {text!r:.60} in row {row + bad}; a time must be a number{or_date}"
+        ) from None
     _in_ns(cut, values, where, row)
     finer = pc.cast(values, pa.decimal256(76, digits + _BELOW_NS), safe=False)
     rounded = pc.cast(pc.call_function("round", [finer], pc.RoundOptions(digits)), exact)

@@ -99,6 +99,11 @@ def test_standard_error_of_a_length():
     assert norm_se(np.zeros(3), covariance) > 0
 
 
+def test_norm_se_of_next_to_nothing():
+    """Of two robots that are one and the same the variance of their distance is negative by rounding."""
+    assert norm_se(np.array([1.0, 0.0, 0.0]), np.diag([-1e-30, 1.0, 1.0])) == 0.0
+
+
 @pytest.mark.parametrize("angle", [0.0, 1e-8, 0.3, 2.0, 3.0])
 def test_covariance_of_a_rotation_vector(angle):
     R = Rotation.from_rotvec(angle * np.array([0.6, 0.0, 0.8]))

@@ -132,6 +132,13 @@ def test_gimbal_angles_in_degrees():
     assert message.endswith("range is -1 to 1 rad - the values look like degrees")
 
 
+def test_encoders_that_start_again_after_a_turn():
+    """Gimbals about their middle that read 0 to 2 pi: their values had been said to look like degrees."""
+    centred = GOOD.theta - GOOD.theta.mean(axis=0)
+    message = complaint(spoiled("theta", slice(None), np.mod(centred, 2 * np.pi)))
+    assert "range is -1 to 1 rad - the values jump by a full turn" in message
+
+
 @pytest.mark.parametrize(
     ("field", "suffix", "bound", "outward"),
     [("phi", "phi2", DESIGN.phi_min_rad, -1), ("phi", "phi2", DESIGN.phi_max_rad, 1)]

@@ -334,3 +334,15 @@ def test_whatever_columns_are_called_the_draft_is_toml(names: list[str], value: 
     if not draft.missing:
         with suppress(InputError):  # names without a robot in them, for example
             parse_map(parsed, "draft")
+
+
+def test_angles_that_start_again_after_a_turn(tmp_path: Path) -> None:
+    """They are no degrees; what is said is what has to be done."""
+    columns = {
+        name: np.mod(x - x.mean(), 2 * np.pi) if "theta" in name else x
+        for name, x in RECORDING.columns().items()
+    }
+    path = write_text(tmp_path / "log.csv", columns)
+    lines = [line for line in draft_of(path).text.splitlines() if line.startswith("theta")]
+    assert len(lines) == 3
+    assert all('unit = "rad"' in line and "doubtful: rad that jump by a full turn" in line for line in lines)

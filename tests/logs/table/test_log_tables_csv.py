@@ -222,7 +222,8 @@ def test_lines_are_counted_with_the_blank_ones(path: Path, lines: list[str]) -> 
 def test_ragged_rows(path: Path, lines: list[str]) -> None:
     for spoiled, count in ((lines[30] + ",1", 38), (lines[30].rpartition(",")[0], 36), ("1", 1)):
         path.write_text("\n".join([*lines[:30], spoiled, *lines[31:]]))
-        assert f"{count} cells in line 31; every row must have 37, like the header" in refused(path)
+        cells = "1 cell" if count == 1 else f"{count} cells"
+        assert f"{cells} in line 31; every row must have 37, like the header" in refused(path)
 
 
 # Columns
