@@ -63,8 +63,9 @@ def _of_response(values: Values) -> list[str]:
     left = f"{told['chi2_per_n']:.3g}"
     if not values["causes"]:
         why = {
-            "consistent": "tolerances, assumed or given, account for it, so nothing is named; but robots as designed "
-            "do not answer like these: calibrate them, or give narrower tolerances",
+            "consistent": "tolerances, assumed or given, account for it, or what the other trials leave open of the "
+            "payload, so nothing is named. Where several trials move, robots as designed do not answer like these: "
+            "calibrate them, or give narrower tolerances",
             "miscalibrated": "robots as designed do not answer like these",
         }.get(values["verdict"], "nothing that is known accounts for it")
         return [
