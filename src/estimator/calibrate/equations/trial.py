@@ -23,13 +23,14 @@ from estimator.calibrate.equations.loops import pose_derivatives
 from estimator.calibrate.equations.noise import adjustment_of, covariance_of, noise_of
 from estimator.calibrate.equations.rows import Rows
 from estimator.calibrate.equations.sensing import Sensing
-from estimator.estimate.fusion import fusion_with, total_wrench
+from estimator.estimate.fusion import fusion_changes, fusion_with, total_wrench
 from estimator.estimate.joint import newton_euler_regressor
 from estimator.rigid_team.changes import needed_wrench, vee
 from estimator.rigid_team.residual import Bases, Shared, pose_error, robot_data
 from estimator.rigid_team.slots import COUNT as SLOTS
 from estimator.rigid_team.slots import PHI, STEPS, TAU, THETA
 from estimator.signals.arm_data import ArmData
+from estimator.so3 import cross
 
 _GEOMETRY = np.r_[AT["radius"], AT["proximal_length"], AT["rod_length"]]
 _MASSES = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]
@@ -178,8 +179,17 @@ def _fusion(units: ArmUnit, shared: Shared) -> Array:
 
     Weighed as equal encoders would have it, which turn the driven links and so move the wrist.
     """
-    ratio = 1.0 / units.design.proximal_length_m
-    return fusion_with(shared.grasps, ratio)
+    return fusion_with(shared.grasps, _ratio(units))
+
+
+def _ratio(units: ArmUnit) -> float:
+    return 1.0 / units.design.proximal_length_m
+
+
+def _regressor(motion: Array, motion_dot: Array, up: Array, gravity_mps2: float) -> Array:
+    """Of what moves the payload, by its ten inertial parameters, shape (Q, 6, 10)."""
+    specific = motion_dot[:, 3:] + cross(motion[:, :3], motion[:, 3:]) + gravity_mps2 * up
+    return newton_euler_regressor(motion[:, :3], motion_dot[:, :3], specific)
 
 
 def _balance(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
@@ -190,8 +200,7 @@ def _balance(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
     up = np.einsum("iab,qib->qa", grasps.R_1i, data.R_bi[..., 2, :])
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     force, moment = total_wrench(data.wrench, grasps)
-    specific = motion_dot[:, 3:] + np.cross(motion[:, :3], motion[:, 3:]) + units.gravity_mps2 * up
-    needed = newton_euler_regressor(motion[:, :3], motion_dot[:, :3], specific) @ shared.pi
+    needed = _regressor(motion, motion_dot, up, units.gravity_mps2) @ shared.pi
     return np.concatenate([force, moment], axis=1) - needed
 
 
@@ -228,7 +237,8 @@ def _derivatives(
         by_units[:, :, i, AT["tau_zero"]] = -of_tau * (1.0 + unit.of("stiffness_ratio"))
         tau = s[:, i, TAU] / (1.0 + unit.of("stiffness_ratio"))
         by_units[:, :, i, AT["stiffness_ratio"]] = of_tau * tau[:, None]
-    return by_signals, by_units, _by_carried(data, units, shared), np.zeros((n, C, 4 * (N - 1)))
+    by_carried = _by_carried(data, motion, motion_dot, up, units, shared)
+    return by_signals, by_units, by_carried, np.zeros((n, C, 4 * (N - 1)))
 
 
 def _moved(s: Array, unit: ArmUnit, slots: NDArray[np.intp], steps: Array, of_unit: bool) -> ArmData:
@@ -270,15 +280,15 @@ def _chain(
     return out
 
 
-def _by_carried(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
+def _by_carried(
+    data: ArmData, motion: Array, motion_dot: Array, up: Array, units: ArmUnit, shared: Shared
+) -> Array:
     n, N = data.h.shape[:2]
-    grasped = 6 * (N - 1)
+    grasped, gravity = 6 * (N - 1), units.gravity_mps2
     out = np.zeros((n, 6 * N, grasped + 10))
-    # The balance depends on grasps in many ways, and on inertia linearly: steps of any size there.
-    steps = np.concatenate([np.full(grasped, 1e-6), np.ones(10)])
-    for k, step in enumerate(steps):
-        dx = np.zeros(len(steps))
-        dx[k] = step
-        ends = [_balance(data, units, shared.moved(sign * dx)) for sign in (1.0, -1.0)]
-        out[:, -6:, k] = (ends[0] - ends[1]) / (2.0 * step)
+    d = fusion_changes(data.twist, data.twist_dot, data.R_bi, data.wrench, shared.grasps, _ratio(units))
+    needed = needed_wrench(motion, d.twist, d.twist_dot, gravity * d.up, shared.pi)
+    out[:, -6:-3, :grasped] = np.moveaxis(d.force - needed[0], 0, -1)
+    out[:, -3:, :grasped] = np.moveaxis(d.moment - needed[1], 0, -1)
+    out[:, -6:, grasped:] = -_regressor(motion, motion_dot, up, gravity)
     return out
