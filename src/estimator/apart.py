@@ -17,7 +17,7 @@ def vectors(*components: ArrayLike) -> Array:
     out = np.empty((len(components), *np.broadcast_shapes(*map(np.shape, components))))
     for k, component in enumerate(components):
         out[k] = component
-    return np.moveaxis(out, 0, -1)
+    return out.transpose(*range(1, out.ndim), 0)
 
 
 def matrices(rows: Sequence[Sequence[ArrayLike]]) -> Array:
@@ -27,10 +27,16 @@ def matrices(rows: Sequence[Sequence[ArrayLike]]) -> Array:
     for i, row in enumerate(rows):
         for k, entry in enumerate(row):
             out[i, k] = entry
-    return np.moveaxis(out, (0, 1), (-2, -1))
+    return out.transpose(*range(2, out.ndim), 0, 1)
 
 
 def apart(x: Array, axes: int) -> Array:
     """The same numbers with the components of the last one or two axes apart."""
     last, first = tuple(range(-axes, 0)), tuple(range(axes))
     return np.moveaxis(np.ascontiguousarray(np.moveaxis(x, last, first)), first, last)
+
+
+def components(x: ArrayLike) -> Array:
+    """Components of vectors, shapes (..., K) -> (K, ...)."""
+    x = np.asarray(x, dtype=float)
+    return x.transpose(-1, *range(x.ndim - 1))

@@ -15,7 +15,7 @@ def cross(a: Array, b: Array) -> Array:
     np.subtract(y * w, z * v, out=out[0])
     np.subtract(z * u, x * w, out=out[1])
     np.subtract(x * v, y * u, out=out[2])
-    return np.moveaxis(out, 0, -1)
+    return out.transpose(*range(1, out.ndim), 0)
 
 
 def times(matrix: Array, vector: Array) -> Array:

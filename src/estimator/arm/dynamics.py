@@ -8,7 +8,7 @@ f_i = (dh/dphi)^-T tau_i for a massless arm; the motor's rotor lies before the s
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.apart import vectors
+from estimator.apart import components, vectors
 from estimator.arm.delta import LEG_DIRECTIONS, LegGeometry, leg_geometry, wrist_motion
 from estimator.arm.design import Triple
 from estimator.arm.gimbal import Gimbal
@@ -115,7 +115,7 @@ def wrench_on_payload(
     f_b = legs.at_wrist(np.asarray(tau) - arm_torque(*phi, design, legs, h_ddot))
     f_i = times(np.swapaxes(R_bi, -1, -2), f_b)
     m_i = -gimbal.moment(gimbal_torque(*theta, design, gimbal))
-    return vectors(*_components(m_i), *_components(f_i))
+    return vectors(*components(m_i), *components(f_i))
 
 
 def _rotor_torque(gimbal: Gimbal, theta_dot: Array, theta_ddot: Array, inertia: Triple) -> Array:
@@ -123,7 +123,3 @@ def _rotor_torque(gimbal: Gimbal, theta_dot: Array, theta_ddot: Array, inertia: 
     omega, omega_dot = gimbal.motion(theta_dot, theta_ddot)
     principal = np.array(inertia)
     return gimbal.about_axes(principal * omega_dot + cross(omega, principal * omega))
-
-
-def _components(vector: Array) -> Array:
-    return np.moveaxis(vector, -1, 0)

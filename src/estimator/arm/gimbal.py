@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from estimator.apart import matrices, vectors
+from estimator.apart import components, matrices, vectors
 from estimator.arrays import Array
 
 
@@ -31,7 +31,7 @@ class Gimbal(NamedTuple):
     @classmethod
     def at(cls, theta: ArrayLike) -> Gimbal:
         """At gimbal angles (theta_z, theta_y, theta_x) [rad], shape (..., 3)."""
-        angles = np.moveaxis(np.asarray(theta, dtype=float), -1, 0)
+        angles = components(theta)
         return cls(*np.cos(angles), *np.sin(angles))
 
     @property
@@ -56,7 +56,7 @@ class Gimbal(NamedTuple):
     def axes_dot(self, theta_dot: ArrayLike) -> Array:
         """See ``rate_matrix_dot``."""
         _, cy, cx, _, sy, sx = self
-        _, y, x = _components(theta_dot)
+        _, y, x = components(theta_dot)
         return matrices([
             [-cy * y, 0.0, 0.0],
             [cy * cx * x - sy * sx * y, -sx * x, 0.0],
@@ -66,8 +66,8 @@ class Gimbal(NamedTuple):
     def motion(self, theta_dot: ArrayLike, theta_ddot: ArrayLike) -> tuple[Array, Array]:
         """See ``angular_motion``: E theta_dot and E theta_ddot + dE/dt theta_dot, without their zeros."""
         _, cy, cx, _, sy, sx = self
-        z, y, x = _components(theta_dot)
-        zz, yy, xx = _components(theta_ddot)
+        z, y, x = components(theta_dot)
+        zz, yy, xx = components(theta_ddot)
         along, across = cy * sx, cy * cx
         omega = vectors(x - sy * z, along * z + cx * y, across * z - sx * y)
         omega_dot = vectors(
@@ -80,13 +80,13 @@ class Gimbal(NamedTuple):
     def about_axes(self, moment: Array) -> Array:
         """Torques about the axes (z, y, x) [N m] of a moment in {i} [N m]: E^T moment, shape (..., 3)."""
         _, cy, cx, _, sy, sx = self
-        x, y, z = _components(moment)
+        x, y, z = components(moment)
         return vectors(cy * sx * y + cy * cx * z - sy * x, cx * y - sx * z, x)
 
     def moment(self, torque: ArrayLike) -> Array:
         """See ``moment_about_axes``."""
         _, cy, cx, _, sy, sx = self
-        about_z, about_y, about_x = _components(torque)
+        about_z, about_y, about_x = components(torque)
         # {i} before its turn about x: there y is the middle axis, and the first axis is (-sin, 0, cos) of theta_y.
         up = (about_z + sy * about_x) / cy
         return vectors(about_x, cx * about_y + sx * up, cx * up - sx * about_y)
@@ -148,7 +148,3 @@ def moment_about_axes(theta: ArrayLike, torque: ArrayLike) -> Array:
         torque: about the axes, in that order [N m], shape (..., 3).
     """
     return Gimbal.at(theta).moment(torque)
-
-
-def _components(vector: ArrayLike) -> Array:
-    return np.moveaxis(np.asarray(vector, dtype=float), -1, 0)
