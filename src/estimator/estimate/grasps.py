@@ -11,8 +11,8 @@ R_1j omega_j. Noise in the angular velocity that multiplies p shortens the estim
 that noise power, treats the two robots of a pair alike, and renumbering the robots changes nothing.
 
 All residuals are linear in the stacked twists V = [V_1; ...; V_N] of a sample, so sums of their products
-depend on the samples only through V V^T: a triangular 6N x 6N factor of all samples replaces them in the fit, and the products
-themselves in sums over windows of samples.
+depend on the samples only through V V^T: a triangular 6N x 6N factor of all samples replaces them in the fit, and the
+products themselves in sums over windows of samples.
 """
 
 import warnings
