@@ -42,7 +42,8 @@ def arm_torque(
     """
     phi, phi_dot, phi_ddot = (np.asarray(a, dtype=float) for a in (phi, phi_dot, phi_ddot))
     legs = leg_geometry(phi, design) if legs is None else legs
-    g = design.gravity_mps2 * np.asarray(design.up)
+    up = np.asarray(design.up)
+    g = design.gravity_mps2 * up
     h_ddot = wrist_motion(legs, phi_dot, phi_ddot)[1] if h_ddot is None else h_ddot
     knee_ddot = legs.knee_d1 * phi_ddot[..., None] + legs.knee_d2 * (phi_dot**2)[..., None]
     # Consistent mass of a slender rod: T = m/6 (va.va + va.vb + vb.vb), half of the weight at each end.
@@ -52,8 +53,7 @@ def arm_torque(
     at_wrist = rod_mass * ((knee_ddot + 2.0 * wrist_ddot) / 6.0 + g[..., None, :] / 2.0)
     wrist_force = at_wrist.sum(axis=-2) + design.wrist_mass_kg * (h_ddot + g)
     link = design.proximal_mass_kg * design.gravity_mps2 * design.proximal_com_m
-    aslant = np.asarray(design.up) @ LEG_DIRECTIONS.T
-    link_weight = link * np.cos(phi) * np.asarray(design.up)[..., 2:] - link * np.sin(phi) * aslant
+    link_weight = link * np.cos(phi) * up[..., 2:] - link * np.sin(phi) * (up @ LEG_DIRECTIONS.T)
     return (
         design.proximal_inertia_kgm2 * phi_ddot
         + link_weight

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from estimator.arm.unit import AT, COUNT, ArmUnit
@@ -28,15 +27,10 @@ from estimator.estimate.joint import newton_euler_regressor
 from estimator.rigid_team.changes import needed_wrench, vee
 from estimator.rigid_team.residual import Bases, Shared, pose_error, robot_data
 from estimator.rigid_team.slots import COUNT as SLOTS
-from estimator.rigid_team.slots import PHI, STEPS, TAU, THETA
+from estimator.rigid_team.slots import PHI, TAU, THETA
+from estimator.signals.arm_changes import BY_UNIT, ArmChanges
 from estimator.signals.arm_data import ArmData
 from estimator.so3 import cross
-
-_GEOMETRY = np.r_[AT["radius"], AT["proximal_length"], AT["rod_length"]]
-_MASSES = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]
-_TILT = np.r_[AT["tilt"]]
-_BY_UNIT: NDArray[np.intp] = np.concatenate([_GEOMETRY, _MASSES, _TILT])
-_UNIT_STEPS = np.concatenate([np.full(9, 1e-6), np.full(7, 1e-4), np.full(2, 1e-6)])
 
 
 class Rowed(NamedTuple):
@@ -222,15 +216,11 @@ def _derivatives(
     by_units = np.zeros((n, C, N, COUNT))
     for i in range(N):
         base = ArmData(*(part[:, i] for part in data))
-        by_unit = [] if held else [(_BY_UNIT, by_units, _UNIT_STEPS)]
-        for slots, changed, steps in [(np.arange(SLOTS), by_signals, STEPS), *by_unit]:
-            moved = _moved(s[:, i], ArmUnit(units.design, units.x[i]), slots, steps, changed is by_units)
-            d = ArmData(*(
-                (after - before) / steps.reshape(-1, *[1] * before.ndim)
-                for after, before in zip(moved, base, strict=True)
-            ))  # fmt: skip
+        arm = ArmChanges(s[:, i], ArmUnit(units.design, units.x[i]))
+        by_unit = [] if held else [(BY_UNIT, by_units, arm.by_unit())]
+        for places, changed, d in [(np.arange(SLOTS), by_signals, arm.by_signals()), *by_unit]:
             part = _chain(i, d, base, data, motion, motion_dot, up, length, G, shared, bases, units)
-            changed[:, :, i, slots] = np.moveaxis(part, 0, -1)
+            changed[:, :, i, places] = np.moveaxis(part, 0, -1)
         by_units[:, :, i, AT["phi_zero"]] = -by_signals[:, :, i, PHI]
         by_units[:, :, i, AT["theta_zero"]] = -by_signals[:, :, i, THETA]
         of_tau, unit = by_signals[:, :, i, TAU], ArmUnit(units.design, units.x[i])
@@ -239,18 +229,6 @@ def _derivatives(
         by_units[:, :, i, AT["stiffness_ratio"]] = of_tau * tau[:, None]
     by_carried = _by_carried(data, motion, motion_dot, up, units, shared)
     return by_signals, by_units, by_carried, np.zeros((n, C, 4 * (N - 1)))
-
-
-def _moved(s: Array, unit: ArmUnit, slots: NDArray[np.intp], steps: Array, of_unit: bool) -> ArmData:
-    """Data of one robot with each of some signals, or deviations, moved, shape (K, n, ...)."""
-    count = len(slots)
-    if of_unit:
-        x = np.tile(unit.x, (count, 1, 1))
-        x[np.arange(count), 0, slots] += steps
-        return robot_data(np.broadcast_to(s, (count, *s.shape)), ArmUnit(unit.design, x))
-    s = np.tile(s, (count, 1, 1))
-    s[np.arange(count), :, slots] += steps[:, None]
-    return robot_data(s, unit)
 
 
 def _chain(
@@ -275,7 +253,7 @@ def _chain(
     d_up = (d_up - np.sum(d_up * up, axis=-1, keepdims=True) * up) / length
     needed = needed_wrench(motion, d.twist @ own.T, d.twist_dot @ own.T, d_up * units.gravity_mps2, shared.pi)
     d_force, d_moment = d.wrench[..., 3:] @ grasps.R_1i[i].T, d.wrench[..., :3] @ grasps.R_1i[i].T
-    d_moment = d_moment + np.cross(grasps.p_1i[i], d_force)
+    d_moment = d_moment + cross(grasps.p_1i[i], d_force)
     out[..., -6:] = np.concatenate([d_force - needed[0], d_moment - needed[1]], axis=-1)
     return out
 
