@@ -214,11 +214,14 @@ def _window_sums(
     K, unit = 6 * (N - 1), np.eye(6 * N).reshape(-1, N, 6)
     r = np.moveaxis(weights * _residuals(unit, R, p), 2, 0).reshape(6 * N, -1)
     J = np.moveaxis(weights[..., None] * _jacobian(unit, R, p), 2, 0).reshape(6 * N, -1, K)
-    of_normals = np.tensordot(J, J, axes=(1, 1)).transpose(0, 2, 1, 3).reshape(-1, K * K)
-    of_scores = np.tensordot(J, r, axes=(1, 1)).transpose(0, 2, 1).reshape(-1, K)
     products = np.array([
         (V[window.part].T * window.weights) @ V[window.part]
         for trial, V in zip(trials, stacked, strict=True)
         for window in windows(trial.samples, trial.rate_hz, window_s)
-    ]).reshape(-1, (6 * N) ** 2)  # fmt: skip
-    return (products @ of_normals).reshape(-1, K, K), products @ of_scores
+    ])  # fmt: skip
+    normals, scores = np.zeros((len(products), K, K)), np.zeros((len(products), K))
+    for row, of_row in enumerate(J):  # all at once would take (6N)^2 K^2 numbers
+        with_others = products[:, row]
+        normals += np.tensordot(with_others, np.tensordot(of_row, J, axes=(0, 1)), axes=(1, 1))
+        scores += with_others @ (r @ of_row)
+    return normals, scores
