@@ -213,17 +213,21 @@ def _upstream_covariance(
     com_by_grasp: Array,
 ) -> Array:
     """Covariance of the inertia due to errors of the CoM and of the grasps, which also move the CoM."""
-    J = _by_upstream(thinned(trials), grasps, p_1c, com_by_grasp)
+    J = by_upstream(thinned(trials), grasps, p_1c, com_by_grasp)
     K = len(grasps.covariance)
     return J[:, :K] @ grasps.covariance @ J[:, :K].T + J[:, K:] @ com_covariance @ J[:, K:].T
 
 
-def _by_upstream(
+def by_upstream(
     trials: Sequence[GraspData], grasps: GraspEstimate, p_1c: Array, com_by_grasp: Array
 ) -> Array:
     """Derivative of the parameters (26) by the grasps' errors, which also move the CoM, and by the CoM, (6, K + 3).
 
     Of X x = y with the residual r: X^T X dx = dX^T r + X^T (dy - dX x).
+
+    Args:
+        trials, grasps, p_1c: as for ``estimate_inertia``.
+        com_by_grasp: derivative of p_1c by the grasps' errors, shape (3, K), K = 6(N-1).
     """
     K = len(grasps.covariance)
     normal, right = np.zeros((6, 6)), np.zeros((6, K + 3))
