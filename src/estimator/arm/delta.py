@@ -46,7 +46,7 @@ class LegGeometry:
     @cached_property
     def across_rods(self) -> Array:
         """The wrist's displacement per rod_k . dh_k, the inverse of the rods [1/m], shape (..., 3, 3)."""
-        return apart(np.linalg.inv(self.rod), 2)
+        return apart(np.asarray(np.linalg.inv(self.rod), dtype=np.float64), 2)
 
     def along_rods(self, force: Array) -> Array:
         """Driven torques [N m] of a force at the wrist in {b} [N]: (dh/dphi)^T force, shape (..., 3)."""

@@ -249,7 +249,7 @@ def by_upstream(
         normal += flat.T @ flat
         right += flat.T @ dy.reshape(K + 3, -1).T
         right[:, :K] += inertia_regressor_changes(omega, d_omega, d_alpha, residual).T
-    return np.linalg.solve(normal, right)
+    return np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
 
 
 def inertia_regressor_changes(omega: Array, d_omega: Array, d_alpha: Array, moment: Array) -> Array:

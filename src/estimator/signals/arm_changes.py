@@ -8,6 +8,7 @@ IV.B, see ``arm_data``) is linear, and so are accelerations and torques.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from estimator.apart import apart, components
 from estimator.arm.delta import LegGeometry, jacobian_of, leg_geometry, wrist_motion
@@ -19,10 +20,10 @@ from estimator.rigid_team.slots import PHI, PHI_DDOT, PHI_DOT, STEPS, TAU, THETA
 from estimator.signals.arm_data import ArmData
 from estimator.so3 import cross, times
 
-LENGTHS = np.r_[AT["radius"], AT["proximal_length"], AT["rod_length"]]
-MASSES = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]
-TILT = np.r_[AT["tilt"]]
-BY_UNIT = np.concatenate([LENGTHS, MASSES, TILT])
+LENGTHS: NDArray[np.intp] = np.r_[AT["radius"], AT["proximal_length"], AT["rod_length"]]
+MASSES: NDArray[np.intp] = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]
+TILT: NDArray[np.intp] = np.r_[AT["tilt"]]
+BY_UNIT: NDArray[np.intp] = np.concatenate([LENGTHS, MASSES, TILT])
 """Deviations that change more than what sensors read."""
 _LENGTH, _MASS, _TILT = 1e-6, 1e-4, 1e-6  # steps of differences
 _NONE = np.zeros(3)
@@ -92,7 +93,7 @@ class ArmChanges:
     def _at(self, slots: slice) -> Array:
         return self._s[:, slots]
 
-    def _deviating(self, places: Array, step: float) -> ArmUnit:
+    def _deviating(self, places: NDArray[np.intp], step: float) -> ArmUnit:
         x = np.tile(self._unit.x, (len(places), 1, 1))
         x[np.arange(len(places)), 0, places] += step
         return ArmUnit(self._unit.design, x)
