@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from estimator.apart import apart, matrices
 from estimator.arm.numbers import Arm
 from estimator.arrays import Array
 from estimator.errors import InputError
@@ -45,7 +46,7 @@ class LegGeometry:
     @cached_property
     def across_rods(self) -> Array:
         """The wrist's displacement per rod_k . dh_k, the inverse of the rods [1/m], shape (..., 3, 3)."""
-        return np.asarray(np.linalg.inv(self.rod), dtype=np.float64)
+        return apart(np.asarray(np.linalg.inv(self.rod), dtype=np.float64), 2)
 
     def along_rods(self, force: Array) -> Array:
         """Driven torques [N m] of a force at the wrist in {b} [N]: (dh/dphi)^T force, shape (..., 3)."""
@@ -67,7 +68,11 @@ def forward_kinematics(phi: ArrayLike, design: Arm) -> Array:
         InputError: the three spheres of the rods do not intersect at some configuration.
     """
     phi = np.asarray(phi, dtype=float)
-    foot, normal, square = _sphere_intersection(phi, design)
+    return _wrist(phi, *_sphere_intersection(_sphere_centres(phi, design), design))
+
+
+def _wrist(phi: Array, foot: Array, normal: Array, square: Array) -> Array:
+    """The wrist over the foot that ``_sphere_intersection`` finds; arguments and errors as there and above."""
     if not np.all(square > 0):
         where = np.unravel_index(np.argmin(square > 0), square.shape)
         angles = ", ".join(f"{value:.4g}" for value in phi[where])
@@ -77,7 +82,16 @@ def forward_kinematics(phi: ArrayLike, design: Arm) -> Array:
 
 def is_reachable(phi: ArrayLike, design: Arm) -> NDArray[np.bool_]:
     """Whether a wrist position exists for driven angles ``phi`` [rad], shape (..., 3) -> (...)."""
-    return _sphere_intersection(np.asarray(phi, dtype=float), design)[2] > 0
+    return _sphere_intersection(_sphere_centres(np.asarray(phi, dtype=float), design), design)[2] > 0
+
+
+def stretches(phi: ArrayLike, design: Arm) -> tuple[NDArray[np.bool_], Array]:
+    """The answer of ``is_reachable``, and the legs' leverage (..., 3), which means nothing where that is no."""
+    phi = np.asarray(phi, dtype=float)
+    centres = _sphere_centres(phi, design)
+    foot, normal, square = _sphere_intersection(centres, design)
+    h = foot + np.sqrt(np.maximum(square, 0.0))[..., None] * normal
+    return square > 0, _legs(phi, h, centres, design).leverage
 
 
 def leg_geometry(phi: ArrayLike, design: Arm) -> LegGeometry:
@@ -87,12 +101,15 @@ def leg_geometry(phi: ArrayLike, design: Arm) -> LegGeometry:
         InputError: the three spheres of the rods do not intersect at some configuration.
     """
     phi = np.asarray(phi, dtype=float)
-    h = forward_kinematics(phi, design)
-    cos, sin = np.cos(phi)[..., None], np.sin(phi)[..., None]
-    rod = h[..., None, :] - _sphere_centres(phi, design)
-    proximal = np.asarray(design.proximal_length_m)[..., None]
-    knee_d1 = proximal * (cos * _Z - sin * LEG_DIRECTIONS)
-    knee_d2 = -proximal * (cos * LEG_DIRECTIONS + sin * _Z)
+    centres = _sphere_centres(phi, design)
+    h = _wrist(phi, *_sphere_intersection(centres, design))
+    return _legs(phi, h, centres, design)
+
+
+def _legs(phi: Array, h: Array, centres: Array, design: Arm) -> LegGeometry:
+    cos, sin = np.cos(phi), np.sin(phi)
+    rod, proximal = h[..., None, :] - centres, np.asarray(design.proximal_length_m)[..., None]
+    knee_d1, knee_d2 = proximal * _in_leg_planes(-sin, cos), -proximal * _in_leg_planes(cos, sin)
     return LegGeometry(h, rod, knee_d1, knee_d2, np.sum(rod * knee_d1, axis=-1))
 
 
@@ -188,13 +205,18 @@ def _leg_triangles(h: Array, design: Arm) -> tuple[Array, Array, Array]:
 
 def _sphere_centres(phi: Array, design: Arm) -> Array:
     radius = design.radius_m + design.proximal_length_m * np.cos(phi)
-    height = design.proximal_length_m * np.sin(phi)
-    return radius[..., None] * LEG_DIRECTIONS + height[..., None] * _Z
+    return _in_leg_planes(radius, design.proximal_length_m * np.sin(phi))
 
 
-def _sphere_intersection(phi: Array, design: Arm) -> tuple[Array, Array, Array]:
+def _in_leg_planes(outward: Array, up: Array) -> Array:
+    """Vectors outward u_k + up z of the three legs, shapes (..., 3) -> (..., 3, 3)."""
+    return matrices([
+        [outward[..., k] * x, outward[..., k] * y, up[..., k]] for k, (x, y, _) in enumerate(LEG_DIRECTIONS)
+    ])  # fmt: skip
+
+
+def _sphere_intersection(centres: Array, design: Arm) -> tuple[Array, Array, Array]:
     """Point of the sphere centres' plane nearest the wrist, upward unit normal, squared height over it."""
-    centres = _sphere_centres(phi, design)
     rod = np.asarray(design.rod_length_m)
     a, b = centres[..., 1, :] - centres[..., 0, :], centres[..., 2, :] - centres[..., 0, :]
     normal = cross(a, b)

@@ -8,12 +8,13 @@ f_i = (dh/dphi)^-T tau_i for a massless arm; the motor's rotor lies before the s
 import numpy as np
 from numpy.typing import ArrayLike
 
+from estimator.apart import components, vectors
 from estimator.arm.delta import LEG_DIRECTIONS, LegGeometry, leg_geometry, wrist_motion
 from estimator.arm.design import Triple
-from estimator.arm.gimbal import angular_motion, moment_about_axes, rate_matrix, rotation
+from estimator.arm.gimbal import Gimbal
 from estimator.arm.numbers import Arm
 from estimator.arrays import Array
-from estimator.so3 import cross
+from estimator.so3 import cross, times
 
 
 def arm_torque(
@@ -41,7 +42,8 @@ def arm_torque(
     """
     phi, phi_dot, phi_ddot = (np.asarray(a, dtype=float) for a in (phi, phi_dot, phi_ddot))
     legs = leg_geometry(phi, design) if legs is None else legs
-    g = design.gravity_mps2 * np.asarray(design.up)
+    up = np.asarray(design.up)
+    g = design.gravity_mps2 * up
     h_ddot = wrist_motion(legs, phi_dot, phi_ddot)[1] if h_ddot is None else h_ddot
     knee_ddot = legs.knee_d1 * phi_ddot[..., None] + legs.knee_d2 * (phi_dot**2)[..., None]
     # Consistent mass of a slender rod: T = m/6 (va.va + va.vb + vb.vb), half of the weight at each end.
@@ -51,8 +53,7 @@ def arm_torque(
     at_wrist = rod_mass * ((knee_ddot + 2.0 * wrist_ddot) / 6.0 + g[..., None, :] / 2.0)
     wrist_force = at_wrist.sum(axis=-2) + design.wrist_mass_kg * (h_ddot + g)
     link = design.proximal_mass_kg * design.gravity_mps2 * design.proximal_com_m
-    aslant = np.asarray(design.up) @ LEG_DIRECTIONS.T
-    link_weight = link * np.cos(phi) * np.asarray(design.up)[..., 2:] - link * np.sin(phi) * aslant
+    link_weight = link * np.cos(phi) * up[..., 2:] - link * np.sin(phi) * (up @ LEG_DIRECTIONS.T)
     return (
         design.proximal_inertia_kgm2 * phi_ddot
         + link_weight
@@ -61,7 +62,9 @@ def arm_torque(
     )
 
 
-def gimbal_torque(theta: ArrayLike, theta_dot: ArrayLike, theta_ddot: ArrayLike, design: Arm) -> Array:
+def gimbal_torque(
+    theta: ArrayLike, theta_dot: ArrayLike, theta_ddot: ArrayLike, design: Arm, gimbal: Gimbal | None = None
+) -> Array:
     """Torques about the gimbal's axes that move its own bodies [N m], order (z, y, x), shape (..., 3).
 
     Args:
@@ -69,13 +72,16 @@ def gimbal_torque(theta: ArrayLike, theta_dot: ArrayLike, theta_ddot: ArrayLike,
         theta_dot: rates [rad/s], shape (..., 3).
         theta_ddot: accelerations [rad/s^2], shape (..., 3).
         design: the robot's numbers.
+        gimbal: the gimbal at ``theta``, if it is known.
     """
-    theta, theta_dot, theta_ddot = (np.asarray(a, dtype=float) for a in (theta, theta_dot, theta_ddot))
-    yoke = design.yoke_inertia_kgm2[2] * theta_ddot * np.array([1.0, 0.0, 0.0])
+    gimbal = Gimbal.at(theta) if gimbal is None else gimbal
+    theta_dot, theta_ddot = np.asarray(theta_dot, dtype=float), np.asarray(theta_ddot, dtype=float)
+    yoke = design.yoke_inertia_kgm2[2] * theta_ddot[..., 0]
     # The ring's frame is {i} before the x rotation: the same formulas with theta_x and its rates at zero.
     no_x = np.array([1.0, 1.0, 0.0])
-    ring = _rotor_torque(theta * no_x, theta_dot * no_x, theta_ddot * no_x, design.ring_inertia_kgm2) * no_x
-    return yoke + ring + _rotor_torque(theta, theta_dot, theta_ddot, design.flange_inertia_kgm2)
+    ring = _rotor_torque(gimbal.before_x, theta_dot * no_x, theta_ddot * no_x, design.ring_inertia_kgm2)
+    flange = _rotor_torque(gimbal, theta_dot, theta_ddot, design.flange_inertia_kgm2)
+    return vectors(yoke + ring[..., 0] + flange[..., 0], ring[..., 1] + flange[..., 1], flange[..., 2])
 
 
 def wrench_on_payload(
@@ -84,6 +90,7 @@ def wrench_on_payload(
     tau: ArrayLike,
     design: Arm,
     legs: LegGeometry | None = None,
+    gimbal: Gimbal | None = None,
     R_bi: Array | None = None,
     h_ddot: Array | None = None,
 ) -> Array:
@@ -96,23 +103,23 @@ def wrench_on_payload(
         theta: gimbal angles (theta_z, theta_y, theta_x) [rad], rates and accelerations, each (..., 3).
         tau: spring torques [N m], shape (..., 3).
         design: the robot's numbers.
-        legs, R_bi, h_ddot: geometry at ``phi``, orientation at ``theta`` and the wrist's acceleration [m/s^2], if
-            they are known.
+        legs, gimbal, R_bi, h_ddot: geometry at ``phi``, gimbal and orientation at ``theta`` and the wrist's
+            acceleration [m/s^2], if they are known.
 
     Raises:
         InputError: no wrist position exists at some configuration.
     """
     legs = leg_geometry(phi[0], design) if legs is None else legs
-    R_bi = rotation(theta[0]) if R_bi is None else R_bi
+    gimbal = Gimbal.at(theta[0]) if gimbal is None else gimbal
+    R_bi = gimbal.rotation() if R_bi is None else R_bi
     f_b = legs.at_wrist(np.asarray(tau) - arm_torque(*phi, design, legs, h_ddot))
-    f_i = np.einsum("...ji,...j->...i", R_bi, f_b)
-    m_i = -moment_about_axes(theta[0], gimbal_torque(*theta, design))
-    return np.concatenate([m_i, f_i], axis=-1, dtype=np.float64)
+    f_i = times(np.swapaxes(R_bi, -1, -2), f_b)
+    m_i = -gimbal.moment(gimbal_torque(*theta, design, gimbal))
+    return vectors(*components(m_i), *components(f_i))
 
 
-def _rotor_torque(theta: Array, theta_dot: Array, theta_ddot: Array, inertia: Triple) -> Array:
+def _rotor_torque(gimbal: Gimbal, theta_dot: Array, theta_ddot: Array, inertia: Triple) -> Array:
     """Joint torques E^T (I omega_dot + omega x I omega) of one balanced body fixed in {i}."""
-    omega, omega_dot = angular_motion(theta, theta_dot, theta_ddot)
+    omega, omega_dot = gimbal.motion(theta_dot, theta_ddot)
     principal = np.array(inertia)
-    moment = principal * omega_dot + cross(omega, principal * omega)
-    return np.einsum("...ij,...i->...j", rate_matrix(theta), moment)
+    return gimbal.about_axes(principal * omega_dot + cross(omega, principal * omega))

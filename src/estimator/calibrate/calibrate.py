@@ -24,7 +24,8 @@ from estimator.calibrate.problem import KnownMass, Trial
 from estimator.calibrate.undecided import undecided
 from estimator.calibrate.unknowns import Unknowns
 from estimator.errors import InputError
-from estimator.estimate.payload import estimate_payload
+from estimator.estimate.consistency import Trial as Processed
+from estimator.estimate.payload import estimate_from_trials, trial_of, within_arithmetic
 from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.statics import CONTRADICTION
@@ -42,6 +43,7 @@ def calibrate(
     known_mass: Mapping[str, tuple[float, float]] | None = None,
     say: Callable[[str], object] = lambda _: None,
     robots: Calibration | None = None,
+    starts: Mapping[str | None, PayloadEstimate] | None = None,
 ) -> Calibration:
     """Geometry, springs, zeros and, where asked, masses of every robot, with what they carry.
 
@@ -56,6 +58,7 @@ def calibrate(
         say: takes the name of the stage that begins.
         robots: an earlier calibration of the same robots, which are held as it found them: the payloads alone are
             estimated, and its covariance goes on to theirs. Excludes ``free``, ``prior`` and ``known_mass``.
+        starts: what ``start_estimate`` makes of each payload's recordings, by its label; None to make it here.
 
     Raises:
         InputError: the recordings do not belong together, do not move enough, or cannot be solved.
@@ -80,7 +83,12 @@ def calibrate(
     shared = []
     for label, members in groups.items():
         say(f"payload {label}" if label else "payload")
-        shared.append(_start(estimate_payload(members, "auto", compare_masses=True, withhold=False), members))
+        if starts is None:
+            with within_arithmetic([recording.name for recording in members]):
+                estimate = start_estimate([trial_of(recording) for recording in members])
+        else:
+            estimate = starts[label]
+        shared.append(_start(estimate, members))
     say("calibration")
     units = ArmUnit(design, np.zeros((N, COUNT))) if robots is None else robots.units
     sensing = Sensing.of_each([Resolution.of(recording) for recording in (*recordings, *free)])
@@ -107,6 +115,18 @@ def calibrate(
     known = tuple(known_mass or ()) if robots is None else robots.known_mass
     wrong = findings(found, given, [recording.name for recording in recordings])
     return _result(found, wrong, recordings, free, labels, payload_of, prior, known)
+
+
+def start_estimate(trials: Sequence[Processed]) -> PayloadEstimate:
+    """What a calibration starts from: grasps, mass, centre of mass and inertia as robots as designed would have them.
+
+    Args:
+        trials: of one payload, processed by ``trial_of``.
+
+    Raises:
+        InputError: they are not of one payload, or tell nothing of it.
+    """
+    return estimate_from_trials(trials, "auto", compare_masses=True, withhold=False)
 
 
 def _by_payload(recordings: Sequence[Recording]) -> dict[str | None, list[Recording]]:

@@ -1,6 +1,7 @@
-"""One motion of the payload from all robots' twists, given the grasp frames."""
+"""One motion of the payload from all robots' twists, given the grasp frames, and how it changes with these."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -50,26 +51,112 @@ def fuse(data: GraspData, grasps: GraspEstimate) -> BodyMotion:
     )
 
 
+class FusionChanges(NamedTuple):
+    """Derivatives of a motion by the grasps' errors (``GraspEstimate.covariance``), K = 6(N-1) of them.
+
+    Attributes:
+        twist, twist_dot: of the payload's twist in {1} and its component-wise derivative, shape (K, Q, 6).
+        up: of the unit vector against gravity in {1}, shape (K, Q, 3).
+        force, moment: of the sum of the robots' wrenches at the origin of {1}, shape (K, Q, 3).
+    """
+
+    twist: Array
+    twist_dot: Array
+    up: Array
+    force: Array
+    moment: Array
+
+
+def fusion_changes(
+    twist: Array,
+    twist_dot: Array,
+    R_bi: Array,
+    wrench: Array,
+    grasps: GraspEstimate,
+    ratio: float | None = None,
+) -> FusionChanges:
+    """Derivatives of ``fuse``.
+
+    Args:
+        twist, twist_dot, R_bi, wrench: as of ``GraspData``.
+        grasps: the grasp frames.
+        ratio: a fixed weight as of ``fusion_with``; None for that of ``fusion_matrix``, which changes with them.
+    """
+    Q, N = twist.shape[:2]
+    K = 6 * (N - 1)
+    by_ratio = np.zeros(K)
+    if ratio is None:
+        ratio, by_ratio = _ratio(grasps)
+    dG = _fusion_matrix_changes(grasps, ratio, by_ratio).reshape(6 * K, 6 * N)
+    summing = _adjoint_inverse_changes(grasps)  # robot i sums to {1} what is its own, so the others stay
+    of_robot = np.repeat(np.arange(1, N), 6)
+    summed = np.moveaxis(summing, -1, -2) @ np.moveaxis(wrench, 0, -1)[of_robot]
+
+    def changed(stacked: Array) -> Array:  # components apart in memory
+        return np.moveaxis((dG @ stacked.reshape(Q, -1).T).reshape(K, 6, Q), 1, 2)
+
+    ups = robot_up(R_bi, grasps)
+    total = ups.sum(axis=1)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    mean = total / length
+    up = np.zeros((N - 1, 6, Q, 3))
+    up[:, :3] = so3.cross(np.eye(3)[:, None], np.moveaxis(ups[:, 1:], 1, 0)[:, None])
+    up = up.reshape(K, Q, 3)
+    up -= np.sum(up * mean, axis=-1, keepdims=True) * mean
+    wrenches = np.moveaxis(summed, 1, 2)
+    return FusionChanges(
+        changed(twist), changed(twist_dot), up / length, wrenches[..., 3:], wrenches[..., :3]
+    )
+
+
 def fusion_matrix(grasps: GraspEstimate) -> Array:
     """G with V_1 = G [V_1; ...; V_N], shape (6, 6N)."""
-    N = grasps.robots
-    if N == 1:
-        return np.eye(6)
-    off = ~np.eye(N, dtype=bool)
+    return np.eye(6) if grasps.robots == 1 else fusion_with(grasps, _ratio(grasps)[0])
+
+
+def _ratio(grasps: GraspEstimate) -> tuple[float, Array]:
+    """Weight of linear residuals [rad/m] beside angular ones, and its derivative by the grasps' errors, (6(N-1),)."""
+    N, off = grasps.robots, ~np.eye(grasps.robots, dtype=bool)
     angular = float(np.mean(grasps.angular_residual_rms[off] ** 2)) / 2
     # The linear residual also holds the angular noise of the mean times the distance; take that part out.
-    distance = np.linalg.norm(grasps.p_1i[:, None] - grasps.p_1i[None], axis=2)[off]
+    apart = grasps.p_1i[:, None] - grasps.p_1i[None]
     pair = float(np.mean(grasps.linear_residual_rms[off] ** 2))
-    linear = max(pair - angular / N * float(np.mean(distance**2)) * 2 / 3, 0.1 * pair) / 2
-    ratio = np.sqrt(angular / linear) if angular > 0 and linear > 0 else 1.0
-    return fusion_with(grasps, ratio)
+    share = angular / N * 2 / 3
+    open_part = pair - share * float(np.mean(np.sum(apart**2, axis=2)[off]))
+    linear = max(open_part, 0.1 * pair) / 2
+    by_errors = np.zeros((N, 6))
+    if not (angular > 0 and linear > 0):
+        return 1.0, by_errors[1:].ravel()
+    ratio = float(np.sqrt(angular / linear))
+    if open_part > 0.1 * pair:
+        by_errors[:, 3:] = 0.25 * ratio / linear * share * 4.0 / (N * (N - 1)) * apart.sum(axis=1)
+    return ratio, by_errors[1:].ravel()
 
 
 def fusion_with(grasps: GraspEstimate, ratio: float) -> Array:
     """The same with linear residuals weighted by ``ratio`` [rad/m], angular ones by 1."""
     weights = np.array([1.0, 1.0, 1.0, ratio, ratio, ratio])
-    H = np.concatenate([weights[:, None] * np.linalg.inv(_adjoint(grasps, i)) for i in range(grasps.robots)])
+    H = (weights[:, None] * _adjoint_inverses(grasps)).reshape(-1, 6)
     return np.asarray(np.linalg.pinv(H) * np.tile(weights, grasps.robots), dtype=float)
+
+
+def _fusion_matrix_changes(grasps: GraspEstimate, ratio: float, by_ratio: Array) -> Array:
+    """Derivative of ``fusion_with`` by the grasps' errors, the ratio's with it, shape (K, 6, 6N).
+
+    G = H^+ W with W the weights and H = W Ad^-1 of full rank: dH^+ = -H^+ dH H^+ + (H^T H)^-1 dH^T (1 - H H^+)
+    (G. Golub, V. Pereyra, SIAM J. Numer. Anal. 10, 1973).
+    """
+    N, K = grasps.robots, len(by_ratio)
+    weights, by_weights = np.repeat([1.0, ratio], 3), np.repeat([0.0, 1.0], 3)
+    inverses = _adjoint_inverses(grasps)
+    H = (weights[:, None] * inverses).reshape(-1, 6)
+    dH = np.zeros((K, N, 6, 6))
+    dH[np.arange(K), np.repeat(np.arange(1, N), 6)] = weights[:, None] * _adjoint_inverse_changes(grasps)
+    dH = (dH + by_ratio[:, None, None, None] * by_weights[:, None] * inverses).reshape(K, 6 * N, 6)
+    back = np.linalg.pinv(H)
+    beyond = np.eye(6 * N) - H @ back
+    d_back = -back @ dH @ back + (back @ back.T) @ np.swapaxes(dH, 1, 2) @ beyond
+    return d_back * np.tile(weights, N) + by_ratio[:, None, None] * back * np.tile(by_weights, N)
 
 
 def total_wrench(wrench: Array, grasps: GraspEstimate) -> tuple[Array, Array]:
@@ -79,9 +166,7 @@ def total_wrench(wrench: Array, grasps: GraspEstimate) -> tuple[Array, Array]:
     grasp moments m_i count too.
     """
     # [Ad_T_i1]^T takes a wrench from {i} to {1}; side by side they add up all robots' in one product.
-    total = wrench.reshape(len(wrench), -1) @ np.vstack(
-        [np.linalg.inv(_adjoint(grasps, i)) for i in range(grasps.robots)]
-    )
+    total = wrench.reshape(len(wrench), -1) @ _adjoint_inverses(grasps).reshape(-1, 6)
     return total[:, 3:], total[:, :3]
 
 
@@ -115,10 +200,20 @@ def acceleration_noise(data: GraspData, grasps: GraspEstimate) -> float:
     return float(np.sqrt(np.mean(np.var(alpha, axis=1, ddof=1))))
 
 
-def _adjoint(grasps: GraspEstimate, i: int) -> Array:
-    """[Ad_T_1i], equation (2), shape (6, 6)."""
-    R = grasps.R_1i[i]
-    Ad = np.zeros((6, 6))
-    Ad[:3, :3] = Ad[3:, 3:] = R
-    Ad[3:, :3] = so3.skew(grasps.p_1i[i]) @ R
-    return Ad
+def _adjoint_inverses(grasps: GraspEstimate) -> Array:
+    """[Ad_T_1i]^-1 of all robots, equation (2), shape (N, 6, 6)."""
+    out = np.zeros((grasps.robots, 6, 6))
+    back = np.swapaxes(grasps.R_1i, 1, 2)
+    out[:, :3, :3] = out[:, 3:, 3:] = back
+    out[:, 3:, :3] = -back @ so3.skew(grasps.p_1i)
+    return out
+
+
+def _adjoint_inverse_changes(grasps: GraspEstimate) -> Array:
+    """Derivatives of each robot's by its own errors (d_i, e_i), robot by robot from the second, shape (K, 6, 6)."""
+    out = np.zeros((grasps.robots - 1, 6, 6, 6))
+    turned = np.swapaxes(grasps.R_1i[1:], 1, 2)[:, None] @ so3.skew(np.eye(3))  # -d(R^T) by d_i
+    out[:, :3, :3, :3] = out[:, :3, 3:, 3:] = -turned
+    out[:, :3, 3:, :3] = turned @ so3.skew(grasps.p_1i[1:])[:, None]
+    out[:, 3:, 3:, :3] = -turned
+    return out.reshape(-1, 6, 6)

@@ -11,7 +11,8 @@ R_1j omega_j. Noise in the angular velocity that multiplies p shortens the estim
 that noise power, treats the two robots of a pair alike, and renumbering the robots changes nothing.
 
 All residuals are linear in the stacked twists V = [V_1; ...; V_N] of a sample, so sums of their products
-depend on the samples only through V V^T: one triangular 6N x 6N factor per window of samples replaces them.
+depend on the samples only through V V^T: a triangular 6N x 6N factor of all samples replaces them in the fit, and the
+products themselves in sums over windows of samples.
 """
 
 import warnings
@@ -91,16 +92,7 @@ def estimate_grasps(
         weights = _weights(V, R, p)
         R, p = _refine(V, R, p, weights)
 
-    normals, scores = [], []
-    for V_b in (
-        _factor(V[window.part], window.weights).reshape(-1, N, 6)
-        for trial, V in zip(trials, stacked, strict=True)
-        for window in windows(trial.samples, trial.rate_hz, window_s)
-    ):
-        J = (weights[..., None] * _jacobian(V_b, R, p)).reshape(-1, 6 * (N - 1))
-        normals.append(J.T @ J)
-        scores.append(J.T @ (weights * _residuals(V_b, R, p)).ravel())
-    covariance = window_covariance(np.array(normals), np.array(scores))
+    covariance = window_covariance(*_window_sums(trials, stacked, R, p, weights, window_s))
 
     mean = 3 * samples
     pair_rms = np.zeros((2, N, N))
@@ -211,7 +203,25 @@ def _triangle(V: Array) -> Array:
     return np.vstack([R, np.zeros((V.shape[1] - len(R), V.shape[1]))])
 
 
-def _factor(V: Array, weights: Array) -> Array:
-    """Square factor F with F^T F = V^T diag(weights) V: quicker than a triangle, exact in products."""
-    values, axes = np.linalg.eigh((V.T * weights) @ V)
-    return np.sqrt(np.maximum(values, 0.0))[:, None] * axes.T
+def _window_sums(
+    trials: Sequence[GraspData], stacked: Sequence[Array], R: Array, p: Array, weights: Array, window_s: float
+) -> tuple[Array, Array]:
+    """Normal matrices (B, K, K) and scores (B, K) of all windows; K = 6(N-1).
+
+    Residuals and their derivatives are those of unit twists, so that sums over a window are those of its V V^T.
+    """
+    N = len(p)
+    K, unit = 6 * (N - 1), np.eye(6 * N).reshape(-1, N, 6)
+    r = np.moveaxis(weights * _residuals(unit, R, p), 2, 0).reshape(6 * N, -1)
+    J = np.moveaxis(weights[..., None] * _jacobian(unit, R, p), 2, 0).reshape(6 * N, -1, K)
+    products = np.array([
+        (V[window.part].T * window.weights) @ V[window.part]
+        for trial, V in zip(trials, stacked, strict=True)
+        for window in windows(trial.samples, trial.rate_hz, window_s)
+    ])  # fmt: skip
+    normals, scores = np.zeros((len(products), K, K)), np.zeros((len(products), K))
+    for row, of_row in enumerate(J):  # all at once would take (6N)^2 K^2 numbers
+        with_others = products[:, row]
+        normals += np.tensordot(with_others, np.tensordot(of_row, J, axes=(0, 1)), axes=(1, 1))
+        scores += with_others @ (r @ of_row)
+    return normals, scores

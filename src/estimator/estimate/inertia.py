@@ -14,14 +14,13 @@ import numpy as np
 
 from estimator import so3
 from estimator.arrays import Array
-from estimator.estimate.fusion import acceleration_noise, fuse
+from estimator.estimate.fusion import acceleration_noise, fuse, fusion_changes
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.identifiability import StepReport, WeakDirection, combination, judge
 from estimator.estimate.principal import PrincipalInertia, inertia_matrix, principal_inertia, project_positive
 from estimator.estimate.uncertainty import (
     WINDOW_S,
     Window,
-    numerical_jacobian,
     standard_errors,
     window_covariance,
     window_normals,
@@ -214,16 +213,59 @@ def _upstream_covariance(
     com_by_grasp: Array,
 ) -> Array:
     """Covariance of the inertia due to errors of the CoM and of the grasps, which also move the CoM."""
-    thin = thinned(trials)
+    J = by_upstream(thinned(trials), grasps, p_1c, com_by_grasp)
     K = len(grasps.covariance)
-
-    def parameters(x: Array) -> Array:
-        moved = grasps.moved(x[:K])
-        parts = [_equations(trial, moved, p_1c + com_by_grasp @ x[:K] + x[K:]) for trial in thin]
-        return _solve(np.concatenate([X for X, _ in parts]), np.concatenate([y for _, y in parts]))
-
-    J = numerical_jacobian(parameters, np.zeros(K + 3))
     return J[:, :K] @ grasps.covariance @ J[:, :K].T + J[:, K:] @ com_covariance @ J[:, K:].T
+
+
+def by_upstream(
+    trials: Sequence[GraspData], grasps: GraspEstimate, p_1c: Array, com_by_grasp: Array
+) -> Array:
+    """Derivative of the parameters (26) by the grasps' errors, which also move the CoM, and by the CoM, (6, K + 3).
+
+    Of X x = y with the residual r: X^T X dx = dX^T r + X^T (dy - dX x).
+
+    Args:
+        trials, grasps, p_1c: as for ``estimate_inertia``.
+        com_by_grasp: derivative of p_1c by the grasps' errors, shape (3, K), K = 6(N-1).
+    """
+    K = len(grasps.covariance)
+    normal, right = np.zeros((6, 6)), np.zeros((6, K + 3))
+    equations = [_equations(trial, grasps, p_1c) for trial in trials]
+    parameters = _solve(*(np.concatenate(part) for part in zip(*equations, strict=True)))
+    inertia = inertia_matrix(parameters)
+    by_com = np.concatenate([com_by_grasp, np.eye(3)], axis=1)
+    for trial, (X, y) in zip(trials, equations, strict=True):
+        motion = fuse(trial, grasps)
+        omega, flat = motion.omega, X.reshape(-1, 6)
+        residual = y - X @ parameters
+        d = fusion_changes(trial.twist, trial.twist_dot, trial.R_bi, trial.wrench, grasps)
+        d_omega, d_alpha = d.twist[..., :3], d.twist_dot[..., :3]
+        dy = np.zeros((K + 3, *omega.shape))
+        dy[:K] = d.moment - so3.cross(p_1c, d.force)
+        dy[:K] -= d_alpha @ inertia
+        dy[:K] -= so3.cross(d_omega, omega @ inertia) + so3.cross(omega, d_omega @ inertia)
+        dy -= so3.cross(by_com.T[:, None], motion.force)
+        normal += flat.T @ flat
+        right += flat.T @ dy.reshape(K + 3, -1).T
+        right[:, :K] += inertia_regressor_changes(omega, d_omega, d_alpha, residual).T
+    return np.asarray(np.linalg.solve(normal, right), dtype=np.float64)
+
+
+def inertia_regressor_changes(omega: Array, d_omega: Array, d_alpha: Array, moment: Array) -> Array:
+    """Changes of sum_q (A + B)^T m, with A + B as of ``inertia_regressor``, by changes of the motion, (K, 6).
+
+    Args:
+        omega: angular velocity [rad/s], shape (Q, 3).
+        d_omega, d_alpha: changes of it and of the angular acceleration, shape (K, Q, 3).
+        moment: m, shape (Q, 3).
+    """
+    # L(w)^T m is linear in w m^T, and [omega]^T m = m x omega.
+    outer = np.swapaxes(d_alpha, 1, 2) @ moment + np.swapaxes(d_omega, 1, 2) @ so3.cross(moment, omega)
+    outer += omega.T @ so3.cross(moment, d_omega)
+    both = outer + np.swapaxes(outer, 1, 2)
+    i, j = np.triu_indices(3)
+    return np.where(i == j, 0.5, 1.0) * both[:, i, j]
 
 
 def thinned(trials: Sequence[GraspData]) -> list[GraspData]:

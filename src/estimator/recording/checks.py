@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.arm.delta import is_reachable, leg_geometry
+from estimator.arm.delta import stretches
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.filtering import MIN_SAMPLES, trim_slice
@@ -184,10 +184,10 @@ def _check_legs(recording: Recording) -> None:
 
     # One robot at a time: the geometry takes ten times the memory of its angles.
     arms = [(recording.joints(robot)[0], recording.arm(robot)) for robot in robots]
-    apart = [np.flatnonzero(~is_reachable(phi, arm)) for phi, arm in arms]
-    if (first := _first(apart)) is not None:
+    found = [stretches(phi, arm) for phi, arm in arms]
+    if (first := _first([np.flatnonzero(~meet) for meet, _ in found])) is not None:
         fail(*first, "the three rods cannot meet")
-    folded = [leg_geometry(phi, arm).leverage <= 0 for phi, arm in arms]
+    folded = [leverage <= 0 for _, leverage in found]
     if (first := _first([np.flatnonzero(legs.any(axis=1)) for legs in folded])) is not None:
         leg = int(np.argmax(folded[first[1]][first[0]]))
         fail(*first, f"leg {leg + 1} is past its stretched position")

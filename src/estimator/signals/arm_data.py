@@ -8,10 +8,10 @@ import numpy as np
 
 from estimator.arm.delta import leg_geometry, wrist_motion
 from estimator.arm.dynamics import wrench_on_payload
-from estimator.arm.gimbal import angular_motion, rotation
+from estimator.arm.gimbal import Gimbal
 from estimator.arm.numbers import Arm
 from estimator.arrays import Array
-from estimator.so3 import cross
+from estimator.so3 import cross, times
 
 
 class ArmData(NamedTuple):
@@ -48,11 +48,13 @@ def arm_data(
     """
     legs = leg_geometry(phi[0], arm)
     h_dot, h_ddot = wrist_motion(legs, phi[1], phi[2])
-    R_bi = rotation(theta[0])
-    omega, omega_dot = angular_motion(theta[0], theta[1], theta[2])
-    v = np.einsum("...ji,...j->...i", R_bi, h_dot)
-    v_dot = np.einsum("...ji,...j->...i", R_bi, h_ddot) - cross(omega, v)
-    wrench = wrench_on_payload(phi, theta, tau, arm, legs, R_bi, h_ddot)
+    gimbal = Gimbal.at(theta[0])
+    R_bi = gimbal.rotation()
+    R_ib = np.swapaxes(R_bi, -1, -2)
+    omega, omega_dot = gimbal.motion(theta[1], theta[2])
+    v = times(R_ib, h_dot)
+    v_dot = times(R_ib, h_ddot) - cross(omega, v)
+    wrench = wrench_on_payload(phi, theta, tau, arm, legs, gimbal, R_bi, h_ddot)
     return ArmData(
         R_bi,
         legs.h,

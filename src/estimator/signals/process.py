@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from estimator.apart import apart
 from estimator.arm.arms import Arms, levelled
 from estimator.arrays import Array
 from estimator.errors import InputError
@@ -54,20 +55,19 @@ def process_recording(recording: Recording, cutoff_hz: float = 5.0, trim_s: floa
     )
     for robot in range(shape[1]):
         arm = recording.arm(robot)
-        phi, theta, tau = (low_pass(samples, rate_hz, cutoff_hz) for samples in recording.joints(robot))
-        driven, gimbal = (_derivatives(angles, rate_hz, keep) for angles in (phi, theta))
-        tau = tau[keep]
+        read = low_pass(np.concatenate(recording.joints(robot), axis=1), rate_hz, cutoff_hz)
+        motion, tau = _derivatives(read[:, :6], rate_hz, keep), apart(read[keep, 6:], 1)
         # In blocks: what lies between takes ten times the memory of the result.
         for first in range(0, len(time), BLOCK):
             block = slice(first, first + BLOCK)
-            _fill(data, robot, block, driven[:, block], gimbal[:, block], tau[block], arm)
+            _fill(data, robot, block, motion[:, block, :3], motion[:, block, 3:], tau[block], arm)
     return data
 
 
 def _derivatives(angles: Array, rate_hz: float, keep: slice) -> Array:
-    """Angles [rad], rates and accelerations of the samples to be kept, shape (3, q, 3)."""
+    """Angles [rad], rates and accelerations of the samples to be kept, shape (3, q, 6)."""
     rate = differentiate(angles, rate_hz)
-    return np.stack([angles[keep], rate[keep], differentiate(rate, rate_hz)[keep]])
+    return apart(np.stack([angles[keep], rate[keep], differentiate(rate, rate_hz)[keep]]), 1)
 
 
 def _fill(

@@ -17,11 +17,10 @@ from estimator.arrays import Array
 from estimator.calibrate.calibration import Calibration
 from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
-from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.recording.model import Recording
 from estimator.signals.process import process_recording
-from mocobot_sim.paper.fits import COLUMNS, SELF_CALIBRATED, TRANSFER, fit_trials, three_trials
+from mocobot_sim.paper.fits import COLUMNS, SELF_CALIBRATED, TRANSFER, estimate_both, fit_trials, three_trials
 from mocobot_sim.paper.published import payload_truth
 from mocobot_sim.paper.scoring import score, score_fit
 from mocobot_sim.paper.store import Store
@@ -192,9 +191,11 @@ def run_paper(
             recordings[key] = recordings[key] + more
 
         sets = [(payload, preset) for preset in plan.presets for payload in plan.payloads]
-        estimates = each("estimates", _estimate, [(recordings[key],) for key in sets])
-        for (payload, preset), estimate in zip(sets, estimates, strict=True):
-            result.estimates.setdefault(preset, {})[payload] = estimate
+        fits = {(payload, preset) for _, preset, payload in plan.fits()}
+        tasks = [(recordings[key], key in fits) for key in sets]
+        estimates = dict(zip(sets, each("estimates", _estimate, tasks), strict=True))
+        for payload, preset in sets:
+            result.estimates.setdefault(preset, {})[payload] = estimates[payload, preset][0]
             result.recordings.setdefault(preset, {})[payload] = recordings[payload, preset]
 
         for stage, tasks in (("calibrations", plan.fits()), ("transfer", plan.transfers())):
@@ -205,6 +206,7 @@ def run_paper(
                     three_trials(recordings[payload, preset]),
                     preset,
                     result.fits[SELF_CALIBRATED][plan.payloads[0]] if column == TRANSFER else None,
+                    estimates[payload, preset][1],
                 )
                 for column, preset, payload in tasks
             ]
@@ -285,11 +287,9 @@ def _grasps(_share: Array, recordings: Sequence[Recording]) -> Grasps:
     return estimate.p_1i, estimate.R_1i
 
 
-def _fit(
-    _share: Array, recordings: Sequence[Recording], preset: str, robots: Calibration | None
-) -> Calibration:
-    return fit_trials(recordings, preset, robots)
+def _fit(_share: Array, *task: Any) -> Calibration:
+    return fit_trials(*task)
 
 
-def _estimate(_share: Array, recordings: Sequence[Recording]) -> PayloadEstimate:
-    return estimate_payload(recordings, "staged")
+def _estimate(_share: Array, *task: Any) -> tuple[PayloadEstimate, PayloadEstimate | None]:
+    return estimate_both(*task)

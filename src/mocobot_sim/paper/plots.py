@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from estimator.files import whole_file
@@ -19,6 +20,7 @@ MARKERS = {
     "paper": "D", "ideal": "v", "nominal": "o", ONE_FIT: "o", "uncalibrated": "s", SELF_CALIBRATED: "^", TRANSFER: "^",
 }  # fmt: skip
 HOLLOW = (ONE_FIT, TRANSFER)
+DPI = 130
 SHARE = "springs' common scale"
 """A line in the plots of mass and inertia: what no carry decides."""
 
@@ -114,6 +116,12 @@ def _save(figure: Figure, legend_of: Axes, path: Path) -> Path:
         ncols=len(labels) if len(labels) <= 6 else -(-len(labels) // 2), frameon=False, fontsize=9,
         columnspacing=1.2, handletextpad=0.2,
     )  # fmt: skip
+    # savefig would lay out while it draws once for nobody; laid out before, the picture is drawn once.
+    figure.set_dpi(DPI)
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        figure.set_layout_engine("none")
     with whole_file(path) as temporary:
-        figure.savefig(temporary, dpi=130, format="png")
+        FigureCanvasAgg(figure).print_png(temporary)
     return path

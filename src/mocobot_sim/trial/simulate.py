@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -73,12 +74,17 @@ class Simulated:
     Attributes:
         recordings: one per sensor preset.
         log: what truly happened.
-        truth: the payload and the robots.
+        scene: the team.
     """
 
     recordings: dict[str, Recording]
     log: TrialLog
-    truth: GroundTruth
+    scene: TeamScene
+
+    @cached_property
+    def truth(self) -> GroundTruth:
+        """The payload and the robots; compiles the team once more."""
+        return GroundTruth.of(self.scene)
 
 
 def simulate(
@@ -153,12 +159,12 @@ def simulate(
         )
         for preset in presets
     }
-    return Simulated(recordings, log, GroundTruth.of(scene))
+    return Simulated(recordings, log, scene)
 
 
 def draw_units(payload: str, preset: SensorPreset, seed: int) -> tuple[AsBuilt, ...]:
     """The robots that carry a payload: as designed (empty) if the preset is calibrated, else drawn from the seed."""
-    return _draw(len(_grasps(payload)), preset, seed)
+    return () if preset.calibrated else _draw(len(_grasps(payload)), preset, seed)
 
 
 def _draw(robots: int, preset: SensorPreset, seed: int) -> tuple[AsBuilt, ...]:

@@ -353,13 +353,15 @@ def test_fits_stand_beside_their_presets(monkeypatch: pytest.MonkeyPatch) -> Non
         )  # fmt: skip
         return Namespace(recordings={preset.name: recording for preset in presets}, log=log)
 
-    def fit(recordings: list, preset: str, robots: Namespace | None) -> Namespace:
+    def fit(recordings: list, preset: str, robots: Namespace | None, start: list) -> Namespace:
+        assert start == recordings
         assert [r.metadata.trial for r in recordings] == ["random", "static", "periodic"]
         assert {r.name[1:] for r in recordings} == {"0"}
         return Namespace(payloads=[(recordings[0].name, preset, robots and robots.payloads[0])])
 
     for name, does in (("simulate", simulate), ("fit_trials", fit), ("_grasps", lambda *_: None),
-                       ("estimate_payload", lambda *_: None), ("score", lambda *_: {}),
+                       ("estimate_both", lambda of, fitted: (None, three_trials(of) if fitted else None)),
+                       ("score", lambda *_: {}),
                        ("score_fit", lambda found, truth, units: (found, truth.name, len(units)))):  # fmt: skip
         monkeypatch.setattr(experiment, name, does)
     told: list[tuple[float, float, str]] = []

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from estimator.arm.unit import AT, COUNT, ArmUnit
@@ -23,19 +22,15 @@ from estimator.calibrate.equations.loops import pose_derivatives
 from estimator.calibrate.equations.noise import adjustment_of, covariance_of, noise_of
 from estimator.calibrate.equations.rows import Rows
 from estimator.calibrate.equations.sensing import Sensing
-from estimator.estimate.fusion import fusion_with, total_wrench
+from estimator.estimate.fusion import fusion_changes, fusion_with, total_wrench
 from estimator.estimate.joint import newton_euler_regressor
 from estimator.rigid_team.changes import needed_wrench, vee
 from estimator.rigid_team.residual import Bases, Shared, pose_error, robot_data
 from estimator.rigid_team.slots import COUNT as SLOTS
-from estimator.rigid_team.slots import PHI, STEPS, TAU, THETA
+from estimator.rigid_team.slots import PHI, TAU, THETA
+from estimator.signals.arm_changes import BY_UNIT, ArmChanges
 from estimator.signals.arm_data import ArmData
-
-_GEOMETRY = np.r_[AT["radius"], AT["proximal_length"], AT["rod_length"]]
-_MASSES = np.r_[AT["proximal_mass_ratio"], AT["rod_mass_ratio"], AT["wrist_mass_ratio"]]
-_TILT = np.r_[AT["tilt"]]
-_BY_UNIT: NDArray[np.intp] = np.concatenate([_GEOMETRY, _MASSES, _TILT])
-_UNIT_STEPS = np.concatenate([np.full(9, 1e-6), np.full(7, 1e-4), np.full(2, 1e-6)])
+from estimator.so3 import cross
 
 
 class Rowed(NamedTuple):
@@ -178,8 +173,17 @@ def _fusion(units: ArmUnit, shared: Shared) -> Array:
 
     Weighed as equal encoders would have it, which turn the driven links and so move the wrist.
     """
-    ratio = 1.0 / units.design.proximal_length_m
-    return fusion_with(shared.grasps, ratio)
+    return fusion_with(shared.grasps, _ratio(units))
+
+
+def _ratio(units: ArmUnit) -> float:
+    return 1.0 / units.design.proximal_length_m
+
+
+def _regressor(motion: Array, motion_dot: Array, up: Array, gravity_mps2: float) -> Array:
+    """Of what moves the payload, by its ten inertial parameters, shape (Q, 6, 10)."""
+    specific = motion_dot[:, 3:] + cross(motion[:, :3], motion[:, 3:]) + gravity_mps2 * up
+    return newton_euler_regressor(motion[:, :3], motion_dot[:, :3], specific)
 
 
 def _balance(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
@@ -190,8 +194,7 @@ def _balance(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
     up = np.einsum("iab,qib->qa", grasps.R_1i, data.R_bi[..., 2, :])
     up /= np.linalg.norm(up, axis=1, keepdims=True)
     force, moment = total_wrench(data.wrench, grasps)
-    specific = motion_dot[:, 3:] + np.cross(motion[:, :3], motion[:, 3:]) + units.gravity_mps2 * up
-    needed = newton_euler_regressor(motion[:, :3], motion_dot[:, :3], specific) @ shared.pi
+    needed = _regressor(motion, motion_dot, up, units.gravity_mps2) @ shared.pi
     return np.concatenate([force, moment], axis=1) - needed
 
 
@@ -213,34 +216,19 @@ def _derivatives(
     by_units = np.zeros((n, C, N, COUNT))
     for i in range(N):
         base = ArmData(*(part[:, i] for part in data))
-        by_unit = [] if held else [(_BY_UNIT, by_units, _UNIT_STEPS)]
-        for slots, changed, steps in [(np.arange(SLOTS), by_signals, STEPS), *by_unit]:
-            moved = _moved(s[:, i], ArmUnit(units.design, units.x[i]), slots, steps, changed is by_units)
-            d = ArmData(*(
-                (after - before) / steps.reshape(-1, *[1] * before.ndim)
-                for after, before in zip(moved, base, strict=True)
-            ))  # fmt: skip
+        arm = ArmChanges(s[:, i], ArmUnit(units.design, units.x[i]))
+        by_unit = [] if held else [(BY_UNIT, by_units, arm.by_unit())]
+        for places, changed, d in [(np.arange(SLOTS), by_signals, arm.by_signals()), *by_unit]:
             part = _chain(i, d, base, data, motion, motion_dot, up, length, G, shared, bases, units)
-            changed[:, :, i, slots] = np.moveaxis(part, 0, -1)
+            changed[:, :, i, places] = np.moveaxis(part, 0, -1)
         by_units[:, :, i, AT["phi_zero"]] = -by_signals[:, :, i, PHI]
         by_units[:, :, i, AT["theta_zero"]] = -by_signals[:, :, i, THETA]
         of_tau, unit = by_signals[:, :, i, TAU], ArmUnit(units.design, units.x[i])
         by_units[:, :, i, AT["tau_zero"]] = -of_tau * (1.0 + unit.of("stiffness_ratio"))
         tau = s[:, i, TAU] / (1.0 + unit.of("stiffness_ratio"))
         by_units[:, :, i, AT["stiffness_ratio"]] = of_tau * tau[:, None]
-    return by_signals, by_units, _by_carried(data, units, shared), np.zeros((n, C, 4 * (N - 1)))
-
-
-def _moved(s: Array, unit: ArmUnit, slots: NDArray[np.intp], steps: Array, of_unit: bool) -> ArmData:
-    """Data of one robot with each of some signals, or deviations, moved, shape (K, n, ...)."""
-    count = len(slots)
-    if of_unit:
-        x = np.tile(unit.x, (count, 1, 1))
-        x[np.arange(count), 0, slots] += steps
-        return robot_data(np.broadcast_to(s, (count, *s.shape)), ArmUnit(unit.design, x))
-    s = np.tile(s, (count, 1, 1))
-    s[np.arange(count), :, slots] += steps[:, None]
-    return robot_data(s, unit)
+    by_carried = _by_carried(data, motion, motion_dot, up, units, shared)
+    return by_signals, by_units, by_carried, np.zeros((n, C, 4 * (N - 1)))
 
 
 def _chain(
@@ -265,20 +253,20 @@ def _chain(
     d_up = (d_up - np.sum(d_up * up, axis=-1, keepdims=True) * up) / length
     needed = needed_wrench(motion, d.twist @ own.T, d.twist_dot @ own.T, d_up * units.gravity_mps2, shared.pi)
     d_force, d_moment = d.wrench[..., 3:] @ grasps.R_1i[i].T, d.wrench[..., :3] @ grasps.R_1i[i].T
-    d_moment = d_moment + np.cross(grasps.p_1i[i], d_force)
+    d_moment = d_moment + cross(grasps.p_1i[i], d_force)
     out[..., -6:] = np.concatenate([d_force - needed[0], d_moment - needed[1]], axis=-1)
     return out
 
 
-def _by_carried(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
+def _by_carried(
+    data: ArmData, motion: Array, motion_dot: Array, up: Array, units: ArmUnit, shared: Shared
+) -> Array:
     n, N = data.h.shape[:2]
-    grasped = 6 * (N - 1)
+    grasped, gravity = 6 * (N - 1), units.gravity_mps2
     out = np.zeros((n, 6 * N, grasped + 10))
-    # The balance depends on grasps in many ways, and on inertia linearly: steps of any size there.
-    steps = np.concatenate([np.full(grasped, 1e-6), np.ones(10)])
-    for k, step in enumerate(steps):
-        dx = np.zeros(len(steps))
-        dx[k] = step
-        ends = [_balance(data, units, shared.moved(sign * dx)) for sign in (1.0, -1.0)]
-        out[:, -6:, k] = (ends[0] - ends[1]) / (2.0 * step)
+    d = fusion_changes(data.twist, data.twist_dot, data.R_bi, data.wrench, shared.grasps, _ratio(units))
+    needed = needed_wrench(motion, d.twist, d.twist_dot, gravity * d.up, shared.pi)
+    out[:, -6:-3, :grasped] = np.moveaxis(d.force - needed[0], 0, -1)
+    out[:, -3:, :grasped] = np.moveaxis(d.moment - needed[1], 0, -1)
+    out[:, -6:, grasped:] = -_regressor(motion, motion_dot, up, gravity)
     return out
