@@ -13,6 +13,7 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.strict import Fields, read_json
+from mocobot_sim.serial.assets import take_along
 from mocobot_sim.serial.built import Effect, refused, steps
 from mocobot_sim.serial.effects import DRY, RobotEffect, dry_levels, resistances
 from mocobot_sim.serial.law import ActingLaw, JointLaw
@@ -30,7 +31,7 @@ LEAST_LOSS = 1e-12
 def write_extended(
     spec: mujoco.MjSpec, effects: Sequence[Effect], folder: Path, recordings: Sequence[str]
 ) -> None:
-    """Write ``robot.xml``, ``effects.json`` and a README into a new folder.
+    """Write ``robot.xml`` with the files that it needs, ``effects.json`` and a README into a new folder.
 
     Args:
         spec: the nominal model; changed.
@@ -44,7 +45,6 @@ def write_extended(
     try:
         inside = [isinstance(e, RobotEffect) and into_mjcf(spec, e) for e in effects]
         spec.compile()
-        text = spec.to_xml()
     except (ValueError, RuntimeError) as error:
         raise refused(error) from error
     places = [
@@ -52,9 +52,10 @@ def write_extended(
     ]
     try:
         folder.mkdir()
+        take_along(spec, folder)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
-    write_text(folder / SCENE, text)
+    write_text(folder / SCENE, spec.to_xml())
     causes = [_entry(e) | {"in": place} for e, place in zip(effects, places, strict=True)]
     write_json(
         folder / NUMBERS,
