@@ -121,9 +121,9 @@ def _magnitudes(found: JointInspection) -> Iterator[str]:
 
 def wrong_scales(found: JointInspection) -> dict[int, float]:
     """Joints whose torque is so many times what the model asks for that no mass explains it."""
-    if found.gains is None or not found.logs or found.logs[0].torque is None:
+    log = found.logs[0] if found.logs else None
+    if found.gains is None or log is None or log.torque is None:
         return {}
-    log = found.logs[0]
     known = ~np.isnan(log.drive.torque_constant) & np.isfinite(log.torque).any(axis=0)
     told = np.flatnonzero(known & np.isfinite(found.gains))
     gains = {int(j): float(found.gains[j]) for j in told}

@@ -104,7 +104,7 @@ def saturated(log: JointLog, robot: Robot) -> Iterator[str]:
         known = ~np.isnan(log.drive.torque_constant)
         for j, joint in enumerate(log.joints):
             if known[j] and np.isfinite(robot.torque_limit[j]):
-                share = np.mean(np.abs(log.torque[:, j]) > SATURATED * robot.torque_limit[j])
+                share = float(np.mean(np.abs(log.torque[:, j]) > SATURATED * robot.torque_limit[j]))
                 if share > 0:
                     yield (
                         f"torque of {joint} is at the model's limit of {robot.torque_limit[j]:g} "
@@ -112,7 +112,7 @@ def saturated(log: JointLog, robot: Robot) -> Iterator[str]:
                     )
     if log.drive.duty is not None:
         for j, joint in enumerate(log.joints):
-            share = np.mean(np.abs(log.drive.duty[:, j]) >= 1.0 - 1e-9)
+            share = float(np.mean(np.abs(log.drive.duty[:, j]) >= 1.0 - 1e-9))
             if share > 0:
                 yield f"duty of {joint} is full in {percent(share)} % of the samples: the loop is saturated there"
 

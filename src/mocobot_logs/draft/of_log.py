@@ -6,7 +6,7 @@ from mocobot_logs.draft.candidates import Candidate, of_table
 from mocobot_logs.draft.channels import find_channels
 from mocobot_logs.draft.draft import Draft, put_together
 from mocobot_logs.draft.time import time_lines
-from mocobot_logs.formats import log_kind
+from mocobot_logs.formats import Kind, log_kind
 from mocobot_logs.map.log_map import CsvMap
 from mocobot_logs.open_log import open_table
 from mocobot_logs.table.table import Table
@@ -36,7 +36,7 @@ def draft_of(path: Path, episode: int | None = None) -> Draft:
     return put_together(str(path), found, [*time_lines(table, candidates, found.robots), *csv])
 
 
-def opened(path: Path, kind: str, episode: int | None) -> tuple[Table, list[Candidate], list[str]]:
+def opened(path: Path, kind: Kind, episode: int | None) -> tuple[Table, list[Candidate], list[str]]:
     """A table, what its columns may be, and lines of a map that say how its text is written, if unlike most.
 
     Args:
