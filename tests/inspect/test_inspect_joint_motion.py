@@ -68,3 +68,19 @@ def test_shares_and_delays() -> None:
         "0", "0.12", "4.5", "99", "100", "100", "1234"
     ]  # fmt: skip
     assert [later(x) for x in (0.0123, -0.0031)] == ["12.3 ms later", "3.1 ms earlier"]
+
+
+def test_a_slide_in_millimetres_may_be_the_mistake_behind_a_force(tmp_path) -> None:
+    model = '<mujoco><worldbody><body><joint name="x" type="slide" axis="1 0 0"/><geom size=".1" mass="10"/></body>'
+    (tmp_path / "axis.xml").write_text(f"{model}</worldbody></mujoco>")
+    time = np.arange(2000) / RATE_HZ
+    position = 0.3 * np.sin(2.0 * time) + 0.1 * np.sin(5.0 * time)
+    force = 10.0 * (-1.2 * np.sin(2.0 * time) - 2.5 * np.sin(5.0 * time))
+    log = write_csv(tmp_path / "log.csv", {"time": time, "x": 1e3 * position, "force": force})
+    text = 'joints = ["x"]\ntime = { column = "time", unit = "s" }\n[channels]\nq = { column = "x", unit = "m" }\n'
+    (tmp_path / "log.toml").write_text(f'{text}torque = {{ column = "force", unit = "N" }}\n')
+    (said,) = (f.sentence for f in serial.inspect(log, tmp_path / "axis.xml").findings)
+    assert said.endswith(
+        " times what the model asks for; is it in whole units, taken for thousandths, or its position in thousandths, "
+        "taken for whole units?"
+    )

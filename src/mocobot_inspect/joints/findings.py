@@ -134,6 +134,8 @@ def _scales(found: JointInspection) -> Iterator[str]:
     for j, gain in wrong_scales(found).items():
         words = unit_of(gain)
         hint = f"is it in {words}" if words else "are its unit, gear and torque constant right"
+        if found.robot.slides[j] and words:
+            hint += f", or its position in {unit_of(1.0 / gain)}"
         yield f"torque of {found.robot.joints[j]} is {gain:.4g} times what the model asks for; {hint}?"
 
 

@@ -50,6 +50,8 @@ _SI: dict[Kind, tuple[str, str]] = {
 }  # fmt: skip
 _TURNS = 4.0 * np.pi
 """Joints that turn farther than that are taken to be logged in degrees [rad]."""
+_METRES = 20.0
+"""Slides that go farther than that are taken to be logged in millimetres [m]."""
 _ROWS = 20_000
 _LISTED = 12
 
@@ -210,6 +212,8 @@ def _line(name: str, place: _Place, values: Array | None, slides: Sequence[bool]
         largest = 0.0 if values is None or not len(values) else float(np.nanmax(np.abs(values)))
         if kind == "position" and not slide and not QUANTITIES[name].motor and largest > _TURNS:
             unit = "deg"
+        if kind == "position" and slide and largest > _METRES:
+            unit = "mm"
         if kind == "duty" and largest > 1.0:
             unit, more = "counts", ", full_scale = 1.0"
             if largest > 32767:

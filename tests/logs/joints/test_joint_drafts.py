@@ -40,6 +40,15 @@ def test_units_in_names_are_read(tmp_path, called: str, said: str) -> None:
     assert f"unit = {said} }}  # -" in line, line  # and what the column holds, without a doubt
 
 
+@pytest.mark.parametrize(("size", "unit"), [(1.0, "m"), (300.0, "mm")])
+def test_slides_that_go_far_are_logged_in_millimetres(tmp_path, size: float, unit: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(
+        "time,pos_1,pos_2\n" + "".join(f"{0.01 * k},{size * k / 100},{-size}\n" for k in range(100))
+    )
+    assert f'unit = "{unit}" }}  # doubtful: unit?' in draft_joint_map(path, JOINTS, [True, True]).text
+
+
 def test_decimal_commas_are_seen(tmp_path) -> None:
     names = ["time", "q_1_deg", "q_2_deg", "torque_1_Nm", "torque_2_Nm"]
     draft = draft_joint_map(written(tmp_path, names, comma=True), JOINTS, [False, False])
