@@ -63,9 +63,8 @@ def diagnose_serial(
         if say:
             say("simulate")
         rolled = rolled_out(rig, found.explanation)
-    return Diagnosed(
-        judged, found, SerialWords(rig.model), partial(traces, rig, found.explanation), rollouts=rolled
-    )
+    words = SerialWords(rig.model, reference=bool(reference))
+    return Diagnosed(judged, found, words, partial(traces, rig, found.explanation), rollouts=rolled)
 
 
 def diagnose_rig(
