@@ -143,7 +143,7 @@ COLUMNS = {
     ),
     "limit": (
         lambda v: v.update({"shoulder torque": np.clip(4 * v["shoulder torque"], -60.0, 60.0)}),
-        r"torque of shoulder is at the model's limit of 60 in \d\.?\d* % of the samples",
+        r"torque of shoulder is at the model's limit of 60 N m in \d\.?\d* % of the samples",
     ),
     "NaN": (
         lambda v: v["turret torque"].__setitem__(slice(3, 5), np.nan),

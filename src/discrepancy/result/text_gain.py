@@ -38,18 +38,19 @@ def _closed_loop(gain: Values, *, named: bool) -> Iterable[str]:
     if before is None or after is None:
         return
     what = "on trials left out of the fit" if gain["validated"] else "on trials in the fit: not validated"
-    yield from ("", f"[[Response to the recorded commands, simulated again ({what})]]")
+    yield from ("", f"[[{answer(gain)} ({what})]]")
     heads = ["before", "after", "noise alone"] if named else ["error", "noise alone"]
-    yield f"    {'':<26}" + "".join(f"{head:>14}" for head in heads)
     units = response_units(gain)
+    width = max(26, *(len(f"{channel} rms / motion [%]") for channel in units))
+    yield f"    {'':<{width}}" + "".join(f"{head:>14}" for head in heads)
     for channel in gain["units"]:
         shown, scale = units[channel]
         noise = scale * gain["noise"][f"{channel}_rms"]
         rms = [scale * which[f"{channel}_rms"] for which in (before, after)]
         share = [100.0 * which[f"{channel}_nrmse"] for which in (before, after)]
-        yield _row(f"{channel} rms [{shown}]", rms, named=named, last=noise)
-        yield _row(f"{channel} rms / motion [%]", share, named=named)
-    yield _row("chi2/n", [before["chi2_per_n"], after["chi2_per_n"]], named=named, last=1.0)
+        yield _row(f"{channel} rms [{shown}]", rms, named=named, last=noise, width=width)
+        yield _row(f"{channel} rms / motion [%]", share, named=named, width=width)
+    yield _row("chi2/n", [before["chi2_per_n"], after["chi2_per_n"]], named=named, last=1.0, width=width)
     if gain["removed"] is not None and named:
         low, high = gain["removed"]["interval"]
         count = sum(t["before"] is not None and t["after"] is not None for t in gain["trials"])
@@ -57,6 +58,18 @@ def _closed_loop(gain: Values, *, named: bool) -> Iterable[str]:
         if low is not None and high is not None and count > 1:
             text += f" (95 % interval over {count} trials: {100 * low:.1f} to {100 * high:.1f} %)"
         yield text
+
+
+def foretold_torques(gain: Values) -> bool:
+    """Whether the channels are torques of a serial robot, foretold from its motion: no commands are needed for them."""
+    return all(channel.endswith(" torque") for channel in gain["units"])
+
+
+def answer(gain: Values) -> str:
+    """What is held against the recordings."""
+    if foretold_torques(gain):
+        return "Torques, foretold from the recorded motion"
+    return "Response to the recorded commands, simulated again"
 
 
 def response_units(gain: Values) -> dict[str, Shown]:
@@ -94,6 +107,6 @@ def _table(values: Values, labels: Mapping[str, str], *, named: bool) -> Iterabl
         yield _row(label, [values["before"][key], values["after"][key]], named=named)
 
 
-def _row(label: str, numbers: list[float], *, named: bool, last: float | None = None) -> str:
+def _row(label: str, numbers: list[float], *, named: bool, last: float | None = None, width: int = 26) -> str:
     shown = (numbers if named else numbers[:1]) + ([] if last is None else [last])
-    return f"    {label:<26}" + "".join(f"{x:>14.4g}" for x in shown)
+    return f"    {label:<{width}}" + "".join(f"{x:>14.4g}" for x in shown)

@@ -43,20 +43,34 @@ def _free(rolled: Values) -> Iterable[str]:
     if horizons[0]["after"] is not None:
         yield ERRORS
     heads = [f"{h['seconds']:g} s ahead" for h in horizons]
-    yield f"{'joint':<22}" + "".join(f"{head:>24}" for head in heads)
     shown = shown_units(rolled)
-    for j, name in enumerate(rolled["joints"]):
-        unit, scale = shown[rolled["units"][j]]
+    rows = []
+    for j in range(len(rolled["joints"])):
+        _, scale = shown[rolled["units"][j]]
         cells = []
         for h in horizons:
             after = None if h["after"] is None else h["after"]["rms"][j]
             removed = None if h["removed"] is None else h["removed"][j]
             cells.append(_cell(h["before"]["rms"][j], after, removed, scale, named=h["after"] is not None))
-        yield f"{f'{name:.14} [{unit}]':<22}" + "".join(f"{cell:>24}" for cell in cells)
+        rows.append(cells)
+    widths = [max(map(len, column)) for column in zip(heads, *rows, strict=True)]
+    called = _called(rolled, shown, WIDTH - 4 - sum(widths) - 2 * len(widths))
+    for name, cells in zip(["joint", *called], [heads, *rows], strict=True):
+        line = (f"  {cell:>{width}}" for cell, width in zip(cells, widths, strict=True))
+        yield f"{name:<{max(map(len, called))}}" + "".join(line)
     yield from diverged_sentences(rolled)
     if rolled["not_simulated"]:
         yield f"Not in the rollouts: {', '.join(rolled['not_simulated'])}."
     yield from rolled["refused"]
+
+
+def _called(rolled: Values, shown: Mapping[str, Shown], room: int) -> list[str]:
+    """Joints by name, with units; by number where names are too long: cut short, they may be alike."""
+    units = [shown[unit][0] for unit in rolled["units"]]
+    named = [f"{name} [{unit}]" for name, unit in zip(rolled["joints"], units, strict=True)]
+    if max(map(len, named)) <= room:
+        return named
+    return [f"joint {j} [{unit}]" for j, unit in enumerate(units, start=1)]
 
 
 def _cell(
@@ -86,8 +100,8 @@ def diverged_sentences(rolled: Values) -> Iterable[str]:
 
 
 def shown_units(rolled: Values) -> dict[str, Shown]:
-    """The unit in which errors of joints that turn and of those that slide are shown."""
-    free = [(h[which] or {}).get("rms", []) for h in rolled["horizons"] for which in ("before", "after")]
+    """The unit in which errors of joints that turn and of those that slide are shown: by what is off first."""
+    free = [(h[which] or {}).get("rms", []) for h in rolled["horizons"][:1] for which in ("before", "after")]
     loop = [rolled["commanded"][which] or [] for which in ("before", "after")]
     return one_each(
         (rolled["units"][j], x or 0.0)
@@ -107,11 +121,15 @@ def _loop(rolled: Values) -> Iterable[str]:
 def _errors(rolled: Values, loop: Values) -> Iterable[str]:
     shown = shown_units(rolled)
     named = loop["after"] is not None
-    for j, name in enumerate(rolled["joints"]):
-        unit, scale = shown[rolled["units"][j]]
+    cells = []
+    for j in range(len(rolled["joints"])):
+        _, scale = shown[rolled["units"][j]]
         after, removed = (loop[key][j] if named else None for key in ("after", "removed"))
         cell = _cell(loop["before"][j], after, removed, scale, named=named)
-        yield f"{f'{name:.14} [{unit}]':<22}{cell:>24}"
+        cells.append(cell)
+    called = _called(rolled, shown, WIDTH - 4 - 2 - max(map(len, cells)))
+    for name, cell in zip(called, cells, strict=True):
+        yield f"{name:<{max(map(len, called))}}  {cell:>{max(map(len, cells))}}"
     for which, words in (("before", "the given model"), ("after", "the extended model")):
         count = lost(loop["blocks"], which)
         if count:

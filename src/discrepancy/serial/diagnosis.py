@@ -23,6 +23,9 @@ from discrepancy.serial.servo.loop import loop_laws, sentences
 from discrepancy.serial.traces import traces
 from discrepancy.serial.words import SerialWords
 
+RESTS = 2.0
+"""A joint whose readings scatter by no more than so many times their noise does not move."""
+
 
 def diagnose_serial(
     model: SerialModel,
@@ -60,9 +63,8 @@ def diagnose_serial(
         if say:
             say("simulate")
         rolled = rolled_out(rig, found.explanation)
-    return Diagnosed(
-        judged, found, SerialWords(rig.model), partial(traces, rig, found.explanation), rollouts=rolled
-    )
+    words = SerialWords(rig.model, reference=bool(reference))
+    return Diagnosed(judged, found, words, partial(traces, rig, found.explanation), rollouts=rolled)
 
 
 def diagnose_rig(
@@ -83,7 +85,8 @@ def diagnose_rig(
     found = diagnose(judged, most=rules.MOST_CAUSES, laws=laws, odds=odds, jobs=jobs, say=say)
     rows = max(2, round(rules.ERROR_BLOCK_S * rig.row_rate_hz(0)))
     explanation = with_errors(found.explanation, rows)
-    notes = (*notes_of([part.signals.log for part in rig.parts]), *found.notes, *_notes(rig))
+    read = [part.signals.log for part in rig.parts]
+    notes = (*notes_of(read), *resting(read), *found.notes, *_notes(rig))
     return replace(found, explanation=explanation, notes=notes)
 
 
@@ -97,6 +100,21 @@ def notes_of(logs: Sequence[JointLog]) -> Iterator[str]:
         more = len(notes) - 1
         parts = f"{more} more part{'s' if more > 1 else ''} of the logs"
         yield notes[0] + (f" So it is, with other numbers, in {parts}." if more else "")
+
+
+def resting(logs: Sequence[JointLog]) -> Iterator[str]:
+    """What rests in all logs, of which they tell little."""
+    still = np.ones(len(logs[0].joints), dtype=bool) if logs else np.zeros(0, dtype=bool)
+    for log in logs:
+        # White noise has second differences of six times its variance; of a motion they are small beside its size.
+        noise = np.std(np.diff(log.q, 2, axis=0), axis=0) / np.sqrt(6.0)
+        still &= np.std(log.q, axis=0) <= np.maximum(RESTS * noise, log.position_step)
+    names = [name for name, rests in zip(logs[0].joints, still, strict=True) if rests] if logs else []
+    if names and still.all():
+        yield "No joint moves in these logs; they tell no friction and no inertia, and gravity in one pose only."
+    elif names:
+        which = f"{', '.join(names[:-1])} and {names[-1]} do" if len(names) > 1 else f"{names[0]} does"
+        yield f"{which} not move in these logs, which tell no friction and no rotor there."
 
 
 def _notes(rig: SerialRig) -> Iterator[str]:

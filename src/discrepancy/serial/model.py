@@ -64,6 +64,13 @@ def load_spec(path: Path | str) -> mujoco.MjSpec:
     except (ValueError, RuntimeError, OSError) as error:
         said = _sentence(error)
         if spec.meshes:
+            spec = mujoco.MjSpec.from_file(str(path))  # of one that did not compile, MuJoCo tells no joints
+            body = _body_of_meshes(spec)
+            if body is not None:
+                raise InputError(
+                    f"{path}: MuJoCo cannot compile it ({said}); without its meshes: the inertia of {body} would be "
+                    "another (give the body an inertial)"
+                ) from error
             _drop_meshes(spec)
             try:
                 spec.compile()
@@ -74,8 +81,38 @@ def load_spec(path: Path | str) -> mujoco.MjSpec:
     return spec
 
 
+def _body_of_meshes(spec: mujoco.MjSpec) -> str | None:
+    """The first body that moves and has its inertia, or part of it, from a mesh, in words; None if there is none."""
+    of = spec.compiler
+    low, high = of.inertiagrouprange
+    for geom in spec.geoms:
+        massless = geom.mass == 0.0 or (np.isnan(geom.mass) and geom.density == 0.0)
+        if not geom.meshname or massless or not low <= geom.group <= high:
+            continue
+        body = geom.parent
+        given = (
+            body.explicitinertial and of.inertiafromgeom != mujoco.mjtInertiaFromGeom.mjINERTIAFROMGEOM_TRUE
+        )
+        if not given and _moves(body):
+            return (
+                f"body {body.name!r}"
+                if body.name
+                else f"a body without a name (its mesh is {geom.meshname!r})"
+            )
+    return None
+
+
+def _moves(body: mujoco.MjsBody) -> bool:
+    """Whether a body, or one that it hangs on, has a joint."""
+    while body is not None and body.name != "world":
+        if body.joints:
+            return True
+        body = body.parent
+    return False
+
+
 def _drop_meshes(spec: mujoco.MjSpec) -> None:
-    """Leave out meshes and what is drawn with them; a body whose inertia is to come from one then does not compile."""
+    """Leave out meshes and what is drawn with them."""
     for geom in [geom for geom in spec.geoms if geom.meshname]:
         spec.delete(geom)
     for mesh in list(spec.meshes):
@@ -91,6 +128,8 @@ def load_model(path: Path | str) -> SerialModel:
     """
     model = load_spec(path).compile()
     _check(Path(path), model)
+    if model.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_GRAVITY):
+        model.opt.gravity[:] = 0.0  # all that asks for it has to find the same
     joint = range(model.njnt)
     limited = model.jnt_limited.astype(bool)
     return SerialModel(

@@ -271,7 +271,8 @@ class SerialRig(SerialRows, Rig):
             InputError: the folder cannot be written, or MuJoCo refuses the model.
         """
         effects = [effect for found in explanation.found for effect in self.effects(found)]
-        write_extended(load_spec(self.model.path), effects, folder, self.trials)
+        spec = load_spec(self.model.path)
+        write_extended(spec, effects, folder, self.trials, reference=bool(self.common))
 
     def effects(self, found: Found) -> Sequence[Effect]:
         """A named cause as the simulator's effects."""

@@ -40,12 +40,14 @@ class SerialWords(Words):
 
     Args:
         model: whose joints slide, or turn.
+        reference: whether numbers count from logs of the robot while it was well, not from the model.
     """
 
     causes = CAUSES
     units = {"speed": "typical speeds"}  # noqa: RUF012
 
-    def __init__(self, model: SerialModel) -> None:
+    def __init__(self, model: SerialModel, *, reference: bool = False) -> None:
+        self._than = "than in the reference" if reference else "than modelled"
         joints = enumerate(zip(model.joints, model.slides, strict=True), start=1)
         sliding = [(j, name) for j, (name, slides) in joints if slides]
         self._slides = {f"{name} torque": "N" for _, name in sliding}
@@ -58,7 +60,7 @@ class SerialWords(Words):
         slide = isinstance(candidate, SerialCandidate) and candidate.slide
         numbers = SlideNumbers(values, se) if slide else Numbers(values, se)
         cause = CAUSES[candidate.cause]
-        return f"{cause.place(candidate)}: {cause.sentence(numbers)}."
+        return f"{cause.place(candidate)}: {cause.sentence(numbers)}.".replace("than modelled", self._than)
 
     def unit(self, name: str) -> str:
         """Unit of a channel, or of a quantity that a misfit may depend on."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from mocobot_inspect.findings import Finding, Topic, of_stream, stands
 from mocobot_inspect.joints.inspection import JointInspection
+from mocobot_inspect.joints.numbers import percent
 from mocobot_inspect.joints.samples import beyond_range, coarse, of_velocities, saturated, unit_of
 from mocobot_inspect.joints.wiring import SUSPICIOUS, Found, Mistake
 from mocobot_inspect.wiring.mistakes.base import listed
@@ -89,8 +90,8 @@ def _of_wiring(found: JointInspection) -> Iterator[str]:
     for mistake in wiring.found:
         yield mistake_sentence(mistake, joints)
     yield from _magnitudes(found)
-    bad = [j for j in np.flatnonzero(wiring.undone > 0.5)]
-    if bad:
+    bad = np.flatnonzero(wiring.undone > 0.5) if found.moves.any() else []
+    if len(bad):
         names = listed([joints[j] for j in bad])
         even = "even then torques" if wiring.found else "torques"
         yield (
@@ -107,26 +108,35 @@ def _magnitudes(found: JointInspection) -> Iterator[str]:
     """Torques without their signs."""
     for j, name in enumerate(found.robot.joints):
         torques = [log.torque[:, j] for log in found.logs if log.torque is not None]
-        if not torques or found.wiring is None or not found.wiring.undone[j] > SUSPICIOUS:
+        if (
+            not torques
+            or found.wiring is None
+            or not (found.wiring.undone[j] > SUSPICIOUS and found.moves.any())
+        ):
             continue
         torque = np.concatenate(torques)
         if np.isfinite(torque).all() and torque.max() > 0 and torque.min() > -_NEVER * torque.max():
             yield f"torque of {name} is never negative: has it lost its sign?"
 
 
-def _scales(found: JointInspection) -> Iterator[str]:
-    if found.gains is None or not found.logs:
-        return
-    log = found.logs[0]
-    if log.torque is None:
-        return
+def wrong_scales(found: JointInspection) -> dict[int, float]:
+    """Joints whose torque is so many times what the model asks for that no mass explains it."""
+    log = found.logs[0] if found.logs else None
+    if found.gains is None or log is None or log.torque is None:
+        return {}
     known = ~np.isnan(log.drive.torque_constant) & np.isfinite(log.torque).any(axis=0)
-    for j in np.flatnonzero(known & np.isfinite(found.gains)):
-        gain = float(found.gains[j])
-        if gain > WRONG_SCALE or gain < 1.0 / WRONG_SCALE:
-            words = unit_of(gain)
-            hint = f"is it in {words}" if words else "are its unit, gear and torque constant right"
-            yield f"torque of {found.robot.joints[j]} is {gain:.4g} times what the model asks for; {hint}?"
+    told = np.flatnonzero(known & np.isfinite(found.gains))
+    gains = {int(j): float(found.gains[j]) for j in told}
+    return {j: gain for j, gain in gains.items() if not 1.0 / WRONG_SCALE <= gain <= WRONG_SCALE}
+
+
+def _scales(found: JointInspection) -> Iterator[str]:
+    for j, gain in wrong_scales(found).items():
+        words = unit_of(gain)
+        hint = f"is it in {words}" if words else "are its unit, gear and torque constant right"
+        if found.robot.slides[j] and words:
+            hint += f", or its position in {unit_of(1.0 / gain)}"
+        yield f"torque of {found.robot.joints[j]} is {gain:.4g} times what the model asks for; {hint}?"
 
 
 def mistake_sentence(found: Found, joints: tuple[str, ...]) -> str:
@@ -136,8 +146,8 @@ def mistake_sentence(found: Found, joints: tuple[str, ...]) -> str:
         told = "; ".join(words(m, joints) for m in found.alternatives[:3])
         others = f" (this log cannot tell it from: {told})"
     return (
-        f"{words(found.mistake, joints)}{others}: undoing it leaves {100 * found.after:.2g} % of the torques concerned "
-        f"unexplained, not {100 * found.before:.2g} %"
+        f"{words(found.mistake, joints)}{others}: undoing it leaves {percent(found.after)} % of the torques concerned "
+        f"unexplained, not {percent(found.before)} %"
     )
 
 
@@ -165,6 +175,6 @@ def _of_delays(found: JointInspection) -> Iterator[str]:
     if abs(late.delay_s) > period_s and late.before > LATE * late.after:
         way = "behind" if late.delay_s > 0 else "ahead of"
         yield (
-            f"torques run {1e3 * abs(late.delay_s):.3g} ms {way} the motion: {100 * late.before:.2g} % of them is left "
-            f"unexplained without that delay, {100 * late.after:.2g} % with it"
+            f"torques run {1e3 * abs(late.delay_s):.3g} ms {way} the motion: {percent(late.before)} % of them is left "
+            f"unexplained without that delay, {percent(late.after)} % with it"
         )

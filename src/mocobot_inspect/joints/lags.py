@@ -16,6 +16,8 @@ LONGEST_S = 0.1
 """Longest delay that is looked for [s]."""
 FOLLOWS = 0.8
 """Correlation with the motion from which on a channel is taken to follow it, up to gain and delay."""
+SLOW = 0.4
+"""Of a joint's rms speed; where it is slower, dry friction has any value, and leads or lags by milliseconds."""
 _STEPS = 10  # delays tried on either side
 _SHARPENED = 3
 
@@ -71,6 +73,8 @@ def exchanged_commands(log: JointLog, motion: Motion) -> list[tuple[int, int]]:
 def torque_delay(log: JointLog, motion: Motion, asked: Array) -> tuple[float, float, float] | None:
     """Delay of all torques after the motion [s], and what is left of their variance without and with it, or None.
 
+    Samples in which a joint is slow are left out.
+
     Args:
         log: the log.
         motion: its motion.
@@ -86,12 +90,15 @@ def torque_delay(log: JointLog, motion: Motion, asked: Array) -> tuple[float, fl
     joints = np.flatnonzero(known)
     most = min(LONGEST_S, 0.1 * len(log.time) / rate)
     time = np.arange(len(torque)) / rate
+    speeds = motion.dq[:, joints]
+    fast = np.abs(speeds) > SLOW * np.sqrt(np.mean(speeds**2, axis=0))
 
     def left(delay_s: float) -> float:
         total = 0.0
         for k, j in enumerate(joints):
-            late = np.interp((motion.at / rate) + delay_s, time, torque[:, k])
-            _, rest = fit(asked[:, j], motion.dq[:, j], motion.ddq[:, j], late)
+            at = fast[:, k]
+            late = np.interp((motion.at[at] / rate) + delay_s, time, torque[:, k])
+            _, rest = fit(asked[at, j], motion.dq[at, j], motion.ddq[at, j], late)
             total += float(np.log(np.var(rest) / max(np.var(late), 1e-30) + 1e-9))
         return total / len(joints)
 

@@ -18,6 +18,8 @@ MOST_ROWS = 1500
 """So many samples are looked at: a model's torque takes 20 us a sample, and fifty mistakes are tried."""
 MOVES = 1e-6
 """Smaller spans are no motion [rad or m]."""
+NOISES = 12.0
+"""Nor are spans of less than so many standard deviations of what noise the low-pass lets through."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +46,11 @@ class Motion:
     @property
     def moves(self) -> NDArray[np.bool_]:
         """Whether each joint moves, shape (J,)."""
-        return np.ptp(self.q, axis=0) > np.maximum(MOVES, 3.0 * self.log.position_step)
+        rate = self.log.rate_hz
+        # What the low-pass takes off is noise, and as much of white noise is left as its band is of the whole.
+        noise = np.std(self.log.q[self.at] - self.q, axis=0) * np.sqrt(2.0 * cutoff_hz(self.log) / rate)
+        least = np.maximum(np.maximum(MOVES, 3.0 * self.log.position_step), NOISES * noise)
+        return np.ptp(self.q, axis=0) > least
 
 
 def cutoff_hz(log: JointLog) -> float:

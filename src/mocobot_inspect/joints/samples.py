@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from estimator.arrays import Array
 from mocobot_inspect.joints.lags import Follows
+from mocobot_inspect.joints.numbers import percent
 from mocobot_inspect.joints.robot import Robot
 from mocobot_logs.joints.joint_log import JointLog
 from mocobot_logs.joints.joint_map import JointMap, label
@@ -92,7 +93,7 @@ def coarse(log: JointLog, moves: NDArray[np.bool_]) -> Iterator[str]:
         span, step = float(np.ptp(log.q[:, j])), float(log.position_step[j])
         if moves[j] and step > COARSE * span:
             yield (
-                f"q of {joint} comes in steps of {step:.3g}, {100 * step / span:.2g} % of all that it moves: what is "
+                f"q of {joint} comes in steps of {step:.3g}, {percent(step / span)} % of all that it moves: what is "
                 "slower or smaller is lost in rounding"
             )
 
@@ -103,17 +104,17 @@ def saturated(log: JointLog, robot: Robot) -> Iterator[str]:
         known = ~np.isnan(log.drive.torque_constant)
         for j, joint in enumerate(log.joints):
             if known[j] and np.isfinite(robot.torque_limit[j]):
-                share = np.mean(np.abs(log.torque[:, j]) > SATURATED * robot.torque_limit[j])
+                share = float(np.mean(np.abs(log.torque[:, j]) > SATURATED * robot.torque_limit[j]))
                 if share > 0:
                     yield (
-                        f"torque of {joint} is at the model's limit of {robot.torque_limit[j]:g} in "
-                        f"{100 * share:.2g} % of the samples"
+                        f"torque of {joint} is at the model's limit of {robot.torque_limit[j]:g} "
+                        f"{'N' if robot.slides[j] else 'N m'} in {percent(share)} % of the samples"
                     )
     if log.drive.duty is not None:
         for j, joint in enumerate(log.joints):
-            share = np.mean(np.abs(log.drive.duty[:, j]) >= 1.0 - 1e-9)
+            share = float(np.mean(np.abs(log.drive.duty[:, j]) >= 1.0 - 1e-9))
             if share > 0:
-                yield f"duty of {joint} is full in {100 * share:.2g} % of the samples: the loop is saturated there"
+                yield f"duty of {joint} is full in {percent(share)} % of the samples: the loop is saturated there"
 
 
 def unit_of(gain: float) -> str | None:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from mocobot_inspect.joints.findings import joint_findings
+from mocobot_inspect.joints.findings import joint_findings, wrong_scales
 from mocobot_inspect.joints.inspection import JointInspection
+from mocobot_inspect.joints.numbers import later, percent
 from mocobot_inspect.stream.channels import Channel
 from mocobot_inspect.wiring.mistakes.base import listed
 from mocobot_logs.joints.quantities import COMMANDS, QUANTITIES
@@ -96,22 +97,22 @@ def _motion(found: JointInspection) -> list[str]:
     if still:
         lines.append(f"    {listed(still)} {'does' if len(still) == 1 else 'do'} not move")
     w = found.wiring
-    if w is None:
+    if w is None or not found.moves.any():
         lines.append(
             "    no torque or duty of a joint that moves: signs and order are not compared with the model"
         )
     else:
-        told = [f"{joints[j]} {100 * w.misfit[j]:.2g} %" for j in np.flatnonzero(np.isfinite(w.misfit))]
+        told = [f"{joints[j]} {percent(w.misfit[j])} %" for j in np.flatnonzero(np.isfinite(w.misfit))]
         lines.append("    neither model nor friction explains, of each torque or duty: " + ", ".join(told))
-        lines.append(f"    {w.tried} mistakes of signs, order and units were tried")
+        lines.append(f"    mistakes of signs, order and units that were tried: {w.tried}")
     for what, all_of in (("dq follows q", found.velocities), ("q follows its command", found.commands)):
         for one in all_of:
             lines.append(
-                f"    {joints[one.joint]}: {what} with gain {one.gain:.4g}, {1e3 * one.delay_s:.3g} ms later, "
+                f"    {joints[one.joint]}: {what} with gain {one.gain:.4g}, {later(one.delay_s)}, "
                 f"correlation {one.correlation:.4g}"
             )
     if found.delay is not None:
-        lines.append(f"    torques follow the motion {1e3 * found.delay.delay_s:.3g} ms later")
+        lines.append(f"    torques follow the motion {later(found.delay.delay_s)}")
     return lines
 
 
@@ -133,7 +134,7 @@ def joint_ready_line(found: JointInspection) -> str:
     if not good:
         return "ready for: nothing (no joint that moves has a torque, a command or a duty)"
     mistakes = 0 if found.wiring is None else len(found.wiring.found)
-    lost = bool(found.signs_lost or found.crossed)
+    lost = bool(found.signs_lost or found.crossed or wrong_scales(found))
     if mistakes or lost:
         what = "the mistake above" if mistakes + lost == 1 else "the mistakes above"
         return f"ready for: nothing as it is; with {what} undone in the map: {' and '.join(good)}"

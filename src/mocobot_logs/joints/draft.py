@@ -11,14 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from estimator.arrays import Array
-from mocobot_logs.draft.candidates import of_table
+from mocobot_logs.draft.of_log import opened
 from mocobot_logs.draft.robots import Robots
 from mocobot_logs.draft.text import DOUBTFUL, printable
 from mocobot_logs.draft.time import time_lines
 from mocobot_logs.formats import log_kind
 from mocobot_logs.joints.quantities import QUANTITIES, Kind, units_of
-from mocobot_logs.map.log_map import CsvMap
-from mocobot_logs.open_log import open_table
 from mocobot_logs.table.table import Table, Wanted
 
 _WORDS: dict[str, set[str]] = {
@@ -43,8 +41,8 @@ _AT_MOTOR = {
 }
 _UNITS = {
     "rad": "rad", "deg": "deg", "degrees": "deg", "turns": "turn", "counts": "counts", "ticks": "counts",
-    "rpm": "rpm", "nm": "Nm", "mnm": "mNm", "n": "N", "a": "A", "ma": "mA", "m": "m", "mm": "mm", "v": "V", "mv": "mV",
-    "volts": "V",
+    "rpm": "rpm", "nm": "Nm", "mnm": "mNm", "nmm": "Nmm", "n": "N", "a": "A", "ma": "mA", "m": "m", "mm": "mm",
+    "v": "V", "mv": "mV", "volts": "V",
 }  # fmt: skip
 _SI: dict[Kind, tuple[str, str]] = {
     "position": ("rad", "m"), "velocity": ("rad/s", "m/s"), "effort": ("Nm", "N"), "current": ("A", "A"),
@@ -52,6 +50,8 @@ _SI: dict[Kind, tuple[str, str]] = {
 }  # fmt: skip
 _TURNS = 4.0 * np.pi
 """Joints that turn farther than that are taken to be logged in degrees [rad]."""
+_METRES = 20.0
+"""Slides that go farther than that are taken to be logged in millimetres [m]."""
 _ROWS = 20_000
 _LISTED = 12
 
@@ -110,8 +110,8 @@ def draft_joint_map(
         places, unused = _of_bag(path, joints)
         lines = [_line(name, place, None, slides) for name, place in places.items()]
         return _drafted(head, [], lines, places, unused)
-    table = open_table(path, kind, CsvMap(), episode)
-    time = time_lines(table, of_table(table), Robots((), ""))
+    table, candidates, csv = opened(path, kind, episode)
+    time = [*time_lines(table, candidates, Robots((), "")), *csv]
     places, unused = _of_table(table, joints, _time_column(time))
     lines = [_line(name, place, _values(table, place.columns), slides) for name, place in places.items()]
     return _drafted(head, time, lines, places, unused)
@@ -201,6 +201,8 @@ def _line(name: str, place: _Place, values: Array | None, slides: Sequence[bool]
         doubts.append("sliding joints need their own unit: [joint.NAME.channels]")
     chunks = re.split(r"[^a-z]+", re.sub(r"\{\w+\}", " ", place.keys.get("column", "")).lower())
     said = [_UNITS[chunk] for chunk in chunks if chunk in _UNITS]
+    if kind == "velocity":
+        said += [f"{unit}/s" for unit in said if unit != "rpm"]
     allowed = units_of(kind, slides=slide)
     unit = next((each for each in reversed(said) if each in allowed), None)
     more = ""
@@ -210,6 +212,8 @@ def _line(name: str, place: _Place, values: Array | None, slides: Sequence[bool]
         largest = 0.0 if values is None or not len(values) else float(np.nanmax(np.abs(values)))
         if kind == "position" and not slide and not QUANTITIES[name].motor and largest > _TURNS:
             unit = "deg"
+        if kind == "position" and slide and largest > _METRES:
+            unit = "mm"
         if kind == "duty" and largest > 1.0:
             unit, more = "counts", ", full_scale = 1.0"
             if largest > 32767:
@@ -229,7 +233,9 @@ def _line(name: str, place: _Place, values: Array | None, slides: Sequence[bool]
 
 def _values(table: Table, columns: Sequence[str]) -> Array | None:
     """The first values of some columns, all together."""
-    plain = {column: column.partition("[")[0] for column in columns}
+    plain = {
+        c: c if c in table.shapes else c.partition("[")[0] for c in columns
+    }  # a unit may stand in brackets
     places = {c: table.aliases.get(c, (plain[c], None))[0] for c in columns}
     wanted = tuple(dict.fromkeys(places.values()))
     if not all(name in table.shapes for name in wanted):

@@ -56,7 +56,7 @@ _TURNING: dict[str, dict[str, float]] = {
     "velocity": {
         "rad/s": 1.0, "deg/s": math.pi / 180.0, "rpm": math.pi / 30.0, "turn/s": 2.0 * math.pi
     },
-    "effort": {"Nm": 1.0, "N m": 1.0, "mNm": 1e-3, "mN m": 1e-3, "kNm": 1e3},
+    "effort": {"Nm": 1.0, "N m": 1.0, "mNm": 1e-3, "mN m": 1e-3, "Nmm": 1e-3, "N mm": 1e-3, "kNm": 1e3},
 }  # fmt: skip
 _SLIDING: dict[str, dict[str, float]] = {
     "position": {"m": 1.0, "mm": 1e-3, "um": 1e-6},

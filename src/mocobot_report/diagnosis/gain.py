@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.result.text_gain import ERRORS, response_units
+from discrepancy.result.text_gain import ERRORS, foretold_torques, response_units
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.charts import chart, column_axis, dots, figure, literal, log_axis
 from mocobot_report.blocks.html import Node, el
@@ -69,7 +69,13 @@ def _closed_loop(book: Book, gain: Values, names: Sequence[str], shown: Mapping[
     where = (
         "on trials left out of the fit" if gain["validated"] else "on trials it was fitted to: not validated"
     )
-    said = f"The recorded commands are simulated again, {where}."
+    of_motion = foretold_torques(gain)
+    what = (
+        "Torques are foretold from the recorded motion"
+        if of_motion
+        else "The recorded commands are simulated again"
+    )
+    said = f"{what}, {where}."
     if gain["removed"] is not None and "after" in shown:
         low, high = gain["removed"]["interval"]
         said += f" The causes remove {percent(gain['removed']['share'])} of the error beyond noise"
@@ -102,7 +108,8 @@ def _response(gain: Values, shown: Mapping[str, Key]) -> Node:
     )
     heads = _heads(shown)
     head = ["channel", "unit", *heads, "noise alone", *(f"{name} / motion [%]" for name in heads)]
-    return table("Error of the simulated response, rms over the trials", head, rows)
+    of = "foretold torques" if foretold_torques(gain) else "simulated response"
+    return table(f"Error of the {of}, rms over the trials", head, rows)
 
 
 def _trials_chart(book: Book, gain: Values, key: str, names: Sequence[str], shown: Mapping[str, Key]) -> Node:

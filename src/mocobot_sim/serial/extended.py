@@ -13,6 +13,7 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.strict import Fields, read_json
+from mocobot_sim.serial.assets import take_along
 from mocobot_sim.serial.built import Effect, refused, steps
 from mocobot_sim.serial.effects import DRY, RobotEffect, dry_levels, resistances
 from mocobot_sim.serial.law import ActingLaw, JointLaw
@@ -23,20 +24,27 @@ FORMAT, VERSION = "mocobot-extended-robot", 2
 SCENE, NUMBERS, README = "robot.xml", "effects.json", "README.md"
 KEYS = ("cause", "joint", "partner", "parameters", "law", "in")
 LAW = "law"
+CHANGED = ", which is what has changed since the reference; what is wrong with the model in both is not in it"
 LEAST_LOSS = 1e-12
 """Dry friction with which MuJoCo makes a row for it [N m or N]."""
 
 
 def write_extended(
-    spec: mujoco.MjSpec, effects: Sequence[Effect], folder: Path, recordings: Sequence[str]
+    spec: mujoco.MjSpec,
+    effects: Sequence[Effect],
+    folder: Path,
+    recordings: Sequence[str],
+    *,
+    reference: bool = False,
 ) -> None:
-    """Write ``robot.xml``, ``effects.json`` and a README into a new folder.
+    """Write ``robot.xml`` with the files that it needs, ``effects.json`` and a README into a new folder.
 
     Args:
         spec: the nominal model; changed.
         effects: what is off.
         folder: is created.
         recordings: names of those that it was found from.
+        reference: whether it is what has changed since other logs, whose own errors are then in no model.
 
     Raises:
         InputError: the folder cannot be written, or an effect makes a model that MuJoCo refuses.
@@ -44,7 +52,6 @@ def write_extended(
     try:
         inside = [isinstance(e, RobotEffect) and into_mjcf(spec, e) for e in effects]
         spec.compile()
-        text = spec.to_xml()
     except (ValueError, RuntimeError) as error:
         raise refused(error) from error
     places = [
@@ -52,15 +59,16 @@ def write_extended(
     ]
     try:
         folder.mkdir()
+        take_along(spec, folder)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
-    write_text(folder / SCENE, text)
+    write_text(folder / SCENE, spec.to_xml())
     causes = [_entry(e) | {"in": place} for e, place in zip(effects, places, strict=True)]
     write_json(
         folder / NUMBERS,
         {"format": FORMAT, "version": VERSION, "causes": causes, "recordings": list(recordings)},
     )
-    write_text(folder / README, _readme(effects, places))
+    write_text(folder / README, _readme(effects, places, CHANGED if reference else ""))
 
 
 def _entry(effect: Effect) -> dict[str, Any]:
@@ -151,7 +159,7 @@ def _rub(model: mujoco.MjModel, data: mujoco.MjData, level: Array) -> None:
             data.iefc_frictionloss[:] = data.efc_frictionloss[data.map_iefc2efc]
 
 
-def _readme(effects: Sequence[Effect], places: Sequence[str]) -> str:
+def _readme(effects: Sequence[Effect], places: Sequence[str], more: str) -> str:
     rows = [
         f"| {_row(e)} | {'not simulated' if place == 'none' else f'`{place}`'} |"
         for e, place in zip(effects, places, strict=True)
@@ -161,7 +169,7 @@ def _readme(effects: Sequence[Effect], places: Sequence[str]) -> str:
     )
     return f"""# Extended robot
 
-The robot with these causes built in:
+The robot with these causes built in{more}:
 
 {table}
 

@@ -7,13 +7,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mocobot_sim.serial.effects import DRY, RobotEffect
+from mocobot_sim.serial.inertials import inertial_of, keep_inertials, real_inertia, set_inertial
 
 INERTIA = ("xx", "yy", "zz", "xy", "xz", "yz")
 SOLREF, SOLIMP = (0.002, 1.0), (0.99, 0.999, 0.001, 0.5, 2.0)
 """Of dry friction. With MuJoCo's defaults it grows with the speed up to about loss / (100 / s inertia), 0.2 rad/s for
 20 N m on 1 kg m^2; with these up to a tenth of that, for steps of up to 1 ms."""
-LEAST_MOMENT = 1e-3
-"""Of a payload's largest second moment of mass, the least that it has in any direction. Chosen: a thin sheet's."""
 
 
 def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
@@ -31,7 +30,7 @@ def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
         return False
     at = effect.joint - 1
     joint = spec.joint(model.joint(at).name)
-    body = spec.body(model.body(model.jnt_bodyid[at]).name)
+    body = joint.parent
     if effect.cause in DRY:
         joint.solref_friction, joint.solimp_friction = list(SOLREF), list(SOLIMP)
     if effect.cause == "friction":
@@ -50,22 +49,22 @@ def into_mjcf(spec: mujoco.MjSpec, effect: RobotEffect) -> bool:
         stiffness = np.array(joint.stiffness, dtype=float).reshape(-1)
         stiffness[0] = effect.number("stiffness")
         joint.stiffness = stiffness if stiffness.size > 1 else stiffness[0]
-        joint.springref = effect.number("neutral")
+        joint.springref = _as_written(spec, joint, effect.number("neutral"))
     elif effect.cause == "joint_zero":
         # It stands farther than it reads: in the pose of the drawing it reads that much less.
-        joint.ref = float(joint.ref) - effect.number("zero")
+        joint.ref = float(joint.ref) - _as_written(spec, joint, effect.number("zero"))
     elif effect.cause == "coupled_drive":
         return _coupled(spec, model, effect)
     elif effect.cause == "link_length":
         body.pos = np.array(body.pos) + [effect.number(axis) for axis in "xyz"]
     elif effect.cause in ("link_mass", "link_com", "link_inertia"):
-        _inertial(body, model, int(model.jnt_bodyid[at]), effect)
+        return _inertial(spec, body, model, int(model.jnt_bodyid[at]), effect)
     elif effect.cause == "payload":
+        keep_inertials(spec, model)
         load = body.add_body(name=f"payload_at_{body.name}")
-        load.mass, load.ipos = effect.number("mass"), [effect.number(axis) for axis in "xyz"]
         ball = effect.number("mass") * effect.number("gyration") ** 2 * np.eye(3)
-        load.fullinertia = _six(real_inertia(ball + _moments(effect)))
-        load.explicitinertial = True
+        centre = np.array([effect.number(axis) for axis in "xyz"])
+        set_inertial(load, effect.number("mass"), centre, real_inertia(ball + _moments(effect)))
     else:
         return False
     return True
@@ -87,43 +86,33 @@ def _coupled(spec: mujoco.MjSpec, model: mujoco.MjModel, effect: RobotEffect) ->
     return True
 
 
-def _inertial(body: mujoco.MjsBody, model: mujoco.MjModel, index: int, effect: RobotEffect) -> None:
-    own = Rotation.from_quat(model.body_iquat[index], scalar_first=True).as_matrix()
-    mass, centre = float(model.body_mass[index]), np.array(model.body_ipos[index])
-    inertia = own @ np.diag(model.body_inertia[index]) @ own.T
+def _as_written(spec: mujoco.MjSpec, joint: mujoco.MjsJoint, position: float) -> float:
+    """A joint's position [rad or m] in the unit in which its model has angles: degrees, if it says nothing."""
+    turns = joint.type == mujoco.mjtJoint.mjJNT_HINGE
+    return float(np.degrees(position)) if turns and spec.compiler.degree else position
+
+
+def _inertial(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, model: mujoco.MjModel, index: int, effect: RobotEffect
+) -> bool:
+    mass, centre, inertia = inertial_of(model, index)
     if effect.cause == "link_mass":
-        inertia *= 1.0 + effect.number("excess") / mass  # denser or less dense
+        if mass + effect.number("excess") <= 0.0:
+            return False
+        inertia = inertia * (1.0 + effect.number("excess") / mass)  # denser or less dense
         mass += effect.number("excess")
     elif effect.cause == "link_com":
         centre = centre + [effect.number(axis) for axis in "xyz"]
     else:
         inertia = inertia + _moments(effect)
-    body.mass, body.ipos, body.iquat = mass, centre, [1.0, 0.0, 0.0, 0.0]
-    body.fullinertia, body.explicitinertial = _six(inertia), True
+    keep_inertials(spec, model)
+    set_inertial(body, mass, centre, inertia)
+    return True
 
 
 def _moments(effect: RobotEffect) -> np.ndarray:
     xx, yy, zz, xy, xz, yz = (effect.number(f"inertia_{axes}") for axes in INERTIA)
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-
-
-def _six(inertia: np.ndarray) -> list[float]:
-    return [*np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]]
-
-
-def real_inertia(inertia: np.ndarray) -> np.ndarray:
-    """The inertia nearest to a fitted one that a body can have, which MuJoCo asks for.
-
-    A density is nowhere below zero, so second moments of mass are positive semidefinite (P. M. Wensing, S. Kim and
-    J.-J. E. Slotine, "Linear matrix inequalities for physically consistent inertial parameter identification", RA-L
-    2018); those that are not are set to a thousandth of the largest.
-
-    Args:
-        inertia: about the centre of mass [kg m^2], shape (3, 3), symmetric.
-    """
-    size, axes = np.linalg.eigh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
-    second = (axes * np.maximum(size, LEAST_MOMENT * max(size[-1], 0.0))) @ axes.T
-    return np.trace(second) * np.eye(3) - second
 
 
 def _tilted(gravity: np.ndarray, effect: RobotEffect) -> np.ndarray:

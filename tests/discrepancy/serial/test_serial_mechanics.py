@@ -56,6 +56,13 @@ def test_torques_are_those_of_mujoco(model: mujoco.MjModel, states: np.ndarray, 
     np.testing.assert_allclose(torque_of(motion.tree, *states), theirs, atol=1e-11)
 
 
+def test_accelerations_are_those_of_the_motion_whatever_a_step_would_make_of_them(states: np.ndarray) -> None:
+    option = '<option integrator="implicit" timestep=".02"><flag invdiscrete="enable"/></option>'
+    other = mujoco.MjModel.from_xml_string(BRANCHED.replace("<worldbody>", f"{option}<worldbody>"))
+    plain = mujoco.MjModel.from_xml_string(BRANCHED)
+    np.testing.assert_allclose(inverse_torque(other, *states), inverse_torque(plain, *states), atol=1e-11)
+
+
 def test_regressors_make_the_torques(model: mujoco.MjModel, states: np.ndarray, motion: Motion) -> None:
     tree = motion.tree
     made = sum(

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import load_model
 from discrepancy.serial.words import SerialWords
 from estimator.errors import InputError
@@ -69,6 +70,43 @@ def test_urdf_whose_inertia_is_in_its_meshes_is_refused(tmp_path) -> None:
         InputError, match=r"MuJoCo cannot compile it \(.*base.stl.*; without its meshes: .*inertia"
     ):
         load_model(written(tmp_path, without, "robot.urdf"))
+
+
+MESHES = '<asset><mesh name="gone" file="gone.obj"/></asset>'
+LOST = {
+    "beside a shape": (
+        '<body name="a"><joint name="one"/><geom size="0.1"/><geom type="mesh" mesh="gone"/></body>', "'a'"
+    ),
+    "of what is welded on": (
+        f'<body name="a"><joint name="one"/>{BODY}<body name="tool"><geom type="mesh" mesh="gone"/></body></body>',
+        "'tool'",
+    ),
+    "of a body without a name": (
+        '<body><joint name="one"/><geom size="0.1"/><geom type="mesh" mesh="gone"/></body>', "a body without a name"
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", list(LOST))
+def test_a_mesh_that_is_missed_and_has_mass_is_no_mesh_to_leave_out(tmp_path, case) -> None:
+    bodies, said = LOST[case]
+    with pytest.raises(InputError, match=f"gone.obj.*; without its meshes: the inertia of .*{said}"):
+        load_model(written(tmp_path, mjcf(bodies, MESHES)))
+
+
+def test_a_mesh_that_is_missed_and_has_no_part_in_what_moves_is_left_out(tmp_path) -> None:
+    bodies = (
+        '<body name="stand"><geom type="mesh" mesh="gone"/></body>'
+        f'<body name="a"><joint name="one"/>{BODY}<geom type="mesh" mesh="gone"/></body>'
+        '<body name="b"><joint name="two"/><geom size="0.1" mass="1"/><geom type="mesh" mesh="gone" mass="0"/></body>'
+    )
+    found = load_model(written(tmp_path, mjcf(bodies, MESHES)))
+    assert found.model.body_mass.tolist() == [0.0, 0.0, 1.0, 1.0]
+
+
+def test_gravity_that_is_switched_off_is_none(tmp_path) -> None:
+    found = load_model(written(tmp_path, mjcf(LINKS, '<option><flag gravity="disable"/></option>')))
+    assert not Tree.of(found.model).gravity.any()
 
 
 @pytest.mark.parametrize("name", ["tx40", "xl330", "panda", "emps"])

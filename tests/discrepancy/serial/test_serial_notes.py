@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-from discrepancy.serial.diagnosis import notes_of
+import numpy as np
+import pytest
+
+from discrepancy.serial.diagnosis import notes_of, resting
 
 
 def log(name: str, *notes: str) -> SimpleNamespace:
@@ -28,3 +31,27 @@ def test_notes_that_differ_in_numbers_are_told_once():
 def test_no_logs_have_no_notes():
     assert list(notes_of([])) == []
     assert list(notes_of([log("monday")])) == []
+
+
+@pytest.mark.parametrize("rate_hz", [50.0, 500.0])
+def test_joints_that_rest_are_told(rate_hz: float) -> None:
+    rng, time = np.random.default_rng(0), np.arange(round(10.0 * rate_hz)) / rate_hz
+
+    def log(*sizes: float, noise: float = 1e-4, step: float = 0.0) -> SimpleNamespace:
+        q = np.column_stack([size * np.sin(3.0 * time) for size in sizes])
+        q += noise * rng.standard_normal(q.shape)
+        return SimpleNamespace(
+            joints=("turret", "shoulder", "elbow"),
+            q=np.round(q / step) * step if step else q,
+            position_step=np.full(3, step),
+        )
+
+    assert list(resting([log(0.5, 0.2, 0.01)])) == []
+    (said,) = resting([log(0.5, 0.0, 0.2)])
+    assert said == "shoulder does not move in these logs, which tell no friction and no rotor there."
+    assert list(resting([log(0.5, 0.0, 0.2), log(0.5, 0.1, 0.2)])) == []
+    (said,) = resting([log(0.5, 0.0, 0.0, noise=1e-5, step=1e-3)])
+    assert said.startswith("shoulder and elbow do not move")
+    (said,) = resting([log(0.0, 0.0, 0.0)])
+    assert said.startswith("No joint moves in these logs; ")
+    assert list(resting([])) == []

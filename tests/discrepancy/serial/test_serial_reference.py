@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import mujoco
 import numpy as np
 import pytest
@@ -39,7 +41,7 @@ def named(found: Diagnosed) -> list[tuple[str, int | None]]:
     return [(f.candidate.cause, f.candidate.joint) for f in found.diagnosis.causes]
 
 
-def test_doubled_friction(model: SerialModel, healthy: JointLog) -> None:
+def test_doubled_friction(model: SerialModel, healthy: JointLog, tmp_path) -> None:
     changed = real()
     changed.joint("elbow").frictionloss *= 2.0
     found = diagnose_serial(model, [simulated(changed.compile(), 1)], reference=[healthy])
@@ -48,6 +50,12 @@ def test_doubled_friction(model: SerialModel, healthy: JointLog) -> None:
     assert found.diagnosis.causes[0].values[0] == pytest.approx(0.8, abs=0.03)
     assert abs(found.diagnosis.causes[0].values[1]) < 0.03
     assert len(found.traces()) == 4
+    assert re.search(
+        r"rubs with 0\.\d+ \+- 0\.\d+ N m more than in the reference", " ".join(str(found).split())
+    )
+    found.rig.write_extended(found.diagnosis.explanation, tmp_path / "extended")
+    told = (tmp_path / "extended" / "README.md").read_text(encoding="utf-8")
+    assert "has changed since the reference; what is wrong with the model in both is not in it" in told
 
 
 @pytest.mark.slow

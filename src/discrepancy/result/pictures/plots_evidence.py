@@ -10,7 +10,7 @@ from matplotlib.ticker import FuncFormatter
 
 from discrepancy.result.evidence_list import drawn, label, relation
 from discrepancy.result.pictures.plots_against import AFTER, BEFORE, log_scale, titled
-from discrepancy.result.text_gain import response_units
+from discrepancy.result.text_gain import foretold_torques, response_units
 
 RELATIONS = {
     "named": ("named", "#2f6fd0", "s"),
@@ -101,4 +101,8 @@ def closed_loop_figure(values: Mapping[str, Any]) -> Figure | None:
         )
         axis.grid(axis="y", alpha=0.25)
     handles, labels = axes[0].get_legend_handles_labels()
-    return titled(figure, "Recorded commands, simulated again: error of the response", handles, labels)
+    if foretold_torques(gain):
+        title = "Torques, foretold from the recorded motion: error"
+    else:
+        title = "Recorded commands, simulated again: error of the response"
+    return titled(figure, title, handles, labels)

@@ -22,6 +22,7 @@ def inverse_torque(model: mujoco.MjModel, q: Array, dq: Array, ddq: Array) -> Ar
     bare = copy.copy(model)
     bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_CONSTRAINT)
     bare.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_ACTUATION)
+    bare.opt.enableflags &= ~int(mujoco.mjtEnableBit.mjENBL_INVDISCRETE)  # ddq is the motion's, not a step's
     bare.dof_damping[:] = 0.0
     data = mujoco.MjData(bare)
     out = np.empty_like(q)
