@@ -12,9 +12,9 @@ def cross(a: Array, b: Array) -> Array:
     u, v, w = b[..., 0], b[..., 1], b[..., 2]
     # Components apart in memory, as in ``estimator.apart``.
     out = np.empty((3, *np.broadcast_shapes(a.shape, b.shape)[:-1]))
-    np.subtract(y * w, z * v, out=out[0])
-    np.subtract(z * u, x * w, out=out[1])
-    np.subtract(x * v, y * u, out=out[2])
+    np.subtract(y * w, z * v, out=out[0, ...])
+    np.subtract(z * u, x * w, out=out[1, ...])
+    np.subtract(x * v, y * u, out=out[2, ...])
     return out.transpose(*range(1, out.ndim), 0)
 
 

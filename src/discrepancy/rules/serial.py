@@ -212,3 +212,5 @@ a simulated arm in other forms is off by 15 to 25 %."""
 UNSEEN_NATS = 20.0
 """What something unlisted may leave beside a lasting cause without being seen. Chosen: a third of ``UNLISTED_NATS``,
 since where the cause acts is known."""
+RESTS = 2.0
+"""Noise over which a joint's readings must scatter for it to move. Chosen: less of a motion tells nothing."""

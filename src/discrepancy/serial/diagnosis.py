@@ -23,9 +23,6 @@ from discrepancy.serial.servo.loop import loop_laws, sentences
 from discrepancy.serial.traces import traces
 from discrepancy.serial.words import SerialWords
 
-RESTS = 2.0
-"""A joint whose readings scatter by no more than so many times their noise does not move."""
-
 
 def diagnose_serial(
     model: SerialModel,
@@ -108,7 +105,7 @@ def resting(logs: Sequence[JointLog]) -> Iterator[str]:
     for log in logs:
         # White noise has second differences of six times its variance; of a motion they are small beside its size.
         noise = np.std(np.diff(log.q, 2, axis=0), axis=0) / np.sqrt(6.0)
-        still &= np.std(log.q, axis=0) <= np.maximum(RESTS * noise, log.position_step)
+        still &= np.std(log.q, axis=0) <= np.maximum(rules.RESTS * noise, log.position_step)
     names = [name for name, rests in zip(logs[0].joints, still, strict=True) if rests] if logs else []
     if names and still.all():
         yield "No joint moves in these logs; they tell no friction and no inertia, and gravity in one pose only."

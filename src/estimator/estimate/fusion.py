@@ -117,6 +117,8 @@ def fusion_matrix(grasps: GraspEstimate) -> Array:
 def _ratio(grasps: GraspEstimate) -> tuple[float, Array]:
     """Weight of linear residuals [rad/m] beside angular ones, and its derivative by the grasps' errors, (6(N-1),)."""
     N, off = grasps.robots, ~np.eye(grasps.robots, dtype=bool)
+    if N == 1:
+        return 1.0, np.zeros(0)
     angular = float(np.mean(grasps.angular_residual_rms[off] ** 2)) / 2
     # The linear residual also holds the angular noise of the mean times the distance; take that part out.
     apart = grasps.p_1i[:, None] - grasps.p_1i[None]

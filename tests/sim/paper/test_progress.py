@@ -49,7 +49,7 @@ def test_parts_of_trials_count(
         return Simulated({"ideal": recording}, random_a, GroundTruth.of(team_a))
 
     monkeypatch.setattr(experiment, "simulate", simulate)
-    monkeypatch.setattr(experiment, "estimate_payload", lambda *_: None)
+    monkeypatch.setattr(experiment, "estimate_both", lambda *_: (None, None))
     monkeypatch.setattr(experiment, "score", lambda *_: {})
     plan = PaperPlan(payloads=("a",), presets=("ideal",), trials=2)
     told: list[tuple[float, float, str]] = []

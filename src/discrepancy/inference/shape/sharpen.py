@@ -32,15 +32,14 @@ def sharpened(
     if near and item.candidate.transient and rig.steps(item.candidate):
         new = event_in_shape(rig, base, start, item.candidate)
         return _beyond_tolerance(base, new.problem, new)
-    known = near and shape is not None
-    tried = (
-        [best_shape(rig, start, base.free, item)]
-        if near and not known
-        else [shape if known else item.candidate]
-    )
-    if near and not known and (held := _with_kind_held(start, item)) is not None:
-        # The others of a kind that scatters to explain this one take its shape from it.
-        tried.append(best_shape(rig, held, base.free, item))
+    tried = [item.candidate]
+    if near and shape is not None:
+        tried = [shape]
+    elif near:
+        tried = [best_shape(rig, start, base.free, item)]
+        if (held := _with_kind_held(start, item)) is not None:
+            # The others of a kind that scatters to explain this one take its shape from it.
+            tried.append(best_shape(rig, held, base.free, item))
     new = max((_in_shape(rig, base, start, item, shape, near) for shape in tried), key=lambda one: one.score)
     if new.causes[-1].transient:
         return _beyond_tolerance(base, new.problem, new)
