@@ -58,7 +58,8 @@ def test_groups_of_channels_share_no_cell(rng):
     parts = cells.grams(cells.spectrum(x), cells.spectrum(x))[:, 0, 0]
     assert len(parts) == 2 * (CELL_BANDS + 1)
     assert not parts[: CELL_BANDS + 1].any()
-    assert np.all(parts[CELL_BANDS + 1 :] > 0)
+    np.testing.assert_array_equal(parts[CELL_BANDS + 1 :] > 0, cells.sizes[CELL_BANDS + 1 :] > 0)
+    assert np.count_nonzero(parts) >= CELL_BANDS - 1
 
 
 @pytest.mark.parametrize("octave", range(CELL_BANDS))
