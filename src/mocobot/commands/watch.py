@@ -125,7 +125,7 @@ def _read(seen: _Seen, options: Watch, say: Say) -> None:
         seen.recordings |= recordings
         if done:
             seen.converted += recordings
-            ready += f" ({done})"
+            ready = f"{ready.partition(';')[0]} ({done})"  # what is to be done first was
         seen.lines.append(f"{path}: {ready}.")
 
 
