@@ -53,7 +53,7 @@ def proposals(
         events: whether to look for what acts for a while, too.
         narrow: whether to look with kinds that scatter held within their tolerance, too.
         known: a cause that others are to be held against.
-        shapes: what was found beside the same causes before, to begin with; None for nothing.
+        shapes: of what was sought beside the same causes before, where a search begins and ends; None for nothing.
     """
     fit, shapes = base.fit, shapes or {}
     scanned = _with_kinds_held(base)

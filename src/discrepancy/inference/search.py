@@ -129,6 +129,11 @@ def _added(base: Hypothesis, proposed: Proposed) -> Hypothesis | None:
     return open_ if tolerated(base, open_) else None
 
 
+def _but(shapes: Mapping[Key, Candidate] | None, cause: Candidate) -> dict[Key, Candidate]:
+    """Shapes of others: a cause's own may be settled further in the noise that is left with it."""
+    return {key: shape for key, shape in (shapes or {}).items() if key != cause.key}
+
+
 def _law_holds(rig: Rig, hypothesis: Hypothesis, index: int) -> bool:
     """Whether a cause is likelier than something unlisted that looks like it."""
     doubt = rig.law_doubt(hypothesis.problem.candidates[index])
@@ -187,7 +192,7 @@ def settled(
             # Its own shape may be another beside what was found since.
             others = proposals(
                 rig, less, events=candidate.transient is None, narrow=False, known=candidate,
-                shapes=shapes if index == last else None,
+                shapes=_but(shapes, candidate) if index == last else None,
             )  # fmt: skip
             rivals[index] = [
                 Rival(other, judged.score - score)
