@@ -39,8 +39,6 @@ class Cells:
     ) -> Cells:
         """Cells of a trial: octaves of frequency, and rows that stand alone, of every group of channels.
 
-        Octaves in which there is next to nothing share a cell with the next.
-
         Args:
             rows, channels: n, C.
             moving: leading rows that follow each other; None for all.
@@ -53,9 +51,7 @@ class Cells:
         )
         band[moving:] = rules.CELL_BANDS
         group = np.zeros(channels, dtype=np.intp) if groups is None else np.asarray(groups, dtype=np.intp)
-        sizes = np.bincount(group)
-        bands = np.stack([_merged(band, int(size)) for size in sizes], axis=1)[:, group]
-        index = bands + (rules.CELL_BANDS + 1) * group[None, :]
+        index = band[:, None] + (rules.CELL_BANDS + 1) * group[None, :]
         count = (rules.CELL_BANDS + 1) * (int(group.max(initial=0)) + 1)
         return cls(moving, index, np.bincount(index.ravel(), minlength=count))
 
@@ -107,17 +103,6 @@ class Cells:
     def _by_cell(self) -> NDArray[np.intp]:
         """The numbers in the order of their cells."""
         return np.argsort(self.index.ravel(), kind="stable")
-
-
-def _merged(band: NDArray[np.intp], channels: int) -> NDArray[np.intp]:
-    """Octaves of rows, the lowest as one as long as they have too few numbers in so many channels."""
-    out, before = band.copy(), 0
-    for octave in range(rules.CELL_BANDS - 1):
-        before += channels * int(np.count_nonzero(band == octave))
-        if before >= rules.CELL_NUMBERS:
-            break
-        out[out == octave] = octave + 1
-    return out
 
 
 @lru_cache(maxsize=8)

@@ -80,9 +80,6 @@ VISIBLE_CHI2_PER_N = 3.0
 
 CELL_BANDS = 6
 """Octaves of frequency in which the noise has powers of its own, of every group of channels and trial. Chosen."""
-CELL_NUMBERS = 3
-"""Numbers of a cell at least; the lowest octaves share one until they have as many. Chosen: of fewer no power is learnt
-beside a prior of twenty. It keeps every octave of a team, whose groups have three channels or more."""
 TRANSFORM_PRIME, TRANSFORM_ROWS = 100, 900
 """Largest prime factor of a number of rows, and rows at most, from which on a cosine transform is a product with its
 matrix. Measured: that is 2.6 times as fast for 446 rows, and as fast for 898; without such a factor it is slower."""

@@ -133,7 +133,7 @@ class SerialRig(SerialRows, Rig):
         return [
             Rows(
                 self.trials[t], residual, self.local_columns(t), self.common_columns(t),
-                [c[t] for c in columns], self.row_times(t), groups=range(residual.shape[1]),
+                [c[t] for c in columns], self.row_times(t),
             )
             for t, residual in enumerate(self.residual(np.zeros(0), [], []))
         ]  # fmt: skip

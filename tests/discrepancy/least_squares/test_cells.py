@@ -58,8 +58,7 @@ def test_groups_of_channels_share_no_cell(rng):
     parts = cells.grams(cells.spectrum(x), cells.spectrum(x))[:, 0, 0]
     assert len(parts) == 2 * (CELL_BANDS + 1)
     assert not parts[: CELL_BANDS + 1].any()
-    np.testing.assert_array_equal(parts[CELL_BANDS + 1 :] > 0, cells.sizes[CELL_BANDS + 1 :] > 0)
-    assert np.count_nonzero(parts) >= CELL_BANDS - 1
+    assert np.all(parts[CELL_BANDS + 1 :] > 0)
 
 
 @pytest.mark.parametrize("octave", range(CELL_BANDS))
@@ -99,15 +98,3 @@ def test_transforms_and_back_whatever_the_rows_are_divisible_by(rng, rows):
     np.testing.assert_allclose(y[:rows], np.einsum("ki,icl->kcl", cosines(rows), x[:rows]), atol=1e-12)
     np.testing.assert_array_equal(y[rows:], x[rows:])
     np.testing.assert_allclose(cells.series(y), x, atol=1e-12)
-
-
-@pytest.mark.parametrize(
-    ("rows", "expected"), [(40, [5, 5, 10, 20]), (400, [12, 13, 25, 50, 100, 200]), (2, [2])]
-)
-def test_lowest_octaves_of_short_trials_share_a_cell(rows, expected):
-    """A cell of one number beside a prior of twenty learns nothing, and costs as much as one of a thousand."""
-    cells = Cells.of(rows, 2, groups=[0, 1])
-    assert cells.sizes.reshape(2, -1).sum() == 2 * rows
-    for sizes in cells.sizes.reshape(2, -1):
-        assert [size for size in sizes if size] == expected
-    assert (np.bincount(cells.index.ravel(), minlength=len(cells.sizes)) == cells.sizes).all()
