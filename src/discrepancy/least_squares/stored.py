@@ -13,17 +13,22 @@ Kind = TypeVar("Kind", bound=np.generic)
 
 
 def stored(x: NDArray[Kind]) -> NDArray[Kind]:
-    """The same numbers, to be read only, in a file that is gone with the array; where no file can be, the array."""
+    """The same numbers, to be read only, in a file that is gone with the array; where no file can be, the array.
+
+    They lie as they did: where components are apart in memory, sums over them have the same bits.
+    """
     if not x.size or is_stored(x):
         return x
+    order = np.argsort([-stride for stride in x.strides], kind="stable")
+    apart = x.transpose(order)
     try:
         with tempfile.TemporaryFile() as file:
-            np.ascontiguousarray(x).tofile(file)
+            np.ascontiguousarray(apart).tofile(file)
             file.flush()
             pages = mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
     except OSError:  # a full disk
         return x
-    return np.frombuffer(pages, dtype=x.dtype).reshape(x.shape)
+    return np.frombuffer(pages, dtype=x.dtype).reshape(apart.shape).transpose(np.argsort(order))
 
 
 def is_stored(x: NDArray[np.generic]) -> bool:

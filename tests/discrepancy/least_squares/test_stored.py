@@ -37,6 +37,17 @@ def test_numbers_stay_and_views_know_where_they_are() -> None:
     assert not is_stored(nothing)
 
 
+@pytest.mark.parametrize("axes", [(0, 1, 2), (2, 0, 1), (1, 2, 0), (2, 1, 0)])
+def test_numbers_lie_as_they_did(axes: tuple[int, ...]) -> None:
+    """Sums over what lies otherwise have other last bits."""
+    x = np.random.default_rng(3).standard_normal((4, 5, 6)).transpose(axes)
+    kept = stored(x)
+    assert is_stored(kept)
+    np.testing.assert_array_equal(kept, x)
+    assert kept.strides == x.strides
+    assert stored(x[0]).strides == np.array(x[0], order="K").strides
+
+
 def test_a_disk_that_is_full(monkeypatch: pytest.MonkeyPatch) -> None:
     """The system's own: whatever is written to it is refused."""
     if not Path("/dev/full").exists():
