@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from estimator.errors import InputError
 from mocobot_logs.draft.candidates import Candidate, of_table
 from mocobot_logs.draft.channels import find_channels
 from mocobot_logs.draft.draft import Draft, put_together
@@ -50,8 +51,12 @@ def opened(path: Path, kind: Kind, episode: int | None) -> tuple[Table, list[Can
     table = open_table(path, kind, CsvMap(), episode)
     candidates = of_table(table)
     if kind == "csv" and not _has_values(candidates):
-        other = open_table(path, kind, CsvMap(decimal=","))
-        if _has_values(again := of_table(other)):
+        try:
+            other = open_table(path, kind, CsvMap(decimal=","))
+            again = of_table(other)
+        except InputError:  # its rows do not fit its header so
+            return table, candidates, []
+        if _has_values(again):
             return other, again, ["[csv]", 'decimal = ","', ""]
     return table, candidates, []
 
