@@ -217,7 +217,7 @@ def test_logs_that_cannot_be_resampled_are_looked_at_all_the_same(tmp_path, heal
     found = inspected(tmp_path, values)
     assert found.unchecked is not None
     assert "time runs back" in found.unchecked
-    assert "time runs backwards 1 time" in sentences(found)
+    assert "time runs backwards 1 time by 2.8 s after 2.80 s" in sentences(found)
     assert found.ready_for.startswith("ready for: nothing (")
 
 
