@@ -56,8 +56,13 @@ class Hypothesis:
     @cached_property
     def score(self) -> float:
         """Log posterior probability, up to what all hypotheses have in common [nats]."""
+        return self.uncharged - sum(self.allowed[i] for i in self.free if i in self.allowed)
+
+    @property
+    def uncharged(self) -> float:
+        """The same without what is not to the causes' credit: which of two is there the data alone tell [nats]."""
         odds = sum(log_prior_odds(self.problem, candidate) for candidate in self.causes)
-        return self.learnt.log_evidence + odds - sum(self.allowed[i] for i in self.free if i in self.allowed)
+        return self.learnt.log_evidence + odds
 
     def without(self, index: int) -> Hypothesis:
         """The hypothesis that one of the causes is not there."""

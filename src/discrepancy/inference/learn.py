@@ -47,7 +47,7 @@ class _Parts:
         grams: upper triangles of the Gram matrices of every cell that has numbers, the residual last, shape (K, half)
             with half = m (m + 1) / 2 and m = used + 1.
         upper: rows and columns of these, shape (half,) each.
-        sizes: numbers in every cell, shape (K,).
+        sizes: numbers in every cell that trials' own unknowns leave, shape (K,).
         group: of every used column: -1 for shared unknowns, else the number of its spread.
         least, most: spread that a group has at least and at most, shape (groups,).
         several: which groups are of kinds at several places, whose spread has a prior, in the order of ``kinds``.
@@ -157,7 +157,7 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
         own.append(True)
     used = np.flatnonzero(group > -2)
     both = np.append(used, count)
-    sizes = [c.sizes[c.sizes > 0] for c in problem.cells]
+    sizes = [own[c.sizes > 0] for own, c in zip(problem.degrees, problem.cells, strict=True)]
     upper = np.triu_indices(len(both))
     at = both[upper[0]] * (count + 1) + both[upper[1]]
     pairs = zip(problem.cell_grams, problem.cells, strict=True)
@@ -166,7 +166,7 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
     for one, gram in zip(grams, filled, strict=True):
         np.take(gram, at, out=one, mode="clip")
     parts = _Parts(
-        grams, upper, np.concatenate(sizes).astype(float), group[used], np.array(least), np.array(most),
+        grams, upper, np.concatenate(sizes), group[used], np.array(least), np.array(most),
         np.array(several, dtype=bool), np.array(own, dtype=bool), groups, like,
     )  # fmt: skip
     return names, parts

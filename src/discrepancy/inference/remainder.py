@@ -12,17 +12,17 @@ from estimator.arrays import Array
 
 
 def left_in_cells(hypothesis: Hypothesis) -> tuple[Array, Array]:
-    """Sum of squares that the hypothesis leaves in every cell of all trials, and the numbers in it."""
+    """Sum of squares that the hypothesis leaves in every cell of all trials, and the numbers that it has for that."""
     problem = hypothesis.problem
     x = np.append(-hypothesis.fit.coefficients, 1.0)
     left = [grams.squares(x) for grams in problem.cell_grams]
-    return np.concatenate(left), np.concatenate([cells.sizes for cells in problem.cells]).astype(float)
+    return np.concatenate(left), np.concatenate(problem.degrees)
 
 
 def nats_left(hypothesis: Hypothesis) -> float:
     """What an explanation of all that is left would gain: half the log of every number's power."""
-    pairs = zip(hypothesis.problem.power, hypothesis.problem.cells, strict=True)
-    return sum(0.5 * float(cells.sizes @ np.log(np.maximum(power, 1.0))) for power, cells in pairs)
+    pairs = zip(hypothesis.problem.power, hypothesis.problem.degrees, strict=True)
+    return sum(0.5 * float(degrees @ np.log(np.maximum(power, 1.0))) for power, degrees in pairs)
 
 
 def is_noise(chi2: float, samples: int, unlisted: float) -> bool:
@@ -38,7 +38,7 @@ def unlisted_nats(hypothesis: Hypothesis) -> float:
     """
     left, sizes = left_in_cells(hypothesis)
     series = np.tile(np.arange(rules.CELL_BANDS + 1) < rules.CELL_BANDS, len(sizes) // (rules.CELL_BANDS + 1))
-    at = (sizes > 0) & series
+    at = (sizes > 0.5) & series  # what has less has no numbers of its own
     level = rules.CLEAN_CHI2_PER_N + _other_forms(hypothesis)[at] / sizes[at]
     clean = np.maximum(left[at] / sizes[at], level) / level
     gain = 0.5 * sizes[at] * (clean - 1.0 - np.log(clean)) - rules.CELL_NATS

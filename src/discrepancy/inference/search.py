@@ -201,12 +201,14 @@ def settled(
             ]
             rivals[index].append(Rival(None, gap))
             if others.best is not None and others.best.score > judged.score + rules.EXCHANGED_NATS:
+                # What each was charged for other forms is of when it was added, beside what was known then: whether
+                # one is there at all is asked of that, and which of two is of the data.
                 other = exact(rig, others.best, nothing)
-                if other.score > best.score:
+                if other.uncharged > best.uncharged:
                     best, changed = other, True
                     break
                 # Less likely where it is exact; and none of the others was likelier than that one.
-                least = best.score - other.score
+                least = best.uncharged - other.uncharged
                 rivals[index] = [
                     rival if rival.candidate is None else replace(rival, gap=max(rival.gap, least))
                     for rival in rivals[index]
@@ -214,7 +216,7 @@ def settled(
             elif others.other is not None and others.other.score > judged.score - rules.EXCHANGED_NATS:
                 # Equally likely by straight columns; exact ones may part them.
                 other = exact(rig, others.other, nothing)
-                if other.score > best.score + rules.EXCHANGED_NATS:
+                if other.uncharged > best.uncharged + rules.EXCHANGED_NATS:
                     best, changed = other, True
                     break
         if not changed:

@@ -86,6 +86,15 @@ class Cells:
         pairs = ((a[at], b[at]) for at in spans)
         return np.array([flat_gram(one, one if same else other) for one, other in pairs])
 
+    def left_by(self, off: Array) -> Array:
+        """Numbers in every cell but those that go into orthonormal columns (n, C, l) taken out of all, shape (K,).
+
+        A projection off them has the trace n - l, of which each cell has the part that is its own.
+        """
+        taken = np.sum(self.spectrum(off) ** 2, axis=2)
+        own = np.bincount(self.index.ravel(), taken.ravel(), minlength=len(self.sizes))
+        return np.maximum(self.sizes - own, 0.0)  # of which rounding may leave less
+
     def only(self, cell: int, x: Array) -> Array:
         """Rows whose transform x, shape (n, C, k), is nought but in a cell."""
         there = self.index == cell

@@ -38,6 +38,7 @@ class Problem:
         local: columns of the trial's own unknowns, shape (n, C, l).
         explicable: orthonormal columns that span the same.
         cells: of every trial.
+        degrees: numbers in every cell that the trial's own unknowns leave, of its size, shape (K,) each.
         cell_grams: Gram matrices over every cell of a trial, K of (columns, columns) each.
         power: variance of the noise in every cell of a trial, shape (K,) each; 1 as whitened.
         shared: number of shared unknowns.
@@ -55,6 +56,7 @@ class Problem:
     local: tuple[Array, ...]
     explicable: tuple[Array, ...]
     cells: tuple[Cells, ...]
+    degrees: tuple[Array, ...]
     cell_grams: tuple[CellGrams, ...]
     power: tuple[Array, ...]
     shared: int
@@ -75,13 +77,14 @@ class Problem:
             candidates: of these columns.
         """
         units = [c.units for c in candidates]
-        columns, local, explicable, cells, grams, shared = [], [], [], [], [], 0
+        columns, local, explicable, cells, degrees, grams, shared = [], [], [], [], [], [], 0
         for trial in trials:
             causes = (a * u for a, u in zip(trial.causes, units, strict=True))
             shared, (rows, channels) = trial.shared.shape[2], trial.residual.shape
             cells.append(Cells.of(rows, channels, trial.moving, trial.groups))
             local.append(trial.local)
             explicable.append(orthonormal(trial.local))
+            degrees.append(cells[-1].left_by(explicable[-1]))
             every = chain([trial.shared], causes, [trial.residual[..., None]])
             columns.append(Columns((), np.zeros((explicable[-1].shape[2], 0))))
             for raw in portions(every, rules.PORTION_BYTES):
@@ -95,8 +98,8 @@ class Problem:
         tolerant = np.array([x for c in candidates for x in c.tolerant], dtype=bool)
         power = tuple(np.ones(len(c.sizes)) for c in cells)
         return cls(
-            tuple(candidates), tuple(columns), tuple(local), tuple(explicable), tuple(cells), tuple(grams), power,
-            shared, tuple(spans), tolerant, np.ones(len(tolerant)),
+            tuple(candidates), tuple(columns), tuple(local), tuple(explicable), tuple(cells), tuple(degrees),
+            tuple(grams), power, shared, tuple(spans), tolerant, np.ones(len(tolerant)),
         )  # fmt: skip
 
     @property

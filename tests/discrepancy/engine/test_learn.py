@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.linalg import null_space
 
 from dense_evidence import dense_evidence, log_prior
 from discrepancy import rules
@@ -70,6 +71,36 @@ def test_log_evidence_is_that_of_a_dense_normal(rows):
     np.testing.assert_allclose(gaps, gaps[0], atol=1e-6)
     size = sum(r.residual.size for r in rows)
     assert gaps[0] == pytest.approx(0.5 * size * np.log(2 * np.pi), abs=1e-6)
+
+
+def without_own(rows):
+    """The rows' numbers that no own unknown can change, one after the other, alone."""
+    out = []
+    for r in rows:
+        seen = null_space(r.local.reshape(r.residual.size, -1).T)
+        of = lambda x, n=seen: (n.T @ x.reshape(len(n), -1)).reshape(n.shape[1], 1, -1)  # noqa: E731
+        causes = [of(x) for x in r.causes]
+        residual = of(r.residual)[..., 0]
+        out.append(
+            Rows(r.name, residual, of(r.local)[..., :0], of(r.shared), causes, np.arange(len(residual)), 0)
+        )
+    return out
+
+
+def test_trials_own_unknowns_spend_numbers_of_their_cells(rng):
+    """Powers and evidence are those of what no own unknown can change (Patterson and Thompson, Biometrika 58, 1971)."""
+    rows = random_rows(rng, n=14, channels=2, local=9, candidates=CANDIDATES, moving=0)
+    rows = with_residuals(rows, [scale * r.residual for scale, r in zip((0.7, 3.0, 6.0), rows, strict=True)])
+    seen = without_own(rows)
+    problem, alone, gaps = Problem.of(rows, CANDIDATES), Problem.of(seen, CANDIDATES), []
+    for free in HYPOTHESES:
+        one, other = learnt(problem, free), learnt(alone, free)
+        for power, own, c in zip(one.problem.power, other.problem.power, problem.cells, strict=True):
+            np.testing.assert_allclose(power[c.sizes > 0], own[c.sizes > 0], rtol=1e-6)
+        noise = [p[-1] * np.eye(r.residual.size) for p, r in zip(other.problem.power, seen, strict=True)]
+        dense = dense_evidence(seen, other.problem, free, noise=noise)
+        gaps.append(one.log_evidence - dense - log_prior(other.problem, kinds_beside(free)))
+    np.testing.assert_allclose(gaps, gaps[0], atol=1e-6)
 
 
 def test_what_is_left_open_has_the_evidence_of_its_covariance(rng, rows, monkeypatch):

@@ -5,6 +5,7 @@ import pytest
 from scipy.stats import chi2
 
 from discrepancy.least_squares.cells import Cells, cosine_matrix
+from discrepancy.least_squares.gram import orthonormal, project
 from discrepancy.rules import CELL_BANDS
 from linear_problem import cosines
 
@@ -98,3 +99,20 @@ def test_transforms_and_back_whatever_the_rows_are_divisible_by(rng, rows):
     np.testing.assert_allclose(y[:rows], np.einsum("ki,icl->kcl", cosines(rows), x[:rows]), atol=1e-12)
     np.testing.assert_array_equal(y[rows:], x[rows:])
     np.testing.assert_allclose(cells.series(y), x, atol=1e-12)
+
+
+def test_numbers_that_unknowns_of_a_trial_leave_in_cells(rng):
+    """The mean square of white noise without them, over draws, and all of a cell that they span."""
+    cells = Cells.of(60, 2, 50, [0, 1])
+    slow = np.zeros((60, 2, 5))
+    slow[:50, 0] = np.vander(np.linspace(-1.0, 1.0, 50), 5)
+    off = orthonormal(slow)
+    left = cells.left_by(off)
+    assert left.sum() == pytest.approx(115.0, abs=1e-9)
+    assert left[0] < cells.sizes[0] - 1.0
+    assert np.all(left[CELL_BANDS + 1 :] == cells.sizes[CELL_BANDS + 1 :])
+    x = cells.spectrum(project(rng.standard_normal((60, 2, 4000)), off))
+    squares = np.bincount(cells.index.ravel(), np.mean(x**2, axis=2).ravel(), minlength=len(left))
+    # A mean of 4000 chi-squares of so many numbers.
+    np.testing.assert_allclose(squares, left, atol=4.0 * np.sqrt(2.0 * left.max() / 4000))
+    assert np.all(Cells.of(6, 1, 0).left_by(orthonormal(np.eye(6)[:, None])) == 0.0)
