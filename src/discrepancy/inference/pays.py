@@ -62,15 +62,19 @@ def needed(base: Hypothesis, more: Hypothesis) -> float:
     """By how many nats a hypothesis with one cause more must be likelier.
 
     A scatter of one kind alone, all others as they should be, is no healthy machine either: as soon as one of its
-    places, or of a kind with the same trace, is likelier than that, it is named. Where several kinds scatter, all is
-    off, and it has to stand out.
+    places, or of a kind with the same trace, or a cause beside which nothing scatters, is likelier than that, it is
+    named. Where several kinds scatter, all is off, and it has to stand out. Than that all are within tolerance it is
+    likelier by ``NAMED_NATS`` in any case.
     """
-    if not _wide(base, rules.SCATTER_FACTOR):
+    if not _wide(base, rules.HELD_FACTOR):
         return rules.NAMED_NATS
     # From three places a spread is known to a half: only one that the data want is one.
     worth = worth_spreads(base.learnt, _wide(base, rules.HELD_FACTOR))
     off = [kind for kind, nats in worth.items() if nats > rules.NAMED_NATS]
-    if len(off) != 1 or not _alike(base.problem, off[0]) & {cause.cause for cause in more.causes}:
+    if len(off) != 1:
+        return rules.NAMED_NATS
+    alike = _alike(base.problem, off[0]) & {cause.cause for cause in more.causes}
+    if not alike and _wide(more, rules.HELD_FACTOR):
         return rules.NAMED_NATS
     if _wide(more, rules.SCATTER_FACTOR):
         return rules.NAMED_NATS

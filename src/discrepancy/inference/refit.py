@@ -1,5 +1,10 @@
 """Exact residuals for a hypothesis: columns are slopes, and what is there may be far from nought."""
 
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 
 from discrepancy import rules
@@ -7,6 +12,32 @@ from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.rig import Rig
 from estimator.arrays import Array
 from estimator.errors import InputError
+
+
+@dataclass(frozen=True)
+class _Point:
+    """Where residuals are exact.
+
+    Attributes:
+        shared: beyond where they are linear, shape (s,).
+        local: the same of every trial, shape (l,) each.
+        values: of what is moved, in units.
+    """
+
+    shared: Array
+    local: Sequence[Array]
+    values: Sequence[Array]
+
+    def towards(self, to: _Point, share: float) -> _Point:
+        """A share of the way to another."""
+        if share == 1.0:
+            return to
+        between = lambda a, b: a + share * (b - a)  # noqa: E731
+        return _Point(
+            between(self.shared, to.shared),
+            [between(a, b) for a, b in zip(self.local, to.local, strict=True)],
+            [between(a, b) for a, b in zip(self.values, to.values, strict=True)],
+        )
 
 
 def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
@@ -23,16 +54,23 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
     """
     own, trials = rig.local_unknowns, hypothesis.problem.trials
     begin = [nothing.fit.local(t)[:own] for t in trials]
-    linear, last = hypothesis, np.inf
-    for _ in range(rules.REFIT_ROUNDS):
+    linear, last, share, at = hypothesis, np.inf, 1.0, None
+    for tried in range(rules.SHORT_ROUNDS):
+        if share == 1.0 and tried >= rules.REFIT_ROUNDS:
+            break
         fit = hypothesis.fit
-        shared = fit.shared - nothing.fit.shared
-        local = [fit.local(t)[:own] - start for t, start in zip(trials, begin, strict=True)]
         there = [
             i for i in range(len(fit.problem.candidates)) if i in fit.free or (rig.curved and fit.uses(i))
         ]
         moved = [fit.problem.candidates[i] for i in there]
-        active = [(c, fit.part(i)[0] * c.units) for i, c in zip(there, moved, strict=True)]
+        to = _Point(
+            fit.shared - nothing.fit.shared,
+            [fit.local(t)[:own] - start for t, start in zip(trials, begin, strict=True)],
+            [fit.part(i)[0] for i in there],
+        )
+        here = to if at is None else at.towards(to, share)
+        shared, local = here.shared, here.local
+        active = [(c, x * c.units) for x, c in zip(here.values, moved, strict=True)]
         try:
             residual = rig.residual(-shared, [-x for x in local], active)
         except InputError:  # no such machine: the linear answer is the better one
@@ -47,12 +85,15 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
             values = np.zeros(fit.problem.width)
             values[: fit.problem.shared] = shared
             total = total + fit.problem.local[t][..., :own] @ local[t]
-            for i in there:
-                values[fit.problem.spans[i]] = fit.part(i)[0]
+            for i, x in zip(there, here.values, strict=True):
+                values[fit.problem.spans[i]] = x
             back.append(total + problem.raw_times(t, values))
         new = Hypothesis.of(problem.with_residual(back), hypothesis.free, hypothesis.allowed)
         lost = hypothesis.learnt.log_evidence - new.learnt.log_evidence
         if lost > (rules.BENT_NATS if bends and hypothesis is linear else rules.DIVERGED_NATS):
+            if rig.curved and at is not None and share > rules.LEAST_STEP:
+                share *= 0.5  # slopes have grown, so that a whole step goes too far
+                continue
             break  # it diverges: the linear answer is the better one
         se = np.sqrt(np.diag(new.fit.covariance))
         step = (
@@ -60,8 +101,11 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         )  # what nothing tells stays where it is
         way = float(step.max(initial=0.0))
         if way > max(last, 1.0):
+            if rig.curved and at is not None and share > rules.LEAST_STEP:
+                share *= 0.5
+                continue
             return linear  # steps grow: columns take up whatever a value that runs away leaves
-        hypothesis, last = new, way
+        hypothesis, last, at = new, way, here
         if way < rules.SETTLED_SE:
             break
     return hypothesis if hypothesis is linear else _from_nought(rig, hypothesis)

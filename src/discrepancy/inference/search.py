@@ -124,6 +124,8 @@ def _added(base: Hypothesis, proposed: Proposed) -> Hypothesis | None:
     best, open_ = proposed.best, proposed.open
     if best is None or best.score - base.score >= needed(base, best) or tolerated(base, best):
         return best
+    if proposed.due is not None:
+        return proposed.due
     if open_ is None or is_noise(base.fit.chi2, base.problem.samples, unlisted_nats(base)):
         return None
     return open_ if tolerated(base, open_) else None

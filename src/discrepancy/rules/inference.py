@@ -42,8 +42,11 @@ LEADS, LEAD_ROUNDS = 3, 8
 """Kinds of shapes far apart that are followed, and Gauss-Newton steps each. Measured: of a cable that is slack at times
 one from the other side explains nearly as much (428 of 453 nats), and more where a search begins (272, 208); seven
 steps are enough."""
-REFIT_ROUNDS = 3
-"""Gauss-Newton steps of causes and unknowns with exact residuals. Chosen."""
+REFIT_ROUNDS, SHORT_ROUNDS = 3, 12
+"""Gauss-Newton steps of causes and unknowns with exact residuals, and steps where they had to be shortened. Chosen."""
+LEAST_STEP = 0.2
+"""Of a step, beyond which it is halved where it makes things worse. Derived: with a slope k times that of the columns
+steps of a share s leave |1 - s k| of the error, so that down to an eighth all k below 16 settle."""
 PUSH_MOVES = (-0.4, -0.2, -0.1, -0.05, 0.0, 0.05, 0.1, 0.2, 0.4)
 """By which ends of a push are moved to refine it, in its duration. Chosen."""
 EVENT_PARTS = 16

@@ -119,6 +119,8 @@ JOINT_SHARE = 0.03
 sticking at reversals moves fitted rotors by up to 0.02 (of a simulated arm without any error)."""
 MOST_INERTIA_SHARE = 1.0
 """Of the same, beyond which a link is not off but another. Chosen: rotors and payloads add more, and are themselves."""
+DENSER = 2.0
+"""Of the same, beyond which no link is heavier. Derived: steel has 2.9 times the density of aluminium."""
 MOST_SE = 2.0
 """Spreads of a kind in the most that one of it can be. Derived: of a normal one, nineteen in twenty are within two."""
 RUBS_MORE = 2.0

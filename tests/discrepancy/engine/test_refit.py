@@ -148,3 +148,30 @@ def test_the_straight_answer_of_what_bends_may_flatter_it_a_little(flatter, take
     linear, nothing = hypotheses(rig, [2])
     found = exact(rig, linear, nothing)
     assert (found is not linear) == taken
+
+
+@dataclass
+class Grown(FakeRig):
+    """What cause 4 does grows with cause 2, as a centre of mass counts for more in a heavier link."""
+
+    curved = True
+    by: float = 0.0
+
+    def residual(self, shared, local, active):
+        values = {c.key: v for c, v in active}
+        more = 1.0 + self.by * values.get(CATALOGUE[2].key, np.zeros(1))[0]
+        grown = [(c, v * more if c.key == CATALOGUE[4].key else v) for c, v in active]
+        return super().residual(shared, local, grown)
+
+
+def test_steps_are_shortened_where_slopes_have_grown():
+    """Two and a half times the slope: whole steps go to the other side, one and a half times as far."""
+    rig = Grown({2: 30.0, 4: 2.5 * 8.0}, by=0.05)
+    linear, nothing = hypotheses(rig, [2])
+    found = exact(rig, linear, nothing)
+    assert found is not linear
+    heavy = found.fit.part(2)[0][0]
+    expected = linear.fit.part(4)[0][0] / (1.0 + rig.by * heavy)
+    assert found.fit.part(4)[0][0] == pytest.approx(expected, abs=0.05)
+    for t in linear.problem.trials:
+        np.testing.assert_allclose(found.fit.remaining(t), linear.fit.remaining(t), atol=0.3)

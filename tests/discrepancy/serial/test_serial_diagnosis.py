@@ -47,6 +47,21 @@ def test_rest_is_not_news(model: SerialModel) -> None:
     assert found.diagnosis.verdict == "consistent"
 
 
+@pytest.mark.parametrize(("link", "joint", "times"), [("fore", 3, 2.6), ("upper", 2, 2.2)])
+def test_a_link_of_another_material_is_found(model: SerialModel, link: str, joint: int, times: float) -> None:
+    """Of steel in place of aluminium: more than scatter may be, and centres of mass count for more in it."""
+    hidden = real(104)
+    before = hidden.body(link).mass
+    hidden.body(link).mass *= times
+    hidden.body(link).fullinertia = np.asarray(hidden.body(link).fullinertia) * times
+    found = diagnose_serial(model, [simulated(hidden.compile(), 8)])
+    assert named(found) == [("link_mass", joint)]
+    told = numbers(found)["excess_kg"]
+    modelled = spec().body(link).mass
+    assert abs(told["value"] - (before * times - modelled)) < 3.0 * told["se"]
+    assert told["se"] < 0.15 * told["value"]
+
+
 def test_friction_is_found_at_its_joint(model: SerialModel) -> None:
     """By MuJoCo's own dry friction, a constraint, and its damping."""
     hidden = real(101)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from discrepancy.rules import serial as rules
-from discrepancy.serial.causes.base import Cause
+from discrepancy.serial.causes.base import Cause, last_link
 from discrepancy.serial.mechanics.regressor import body_regressor, inertial_parameters
 from discrepancy.serial.rows.moved import with_tree
 
@@ -29,7 +29,11 @@ class LinkMass(Cause):
         return self.normal(tree, at)
 
     def possible(self, tree, at, values, se):
-        return abs(values[0]) < self.most(tree, at)[0] + 2.0 * se[0]
+        # Less than nothing it cannot weigh; of steel in place of aluminium it weighs three times as much. At the last
+        # link that would be a payload.
+        least = self.most(tree, at)[0]
+        most = least if at == last_link(tree) else rules.DENSER * least
+        return -least < values[0] + 2.0 * se[0] and values[0] < most + 2.0 * se[0]
 
     def most(self, tree, at):
         return [rules.MOST_INERTIA_SHARE * float(tree.mass[tree.joint_body[at]])]
