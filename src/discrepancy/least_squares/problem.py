@@ -91,12 +91,10 @@ class Problem:
                 columns[-1] = columns[-1].beside(Columns.of(raw, explicable[-1], cells[-1]))
                 columns = held(columns, rules.ROWS_BYTES)
             grams.append(CellGrams.of_columns(columns[-1], cells[-1]))
-        spans, at = [], shared
-        for candidate in candidates:
-            spans.append(slice(at, at + len(candidate.parameters)))
-            at += len(candidate.parameters)
+        ends = np.cumsum([shared, *(len(c.parameters) for c in candidates)]).tolist()
+        spans = map(slice, ends[:-1], ends[1:])
         tolerant = np.array([x for c in candidates for x in c.tolerant], dtype=bool)
-        power = tuple(np.ones(len(c.sizes)) for c in cells)
+        power = tuple(np.ones_like(own) for own in degrees)
         return cls(
             tuple(candidates), tuple(columns), tuple(local), tuple(explicable), tuple(cells), tuple(degrees),
             tuple(grams), power, shared, tuple(spans), tolerant, np.ones(len(tolerant)),
