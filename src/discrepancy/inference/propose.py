@@ -13,7 +13,6 @@ from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.imitation import imitated
 from discrepancy.inference.other_forms import beside_other_forms
-from discrepancy.inference.pays import needed
 from discrepancy.inference.scan import Scanned, events_of, scan, score_of, score_with, scores_with
 from discrepancy.inference.shape.sharpen import sharpened
 from discrepancy.inference.twins import twins
@@ -32,7 +31,6 @@ class Proposed:
         other: the likeliest whose added cause is not the one that is known; None without one.
         open: the one that would be likeliest if its added cause were as far off as its kind scatters, of those that
             leave something open; None without one.
-        due: the likeliest of those that are to be named, where one needs less than others; None without one.
         shapes: lasting causes whose shapes were sought to the end, in these.
     """
 
@@ -40,7 +38,6 @@ class Proposed:
     scores: tuple[tuple[Candidate, float], ...]
     other: Hypothesis | None = None
     open: Hypothesis | None = None
-    due: Hypothesis | None = None
     shapes: Mapping[Key, Candidate] = field(default_factory=dict)
 
 
@@ -67,7 +64,6 @@ def proposals(
     best: Hypothesis | None = None  # each has its own columns: all together would be gigabytes
     other: Hypothesis | None = None
     open_: Hypothesis | None = None
-    due: Hypothesis | None = None
     most = -np.inf  # score of that, tolerated
     scores: dict[tuple[object, ...], tuple[Candidate, float]] = {}
     rough: list[tuple[Scanned, float]] = []  # what was not sharpened, and the score of the hypothesis with it
@@ -90,21 +86,13 @@ def proposals(
                 sought[last.key] = last
             if best is None or new.score > best.score:
                 best = new
-            if known is None and (due is None or new.score > due.score) and _is_due(base, new):
-                due = new
             if last.key in new.problem.opened and last.key not in base.problem.opened:
                 tolerated = new.tolerating(new.free[-1])
                 if tolerated is not None and tolerated.score > most:
                     open_, most = new, tolerated.score
             if known is not None and last.key != known.key and (other is None or new.score > other.score):
                 other = new
-    return Proposed(best, tuple(sorted(scores.values(), key=lambda one: -one[1])), other, open_, due, sought)
-
-
-def _is_due(base: Hypothesis, more: Hypothesis) -> bool:
-    """Whether one cause more pays though others would have to gain more."""
-    gain = more.score - base.score
-    return 0.0 <= gain < rules.NAMED_NATS and gain >= needed(base, more)
+    return Proposed(best, tuple(sorted(scores.values(), key=lambda one: -one[1])), other, open_, sought)
 
 
 def _hypotheses(

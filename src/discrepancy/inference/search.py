@@ -124,8 +124,6 @@ def _added(base: Hypothesis, proposed: Proposed) -> Hypothesis | None:
     best, open_ = proposed.best, proposed.open
     if best is None or best.score - base.score >= needed(base, best) or tolerated(base, best):
         return best
-    if proposed.due is not None:
-        return proposed.due
     if open_ is None or is_noise(base.fit.chi2, base.problem.samples, unlisted_nats(base)):
         return None
     return open_ if tolerated(base, open_) else None
@@ -134,6 +132,15 @@ def _added(base: Hypothesis, proposed: Proposed) -> Hypothesis | None:
 def _but(shapes: Mapping[Key, Candidate] | None, cause: Candidate) -> dict[Key, Candidate]:
     """Shapes of others: a cause's own may be settled further in the noise that is left with it."""
     return {key: shape for key, shape in (shapes or {}).items() if key != cause.key}
+
+
+def _likelier(other: Hypothesis, best: Hypothesis, by: float = 0.0) -> bool:
+    """Whether another is to be there instead, by the data alone and beside what other forms of the rest could do.
+
+    What each is charged for these is of when it was added, beside what was known then: no reason alone for the other.
+    Nor is a fit alone that is mostly theirs, or the search would end where it had gone on.
+    """
+    return other.uncharged > best.uncharged + by and other.score > best.score + by
 
 
 def _law_holds(rig: Rig, hypothesis: Hypothesis, index: int) -> bool:
@@ -203,14 +210,12 @@ def settled(
             ]
             rivals[index].append(Rival(None, gap))
             if others.best is not None and others.best.score > judged.score + rules.EXCHANGED_NATS:
-                # What each was charged for other forms is of when it was added, beside what was known then: whether
-                # one is there at all is asked of that, and which of two is of the data.
                 other = exact(rig, others.best, nothing)
-                if other.uncharged > best.uncharged:
+                if _likelier(other, best):
                     best, changed = other, True
                     break
-                # Less likely where it is exact; and none of the others was likelier than that one.
-                least = best.uncharged - other.uncharged
+                # Not likelier where it is exact; and none of the others was likelier than that one.
+                least = max(best.uncharged - other.uncharged, 0.0)
                 rivals[index] = [
                     rival if rival.candidate is None else replace(rival, gap=max(rival.gap, least))
                     for rival in rivals[index]
@@ -218,7 +223,7 @@ def settled(
             elif others.other is not None and others.other.score > judged.score - rules.EXCHANGED_NATS:
                 # Equally likely by straight columns; exact ones may part them.
                 other = exact(rig, others.other, nothing)
-                if other.uncharged > best.uncharged + rules.EXCHANGED_NATS:
+                if _likelier(other, best, rules.EXCHANGED_NATS):
                     best, changed = other, True
                     break
         if not changed:

@@ -13,7 +13,7 @@ from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.propose import proposals
 from discrepancy.inference.remainder import unlisted_nats
 from discrepancy.inference.scan import score_of
-from discrepancy.inference.search import search, settled
+from discrepancy.inference.search import search
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.patches import Patches
 from discrepancy.least_squares.problem import Problem
@@ -568,27 +568,3 @@ def test_a_scatter_of_another_kind_with_the_same_trace_does_not_hide_a_fault(ben
     rig = BentRig(present, catalogue=(*SCATTERED[:3], *LAGS, *CATALOGUE), twins=twins, curls=bent)
     (found,) = found_in(rig).found
     assert (found.candidate.cause, found.candidate.robot) == (wanted, 1)
-
-
-class Formed(FakeRig):
-    """What else is there may leave nearly all that cause 2 does, by the forms that it may have."""
-
-    def other_forms(self, candidate, values, there):
-        if candidate.cause != "cause 2":
-            return []
-        rng = np.random.default_rng(0)
-        return [20.0 * (c + 0.1 * rng.standard_normal(c.shape)) for c in self.columns(candidate)]
-
-
-def test_which_of_two_is_there_is_asked_of_the_data_alone():
-    """What one was charged when it was added, for what is known of another since, is no reason for the other."""
-    none = [cause(c.cause, tolerance=0.0) if c.cause in ("cause 2", "cause 4") else c for c in CATALOGUE]
-    rig = Formed({2: 60.0, 5: [90.0, -80.0]}, twins={4: (2, 0.2)}, catalogue=tuple(none))
-    problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
-    there = Hypothesis.of(problem, (5, 2), {2: 40000.0})
-    instead = Hypothesis.of(problem, (5, 4))
-    assert there.score < instead.score < there.uncharged
-    found, rivals = settled(rig, there, Hypothesis.of(problem, ()))
-    assert set(found.free) == {5, 2}
-    gap = next(r.gap for r in rivals[2] if r.candidate is not None and r.candidate.cause == "cause 4")
-    assert gap == pytest.approx(found.uncharged - instead.uncharged, rel=0.02)

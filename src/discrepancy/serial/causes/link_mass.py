@@ -31,9 +31,9 @@ class LinkMass(Cause):
     def possible(self, tree, at, values, se):
         # Less than nothing it cannot weigh; of steel in place of aluminium it weighs three times as much. At the last
         # link that would be a payload.
-        least = self.most(tree, at)[0]
-        most = least if at == last_link(tree) else rules.DENSER * least
-        return -least < values[0] + 2.0 * se[0] and values[0] < most + 2.0 * se[0]
+        most = self.most(tree, at)[0]
+        more = most if at == last_link(tree) else rules.DENSER * most
+        return -most - 2.0 * se[0] < values[0] < more + 2.0 * se[0]
 
     def most(self, tree, at):
         return [rules.MOST_INERTIA_SHARE * float(tree.mass[tree.joint_body[at]])]

@@ -1,0 +1,60 @@
+"""Which of two causes is there: by the data, and beside what other forms of the rest could do."""
+
+import numpy as np
+import pytest
+
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.other_forms import beside_other_forms
+from discrepancy.inference.search import settled
+from discrepancy.least_squares.problem import Problem
+from fake_rig import CATALOGUE, FakeRig, cause
+
+
+class Formed(FakeRig):
+    """What else is there may leave nearly all that cause 2 does, by the forms that it may have."""
+
+    def other_forms(self, candidate, values, there):
+        if candidate.cause != "cause 2":
+            return []
+        rng = np.random.default_rng(0)
+        return [20.0 * (c + 0.1 * rng.standard_normal(c.shape)) for c in self.columns(candidate)]
+
+
+def test_which_of_two_is_there_is_asked_of_the_data_alone():
+    """What one was charged when it was added, for what is known of another since, is no reason for the other."""
+    none = [cause(c.cause, tolerance=0.0) if c.cause in ("cause 2", "cause 4") else c for c in CATALOGUE]
+    rig = Formed({2: 60.0, 5: [90.0, -80.0]}, twins={4: (2, 0.2)}, catalogue=tuple(none))
+    problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
+    there = Hypothesis.of(problem, (5, 2), {2: 40000.0})
+    instead = Hypothesis.of(problem, (5, 4))
+    assert there.score < instead.score < there.uncharged
+    found, rivals = settled(rig, there, Hypothesis.of(problem, ()))
+    assert set(found.free) == {5, 2}
+    gap = next(r.gap for r in rivals[2] if r.candidate is not None and r.candidate.cause == "cause 4")
+    assert gap == pytest.approx(found.uncharged - instead.uncharged, rel=0.02)
+
+
+class BothFormed(Formed):
+    """Half of what cause 4 does may be left so, too."""
+
+    def other_forms(self, candidate, values, there):
+        if candidate.cause != "cause 4":
+            return super().other_forms(candidate, values, there)
+        rng = np.random.default_rng(1)
+        return [20.0 * (c + rng.standard_normal(c.shape) * c.std()) for c in self.columns(candidate)]
+
+
+def test_an_exchange_does_not_end_a_search():
+    """What fits better and is charged for it is no gain, and a search for gains ended with it: both have to say so."""
+    none = [cause(c.cause, tolerance=0.0) if c.cause in ("cause 2", "cause 4") else c for c in CATALOGUE]
+    rig = BothFormed({4: 60.0, 5: [90.0, -80.0]}, twins={4: (2, 0.2)}, catalogue=tuple(none))
+    problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
+    there, instead = Hypothesis.of(problem, (5, 2)), Hypothesis.of(problem, (5, 4))
+    charged = beside_other_forms(rig, instead, 4, instead.without(4))
+    judged = beside_other_forms(rig, there, 2, there.without(2))
+    assert judged.score < charged.score < there.score < instead.score
+    found, rivals = settled(rig, there, Hypothesis.of(problem, ()))
+    assert found.score >= there.score
+    assert set(found.free) == {5, 2}
+    gap = next(r.gap for r in rivals[2] if r.candidate is not None and r.candidate.cause == "cause 4")
+    assert gap == 0.0  # the data prefer it, what it is charged for does not: as likely as not
