@@ -1,6 +1,7 @@
 """What a task costs on a cluster besides its work: seconds from here to a worker and back, and bytes of a trial.
 
-python benchmarks/speed/cluster.py [TASKS]        (needs dask.distributed)
+python benchmarks/speed/cluster.py [TASKS]            (needs dask.distributed)
+python benchmarks/speed/cluster.py --speed-up [N]     the paper's method on N random trials: processes, and workers
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from distributed import LocalCluster
 from joblib import Parallel, delayed
 
 from mocobot.cluster import workers_of
+from mocobot_sim.paper.experiment import PaperPlan, run_paper
 from mocobot_sim.trial.sensors import PRESETS
 from mocobot_sim.trial.simulate import TrialRequest, simulate
 
@@ -30,6 +32,37 @@ def seconds_per_task(tasks: int, values: np.ndarray) -> float:
         start = time.perf_counter()
         list(pool(delayed(echo)(values.copy()) for _ in range(tasks)))
         return (time.perf_counter() - start) / tasks
+
+
+def speed_up(trials: int = 12) -> None:
+    """Print the wall times of one experiment in one and two processes, and on one and two workers."""
+    plan = PaperPlan(payloads=("b",), trials=trials, staged_only=True)
+    warm = PaperPlan(payloads=("b",), presets=("ideal",), trials=2, vias=2, duration_s=5.0, staged_only=True)
+    alone = 0.0
+
+    def timed(what: str, jobs: int, *, remote: bool) -> None:
+        nonlocal alone
+        run_paper(warm, jobs, remote=remote)  # libraries and machine code are loaded
+        start, work = time.perf_counter(), time.process_time()
+        run_paper(plan, jobs, remote=remote)
+        wall = time.perf_counter() - start
+        alone = alone or wall
+        here = time.process_time() - work
+        print(
+            f"{what}: {wall:.1f} s, {alone / wall:.2f} times as fast; {here:.1f} s of CPU in the command",
+            flush=True,
+        )
+
+    for jobs in (1, 2):
+        timed(f"{jobs} process{'es' * (jobs > 1)}", jobs, remote=False)
+    for workers in (1, 2):
+        with (
+            LocalCluster(
+                n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None
+            ) as cluster,
+            workers_of(cluster.scheduler_address),
+        ):
+            timed(f"{workers} worker{'s' * (workers > 1)}", 1, remote=True)
 
 
 def main(tasks: int = 100) -> None:
@@ -53,4 +86,7 @@ def main(tasks: int = 100) -> None:
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    if sys.argv[1:2] == ["--speed-up"]:
+        speed_up(*map(int, sys.argv[2:]))
+    else:
+        main(*map(int, sys.argv[1:]))

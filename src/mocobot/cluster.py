@@ -13,6 +13,9 @@ INSTALL = "pip install 'mocobot[cluster]'"
 REACH_S, WORKERS_S = 20.0, 120.0
 """How long a scheduler is looked for, and its first worker waited for."""
 
+LARGE_TASKS = {"distributed.admin.large-graph-warning-threshold": "1TB"}
+"""An estimate is sent all recordings of its experiment, tens of MB on purpose: Dask would warn from 10 MB on."""
+
 
 @contextmanager
 def workers_of(scheduler: str | None) -> Iterator[None]:
@@ -32,6 +35,7 @@ def workers_of(scheduler: str | None) -> Iterator[None]:
         yield
         return
     try:
+        from dask import config
         from distributed import CancelledError, Client, KilledWorker
         from distributed.comm.core import CommClosedError
         from joblib._dask import DaskDistributedBackend  # which "dask" stands for; it has no public name
@@ -62,7 +66,7 @@ def workers_of(scheduler: str | None) -> Iterator[None]:
     with client:
         _check_workers(client, scheduler)
         try:
-            with parallel_config(backend=Workers(client=client)):
+            with config.set(LARGE_TASKS), parallel_config(backend=Workers(client=client)):
                 yield
         except KilledWorker as error:
             raise InputError(

@@ -23,6 +23,7 @@ import json, os, signal, sys, threading, time
 from pathlib import Path
 
 from distributed import Client, LocalCluster
+from joblib import Parallel, delayed
 
 from mocobot.cluster import workers_of
 from mocobot_sim.paper import experiment
@@ -56,6 +57,7 @@ def main(out):
             killer.start()
             with workers_of(cluster.scheduler_address):
                 result = run_paper(plan, 1, None, store, remote=True)
+                list(Parallel()(delayed(len)(bytes(20_000_000 + i)) for i in range(2)))  # as large as recordings
             killer.join()
     assert os.getpid() not in pids.values()
     print(json.dumps({"killed": len(killed), "scores": result.scores}))
@@ -86,6 +88,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bits(tmp_path: Path, refer
         check=False,
     )
     assert done.returncode == 0, done.stderr[-3000:]
+    assert "large graph" not in done.stderr
     said = json.loads(done.stdout.splitlines()[-1])
     assert said["killed"] == 1
     assert json.dumps(said["scores"]) == reference
