@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -12,6 +13,7 @@ import numpy as np
 
 from arm import machine
 from arm.forms import CAUSE_OF, MOST, NOT_FIRST, NOWHERE, TYPICAL, Form
+from discrepancy.candidate import Candidate
 from discrepancy.rules import inference
 from discrepancy.serial.logs import parts_of
 from discrepancy.serial.recording.joint_log import JointLog
@@ -98,11 +100,11 @@ def make(request: ArmSet, folder: Path) -> Made:
     q, torque = _read(arm, (), motion)
     clean = machine.logged("clean", motion.time, q, torque, request.rng("noise"))
     rig = SerialRig.of(machine.nominal(folder), [clean])
-    ideal = machine.logged("ideal", motion.time, q, torque, None)
+    shown = _Shown.of(request, rig) if request.forms else None
     sized, told = [], []
     sizes = request.rng("sizes")
     for k, form in enumerate(request.forms):
-        gain, tolerances = _shown(rig, ideal, _with(form, arm, motion, request.rng("motion")), form)
+        gain, tolerances = shown.by(form)
         # What is not so far out of its tolerance is no fault.
         limit = form.size * max(np.sqrt(GAIN / gain), inference.LEAST_SLAB / max(tolerances, 1e-9))
         wanted = request.factor or SIZES[(request.seed + k) % len(SIZES)] * sizes.uniform(0.9, 1.1)
@@ -178,33 +180,69 @@ def _asked(model: mujoco.MjModel, motion: machine.Motion, form: Form | None) -> 
     return out
 
 
-def _shown(rig: SerialRig, ideal: JointLog, changed: JointLog, form: Form) -> tuple[float, float]:
-    """What a form leaves of chi-square beside everything within its tolerance, and its size in tolerances.
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """What effects show, each alone, on an arm that is as its model says, in the noise of the healthy one's log.
 
-    The latter is that of its cause's nearest values; infinite where that has no tolerance, or shapes to tell it by.
+    On another one a payload of a kilogram times an angle that is off by some milliradians shows as well: a fit of that
+    arm has both, and nothing of it is the payload's.
+
+    Attributes:
+        request: the set.
+        arm, motion: without errors, along the same reference.
+        rig: its log without noise, whitened as the healthy one's.
     """
-    logs = (parts_of(rig.model, [log], rig.motors)[0] for log in (ideal, changed))
-    rows = [replace(rig, parts=parts, _seen={}).physical_residual([]) for parts in logs]
-    within = [c for c in rig.candidates() if all(p.tolerance > 0 for p in c.parameters)]
-    columns = [rig.columns(c) for c in within]
-    units = np.concatenate([[p.tolerance for p in c.parameters] for c in within])
-    A, b, width = [], [], len(units)
-    for t, white in enumerate(rig.whitening):
-        change = white(rows[1][t]) - white(rows[0][t])
-        X = np.concatenate([c[t] for c in columns], axis=2) * units
-        own = rig.local_columns(t)
-        n = change.size
-        X, change = X.reshape(n, width), change.reshape(n)
-        if own.size:
-            Q, _ = np.linalg.qr(own.reshape(n, -1))
-            X, change = X - Q @ (Q.T @ X), change - Q @ (Q.T @ change)
-        A.append(X)
-        b.append(change)
-    X, d = np.concatenate(A), np.concatenate(b)
-    x = np.linalg.solve(X.T @ X + np.eye(width), X.T @ d)
-    at = np.cumsum([0, *(len(c.parameters) for c in within)])
-    tolerances = np.inf
-    for k, c in enumerate(within):
-        if (c.cause, c.joint) == (form.cause, form.joint) and not rig.refinements(c):
-            tolerances = float(np.abs(np.linalg.lstsq(X[:, at[k] : at[k + 1]], d, rcond=None)[0]).max())
-    return float(d @ d - d @ (X @ x)), tolerances
+
+    request: ArmSet
+    arm: machine.Healthy
+    motion: machine.Motion
+    rig: SerialRig
+
+    @classmethod
+    def of(cls, request: ArmSet, healthy: SerialRig) -> _Shown:
+        """From the rig of the healthy arm's log."""
+        arm = machine.healthy(request.rng("arm"), 0.0)
+        motion = machine.moved(arm.spec, request.rng("motion"))
+        ideal = machine.logged("ideal", motion.time, *_read(arm, (), motion), None)
+        rig = SerialRig.of(healthy.model, [ideal])
+        return cls(request, arm, motion, replace(rig, whitening=healthy.whitening, spoilt=healthy.spoilt, _seen={}))
+
+    def by(self, form: Form) -> tuple[float, float]:
+        """What a form leaves of chi-square beside everything within its tolerance, and its size in tolerances.
+
+        The latter is that of its cause's nearest values, in the nearest shape; infinite where that has no tolerance.
+        """
+        rig = self.rig
+        changed = _with(form, self.arm, self.motion, self.request.rng("motion"))
+        parts, _ = parts_of(rig.model, [changed], rig.motors)
+        after = replace(rig, parts=parts, _seen={}, traces={}).physical_residual([])
+        change = [b - a for a, b in zip(rig.physical_residual([]), after, strict=True)]
+        d = self._white([rows[..., None] for rows in change])[:, 0]
+        within = [c for c in rig.candidates() if all(p.tolerance > 0 for p in c.parameters)]
+        X = np.concatenate([self._columns(c) for c in within], axis=1)
+        x = np.linalg.solve(X.T @ X + np.eye(X.shape[1]), X.T @ d)
+        own = [c for c in within if (c.cause, c.joint) == (form.cause, form.joint)]
+        near = [self._nearest(shape, d) for c in own for shape in (c, *rig.refinements(c))]
+        return float(d @ d - d @ (X @ x)), min(near)[1] if near else np.inf
+
+    def _nearest(self, candidate: Candidate, d: np.ndarray) -> tuple[float, float]:
+        """What a cause leaves of an effect's rows, and its largest value in tolerances."""
+        X = self._columns(candidate)
+        x = np.linalg.lstsq(X, d, rcond=None)[0]
+        return float(np.sum((d - X @ x) ** 2)), float(np.abs(x).max())
+
+    def _columns(self, candidate: Candidate) -> np.ndarray:
+        """Of a cause, a tolerance each, shape (rows, k)."""
+        return self._white(self.rig.physical(candidate)) * [p.tolerance for p in candidate.parameters]
+
+    def _white(self, physical: Sequence[np.ndarray]) -> np.ndarray:
+        """Rows (n, C, k) of every block without what rest may hide, shape (rows, k)."""
+        out = []
+        for t, (white, rows) in enumerate(zip(self.rig.whitening, physical, strict=True)):
+            x = white(rows).reshape(-1, rows.shape[2])
+            own = self.rig.local_columns(t)
+            if own.size:
+                Q, _ = np.linalg.qr(own.reshape(len(x), -1))
+                x = x - Q @ (Q.T @ x)
+            out.append(x)
+        return np.concatenate(out)
