@@ -205,7 +205,9 @@ class _Shown:
         motion = machine.moved(arm.spec, request.rng("motion"))
         ideal = machine.logged("ideal", motion.time, *_read(arm, (), motion), None)
         rig = SerialRig.of(healthy.model, [ideal])
-        return cls(request, arm, motion, replace(rig, whitening=healthy.whitening, spoilt=healthy.spoilt, _seen={}))
+        return cls(
+            request, arm, motion, replace(rig, whitening=healthy.whitening, spoilt=healthy.spoilt, _seen={})
+        )
 
     def by(self, form: Form) -> tuple[float, float]:
         """What a form leaves of chi-square beside everything within its tolerance, and its size in tolerances.
