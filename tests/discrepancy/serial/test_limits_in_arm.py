@@ -1,0 +1,28 @@
+"""From which size on the arm's campaign says that an effect can be found, held against what tolerances allow."""
+
+import numpy as np
+import pytest
+
+from arm import machine
+from arm.forms import CAUSE_OF, TYPICAL, Form
+from arm.limits import Shown, read
+from arm.sets import ArmSet
+from discrepancy.rules import inference
+from discrepancy.serial.rig import SerialRig
+
+
+@pytest.mark.slow
+def test_a_tilt_shows_no_more_than_its_tolerance_costs(tmp_path):
+    """A base that is off leaves at most its square in tolerances, whatever else the arm has that is off."""
+    rng = ArmSet.of(14133).rng
+    arm = machine.healthy(rng("arm"))
+    motion = machine.moved(arm.spec, rng("motion"))
+    log = machine.logged("clean", motion.time, *read(arm, (), motion), rng("noise"))
+    shown = Shown.of(rng, SerialRig.of(machine.nominal(tmp_path), [log]))
+    tilt = Form("tilt", CAUSE_OF["tilt"], None, TYPICAL["tilt"], 14133)
+    way = tilt.rng.uniform(0.0, 2.0 * np.pi)
+    tolerances = tilt.size / machine.LEVEL_RAD * np.abs([np.cos(way), np.sin(way)])
+    gain, largest = shown.by(tilt)
+    assert 0.9 * tolerances @ tolerances < gain < 1.01 * tolerances @ tolerances
+    np.testing.assert_allclose(largest, tolerances.max(), rtol=0.01)
+    assert shown.limit(tilt) >= inference.LEAST_SLAB * machine.LEVEL_RAD
