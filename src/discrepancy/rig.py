@@ -133,13 +133,19 @@ class Rig(ABC):
         return LawDoubt()
 
     def other_forms(
-        self, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]]
-    ) -> list[Array]:
+        self, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]],
+        rival: Candidate | None = None,
+    ) -> list[Array]:  # fmt: skip
         """Whitened columns (n, C, k) per trial of what causes that are there leave if their laws have other forms.
 
-        Each of one standard deviation; none where that is no matter for a candidate of such values beside them.
+        Each of one standard deviation; none where that is no matter for a candidate of such values beside them. With a
+        rival only those that matter for it, too.
         """
         return []
+
+    def charged_alike(self, one: Candidate, other: Candidate) -> bool:
+        """Whether the same other forms of what is there matter for two, so that their scores compare."""
+        return True
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Causes that act for a while in one trial only, where the whitened residuals (n, C) are worst."""

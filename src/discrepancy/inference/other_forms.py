@@ -5,13 +5,16 @@ from dataclasses import replace
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.scan import log_bayes_factor
 from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Rig
 
 
-def beside_other_forms(rig: Rig, hypothesis: Hypothesis, index: int, base: Hypothesis) -> Hypothesis:
+def beside_other_forms(
+    rig: Rig, hypothesis: Hypothesis, index: int, base: Hypothesis, rival: Candidate | None = None
+) -> Hypothesis:
     """The hypothesis without the credit that one of its causes has for what other forms of the others would explain.
 
     These are random columns of unit variance (``Rig.other_forms``), so that what a cause gains beside them is less, by
@@ -22,6 +25,8 @@ def beside_other_forms(rig: Rig, hypothesis: Hypothesis, index: int, base: Hypot
         hypothesis: with the cause.
         index: which.
         base: without it.
+        rival: only what other forms matter for this one, too, as where the two are held against each other; None for
+            all.
     """
     problem, candidate = hypothesis.problem, hypothesis.problem.candidates[index]
     fit, others = hypothesis.fit, [i for i in hypothesis.free if i != index]
@@ -35,9 +40,9 @@ def beside_other_forms(rig: Rig, hypothesis: Hypothesis, index: int, base: Hypot
     ]
     there = [(problem.candidates[i], fit.part(i)[0] * problem.candidates[i].units) for i in others]
     there += [(base.problem.candidates[i], before.part(i)[0] * base.problem.candidates[i].units) for i in off]
-    forms = rig.other_forms(candidate, fit.part(index)[0] * candidate.units, there)
+    forms = rig.other_forms(candidate, fit.part(index)[0] * candidate.units, there, rival)
     if not forms:
-        return hypothesis
+        return replace(hypothesis, allowed={i: x for i, x in hypothesis.allowed.items() if i != index})
     k = len(candidate.parameters)
     spike = 0.0
     if problem.has_tolerance(index):

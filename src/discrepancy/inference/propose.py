@@ -22,12 +22,27 @@ from discrepancy.rig import Rig
 
 
 @dataclass(frozen=True, eq=False)
+class Offer:
+    """A cause that could be added, in its shape.
+
+    Attributes:
+        candidate: the cause.
+        score: how likely the hypothesis with it is [nats].
+        alike: the same, charged only for what the known one is charged for, too.
+    """
+
+    candidate: Candidate
+    score: float
+    alike: float
+
+
+@dataclass(frozen=True, eq=False)
 class Proposed:
     """Hypotheses with one cause more.
 
     Attributes:
         best: the likeliest; the added cause is the last of its ``free``. None where none is possible.
-        scores: what is added, in its shape, and how likely that is [nats], the likeliest first.
+        offers: what is added, the likeliest first.
         other: the likeliest whose added cause is not the one that is known; None without one.
         open: the one that would be likeliest if its added cause were as far off as its kind scatters, of those that
             leave something open; None without one.
@@ -35,7 +50,7 @@ class Proposed:
     """
 
     best: Hypothesis | None
-    scores: tuple[tuple[Candidate, float], ...]
+    offers: tuple[Offer, ...]
     other: Hypothesis | None = None
     open: Hypothesis | None = None
     shapes: Mapping[Key, Candidate] = field(default_factory=dict)
@@ -65,21 +80,25 @@ def proposals(
     other: Hypothesis | None = None
     open_: Hypothesis | None = None
     most = -np.inf  # score of that, tolerated
-    scores: dict[tuple[object, ...], tuple[Candidate, float]] = {}
+    offers: dict[tuple[object, ...], Offer] = {}
     rough: list[tuple[Scanned, float]] = []  # what was not sharpened, and the score of the hypothesis with it
     sought: dict[Key, Candidate] = {}
     offered = chain(
         _hypotheses(rig, base, ranked, shapes, narrow=narrow),
-        _sharper(rig, base, ranked, shapes, rough, scores),
+        _sharper(rig, base, ranked, shapes, rough, offers),
     )
     for item, new in offered:
-        new = beside_other_forms(rig, new, new.free[-1], base)
+        bare = new
+        new = beside_other_forms(rig, bare, bare.free[-1], base)
         last = new.causes[-1]
         which = (last.key, last.transient)
-        if which in scores and scores[which][1] >= new.score:
+        if which in offers and offers[which].score >= new.score:
             continue
         if new.possible(rig, new.free[-1]) and not imitated(rig, base, new):
-            scores[which] = last, new.score
+            alike = new.score
+            if known is not None and not rig.charged_alike(last, known):
+                alike = beside_other_forms(rig, bare, bare.free[-1], base, known).score
+            offers[which] = Offer(last, new.score, alike)
             if item is not None:
                 rough.append((item, new.score))
             elif last.transient is None:
@@ -92,7 +111,7 @@ def proposals(
                     open_, most = new, tolerated.score
             if known is not None and last.key != known.key and (other is None or new.score > other.score):
                 other = new
-    return Proposed(best, tuple(sorted(scores.values(), key=lambda one: -one[1])), other, open_, sought)
+    return Proposed(best, tuple(sorted(offers.values(), key=lambda one: -one.score)), other, open_, sought)
 
 
 def _hypotheses(
@@ -115,7 +134,7 @@ def _sharper(
     ranked: Sequence[Scanned],
     shapes: Mapping[Key, Candidate],
     rough: Sequence[tuple[Scanned, float]],
-    scores: Mapping[tuple[object, ...], tuple[Candidate, float]],
+    offers: Mapping[tuple[object, ...], Offer],
 ) -> Iterator[tuple[None, Hypothesis]]:
     """After all, what is rough and the likeliest, or might be if its shape were not.
 
@@ -127,13 +146,16 @@ def _sharper(
         ranked: the scan.
         shapes: as of ``proposals``.
         rough: what was not sharpened, with scores.
-        scores: of all, to be asked when that is known.
+        offers: all, to be asked when they are known.
     """
-    best, most = max(scores.values(), key=lambda one: one[1], default=(None, base.score))
+    first = max(offers.values(), key=lambda one: one.score, default=None)
+    most = first.score if first else base.score
     # One whose shapes are far apart, once it has the best, is no measure for others that have not: their scans are.
     least = np.inf
-    if best is not None and best.cause in rig.coarse:
-        seen = max((item.score for item in ranked if item.candidate.key == best.key), default=np.inf)
+    if first is not None and first.candidate.cause in rig.coarse:
+        seen = max(
+            (item.score for item in ranked if item.candidate.key == first.candidate.key), default=np.inf
+        )
         least = rules.COARSE_SHARE * seen if seen > 0.0 else seen
     for item, score in list(rough):
         coarse = item.candidate.cause in rig.coarse

@@ -11,7 +11,7 @@ from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.other_forms import beside_other_forms
 from discrepancy.inference.pays import gained, healthy, needed, tolerated
 from discrepancy.inference.probability import probability
-from discrepancy.inference.propose import Proposed, proposals
+from discrepancy.inference.propose import Offer, Proposed, proposals
 from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import is_noise, nats_left, share_left, unlisted_nats
 from discrepancy.inference.shape.reshape import reshaped, settled_shape
@@ -143,6 +143,19 @@ def _likelier(other: Hypothesis, best: Hypothesis, by: float = 0.0) -> bool:
     return other.uncharged > best.uncharged + by and other.score > best.score + by
 
 
+def _gap(rig: Rig, best: Hypothesis, index: int, less: Hypothesis, judged: Hypothesis, other: Offer) -> float:
+    """By how much a cause is likelier than another in its place [nats].
+
+    Where other forms of the rest matter for one of the two alone, that is no reason for the other: both are judged
+    beside what matters for both, and share the probability where nothing else parts them.
+    """
+    gap = judged.score - other.score
+    if rig.charged_alike(best.problem.candidates[index], other.candidate):
+        return gap
+    alike = beside_other_forms(rig, best, index, less, other.candidate).score - other.alike
+    return min(gap, max(alike, 0.0))
+
+
 def _law_holds(rig: Rig, hypothesis: Hypothesis, index: int) -> bool:
     """Whether a cause is likelier than something unlisted that looks like it."""
     doubt = rig.law_doubt(hypothesis.problem.candidates[index])
@@ -204,9 +217,9 @@ def settled(
                 shapes=_but(shapes, candidate) if index == last else None,
             )  # fmt: skip
             rivals[index] = [
-                Rival(other, judged.score - score)
-                for other, score in others.scores
-                if other.key != candidate.key
+                Rival(one.candidate, _gap(rig, best, index, less, judged, one))
+                for one in others.offers
+                if one.candidate.key != candidate.key
             ]
             rivals[index].append(Rival(None, gap))
             if others.best is not None and others.best.score > judged.score + rules.EXCHANGED_NATS:

@@ -151,8 +151,8 @@ class Forms:
 
     def among(self, proposed: Proposed) -> bool:
         """Whether the likeliest law, or one that the rows cannot tell from it, is a named cause in another form."""
-        top = proposed.scores[0][1]
-        alike = [c for c, score in proposed.scores if top - score < rules.AMBIGUOUS_NATS]
+        top = proposed.offers[0].score
+        alike = [one.candidate for one in proposed.offers if top - one.score < rules.AMBIGUOUS_NATS]
         one = form_of_named((c for c in alike if isinstance(c, LawCandidate)), self.named, self.bench)
         if one is not None:
             self.found.append(one)

@@ -11,7 +11,7 @@ from discrepancy import rules
 from discrepancy.engine.held_out import held_out_gains
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.probability import parted
-from discrepancy.inference.propose import Proposed
+from discrepancy.inference.propose import Offer, Proposed
 from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import unlisted_nats
 from discrepancy.inference.scan import Scanned
@@ -199,16 +199,16 @@ def _proposals(
     base = searched.best
     say("try formulas")
     ranked = judged(base.fit, bench, _tried(places))
-    best, scores = None, []
+    best, offers = None, []
     leaders = _leaders(ranked, base) if ranked and ranked[0].nats >= least else []
     for item in leaders:
         candidate = _candidate(item, bench)
         scanned = Scanned(None, candidate, item.nats, tuple(searched.rig.columns(candidate)))
         new = sharpened(searched.rig, base, scanned, near=item.nats > rules.LAW_NEAR * leaders[0].nats)
-        scores.append((new.causes[-1], new.score))
+        offers.append(Offer(new.causes[-1], new.score, new.score))
         if best is None or new.score > best.score:
             best = new
-    return Proposed(best, tuple(sorted(scores, key=lambda one: -one[1])))
+    return Proposed(best, tuple(sorted(offers, key=lambda one: -one.score)))
 
 
 def _tried(places: Sequence[Located]) -> list[Place]:
@@ -249,16 +249,17 @@ def _candidate(item: Judged, bench: Bench) -> LawCandidate:
 
 def _rivals(bench: Bench, proposed: Proposed) -> list[Rival]:
     """What else could be there instead of the first, and the place that the rows cannot tell from it."""
-    (law, score), *others = proposed.scores
+    first, *others = proposed.offers
+    law = first.candidate
     out: dict[tuple[object, ...], Rival] = {}
     assert isinstance(law, LawCandidate)
     twin = bench.twin(law.at)
     if twin is not None:
         other = replace(law, at=twin, title=twin.title)
         out[other.key] = Rival(other, 0.0)
-    for candidate, less in others:
-        if candidate.key != law.key and candidate.key not in out:
-            out[candidate.key] = Rival(candidate, score - less)
+    for one in others:
+        if one.candidate.key != law.key and one.candidate.key not in out:
+            out[one.candidate.key] = Rival(one.candidate, first.score - one.score)
     return list(out.values())[: rules.LAW_RIVALS]
 
 

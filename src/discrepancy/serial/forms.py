@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -16,8 +17,9 @@ from estimator.arrays import Array
 
 
 def forms_beside(
-    rows: SerialRows, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]]
-) -> list[Array]:
+    rows: SerialRows, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]],
+    rival: Candidate | None = None,
+) -> list[Array]:  # fmt: skip
     """Whitened columns (n, C, k) per block of what a joint's causes leave if their laws have other forms.
 
     Friction in all its forms is one thing: what the catalogue has of it may be added up. But friction that the model
@@ -29,12 +31,17 @@ def forms_beside(
         candidate: which is judged beside them.
         values: of its parameters, in their units.
         there: causes with their values.
+        rival: only what matters for this one in the candidate's place, too; None for all.
     """
-    if candidate.cause not in CAUSES or candidate.transient is not None:
+    both = [candidate] if rival is None else [candidate, rival]
+    if any(charged_as(one) is None for one in both):
         return []
-    own = [(c, v) for c, v in there if _at_a_joint(c) and not (_rubs(candidate) and _rubs(c))]
-    soft = [*_named_friction(rows, candidate, values), *_shapes_of_found(rows, candidate, there)]
-    driven = [] if _rubs(candidate) else [motor.joint for motor in rows.motors]
+    rubs = any(map(_rubs, both))
+    own = [(c, v) for c, v in there if _at_a_joint(c) and not (rubs and _rubs(c))]
+    soft: list[list[Array]] = []
+    if all(map(_rubs, both)):
+        soft = [*_named_friction(rows, candidate, values), *_shapes_of_found(rows, candidate, there)]
+    driven = [] if rubs else [motor.joint for motor in rows.motors]
     if not own and not soft and not driven:
         return []
     traces = [[x @ v for x in rows.physical(c)] for c, v in own]
@@ -50,6 +57,13 @@ def forms_beside(
         columns += [column for j in driven for column in _worth(rows, t, j)]
         out.append(rows.whitening[t](np.stack(columns, axis=2)))
     return out
+
+
+def charged_as(candidate: Candidate) -> Literal["friction", "other"] | None:
+    """Which causes are judged beside the same forms; None of those that are beside none."""
+    if candidate.cause not in CAUSES or candidate.transient is not None:
+        return None
+    return "friction" if _rubs(candidate) else "other"
 
 
 def _worth(rows: SerialRows, trial: int, j: int) -> list[Array]:

@@ -118,10 +118,14 @@ class PairedRig(Rig):
         return self.inner.law_doubt(candidate)
 
     def other_forms(
-        self, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]]
-    ) -> list[Array]:
-        forms = self.inner.other_forms(candidate, values, there)
+        self, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]],
+        rival: Candidate | None = None,
+    ) -> list[Array]:  # fmt: skip
+        forms = self.inner.other_forms(candidate, values, there, rival)
         return self.merged(forms) if forms else []
+
+    def charged_alike(self, one: Candidate, other: Candidate) -> bool:
+        return self.inner.charged_alike(one, other)
 
     def possible(self, candidate: Candidate, values: Array, covariance: Array) -> bool:
         return self.inner.possible(candidate, values, covariance)

@@ -21,7 +21,7 @@ from discrepancy.serial import catalogue, shapes
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
-from discrepancy.serial.forms import forms_beside
+from discrepancy.serial.forms import charged_as, forms_beside
 from discrepancy.serial.logs import parts_of
 from discrepancy.serial.model import SerialModel, load_spec
 from discrepancy.serial.prediction import Within, unforetold
@@ -168,10 +168,15 @@ class SerialRig(SerialRows, Rig):
         return LawDoubt(share, rules.RIVAL_SHARE, rules.UNSEEN_NATS)
 
     def other_forms(
-        self, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]]
-    ) -> list[Array]:
+        self, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]],
+        rival: Candidate | None = None,
+    ) -> list[Array]:  # fmt: skip
         """What a joint's causes, and the friction that its model names, leave if their laws have other forms."""
-        return forms_beside(self, candidate, values, there)
+        return forms_beside(self, candidate, values, there, rival)
+
+    def charged_alike(self, one: Candidate, other: Candidate) -> bool:
+        """Friction is not judged beside the forms of other friction, and a push beside none."""
+        return charged_as(one) == charged_as(other)
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the torques are worst; none where torques are only what duties should give.

@@ -214,7 +214,11 @@ def test_one_that_has_its_best_shape_is_no_measure_for_those_that_have_not():
     found = proposals(rig, nothing)
     best, gained = (
         found.best,
-        {c.robot: score - nothing.score for c, score in found.scores if c.cause == "half"},
+        {
+            one.candidate.robot: one.score - nothing.score
+            for one in found.offers
+            if one.candidate.cause == "half"
+        },
     )
     assert best is not None
     assert (best.causes[-1].cause, best.causes[-1].robot) == ("half", 1)

@@ -13,7 +13,7 @@ from fake_rig import CATALOGUE, FakeRig, cause
 class Formed(FakeRig):
     """What else is there may leave nearly all that cause 2 does, by the forms that it may have."""
 
-    def other_forms(self, candidate, values, there):
+    def other_forms(self, candidate, values, there, rival=None):
         if candidate.cause != "cause 2":
             return []
         rng = np.random.default_rng(0)
@@ -37,9 +37,9 @@ def test_which_of_two_is_there_is_asked_of_the_data_alone():
 class BothFormed(Formed):
     """Half of what cause 4 does may be left so, too."""
 
-    def other_forms(self, candidate, values, there):
+    def other_forms(self, candidate, values, there, rival=None):
         if candidate.cause != "cause 4":
-            return super().other_forms(candidate, values, there)
+            return super().other_forms(candidate, values, there, rival)
         rng = np.random.default_rng(1)
         return [20.0 * (c + rng.standard_normal(c.shape) * c.std()) for c in self.columns(candidate)]
 
@@ -58,3 +58,35 @@ def test_an_exchange_does_not_end_a_search():
     assert set(found.free) == {5, 2}
     gap = next(r.gap for r in rivals[2] if r.candidate is not None and r.candidate.cause == "cause 4")
     assert gap == 0.0  # the data prefer it, what it is charged for does not: as likely as not
+
+
+class Unlike(Formed):
+    """What matters for cause 2 does not for cause 4."""
+
+    def other_forms(self, candidate, values, there, rival=None):
+        if rival is not None and rival.cause == "cause 4":
+            return []
+        return super().other_forms(candidate, values, there, rival)
+
+    def charged_alike(self, one, other):
+        return (one.cause == "cause 2") == (other.cause == "cause 2")
+
+
+@pytest.mark.parametrize("apart", [0.005, 0.02])
+def test_what_one_of_two_alone_is_charged_for_does_not_part_them(apart):
+    """Friction is not charged for other friction, an offset is: as likely by the data, they share the probability."""
+    none = [cause(c.cause, tolerance=0.0) if c.cause in ("cause 2", "cause 4") else c for c in CATALOGUE]
+    gaps = []
+    for kind in (Formed, Unlike):
+        rig = kind({4: 60.0, 5: [90.0, -80.0]}, twins={4: (2, apart)}, catalogue=tuple(none))
+        problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
+        there, instead = Hypothesis.of(problem, (5, 4)), Hypothesis.of(problem, (5, 2))
+        found, rivals = settled(rig, there, Hypothesis.of(problem, ()))
+        assert set(found.free) == {5, 4}
+        gaps.append(
+            next(r.gap for r in rivals[4] if r.candidate is not None and r.candidate.cause == "cause 2")
+        )
+        data = max(there.uncharged - instead.uncharged, 0.0)
+    charged, alike = gaps
+    assert charged > data + 50.0
+    assert alike == pytest.approx(data, abs=0.1 + 0.02 * data)

@@ -111,3 +111,22 @@ def test_what_another_shape_explains_is_no_second_kind(tmp_path: Path) -> None:
     assert not forms_beside(rig, soft, np.array([0.4, 0.1]), there)
     (elsewhere,) = (c for c in rig.candidates() if c.cause == "stribeck" and c.joint == 2)
     assert not forms_beside(rig, elsewhere, np.array([-0.1]), there)
+
+
+def test_friction_and_an_offset_are_held_against_each_other_beside_the_same(tmp_path: Path) -> None:
+    """An offset is charged for what friction at its joint leaves, friction is not: neither is where the two compare."""
+    rig = SerialRig.of(nominal(tmp_path), [simulated(spec().compile(), 11, seconds=12.0)])
+    each = {c.cause: c for c in rig.candidates() if c.joint == 3}
+    offset, one_way, spring = each["torque_offset"], each["asymmetric_coulomb"], each["counterbalance"]
+    there = [(each["friction"], np.array([0.4, 0.1]))]
+    assert not rig.charged_alike(offset, one_way)
+    assert rig.charged_alike(offset, spring)
+    assert forms_beside(rig, offset, np.array([0.1]), there)
+    assert not forms_beside(rig, offset, np.array([0.1]), there, one_way)
+    assert not forms_beside(rig, one_way, np.array([0.1]), there, offset)
+    besides = [*there, (spring, np.array([0.2, 0.1]))]
+    some, all_ = (forms_beside(rig, offset, np.array([0.1]), besides, other) for other in (one_way, None))
+    alone = forms_beside(rig, offset, np.array([0.1]), [(spring, np.array([0.2, 0.1]))])
+    for own, more, by_itself in zip(some, all_, alone, strict=True):
+        assert 0 < own.shape[2] < more.shape[2]
+        np.testing.assert_array_equal(own, by_itself)
