@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from discrepancy.rules import serial as rules
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.causes import CAUSES
-from discrepancy.serial.causes.base import Cause, Hints, last_link, partner
+from discrepancy.serial.causes.base import Cause, Hints, partner
 from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rows.signals import Signals
@@ -35,7 +35,7 @@ def places(cause: Cause, tree: Tree, hints: Hints, *, change: bool = False) -> l
         if cause.name == "payload":
             # Where one joint moves a link its mass does not show: what does is a first moment and an inertia.
             carried = [j for j in moving if tree.moved[:, tree.joint_body[j]].sum() > 1]
-            return [j for j in carried if change or j == last_link(tree)]
+            return [j for j in carried if change or j == tree.last_link]
         return [j for j in moving if cause.name == "link_length" or tree.mass[tree.joint_body[j]] > 0]
     travelled = [j for j in joints if hints.travel[j] > rules.LEAST_TRAVEL and cause.shapes(hints, j)]
     if cause.part == "pair":

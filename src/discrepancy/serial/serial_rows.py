@@ -100,7 +100,21 @@ class SerialRows:
 
     def columns(self, candidate: Candidate) -> list[Array]:
         """Whitened columns of one candidate, shape (n, C, k) per block."""
-        return [white(c) for white, c in zip(self.whitening, self.physical(candidate), strict=True)]
+        if candidate.cause not in CAUSES:
+            return [white(c) for white, c in zip(self.whitening, self.physical(candidate), strict=True)]
+        if candidate.transient is not None:
+            acts, rows = candidate.transient.trial, self.physical(candidate)
+            return [self.whitening[t](c) if t == acts else np.zeros(c.shape) for t, c in enumerate(rows)]
+        key = shaped_key(candidate)
+        if key not in self._white:
+            rows = self.physical(candidate)
+            self._white[key] = [white(c) for white, c in zip(self.whitening, rows, strict=True)]
+        return self._white[key]
+
+    @cached_property
+    def _white(self) -> dict[Any, list[Array]]:
+        """Whitened columns of what lasts, as far as they were made already."""
+        return {}
 
     def common_columns(self, trial: int) -> Array:
         """Whitened columns of what may be wrong in all logs, shape (n, C, s); none without a reference."""

@@ -181,12 +181,6 @@ def partner(tree: Tree, at: int) -> int | None:
     return int(np.flatnonzero(moved)[-1]) if moved.any() else None
 
 
-def last_link(tree: Tree) -> int:
-    """The joint that moves the last link: the one with the longest way to the base."""
-    ways = tree.moved[:, tree.joint_body].sum(axis=0)
-    return int(np.flatnonzero(ways == ways.max())[-1])
-
-
 def at_joint(signals: Signals, at: int, *columns: Array) -> Array:
     """Columns (W,) that act on one joint, shape (W, J, k)."""
     out = np.zeros((len(signals.time), signals.q.shape[1], len(columns)))

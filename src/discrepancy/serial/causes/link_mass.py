@@ -3,7 +3,7 @@
 import numpy as np
 
 from discrepancy.rules import serial as rules
-from discrepancy.serial.causes.base import Cause, last_link
+from discrepancy.serial.causes.base import Cause
 from discrepancy.serial.mechanics.regressor import body_regressor, inertial_parameters
 from discrepancy.serial.rows.moved import with_tree
 
@@ -32,7 +32,7 @@ class LinkMass(Cause):
         # Less than nothing it cannot weigh; of steel in place of aluminium it weighs three times as much. At the last
         # link that would be a payload.
         most = self.most(tree, at)[0]
-        more = most if at == last_link(tree) else rules.DENSER * most
+        more = most if at == tree.last_link else rules.DENSER * most
         return -most - 2.0 * se[0] < values[0] < more + 2.0 * se[0]
 
     def most(self, tree, at):

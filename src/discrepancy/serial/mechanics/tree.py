@@ -78,6 +78,12 @@ class Tree:
         return out
 
     @property
+    def last_link(self) -> int:
+        """The joint that moves the last link: the one with the longest way to the base."""
+        ways = self.moved[:, self.joint_body].sum(axis=0)
+        return int(np.flatnonzero(ways == ways.max())[-1])
+
+    @property
     def links(self) -> NDArray[np.intp]:
         """Bodies that move and have mass: those whose inertias can show."""
         return np.flatnonzero(self.moved.any(axis=0) & (self.mass > 0))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from discrepancy.rules import serial as rules
 from discrepancy.serial.mechanics.motion import Motion
+from discrepancy.serial.mechanics.regressor import force_torque
 from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.recording.joint_log import JointLog
 from estimator.arrays import Array
@@ -78,6 +79,12 @@ class Signals:
     def motion(self) -> Motion:
         """Of the nominal tree's bodies."""
         return Motion.of(self.tree, self.q, self.dq, self.ddq)
+
+    @cached_property
+    def pushed(self) -> Array:
+        """Joint torques per newton on the last link's centre of mass along the world's axes, shape (W, J, 3)."""
+        body = int(self.tree.joint_body[self.tree.last_link])
+        return force_torque(self.motion, body, self.tree.com[body])
 
     @property
     def residual(self) -> Array:
