@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -43,7 +45,18 @@ class Opened:
             own: orthonormal columns that the rows are without, shape (n, C, l).
             before: unknowns that the rows are transformed for already, in turn.
         """
-        columns = columns.fewer()
+        # A search looks at the same columns again and again.
+        made = _MADE.setdefault(columns, {})
+        key = (id(own), *((id(one.basis), one.size) for one in before))
+        if key not in made:
+            if len(made) >= rules.OPEN_KEPT:
+                made.clear()
+            made[key] = _Made(cls._unit(columns.fewer(), own, before), own, tuple(before))
+        return made[key].opened.of_size(size)
+
+    @classmethod
+    def _unit(cls, columns: Patches, own: Array, before: Sequence[Opened]) -> Opened:
+        """The same of unit size, with columns that all show."""
         left = Mixed.of(columns, own)
         squares = columns.cross(columns)
         shown = rules.PATCH_SHOWS**2 * np.max(np.diag(squares), initial=0.0)
@@ -57,7 +70,7 @@ class Opened:
         squares, V = np.linalg.eigh(squares)
         keep = squares > max(rules.OPEN_SHOWS**2 * squares.max(initial=0.0), shown)
         s = np.sqrt(squares[keep])
-        return cls(columns, left.at(V[:, keep] / s), s, size)
+        return cls(columns, left.at(V[:, keep] / s), s, 1.0)
 
     @cached_property
     def shrink(self) -> Array:
@@ -82,6 +95,19 @@ class Opened:
         if not len(self.stretch) or not x.size:
             return x
         return np.asarray(x - self.basis.times(self.along(x)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Made:
+    """Unknowns, and beside what they were made: as long as these are kept, nothing else has their identity."""
+
+    opened: Opened
+    own: Array
+    before: tuple[Opened, ...]
+
+
+_MADE: WeakKeyDictionary[Patches, dict[tuple[Any, ...], _Made]] = WeakKeyDictionary()
+"""What was made of columns that are in use, by what was there before."""
 
 
 def through(opened: Sequence[Opened], x: Array) -> Array:

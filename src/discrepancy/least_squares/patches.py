@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +33,12 @@ class Patch:
     first: int
     values: Array
 
+    @cached_property
+    def where(self) -> slice | NDArray[np.intp]:
+        """The rows as an index: a slice, which copies nothing, where none is missing between the first and the last."""
+        whole = len(self.rows) and self.rows[-1] - self.rows[0] + 1 == len(self.rows)
+        return slice(int(self.rows[0]), int(self.rows[-1]) + 1) if whole else self.rows
+
     @property
     def flat(self) -> Array:
         """All their numbers, shape (rows (C - first), k)."""
@@ -39,16 +46,26 @@ class Patch:
 
     def within(self, x: Array, first: int = 0) -> Array:
         """The same numbers of others, of channels from one on, shape (n, C - first, l) -> (rows (C - first), l)."""
-        return x[self.rows, self.first - first :].reshape(len(self.flat), x.shape[2])
+        part = x[self.where, self.first - first :]
+        return part.reshape(part.shape[0] * part.shape[1], x.shape[2])
 
     def cross(self, other: Patch) -> Array:
         """Products with the columns of another, shape (k, l)."""
         if self.rows[0] > other.rows[-1] or other.rows[0] > self.rows[-1]:
             return np.zeros((self.values.shape[2], other.values.shape[2]))
         first = max(self.first, other.first)
-        _, here, there = np.intersect1d(self.rows, other.rows, assume_unique=True, return_indices=True)
+        here, there = self._shared(other)
         a, b = self.values[here, first - self.first :], other.values[there, first - other.first :]
         return a.reshape(-1, a.shape[2]).T @ b.reshape(-1, b.shape[2])
+
+    def _shared(self, other: Patch) -> tuple[Any, Any]:
+        """Which of its own rows are those of another, and which of the other's."""
+        a, b = self.where, other.where
+        if isinstance(a, slice) and isinstance(b, slice):
+            start, stop = max(a.start, b.start), min(a.stop, b.stop)
+            return slice(start - a.start, stop - a.start), slice(start - b.start, stop - b.start)
+        _, here, there = np.intersect1d(self.rows, other.rows, assume_unique=True, return_indices=True)
+        return here, there
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +117,7 @@ class Patches:
         out = np.zeros((self.shape[0], self.shape[1] - first, z.shape[1]))
         for patch, span in zip(self.each, self.spans, strict=True):
             sums = (patch.flat @ z[span]).reshape(*patch.values.shape[:2], -1)
-            out[patch.rows, max(patch.first - first, 0) :] += sums[:, max(first - patch.first, 0) :]
+            out[patch.where, max(patch.first - first, 0) :] += sums[:, max(first - patch.first, 0) :]
         return out
 
     def products(self, x: Array, first: int = 0) -> Array:

@@ -58,7 +58,7 @@ class TeamRows(Rig):
         origin: how far from the robots as they were believed to be all is linear; None for not at all.
         resting: spread over its tolerance of each kind that leaves something open, such as friction at rest: noise.
         jobs: parallel processes.
-        kept: whitened columns of shapes that are asked for again and again.
+        kept: whitened columns that are asked for again and again.
     """
 
     recordings: tuple[Recording, ...]
@@ -69,7 +69,7 @@ class TeamRows(Rig):
     origin: ArmUnit | None = None
     resting: Mapping[str, float] = field(default_factory=dict)
     jobs: int = 1
-    kept: dict[tuple[Any, ...], Array] = field(default_factory=dict, repr=False)
+    kept: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False)
 
     @classmethod
     def of(
@@ -216,8 +216,11 @@ class TeamRows(Rig):
         return CAUSES[candidate.cause].possible(values, se, candidate.shape)
 
     def unknowns(self, candidate: Candidate) -> Sequence[Patches]:
-        of, place = CAUSES[candidate.cause].unknowns, (*indices(candidate), candidate.shape)
-        return [w.of_patches(of(t, *place)) for w, t in zip(self.whitening, self.linear, strict=True)]
+        if (key := ("open", *candidate.trace)) not in self.kept:
+            of, place = CAUSES[candidate.cause].unknowns, (*indices(candidate), candidate.shape)
+            pairs = zip(self.whitening, self.linear, strict=True)
+            self.kept[key] = [w.of_patches(of(t, *place)) for w, t in pairs]
+        return self.kept[key]
 
     def rows(self, candidates: Sequence[Candidate]) -> Iterator[Rows]:
         for t, linear in enumerate(self.linear):
@@ -226,16 +229,11 @@ class TeamRows(Rig):
             for k, candidate in enumerate(candidates):
                 there = origin_of(candidate, self.origin)
                 residual += 0.0 if there is None else causes[k] @ there
+            local = np.concatenate([linear.by_bases, linear.by_clocks], axis=2)
             yield Rows(
-                self.recordings[t].name,
-                residual,
-                self.whitening[t](np.concatenate([linear.by_bases, linear.by_clocks], axis=2)),
-                self.whitening[t](linear.by_shared),
-                causes,
-                linear.reduction.time,
-                linear.reduction.moving,
-                groups_of(self.robots),
-            )
+                self.recordings[t].name, residual, self.whitening[t](local), self.whitening[t](linear.by_shared),
+                causes, linear.reduction.time, linear.reduction.moving, groups_of(self.robots),
+            )  # fmt: skip
 
     def _at_origin(self, trial: int, candidate: Candidate) -> Array | float:
         """What the robots, as they were found, have of it: out of the residual, for values count from the design."""

@@ -1,10 +1,13 @@
 """Unknowns of a known size, integrated out: the same as a dense covariance of the rows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
 from discrepancy.least_squares.fit import Fit
+from discrepancy.least_squares.gram import orthonormal
 from discrepancy.least_squares.opened import Opened, through
 from discrepancy.least_squares.patches import Patches
 from discrepancy.least_squares.problem import Problem
@@ -64,6 +67,21 @@ def test_transformed_rows_and_price_are_the_dense_likelihood(rng, size):
         expected = multivariate_normal.logpdf(y.ravel(), np.zeros(30), dense)
         got = -0.5 * white @ white - opened.price - 15.0 * np.log(2 * np.pi)
         assert got == pytest.approx(expected, abs=1e-6)
+
+
+def test_columns_that_are_looked_at_again_are_beside_what_is_there_then(rng):
+    """What they become is kept for a while: beside other unknowns, other sizes or other own columns it is another."""
+    own = [orthonormal(rng.standard_normal((10, 3, k))) for k in (2, 3)]
+    others = [Opened.of(Patches.of(rng.standard_normal((10, 3, 2))), size, own[0]) for size in (0.5, 2.0)]
+    others += [other.of_size(7.0) for other in others]
+    columns, y = Patches.of(rng.standard_normal((10, 3, 4))), rng.standard_normal((10, 3, 2))
+    cases = [(2.0, each, ()) for each in own] + [(1.0, own[0], (other,)) for other in others]
+    for size, each, before in cases * 2:
+        again = Opened.of(columns, size, each, before)
+        anew = Opened.of(replace(columns), size, each, before)
+        assert again.price == pytest.approx(anew.price, rel=1e-12)
+        np.testing.assert_allclose(again(y), anew(y), rtol=1e-12, atol=1e-12)
+    assert len({round(Opened.of(columns, *case).price, 6) for case in cases}) == len(cases)
 
 
 def test_what_is_transformed_is_white(rng):

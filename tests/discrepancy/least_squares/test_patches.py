@@ -47,6 +47,20 @@ def test_sums_and_products(rng, case):
     assert len(patches.together(4).each) == 3
 
 
+def test_rows_with_a_gap(rng, case):
+    """Moving rows, and others after all of them, as whitening puts them together."""
+    whole, patches = case
+    gap = np.zeros((N, C, 2))
+    gap[[7, 8, 9, 50, 51, 58], 1:] = rng.standard_normal((6, C - 1, 2))
+    one, x = Patches.of(gap), rng.standard_normal((N, C, 3))
+    assert isinstance(patches.each[0].where, slice)
+    assert not isinstance(one.each[0].where, slice)
+    for a, b in ((one, patches), (patches, one), (one, one)):
+        np.testing.assert_allclose(a.cross(b), gram_of(a.dense(), b.dense()), atol=1e-12)
+    np.testing.assert_allclose(one.products(x[:, 1:], 1), gram_of(gap, x), atol=1e-12)
+    np.testing.assert_array_equal(one.dense(), gap)
+
+
 def test_as_few_columns_as_scatter_alike(rng, case):
     """Normal unknowns of size one have the same covariance; columns that others are made of are no more of them."""
     whole, patches = case
