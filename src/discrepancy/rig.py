@@ -63,7 +63,7 @@ class Channel:
 class Rig(ABC):
     """A machine and its simulation, seen by the diagnosis; what a machine may lack has defaults that say so."""
 
-    rigid: ClassVar[tuple[str, ...]] = ()  # causes that are looked for with kinds held, too
+    rigid: ClassVar[tuple[str, ...]] = ()  # looked for with kinds held, too; can be in some shapes only
     shaped: ClassVar[
         tuple[str, ...]
     ] = ()  # causes that have a tolerance, and a shape without which they may not show

@@ -73,7 +73,7 @@ class _Search:
         for _ in range(rules.FINER_ROUNDS + 1):
             if not shapes:
                 break
-            best = max((best, *self.scored(shapes)), key=_score)
+            best = self._likeliest((best, *self.scored(shapes)))
             if best is around:
                 break
             around, shapes = best, self.rig.refinements(best[0], finer=True)
@@ -84,10 +84,25 @@ class _Search:
         for _ in range(rounds if self.rig.steps(best) else 0):
             values = self._solution(best)[0] * best.units
             ((nearer, judged),) = self.scored([nearest_shape(self.rig, self.fit, best, values)])
-            if judged <= score:
+            if judged <= score or (
+                self._bounded(nearer) and self._possible(best) and not self._possible(nearer)
+            ):
                 break
             best, score = nearer, judged
         return best, score
+
+    def _bounded(self, candidate: Candidate) -> bool:
+        return candidate.cause in self.rig.rigid
+
+    def _likeliest(self, each: Sequence[_Scored]) -> _Scored:
+        """The likeliest; of what has values in some shapes only that can be, among these, if there are any.
+
+        A mass a little off its place gets an inertia that none has, and fits as well.
+        """
+        ranked = sorted(each, key=_score, reverse=True)
+        if not self._bounded(ranked[0][0]):
+            return ranked[0]
+        return next((one for one in ranked if self._possible(one[0])), ranked[0])
 
     def of_far_apart(self, best: Candidate, score: float) -> _Scored:
         """The likeliest that steps lead to from any of the shapes that are far apart."""

@@ -68,6 +68,8 @@ def settled_shape(rig: Rig, new: Hypothesis, index: int) -> Hypothesis:
         other = in_shape(rig, new, index, moved)
         if other.score <= new.score:
             break
+        if candidate.cause in rig.rigid and new.possible(rig, index) and not other.possible(rig, index):
+            break
         gained, new = other.score - new.score, other
         if gained < rules.SETTLED_NATS:
             break
