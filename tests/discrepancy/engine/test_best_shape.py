@@ -56,6 +56,29 @@ def found_in(seed):
     return found
 
 
+class Bounded(Wave):
+    """Nothing has a frequency above 1.305: the likeliest is a little more than can be, as by an error of the model."""
+
+    rigid = ("wave",)
+
+    def possible(self, candidate, values, covariance):
+        return candidate.cause != "wave" or candidate.shape["w"] <= 1.305
+
+
+@pytest.mark.parametrize("start", [1.18, 1.3, 1.34])
+def test_a_shape_that_can_be_is_taken_where_the_likeliest_cannot(start):
+    """A payload of which the likeliest place asks for an inertia that no body has is there all the same."""
+    wave = replace(WAVE, shape={"w": start})
+    rig, free = (kind({}, catalogue=(*CATALOGUE, wave), seed=3) for kind in (Bounded, Wave))
+    nothing = nothing_in(rig)
+    item = Scanned(len(CATALOGUE), wave, 0.0)
+    assert best_shape(free, nothing.problem, (), item).shape["w"] == pytest.approx(TRUE_W, abs=0.004)
+    assert 1.26 < best_shape(rig, nothing.problem, (), item).shape["w"] <= 1.305
+    (found,) = explain(search(rig)).found
+    assert found.candidate.cause == "wave"
+    assert 1.26 < found.candidate.shape["w"] <= 1.305
+
+
 @pytest.mark.slow
 def test_shape_is_found_between_the_grids_points_with_errors_as_stated():
     """Monte Carlo over noise, unknowns and the tolerances of all other causes."""

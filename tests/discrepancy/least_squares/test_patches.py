@@ -49,7 +49,7 @@ def test_sums_and_products(rng, case):
 
 def test_rows_with_a_gap(rng, case):
     """Moving rows, and others after all of them, as whitening puts them together."""
-    whole, patches = case
+    _, patches = case
     gap = np.zeros((N, C, 2))
     gap[[7, 8, 9, 50, 51, 58], 1:] = rng.standard_normal((6, C - 1, 2))
     one, x = Patches.of(gap), rng.standard_normal((N, C, 3))
