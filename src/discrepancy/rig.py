@@ -135,13 +135,13 @@ class Rig(ABC):
     def other_forms(
         self, candidate: Candidate, values: Array, there: Sequence[tuple[Candidate, Array]],
         rival: Candidate | None = None,
-    ) -> list[Array]:  # fmt: skip
+    ) -> list[Array] | None:  # fmt: skip
         """Whitened columns (n, C, k) per trial of what causes that are there leave if their laws have other forms.
 
         Each of one standard deviation; none where that is no matter for a candidate of such values beside them. With a
-        rival only those that matter for it, too.
+        rival only those that matter for it, too. None where the rig knows of no other forms.
         """
-        return []
+        return None
 
     def charged_alike(self, one: Candidate, other: Candidate) -> bool:
         """Whether the same other forms of what is there matter for two, so that their scores compare."""

@@ -41,6 +41,8 @@ def beside_other_forms(
     there = [(problem.candidates[i], fit.part(i)[0] * problem.candidates[i].units) for i in others]
     there += [(base.problem.candidates[i], before.part(i)[0] * base.problem.candidates[i].units) for i in off]
     forms = rig.other_forms(candidate, fit.part(index)[0] * candidate.units, there, rival)
+    if forms is None:  # it is charged for other things, if at all
+        return hypothesis
     if not forms:
         return replace(hypothesis, allowed={i: x for i, x in hypothesis.allowed.items() if i != index})
     k = len(candidate.parameters)

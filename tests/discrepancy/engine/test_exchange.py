@@ -90,3 +90,12 @@ def test_what_one_of_two_alone_is_charged_for_does_not_part_them(apart):
     charged, alike = gaps
     assert charged > data + 50.0
     assert alike == pytest.approx(data, abs=0.1 + 0.02 * data)
+
+
+def test_what_was_charged_for_forms_that_matter_no_more_is_no_charge():
+    """The others it stood beside are gone; but what it is charged for else, such as what it leaves open, stays."""
+    for kind, kept in ((Formed, {}), (FakeRig, {4: 100.0})):
+        rig = kind({4: 60.0, 5: [90.0, -80.0]}, catalogue=CATALOGUE)
+        problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
+        there = Hypothesis.of(problem, (5, 4), {4: 100.0})
+        assert beside_other_forms(rig, there, 4, there.without(4)).allowed == kept

@@ -486,7 +486,7 @@ def test_a_fault_of_one_of_two_kinds_with_one_trace_is_seen_in_both():
     nothing = Hypothesis.of(Problem.of(rig.rows(catalogue), catalogue), ())
     wide = nothing.problem.spread[[0, 3]]
     assert min(wide) < 1.5 < 3.0 < max(wide)
-    seen = {c.key: score for c, score in proposals(rig, nothing, events=False).scores}
+    seen = {one.candidate.key: one.score for one in proposals(rig, nothing, events=False).offers}
     assert seen["lag", 2, None] == pytest.approx(seen["late", 2, None], abs=0.5)
     assert seen["late", 2, None] > nothing.score
 
