@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from discrepancy.candidate import Candidate, Parameter, Transient
+from discrepancy.engine.explanation import explain
+from discrepancy.inference.search import search
 from discrepancy.rig import Channel, Rig, Rows
 
 ROWS, CHANNELS, RATE_HZ = 120, 4, 12.5
@@ -150,3 +152,7 @@ class FakeRig(Rig):
 
 def names(found):
     return [f.candidate.cause for f in found]
+
+
+def found_in(rig, **options):
+    return explain(search(rig, **options))
