@@ -216,11 +216,13 @@ class TeamRows(Rig):
         return CAUSES[candidate.cause].possible(values, se, candidate.shape)
 
     def unknowns(self, candidate: Candidate) -> Sequence[Patches]:
-        if (key := ("open", *candidate.trace)) not in self.kept:
-            of, place = CAUSES[candidate.cause].unknowns, (*indices(candidate), candidate.shape)
-            pairs = zip(self.whitening, self.linear, strict=True)
-            self.kept[key] = [w.of_patches(of(t, *place)) for w, t in pairs]
-        return self.kept[key]
+        if (key := ("open", *candidate.trace)) in self.kept:
+            return self.kept[key]
+        of, place = CAUSES[candidate.cause].unknowns, (*indices(candidate), candidate.shape)
+        own = [w.of_patches(of(t, *place)) for w, t in zip(self.whitening, self.linear, strict=True)]
+        if not is_filed(self.linear[0]):  # of long recordings they would fill the memory
+            self.kept[key] = own
+        return own
 
     def rows(self, candidates: Sequence[Candidate]) -> Iterator[Rows]:
         for t, linear in enumerate(self.linear):
