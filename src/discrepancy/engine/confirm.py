@@ -134,7 +134,8 @@ def confirm(
 
 def _decided(found: Found, alternatives: Sequence[Alternative]) -> float:
     """The probability of a cause once the closed loop has spoken: a rival that does worse there is no look-alike."""
-    return probability([*map(decided_gap, alternatives)], found.share_left, found.doubt, found.over_nothing)
+    gaps = [*map(decided_gap, alternatives)]
+    return found.weight * probability(gaps, found.share_left, found.doubt, found.over_nothing)
 
 
 def decided_gap(other: Alternative) -> float:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from discrepancy import rules
-from discrepancy.engine.confirm import Alternative, confirm, not_simulated
+from discrepancy.engine.confirm import Alternative, confirm, labels, not_simulated
 from discrepancy.engine.explanation import Explanation, Found, explain
 from discrepancy.engine.gain import Gain, responses
 from discrepancy.engine.lawful import laws_of, refining, responding
@@ -133,6 +133,12 @@ def diagnose(
     elif why_not is None:
         before = responses(rig, explanation.problem, [[]], jobs, simulated)[0]
         gain = Gain(before, before, len(rig.trials) > 1)
+    notes += [
+        f"{labels([found])}: what the other trials say of it foretells a trial worse than nothing does, by "
+        f"{-sum(found.folds):.0f} of chi-square in all, which speaks against it."
+        for found in (*explanation.found, *explanation.suspected)
+        if found.contradicted
+    ]
     verdict = verdict_of(explanation)
     if contradicted and verdict == "explained":
         verdict = "partly_explained"

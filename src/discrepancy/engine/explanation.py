@@ -60,6 +60,16 @@ class Found:
     in_sample: float
     held_out: float | None
 
+    @property
+    def contradicted(self) -> bool:
+        """Whether trials left out speak against it as much as a cause has to be spoken for."""
+        return sum(self.folds) < -2.0 * rules.NAMED_NATS
+
+    @property
+    def weight(self) -> float:
+        """What its probability is worth on data that were not used."""
+        return rules.CONTRADICTED if self.contradicted else 1.0
+
 
 @dataclass(frozen=True)
 class Scatter:
@@ -188,7 +198,7 @@ def _found(rig: Rig, best: Hypothesis, index: int, rivals: Sequence[Rival]) -> F
     gaps = [gap for _, gap in others]
     about = left, rig.law_doubt(candidate), nothing
     told = told_nats(gaps, *about)
-    return Found(
+    item = Found(
         index=index,
         candidate=candidate,
         probability=probability(gaps, *about),
@@ -202,6 +212,11 @@ def _found(rig: Rig, best: Hypothesis, index: int, rivals: Sequence[Rival]) -> F
         folds=tuple(held_out_gains(best.problem, [i for i in best.free if i != index], index)),
         in_sample=0.0,
         held_out=None,
+    )
+    return replace(
+        item,
+        probability=item.weight * item.probability,
+        probability_alike=item.weight * item.probability_alike,
     )
 
 
