@@ -155,6 +155,7 @@ def tables(results: Sequence[Item]) -> str:
         cause = next(e["cause"] for e, _ in every if e["name"] == name)
         rows.append([f"{name} (`{cause}`)", len(own), sum(own)])
     out.append(markdown("By form", ["hidden", "effects", "found"], rows))
+    out.append(_left_out([s for s in scored if s.result["kind"] == "left-out"]))
     stated = [pair for s in scored for pair in s.stated]
     if stated:
         found = reliability(stated)
@@ -167,7 +168,49 @@ def tables(results: Sequence[Item]) -> str:
         out.append(f"CPU {np.median(cpu):.1f} s in the median, {cpu.max():.1f} at most.")
     if failed := [r["error"].splitlines()[-1] for r in results if r["error"]]:
         out.append("\n".join(f"{n} x {e}" for e, n in Counter(failed).items()))
-    return "\n\n".join(out)
+    return "\n\n".join(part for part in out if part)
+
+
+def strangers(one: Scored) -> list[Item]:
+    """Causes that were named and are not of the family of anything hidden; terms of a friction are one family."""
+    hidden = [e["cause"] for e in one.result["truth"]["effects"] if e["cause"]]
+    families = {CAUSES[cause].family for cause in hidden}
+    rubs = any(cause in RUBS for cause in hidden)
+    return [
+        e for e in one.extras
+        if e["cause"] != "law" and e["family"] not in families and not (rubs and e["cause"] in RUBS)
+    ]  # fmt: skip
+
+
+def _left_out(scored: Sequence[Scored]) -> str:
+    """What becomes of a cause that the catalogue does not have, by what it is called."""
+    groups: dict[str, list[Scored]] = {}
+    for one in scored:
+        groups.setdefault(one.result["truth"]["effects"][0]["cause"], []).append(one)
+    rows = [[f"`{name}`", *_fate(own)] for name, own in sorted(groups.items())]
+    header = [
+        "left out",
+        "sets",
+        "nothing named",
+        "laws alone",
+        "in its family",
+        "outside",
+        "outside with over 50 %",
+    ]
+    return markdown("Left out", header, [*rows, ["**all**", *_fate(scored)]] if rows else [])
+
+
+def _fate(own: Sequence[Scored]) -> list[int]:
+    nothing = laws = inside = outside = sure = 0
+    for one in own:
+        causes = [e for e in one.extras if e["cause"] != "law"]
+        others = strangers(one)
+        nothing += not one.extras
+        laws += bool(one.extras) and not causes
+        inside += bool(causes) and not others
+        outside += bool(others)
+        sure += any(e["probability"] > 0.5 for e in others)
+    return [len(own), nothing, laws, inside, outside, sure]
 
 
 def misses(results: Iterable[Item]) -> str:
