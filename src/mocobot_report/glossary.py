@@ -59,7 +59,7 @@ TERMS = (
     Term("excitation", r"[Ee]xcitation|signal over noise",
          "How strongly the motion shows a number that is to be estimated, against the noise."),
     Term("fold", r"\bfolds?\b",
-         "One trial left out, the cause fitted to the others, and tried on the one left out."),
+         "One trial left out and foretold by the others: better where it is likelier with the cause than without."),
     Term("frame {1}, grasp frame", r"\{1\}|[Gg]rasp frames?|frame \{[ij]\}",
          "Axes at the wrist of a robot, fixed to the payload: {1} is that of robot 1, in which the payload's numbers "
          "are given; {i} is that of robot i. p_12 is the place of frame {2} in frame {1}, R_12 its rotation."),

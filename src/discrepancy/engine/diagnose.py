@@ -4,6 +4,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from discrepancy import rules
 from discrepancy.engine.confirm import Alternative, confirm, labels, not_simulated
 from discrepancy.engine.explanation import Explanation, Found, explain
@@ -134,8 +136,8 @@ def diagnose(
         before = responses(rig, explanation.problem, [[]], jobs, simulated)[0]
         gain = Gain(before, before, len(rig.trials) > 1)
     notes += [
-        f"{labels([found])}: what the other trials say of it foretells a trial worse than nothing does, by "
-        f"{-sum(found.folds):.0f} of chi-square in all, which speaks against it."
+        f"{labels([found])}: as the others tell it, {rig.trials[int(np.argmin(found.folds))]} is less likely with it, "
+        f"by {-min(found.folds):.0f} nats; beside what is not explained that speaks against it."
         for found in (*explanation.found, *explanation.suspected)
         if found.contradicted
     ]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
-from discrepancy.engine.held_out import Foretold, foretold, held_out_gains, shares
+from discrepancy.engine.held_out import Foretold, foretold, predictive_nats, shares
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.learn import worth_spreads
 from discrepancy.inference.probability import probability, told_nats
@@ -40,7 +40,9 @@ class Found:
         rivals: what else could be in its place, the likeliest first, and by how much it is less likely [nats].
         values: its parameters, in their own units, shape (k,).
         covariance: of the values and of what is determined of its shape (see ``best_shape``), in their own units.
-        folds: gain of chi-square on every trial when fitted to the others.
+        folds: see ``held_out.predictive_nats``.
+        contradicted: whether one of these speaks against it as much as a cause has to be spoken for, and what is left
+            is no noise: then what imitates it may be there instead.
         in_sample, held_out: share of the nominal model's misfit that it removes beyond the causes before it (see
             ``held_out.shares``).
     """
@@ -57,13 +59,9 @@ class Found:
     values: Array
     covariance: Array
     folds: tuple[float, ...]
+    contradicted: bool
     in_sample: float
     held_out: float | None
-
-    @property
-    def contradicted(self) -> bool:
-        """Whether trials left out speak against it as much as a cause has to be spoken for."""
-        return sum(self.folds) < -2.0 * rules.NAMED_NATS
 
     @property
     def weight(self) -> float:
@@ -153,7 +151,8 @@ def explain(searched: Searched) -> Explanation:
     """Values, probabilities and worth of what a search found."""
     rig, best, nothing = searched.rig, searched.best, searched.nothing
     rivals = dict(zip(best.free, searched.rivals, strict=True))
-    found = [_found(rig, best, index, rivals[index]) for index in best.free]
+    noise = is_noise(best.fit.chi2, best.problem.samples, unlisted_nats(best))
+    found = [_found(rig, best, index, rivals[index], noise) for index in best.free]
     suspected = [item for item in found if item.probability_alike < rules.LEAST_PROBABILITY]
     for item in suspected:
         # What is less likely than not takes no part in what is said of the others.
@@ -188,7 +187,7 @@ def _with_unit_power(problem: Problem) -> Problem:
     return problem.with_noise([np.ones_like(p) for p in problem.power], problem.spread)
 
 
-def _found(rig: Rig, best: Hypothesis, index: int, rivals: Sequence[Rival]) -> Found:
+def _found(rig: Rig, best: Hypothesis, index: int, rivals: Sequence[Rival], noise: bool) -> Found:
     candidate = best.problem.candidates[index]
     left = share_left(best, index)
     nothing = next((rival.gap for rival in rivals if rival.candidate is None), np.inf)
@@ -198,6 +197,7 @@ def _found(rig: Rig, best: Hypothesis, index: int, rivals: Sequence[Rival]) -> F
     gaps = [gap for _, gap in others]
     about = left, rig.law_doubt(candidate), nothing
     told = told_nats(gaps, *about)
+    folds = tuple(predictive_nats(best.problem, [i for i in best.free if i != index], index))
     item = Found(
         index=index,
         candidate=candidate,
@@ -209,7 +209,8 @@ def _found(rig: Rig, best: Hypothesis, index: int, rivals: Sequence[Rival]) -> F
         doubt=rig.law_doubt(candidate),
         rivals=tuple(others),
         **_values(rig, best, index),
-        folds=tuple(held_out_gains(best.problem, [i for i in best.free if i != index], index)),
+        folds=folds,
+        contradicted=not noise and min(folds, default=0.0) < -rules.NAMED_NATS,
         in_sample=0.0,
         held_out=None,
     )

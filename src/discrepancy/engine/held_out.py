@@ -6,8 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from discrepancy.inference.scan import likeliest_spread, log_evidence
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
+from estimator.arrays import Array
 
 
 def held_out_gains(problem: Problem, free: Sequence[int], index: int) -> list[float]:
@@ -25,6 +27,35 @@ def held_out_gains(problem: Problem, free: Sequence[int], index: int) -> list[fl
         without = Fit.of(problem, told, others, fixed=(index, nothing))
         gains.append(without.held_out(t) - Fit.of(problem, [*told, index], others).held_out(t))
     return gains
+
+
+def predictive_nats(problem: Problem, free: Sequence[int], index: int) -> list[float]:
+    """By how many nats every trial is likelier with a cause than without, as the other trials foretell it.
+
+    Of its values no more is known than they tell: log p(trial | others) with it, less that without. Of what is there,
+    that is below -a with a probability of exp(-a) at most. What is there in some trials only has none.
+    """
+    if problem.candidates[index].of_trials or len(problem.trials) < 2:
+        return []
+    spread = likeliest_spread(*_told_alone(problem, free, index, problem.trials))
+    gains = []
+    for t in problem.trials:
+        told = _told(problem, free, t)
+        others = [k for k in problem.trials if k != t]
+        known, foretelling = (
+            log_evidence(*_told_alone(problem, told, index, trials), spread)
+            for trials in (problem.trials, others)
+        )
+        gains.append(known - foretelling)
+    return gains
+
+
+def _told_alone(
+    problem: Problem, free: Sequence[int], index: int, trials: Sequence[int]
+) -> tuple[Array, Array]:
+    """Information about a cause and its score vector, given all else, of some trials."""
+    fit = Fit.of(problem, free, trials, fixed=(index, np.zeros(len(problem.candidates[index].parameters))))
+    return fit.told_besides(index)
 
 
 @dataclass(frozen=True)

@@ -100,11 +100,21 @@ def log_bayes_factor(information: Array, score: Array, spike: float) -> float:
     lam, z = _visible(information, score)
     if not len(lam):
         return -np.inf
-    best = np.sqrt(np.mean((z / lam) ** 2))
-    slabs = best * 2.0 ** np.arange(-2.0, 2.5)
+    slabs = likeliest_spread(information, score) * 2.0 ** np.arange(-2.0, 2.5)
     if spike > 0:
         slabs = np.maximum(slabs, rules.LEAST_SLAB * spike)
     return max(_log_evidence(lam, z, slab) for slab in slabs) - _log_evidence(lam, z, spike)
+
+
+def likeliest_spread(information: Array, score: Array) -> float:
+    """About the spread that makes values likeliest, arguments as of ``log_bayes_factor``; 0 where the data see none."""
+    lam, z = _visible(information, score)
+    return float(np.sqrt(np.mean((z / lam) ** 2))) if len(lam) else 0.0
+
+
+def log_evidence(information: Array, score: Array, spread: float) -> float:
+    """Of values that are normal with a spread, over none."""
+    return _log_evidence(*_visible(information, score), spread)
 
 
 def _visible(information: Array, score: Array) -> tuple[Array, Array]:

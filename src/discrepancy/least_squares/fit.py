@@ -219,6 +219,10 @@ class Fit:
             inverse = np.linalg.inv(covariance)
             own = np.diag(self.problem.spread[self.problem.columns_of(index)] ** -2.0)
             return inverse - own, inverse @ values
+        return self.told_besides(index)
+
+    def told_besides(self, index: int) -> tuple[Array, Array]:
+        """The same of a candidate that is not in the model."""
         span = self.problem.spans[index]
         cross = self.gram[span][:, self.used]
         information = self.gram[span, span] - cross @ self.covariance @ cross.T

@@ -198,8 +198,8 @@ of the cause stands out by more, what its law leaves of that (``LAW_SHARE``) may
 SCATTER_FACTOR = 3.0
 """Spread of a kind over its tolerance, from which a team is said to be off in it. Chosen."""
 CONTRADICTED = 0.5
-"""By which causes lose probability that make the closed loop's response worse, or trials left out less likely by
-``NAMED_NATS``. Chosen: as likely wrong as not."""
+"""By which causes lose probability that make the closed loop's response worse or, where what is left is no noise, a
+trial that is foretold by the others less likely by ``NAMED_NATS``. Chosen: as likely wrong as not."""
 BASE_ROUNDS = 4
 """Linearisations at most. Measured: robots 1 deg off take two."""
 DOUBTFUL, LITTLE_SHARE = 2, 0.05
