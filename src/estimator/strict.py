@@ -57,6 +57,8 @@ def read_json(path: Path, what: str) -> dict[str, Any]:
         raise InputError(f"{path}: there is no such file; it would be {what}") from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error}); it must be {what}") from error
+    if content.startswith(b"PAR1"):
+        raise InputError(f"{path}: a Parquet file, as recordings are; it must be {what}")
     return parse_json(content, str(path))
 
 

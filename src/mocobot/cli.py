@@ -86,17 +86,21 @@ def _run(arguments: Sequence[str]) -> None:
     if "--version" in arguments:
         print(f"mocobot {_version()}")
         return
-    try:
-        options = parse(COMMANDS, with_config(COMMANDS, arguments))
-    except OSError as error:
-        if error.filename is None:  # a closed pipe
-            raise
-        raise InputError(f"{error.filename}: cannot be written ({error.strerror})") from error  # a completion
-    name = next(name for name, kind in COMMANDS.items() if isinstance(options, kind))
-    import_module(f"mocobot.checks.{name}").check(options)
-    # joblib stops workers that idle, and starts others: nothing is lost, and nobody can do anything about it.
-    warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
-    _command(name)(options)
+    configured = with_config(COMMANDS, arguments)
+    with configured.told():
+        try:
+            options = parse(COMMANDS, configured.words)
+        except OSError as error:
+            if error.filename is None:  # a closed pipe
+                raise
+            raise InputError(
+                f"{error.filename}: cannot be written ({error.strerror})"
+            ) from error  # a completion
+        name = next(name for name, kind in COMMANDS.items() if isinstance(options, kind))
+        import_module(f"mocobot.checks.{name}").check(options)
+        # joblib stops workers that idle, and starts others: nothing is lost, and nobody can do anything about it.
+        warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
+        _command(name)(options)
 
 
 def _version() -> str:

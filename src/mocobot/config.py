@@ -1,8 +1,10 @@
 """Options from a file: ``mocobot COMMAND --config FILE.toml`` adds those of its table ``[COMMAND]``."""
 
 import difflib
-from collections.abc import Mapping, Sequence
-from dataclasses import Field, fields
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import Field, dataclass, fields
 from pathlib import Path
 from typing import Any, get_args
 
@@ -13,7 +15,37 @@ from estimator.errors import InputError
 OPTION = "--config"
 
 
-def with_config(commands: Mapping[str, type], arguments: Sequence[str]) -> list[str]:
+@dataclass(frozen=True)
+class Configured:
+    """Arguments of the command line, with those of a file.
+
+    Attributes:
+        words: all of them, as if all had been given there.
+        table: file and table, as a sentence names them.
+        names: options that are the file's.
+    """
+
+    words: list[str]
+    table: str = ""
+    names: tuple[str, ...] = ()
+
+    @contextmanager
+    def told(self) -> Iterator[None]:
+        """Say in whatever is refused meanwhile if it is of the file.
+
+        Raises:
+            InputError: as it was raised, with the file if it begins with an option of the file.
+        """
+        try:
+            yield
+        except InputError as error:
+            begin = re.match(r"(?:--)?([a-z][a-z_-]*)\b", str(error))
+            if begin and begin[1].replace("-", "_") in self.names:
+                raise InputError(f"{self.table} {error}") from error
+            raise
+
+
+def with_config(commands: Mapping[str, type], arguments: Sequence[str]) -> Configured:
     """Arguments with the options of a file behind them; what the command line says itself goes before the file.
 
     Args:
@@ -27,7 +59,7 @@ def with_config(commands: Mapping[str, type], arguments: Sequence[str]) -> list[
     left, file = _taken(arguments)
     command = next((word for word in left if word in commands), None)
     if file is None or command is None:
-        return left
+        return Configured(left)
     from estimator.strict import read_toml  # numpy, which a refusal does not need
 
     tables = read_toml(Path(file), "file of options")
@@ -41,6 +73,7 @@ def with_config(commands: Mapping[str, type], arguments: Sequence[str]) -> list[
         for entry in fields(commands[command])
         if tyro.conf.Positional not in get_args(entry.type)
     }
+    names = []
     for key, value in tables.get(command, {}).items():
         name = key.replace("-", "_")
         if name not in known:
@@ -49,7 +82,8 @@ def with_config(commands: Mapping[str, type], arguments: Sequence[str]) -> list[
         flag = name.replace("_", "-")
         if not {f"--{flag}", f"--no-{flag}"} & given:
             left += _words(f"{file}: [{command}] {key}", flag, value, known[name])
-    return left
+            names.append(name)
+    return Configured(left, f"{file}: [{command}]", tuple(names))
 
 
 def _taken(arguments: Sequence[str]) -> tuple[list[str], str | None]:

@@ -211,8 +211,10 @@ def test_nothing_is_compared_with_something_else(
     write_json(tmp_path / "verdict" / "diagnosis.json", small_diagnosis())
     (tmp_path / "empty").mkdir()
     (tmp_path / "other.json").write_text('{"format": "mine"}')
+    (tmp_path / "rec.parquet").write_bytes(b"PAR1\x9e PAR1")
     est = estimates / "a.json"
     for other, said in (
+        ("rec.parquet", "rec.parquet: a Parquet file, as recordings are; it must be an estimate of"),
         ("verdict", "is an estimate and verdict a diagnosis; both must be of one kind"),
         ("empty", "empty: holds no result; name the file of an estimate of"),
         ("other.json", "other.json: format is 'mine'; it must be an estimate of"),

@@ -34,7 +34,7 @@ def file(tmp_path: Path) -> Path:
 
 
 def parsed(*words: object):
-    return parse(COMMANDS, with_config(COMMANDS, [str(word) for word in words]))
+    return parse(COMMANDS, with_config(COMMANDS, [str(word) for word in words]).words)
 
 
 def test_a_file_says_what_the_command_line_would(file):
@@ -66,7 +66,8 @@ def test_the_command_line_goes_before_the_file(file):
             "[diagnose]\njobs = true\n",
             "[diagnose] jobs is true; it is not an option that is switched on or off",
         ),
-        ("[diagnose]\njobs = 'many'\n", "--jobs is 'many'; it must be a whole number"),
+        ("[diagnose]\njobs = 'many'\n", "mine.toml: [diagnose] --jobs is 'many'; it must be a whole number"),
+        ("[diagnose]\nodds = -3\n", "mine.toml: [diagnose] odds is -3; it must be greater than 0"),
         ("[diagnose]\nexclude = [['drag']]\n", "it must be a value, or a list of values"),
         ("[diagnose\n", "mine.toml"),
     ],
@@ -74,6 +75,13 @@ def test_the_command_line_goes_before_the_file(file):
 def test_refusals(file, capsys, text, said):
     file.write_text(text)
     assert said in refused(capsys, "diagnose", "a.parquet", "--config", file)
+
+
+def test_what_the_command_line_says_is_not_said_of_the_file(file, capsys):
+    file.write_text("[diagnose]\njobs = 2\nodds = 0.1\n")
+    said = refused(capsys, "diagnose", "a.parquet", "--config", file, "--odds", "-3")
+    assert said == "mocobot: odds is -3; it must be greater than 0 and at most 1000"
+    assert "mine.toml" not in said
 
 
 def test_a_file_that_is_not_there(capsys, tmp_path):
