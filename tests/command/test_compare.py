@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
@@ -211,7 +213,7 @@ def test_nothing_is_compared_with_something_else(
     write_json(tmp_path / "verdict" / "diagnosis.json", small_diagnosis())
     (tmp_path / "empty").mkdir()
     (tmp_path / "other.json").write_text('{"format": "mine"}')
-    (tmp_path / "rec.parquet").write_bytes(b"PAR1\x9e PAR1")
+    pq.write_table(pa.table({"time": [0.0]}), tmp_path / "rec.parquet")
     est = estimates / "a.json"
     for other, said in (
         ("rec.parquet", "rec.parquet: a Parquet file, as recordings are; it must be an estimate of"),
