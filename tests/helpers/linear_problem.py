@@ -125,3 +125,11 @@ def brute(rows, candidates, free=(), trials=None, background=True, fixed=None, n
         causes.setdefault(index, []).append(x[shared + at])
     local = [x[shared + len(used) + own * p :][:own] for p in range(len(trials))]
     return Solution(x[:shared], causes, local, sum(misfits) + float(np.sum((prior @ x) ** 2)), misfits)
+
+
+def drawn_noise(rng, problem):
+    """Another power in every cell, another spread of every column with a tolerance."""
+    power = [rng.uniform(0.5, 4.0, len(p)) for p in problem.power]
+    return problem.with_noise(
+        power, np.where(problem.tolerant, rng.uniform(1.0, 5.0, problem.spread.shape), 1.0)
+    )

@@ -30,7 +30,9 @@ def block_covariance(fit: Fit, rows_per_block: int) -> Array:
 def block_scores(fit: Fit, rows_per_block: int) -> Iterator[Array]:
     """Score of every block: its columns times what the fit leaves in it, one number per column in the fit."""
     for t in fit.problem.trials:
-        rows = fit.problem.weighted(t)
+        problem, every = fit.problem, slice(None)
+        # As a fit weighs them: every cell of the noise over its power.
+        rows = problem.cells[t].series(problem.spectra_of(t, every) * np.sqrt(problem.weights[t]))
         left = rows @ np.append(-fit.coefficients, 1.0)
         count = max(1, round(len(rows) / rows_per_block))
         for part in np.array_split(np.arange(len(rows)), count):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
+from discrepancy.least_squares.asked import Asked
 from discrepancy.least_squares.columns import portions
 from discrepancy.least_squares.gram import flat_inverse, gram_of
 from discrepancy.least_squares.opened import best_of
@@ -196,7 +198,8 @@ class Fit:
         edge = np.zeros((self.gram.shape[0], ends[-1]))
         for t in self.problem.trials:
             here: list[int] = []  # of which there are columns, as a transient is in one trial only
-            for some in portions(_there(sets, units, t, here), rules.TOLD_BYTES):
+            again: list[tuple[int, Asked]] = []
+            for some in portions(_there(self.problem, sets, units, t, here, again), rules.TOLD_BYTES):
                 own = self.problem.spectrum(t, some)
                 weighted, at = own * self.problem.weights[t], 0
                 products = self.problem.products(t, weighted)
@@ -206,6 +209,10 @@ class Fit:
                     edge[:, spans[k]] += products[:, its]
                     at = its.stop
                 here.clear()
+            for k, asked in again:
+                weights = 1.0 / self.problem.power[t]
+                own_grams[k] += units[k][:, None] * asked.own(weights) * units[k]
+                edge[:, spans[k]] += asked.beside(self.problem.columns[t], weights) * units[k]
         crosses = [edge[self.used, span].T for span in spans]
         return [
             (gram - cross @ self.covariance @ cross.T, edge[-1, span] - cross @ self.solution)
@@ -230,12 +237,21 @@ class Fit:
 
 
 def _there(
-    sets: Sequence[Sequence[Array]], units: Sequence[Array], trial: int, here: list[int]
-) -> Iterator[Array]:
-    """Columns of a trial that are not nought, one set after the other, each of which is noted in ``here``."""
+    problem: Problem, sets: Sequence[Sequence[Array]], units: Sequence[Array], trial: int, here: list[int],
+    again: list[tuple[int, Asked]],
+) -> Iterator[Array]:  # fmt: skip
+    """Columns of a trial that are not nought, one set after the other, each of which is noted in ``here``.
+
+    Those that were asked about before are noted in ``again`` instead.
+    """
+    kept = not problem.opened and not problem.columns[trial].is_single
     for k, (columns, unit) in enumerate(zip(sets, units, strict=True)):
         own = columns[trial]
         if own.any():
-            here.append(k)
-            yield own * unit
+            asked = problem.again[trial].of(own, partial(problem.spectrum, trial)) if kept else None
+            if asked is not None:
+                again.append((k, asked))
+            else:
+                here.append(k)
+                yield own * unit
         given_back(own)

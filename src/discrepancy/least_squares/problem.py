@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.least_squares.along import Along, Taken
+from discrepancy.least_squares.asked import Again
 from discrepancy.least_squares.cell_grams import CellGrams
 from discrepancy.least_squares.cells import Cells
 from discrepancy.least_squares.columns import Columns, held, portions
@@ -49,6 +50,7 @@ class Problem:
         shares: how much of every column lies along what they leave open, (r, columns) per trial, by cause.
         odds: of any cause being there before the data are seen, at all its places together.
         by_own: products of the columns with a trial's own unknowns over every cell, (K, columns, l), once asked for.
+        again: what further columns were asked about, of every trial.
     """
 
     candidates: tuple[Candidate, ...]
@@ -67,6 +69,7 @@ class Problem:
     shares: Mapping[Key, tuple[Array, ...]] = field(default_factory=dict)
     odds: float = rules.PRIOR_ODDS
     by_own: dict[int, Array] = field(default_factory=dict, repr=False)
+    again: tuple[Again, ...] = field(default=(), repr=False)
 
     @classmethod
     def of(cls, trials: Iterable[Rows], candidates: Sequence[Candidate]) -> Problem:
@@ -98,6 +101,7 @@ class Problem:
         return cls(
             tuple(candidates), tuple(columns), tuple(local), tuple(explicable), tuple(cells), tuple(degrees),
             tuple(grams), power, shared, tuple(spans), tolerant, np.ones(len(tolerant)),
+            again=tuple(map(Again, cells)),
         )  # fmt: skip
 
     @property
@@ -183,10 +187,6 @@ class Problem:
     def rows(self, trial: int) -> Array:
         """Rows without what the trial's own unknowns can explain, in time, shape (n, C, columns)."""
         return self.cells[trial].series(self.spectra_of(trial, slice(None)))
-
-    def weighted(self, trial: int) -> Array:
-        """The same as a fit weighs them: every cell of the noise over its power, shape (n, C, columns)."""
-        return self.cells[trial].series(self.spectra_of(trial, slice(None)) * np.sqrt(self.weights[trial]))
 
     def without_own(self, trial: int, x: Array) -> Array:
         """Rows without what the trial's own unknowns, and those that causes leave open, can explain, (n, C, k)."""

@@ -94,6 +94,12 @@ PORTION_BYTES = 1e8
 TOLD_BYTES = 1e7
 """Of columns that are held against a fit together. Chosen: memory; all pushes near one of a minute of three robots are
 ten times as much."""
+ASKED_BEFORE = 2
+"""Times that columns were asked about before what is needed of them is kept. Chosen: events are asked about twice, and
+then not again."""
+KEPT_COLUMNS = 16
+"""Of those made together, as many from which their products with columns that are asked about again are kept. Chosen:
+fewer are multiplied again in less time than is needed to look each cell up."""
 WIDENED_ROWS = 1024
 """Of these, turned into double precision together. Chosen: as many as a processor's cache holds."""
 POWER_NUMBERS = 20.0

@@ -7,7 +7,15 @@ from discrepancy.candidate import Transient
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.gram import flat_inverse
 from discrepancy.least_squares.problem import Problem
-from linear_problem import CANDIDATES, brute, candidate, noise_covariance, random_rows, with_residuals
+from linear_problem import (
+    CANDIDATES,
+    brute,
+    candidate,
+    drawn_noise,
+    noise_covariance,
+    random_rows,
+    with_residuals,
+)
 
 
 @pytest.fixture
@@ -102,14 +110,6 @@ def test_fixed_values_take_a_candidate_out_of_the_fit(rows):
     best = Fit.of(problem, [4], background=False)
     held = Fit.of(problem, [], fixed=(4, best.part(4)[0]), background=False)
     assert held.misfit == pytest.approx(best.misfit)
-
-
-def drawn_noise(rng, problem):
-    """Another power in every cell, another spread of every column with a tolerance."""
-    power = [rng.uniform(0.5, 4.0, len(p)) for p in problem.power]
-    return problem.with_noise(
-        power, np.where(problem.tolerant, rng.uniform(1.0, 5.0, problem.spread.shape), 1.0)
-    )
 
 
 @pytest.mark.parametrize("free", [(), (1,), (3, 2)])
