@@ -10,7 +10,7 @@ import numpy as np
 from discrepancy.emps.diagnosis import diagnose_axis
 from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.rig import EmpsRig
-from discrepancy.least_squares.block_errors import block_covariance, part_of
+from discrepancy.least_squares.block_errors import block_covariance, part_of, weighted_rows
 from discrepancy.least_squares.fit import Fit
 from emps_data import DATA, PULSES, needed_folder
 
@@ -22,7 +22,7 @@ def bootstrap(fit: Fit, rows_per_block: int, rng: np.random.Generator, draws: in
     """Standard deviations of a fit's solution over resampled blocks of rows, in units, shape (used,)."""
     grams = []
     for t in fit.problem.trials:
-        rows = fit.problem.weighted(t)
+        rows = weighted_rows(fit.problem, t)
         count = max(1, round(len(rows) / rows_per_block))
         for part in np.array_split(np.arange(len(rows)), count):
             flat = rows[part].reshape(-1, rows.shape[2])

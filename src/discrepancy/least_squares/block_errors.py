@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from discrepancy.least_squares.fit import Fit
+from discrepancy.least_squares.problem import Problem
 from estimator.arrays import Array
 
 
@@ -30,13 +31,17 @@ def block_covariance(fit: Fit, rows_per_block: int) -> Array:
 def block_scores(fit: Fit, rows_per_block: int) -> Iterator[Array]:
     """Score of every block: its columns times what the fit leaves in it, one number per column in the fit."""
     for t in fit.problem.trials:
-        problem, every = fit.problem, slice(None)
-        # As a fit weighs them: every cell of the noise over its power.
-        rows = problem.cells[t].series(problem.spectra_of(t, every) * np.sqrt(problem.weights[t]))
+        rows = weighted_rows(fit.problem, t)
         left = rows @ np.append(-fit.coefficients, 1.0)
         count = max(1, round(len(rows) / rows_per_block))
         for part in np.array_split(np.arange(len(rows)), count):
             yield np.einsum("ncl,nc->l", rows[part][..., fit.used], left[part])
+
+
+def weighted_rows(problem: Problem, trial: int) -> Array:
+    """Rows of a trial as a fit weighs them: every cell of the noise over its power, shape (n, C, columns)."""
+    spectra = problem.spectra_of(trial, slice(None))
+    return problem.cells[trial].series(spectra * np.sqrt(problem.weights[trial]))
 
 
 def part_of(fit: Fit, covariance: Array, index: int) -> Array:
