@@ -179,6 +179,10 @@ class Rig(ABC):
         """Columns of what is no multiple of its values: slopes there, and per unit from nought on; None of others."""
         return None
 
+    def slopes(self, active: Sequence[tuple[Candidate, Array]]) -> Sequence[Sequence[Array] | None]:
+        """Columns of causes where all of them have these values; None of those that are what they always are."""
+        return [None] * len(active)
+
     def inexact(self, candidate: Candidate) -> Array:
         """Of the numbers that ``steps`` changes, those that the law's own error puts off, as it does sizes; else 0."""
         return np.zeros(len(self.steps(candidate)))

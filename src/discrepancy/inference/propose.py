@@ -12,8 +12,9 @@ from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.imitation import imitated
+from discrepancy.inference.narrow import with_kinds_narrow
 from discrepancy.inference.other_forms import beside_other_forms
-from discrepancy.inference.scan import Scanned, events_of, scan, score_of, score_with, scores_with
+from discrepancy.inference.scan import Scanned, events_of, in_best_shape, scan, score_of
 from discrepancy.inference.shape.sharpen import sharpened
 from discrepancy.inference.twins import twins
 from discrepancy.least_squares.fit import Fit
@@ -57,8 +58,8 @@ class Proposed:
 
 
 def proposals(
-    rig: Rig, base: Hypothesis, *, events: bool = True, narrow: bool = True, known: Candidate | None = None,
-    shapes: Mapping[Key, Candidate] | None = None,
+    rig: Rig, base: Hypothesis, *, events: bool = True, nothing: Hypothesis | None = None,
+    known: Candidate | None = None, shapes: Mapping[Key, Candidate] | None = None,
 ) -> Proposed:  # fmt: skip
     """Hypotheses with one cause more.
 
@@ -66,14 +67,15 @@ def proposals(
         rig: for columns of other shapes.
         base: what is there already.
         events: whether to look for what acts for a while, too.
-        narrow: whether to look with kinds that scatter held within their tolerance, too.
+        nothing: the hypothesis that nothing is there, to look with kinds that scatter held within their tolerance, too;
+            None not to.
         known: a cause that others are to be held against.
         shapes: of what was sought beside the same causes before, where a search begins and ends; None for nothing.
     """
     fit, shapes = base.fit, shapes or {}
     scanned = _with_kinds_held(base)
     loud = {item.candidate.joint for item in scanned if item.score > rules.LOOKED_AT_NATS}
-    ranked = [_in_best_shape(rig, fit, item, loud) for item in scanned]
+    ranked = [in_best_shape(rig, fit, item, loud) for item in scanned]
     ranked += events_of(rig, fit) if events else []
     ranked.sort(key=lambda item: -item.score)
     best: Hypothesis | None = None  # each has its own columns: all together would be gigabytes
@@ -84,7 +86,7 @@ def proposals(
     rough: list[tuple[Scanned, float]] = []  # what was not sharpened, and the score of the hypothesis with it
     sought: dict[Key, Candidate] = {}
     offered = chain(
-        _hypotheses(rig, base, ranked, shapes, narrow=narrow),
+        _hypotheses(rig, base, ranked, shapes, nothing),
         _sharper(rig, base, ranked, shapes, rough, offers),
     )
     for item, new in offered:
@@ -115,7 +117,11 @@ def proposals(
 
 
 def _hypotheses(
-    rig: Rig, base: Hypothesis, ranked: Sequence[Scanned], shapes: Mapping[Key, Candidate], *, narrow: bool
+    rig: Rig,
+    base: Hypothesis,
+    ranked: Sequence[Scanned],
+    shapes: Mapping[Key, Candidate],
+    nothing: Hypothesis | None,
 ) -> Iterator[tuple[Scanned | None, Hypothesis]]:
     """One after the other, each with one cause more, and its item where its shape has not been sharpened."""
     for item in _chosen(ranked, rules.LEADERS, base.problem.opened):
@@ -124,8 +130,8 @@ def _hypotheses(
             None if near else item,
             sharpened(rig, base, item, near=near, shape=shapes.get(item.candidate.key)),
         )
-    if narrow:
-        yield from ((None, new) for new in _with_kinds_narrow(rig, base))
+    if nothing is not None:
+        yield from ((None, new) for new in with_kinds_narrow(rig, base, nothing))
 
 
 def _sharper(
@@ -209,42 +215,3 @@ def _chosen(ranked: Sequence[Scanned], leaders: int, opened: Collection[Key]) ->
             kinds.add(kind(item))
             chosen.append(item)
     return chosen[: 2 * leaders]
-
-
-def _in_best_shape(rig: Rig, fit: Fit, item: Scanned, loud: Collection[int | None] = ()) -> Scanned:
-    """An event without a tolerance in the shape that tells most: in another it may not be seen at all.
-
-    So may some that have a tolerance (``Rig.shaped``), at joints at which something shows.
-    """
-    if item.index is None:
-        return item
-    best, healthy = item, 0.0
-    if fit.problem.has_tolerance(item.index):
-        if item.candidate.cause not in (*rig.shaped, *rig.reshaped) or item.candidate.joint not in loud:
-            return item
-        fit = Fit.of(fit.problem, fit.free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
-        # What the healthy one explains has its own shape, whatever that of the faulty one.
-        healthy = score_with(fit, item.candidate, rig.columns(item.candidate)) - item.score
-    each = [(shape, rig.columns(shape)) for shape in rig.refinements(item.candidate)]
-    for (shape, columns), score in zip(each, scores_with(fit, each), strict=True):
-        if score - healthy > best.score:
-            best = Scanned(item.index, shape, score - healthy, columns)
-    return best
-
-
-def _with_kinds_narrow(rig: Rig, base: Hypothesis) -> list[Hypothesis]:
-    """What has a shape that the data determine, found with every kind within its tolerance, if any scatters.
-
-    Kinds that scatter to explain a cause take its shape from it: a payload is then whatever masses leave of it.
-    """
-    wide = base.problem.spread > rules.HELD_FACTOR
-    if not wide.any() or not rig.rigid:
-        return []
-    narrow = replace(base.problem, spread=np.where(wide, 1.0, base.problem.spread))
-    fit, found = Fit.of(narrow, base.free), []
-    for index, candidate in enumerate(narrow.candidates):
-        if index not in base.free and candidate.cause in rig.rigid and not candidate.hidden:
-            item = _in_best_shape(rig, fit, Scanned(index, candidate, score_of(fit, index)))
-            if item.score > rules.LOOKED_AT_NATS:
-                found.append(sharpened(rig, base, item, near=True, start=narrow))
-    return found

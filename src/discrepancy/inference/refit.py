@@ -9,6 +9,7 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.least_squares.renewed import renewed
 from discrepancy.rig import Rig
 from estimator.arrays import Array
 from estimator.errors import InputError
@@ -27,6 +28,11 @@ class _Point:
     shared: Array
     local: Sequence[Array]
     values: Sequence[Array]
+
+    @property
+    def origin(self) -> _Point:
+        """Where all is linear."""
+        return _Point(0.0 * self.shared, [0.0 * x for x in self.local], [0.0 * x for x in self.values])
 
     def towards(self, to: _Point, share: float) -> _Point:
         """A share of the way to another."""
@@ -55,9 +61,12 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
     own, trials = rig.local_unknowns, hypothesis.problem.trials
     begin = [nothing.fit.local(t)[:own] for t in trials]
     linear, last, share, at = hypothesis, np.inf, 1.0, None
+    anew, rounds = False, rules.REFIT_ROUNDS
     for tried in range(rules.SHORT_ROUNDS):
-        if share == 1.0 and tried >= rules.REFIT_ROUNDS:
-            break
+        if share == 1.0 and tried >= rounds:
+            if not rig.curved or anew or last < 1.0:
+                break
+            anew, last, rounds = True, np.inf, tried + rules.REFIT_ROUNDS  # it settles, but slowly
         fit = hypothesis.fit
         there = [
             i for i in range(len(fit.problem.candidates)) if i in fit.free or (rig.curved and fit.uses(i))
@@ -68,7 +77,7 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
             [fit.local(t)[:own] - start for t, start in zip(trials, begin, strict=True)],
             [fit.part(i)[0] for i in there],
         )
-        here = to if at is None else at.towards(to, share)
+        here = (to.origin if at is None else at).towards(to, share)
         shared, local = here.shared, here.local
         active = [(c, x * c.units) for x, c in zip(here.values, moved, strict=True)]
         try:
@@ -79,6 +88,9 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         for i, (cause, values) in zip(there, active, strict=True):
             if (bent := rig.bent(cause, values)) is not None:
                 problem, bends = problem.with_columns(i, cause, bent[0]), True
+        if anew:
+            slopes = zip(there, rig.slopes(active), strict=True)
+            problem = renewed(problem, {i: columns for i, columns in slopes if columns is not None})
         # The problem counts total values, so what its columns stand for is added back.
         back = []
         for t, total in zip(trials, residual, strict=True):
@@ -90,9 +102,12 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
             back.append(total + problem.raw_times(t, values))
         new = Hypothesis.of(problem.with_residual(back), hypothesis.free, hypothesis.allowed)
         lost = hypothesis.learnt.log_evidence - new.learnt.log_evidence
-        if lost > (rules.BENT_NATS if bends and hypothesis is linear else rules.DIVERGED_NATS):
-            if rig.curved and at is not None and share > rules.LEAST_STEP:
-                share *= 0.5  # slopes have grown, so that a whole step goes too far
+        if lost > (rules.BENT_NATS if (bends or anew) and hypothesis is linear else rules.DIVERGED_NATS):
+            if rig.curved and not anew:
+                anew, last = True, np.inf  # slopes there are others than where all is linear
+                continue
+            if rig.curved and share > rules.LEAST_STEP:
+                share *= 0.5
                 continue
             break  # it diverges: the linear answer is the better one
         se = np.sqrt(np.diag(new.fit.covariance))
@@ -100,8 +115,11 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
             np.abs(new.fit.solution - fit.solution)[se > 0] / se[se > 0]
         )  # what nothing tells stays where it is
         way = float(step.max(initial=0.0))
-        if way > max(last, 1.0):
-            if rig.curved and at is not None and share > rules.LEAST_STEP:
+        if way > max(last, 1.0) and not (anew and lost < 0.0):
+            if rig.curved and not anew:
+                anew, last = True, np.inf
+                continue
+            if rig.curved and share > rules.LEAST_STEP:
                 share *= 0.5
                 continue
             return linear  # steps grow: columns take up whatever a value that runs away leaves

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -66,6 +66,27 @@ def scores_with(
         log_bayes_factor(*one, spike) + log_prior_odds(fit.problem, candidate)
         for (candidate, _), one in zip(each, told, strict=True)
     ]
+
+
+def in_best_shape(rig: Rig, fit: Fit, item: Scanned, loud: Collection[int | None] = ()) -> Scanned:
+    """An event without a tolerance in the shape that tells most: in another it may not be seen at all.
+
+    So may some that have a tolerance (``Rig.shaped``), at joints at which something shows.
+    """
+    if item.index is None:
+        return item
+    best, healthy = item, 0.0
+    if fit.problem.has_tolerance(item.index):
+        if item.candidate.cause not in (*rig.shaped, *rig.reshaped) or item.candidate.joint not in loud:
+            return item
+        fit = Fit.of(fit.problem, fit.free, fixed=(item.index, np.zeros(len(item.candidate.parameters))))
+        # What the healthy one explains has its own shape, whatever that of the faulty one.
+        healthy = score_with(fit, item.candidate, rig.columns(item.candidate)) - item.score
+    each = [(shape, rig.columns(shape)) for shape in rig.refinements(item.candidate)]
+    for (shape, columns), score in zip(each, scores_with(fit, each), strict=True):
+        if score - healthy > best.score:
+            best = Scanned(item.index, shape, score - healthy, columns)
+    return best
 
 
 def events_of(rig: Rig, fit: Fit) -> list[Scanned]:

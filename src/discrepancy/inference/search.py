@@ -82,7 +82,7 @@ def continued(
     rivals = dict(zip(best.free, map(list, searched.rivals), strict=True))
     doubtful = 0
     while len(best.free) < most and doubtful < rules.DOUBTFUL:
-        proposed = proposals(rig, best)
+        proposed = proposals(rig, best, nothing=nothing)
         added, shapes = _added(best, proposed), proposed.shapes
         del proposed  # for the sake of memory
         if added is None:
@@ -213,7 +213,7 @@ def settled(
             candidate = best.problem.candidates[index]
             # Its own shape may be another beside what was found since.
             others = proposals(
-                rig, less, events=candidate.transient is None, narrow=False, known=candidate,
+                rig, less, events=candidate.transient is None, known=candidate,
                 shapes=_but(shapes, candidate) if index == last else None,
             )  # fmt: skip
             rivals[index] = [

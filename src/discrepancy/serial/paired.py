@@ -111,6 +111,9 @@ class PairedRig(Rig):
     ) -> list[Array]:
         return self.merged(self.inner.residual(shared, local, active))
 
+    def slopes(self, active: Sequence[tuple[Candidate, Array]]) -> Sequence[Sequence[Array] | None]:
+        return [None if own is None else self.merged(own) for own in self.inner.slopes(active)]
+
     def candidates(self) -> list[Candidate]:
         return self.inner.candidates()
 

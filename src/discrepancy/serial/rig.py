@@ -18,6 +18,7 @@ from discrepancy.rig import Channel, Rig, Rows
 from discrepancy.rules import LAW_SHARE
 from discrepancy.rules import serial as rules
 from discrepancy.serial import catalogue, shapes
+from discrepancy.serial.applied import place_of
 from discrepancy.serial.candidate import SerialCandidate
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
@@ -29,7 +30,7 @@ from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rows.common import combinations
 from discrepancy.serial.rows.remainder import Key
 from discrepancy.serial.rows.whiten import whiten
-from discrepancy.serial.serial_rows import SerialRows, place_of, shaped_key
+from discrepancy.serial.serial_rows import SerialRows, shaped_key
 from discrepancy.serial.servo.motor import with_torques
 from discrepancy.serial.undecidable import general, look_alikes
 from estimator.arrays import Array

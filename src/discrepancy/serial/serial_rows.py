@@ -13,15 +13,14 @@ from numpy.typing import NDArray
 from discrepancy.candidate import Candidate
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rules import serial as rules
+from discrepancy.serial.applied import Applied, place_of
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.base import Hints
 from discrepancy.serial.logs import Part
 from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel
-from discrepancy.serial.rows.moved import asking
 from discrepancy.serial.rows.remainder import Key
-from discrepancy.serial.rows.signals import Signals
 from discrepancy.serial.servo.motor import Motor
 from estimator.arrays import Array
 
@@ -160,8 +159,8 @@ class SerialRows:
         lasting = [(c, v) for c, v in active if c.transient is None]
         out, changed = [], {id(part) for part, _ in self.block_of[: self.changed]}
         for part in self.parts:
-            left = part.reduction(_left(part.signals, lasting if id(part) in changed else []))
-            out += [rows[:, self.joints] for rows in left]
+            there = Applied.of(part.signals, lasting if id(part) in changed else [])
+            out += [rows[:, self.joints] for rows in part.reduction(there.left)]
         for candidate, values in active:
             if candidate.transient is not None:
                 taken = [columns @ values for columns in self.physical(candidate)]
@@ -170,23 +169,28 @@ class SerialRows:
             out = [r + columns @ shared for r, columns in zip(out, self.common, strict=True)]
         return out
 
+    def slopes(self, active: Sequence[tuple[Candidate, Array]]) -> Sequence[Sequence[Array] | None]:
+        """Whitened columns of causes where all are, (n, C, k) per block; None where they are those of the model."""
+        listed = [c.transient is None and c.cause in CAUSES for c, _ in active]
+        lasting = [one for one, there in zip(active, listed, strict=True) if there]
+        changed = {id(part) for part, _ in self.block_of[: self.changed]}
+        parts = [(part, Applied.of(part.signals, lasting)) for part in self.parts if id(part) in changed]
+        return [
+            self._slopes(parts, *one) if there else None for one, there in zip(active, listed, strict=True)
+        ]
 
-def _left(signals: Signals, active: Sequence[tuple[Candidate, Array]]) -> Array:
-    """Measured torques less those that the model asks for with causes in it, shape (W, J)."""
-    moved, besides = signals, []
-    for candidate, values in active:
-        cause, at = CAUSES[candidate.cause], place_of(candidate)
-        there = cause.applied(moved, at, values)
-        if there is None:
-            besides.append((cause, at, values, candidate.shape))
-        moved = there or moved
-    if moved is not signals:
-        moved = asking(signals, moved)
-    added = sum(
-        (cause.exact(moved, at, values, shape) for cause, at, values, shape in besides),
-        np.zeros_like(signals.torque),
-    )
-    return moved.residual - added
+    def _slopes(
+        self, parts: Sequence[tuple[Part, Applied]], candidate: Candidate, values: Array
+    ) -> list[Array] | None:
+        rows: list[Array] = []
+        for part, there in parts:
+            columns = there.slopes(candidate, values)
+            if columns is None:
+                return None
+            rows += [block[:, self.joints] for block in part.reduction(columns)]
+        rows = _seen_only(rows, candidate.units)
+        rows += [np.zeros_like(block) for block in self.physical(candidate)[len(rows) :]]
+        return [white(block) for white, block in zip(self.whitening, rows, strict=True)]
 
 
 def _seen_only(rows: list[Array], units: Array) -> list[Array]:
@@ -198,8 +202,3 @@ def _seen_only(rows: list[Array], units: Array) -> list[Array]:
 def shaped_key(candidate: Candidate) -> Any:
     """What tells a candidate's columns from those of others: cause, place and shape."""
     return candidate.key, tuple(sorted(candidate.shape.items()))
-
-
-def place_of(candidate: Candidate) -> int:
-    """Which joint a candidate is at, from 0; -1 of the whole arm."""
-    return -1 if candidate.joint is None else candidate.joint - 1

@@ -13,6 +13,7 @@ class Backlash(Cause):
 
     title = "backlash in {joint}"
     family = "elasticity"
+    laden = True
     parameters = ("play_rad",)
     scales = (1e-3,)
     positive = ("play_rad",)

@@ -67,6 +67,8 @@ class Cause(base.Cause):
         built: whether it is how the robot was made, and so the same on two days.
         reversible: whether, between two days, it may as well have gone as come.
         alike: how many shapes at every place are equally likely beforehand; 0 where that is not charged.
+        merges: whether it becomes a part of a link in the tree, whose own numbers are meant without it.
+        laden: whether its columns depend on all that hangs on the arm.
     """
 
     where = "arm"
@@ -75,6 +77,8 @@ class Cause(base.Cause):
     built: ClassVar[bool] = False
     reversible: ClassVar[bool] = False
     alike: ClassVar[int] = 0
+    merges: ClassVar[bool] = False
+    laden: ClassVar[bool] = False
 
     @abstractmethod
     def columns(self, signals: Signals, at: int, shape: Shape) -> Array:
@@ -90,7 +94,7 @@ class Cause(base.Cause):
         """What the given values add, shape (W, J), where that is not linear in them."""
         return self.columns(signals, at, shape) @ values
 
-    def applied(self, signals: Signals, at: int, values: Array) -> Signals | None:
+    def applied(self, signals: Signals, at: int, values: Array, shape: Shape) -> Signals | None:
         """The signals with its values in the tree and the motion, the torques asked for left alone; None: not there."""
         return None
 

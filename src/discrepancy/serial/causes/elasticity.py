@@ -13,6 +13,7 @@ class Elasticity(Cause):
 
     title = "elasticity of {joint}"
     family = "elasticity"
+    laden = True
     parameters = ("compliance_rad_per_Nm",)
     scales = (1e-4,)
     positive = ("compliance_rad_per_Nm",)

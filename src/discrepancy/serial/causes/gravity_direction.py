@@ -16,6 +16,7 @@ class GravityDirection(Cause):
     family = "tilt"
     part = "arm"
     where = "base"
+    laden = True
     parameters = ("tilt_1_rad", "tilt_2_rad")
     tolerances = (rules.LEVEL_RAD, rules.LEVEL_RAD)
     separate = "A level on the base."
@@ -27,7 +28,7 @@ class GravityDirection(Cause):
     def shapes(self, hints, at):
         return [{}]
 
-    def applied(self, signals, at, values):
+    def applied(self, signals, at, values, shape):
         way = np.array(horizontal(signals.tree.gravity)).T @ values
         return with_tree(signals, gravity=Rotation.from_rotvec(-way).apply(signals.tree.gravity))
 

@@ -14,6 +14,7 @@ class JointZero(Cause):
 
     title = "zero of {joint}"
     family = "zero"
+    laden = True
     parameters = ("zero_rad",)
     separate = "A mark, or an inclinometer on the link."
 
@@ -34,7 +35,7 @@ class JointZero(Cause):
     def most(self, tree, at):
         return [rules.MOST_LENGTH_M if tree.slides[at] else rules.MOST_ZERO_RAD]
 
-    def applied(self, signals, at, values):
+    def applied(self, signals, at, values, shape):
         return replace(signals, q=signals.q + values[0] * (np.arange(signals.q.shape[1]) == at))
 
     def columns(self, signals, at, shape):

@@ -36,7 +36,7 @@ class LinkCom(Cause):
         most = self.most(tree, at)[0]
         return bool(np.all(np.abs(values) < most + 2.0 * se))
 
-    def applied(self, signals, at, values):
+    def applied(self, signals, at, values, shape):
         tree, b = signals.tree, int(signals.tree.joint_body[at])
         here = np.arange(len(tree.mass)) == b
         return with_tree(signals, com=tree.com + here[:, None] * values)

@@ -43,7 +43,7 @@ class LinkInertia(Cause):
         second = 0.5 * np.trace(total) * np.eye(3) - total
         return bool(np.linalg.eigvalsh(second)[0] > -2.0 * np.max(se))
 
-    def applied(self, signals, at, values):
+    def applied(self, signals, at, values, shape):
         tree, b = signals.tree, int(signals.tree.joint_body[at])
         here = np.arange(len(tree.mass)) == b
         return with_tree(signals, inertia=tree.inertia + here[:, None, None] * symmetric(values))

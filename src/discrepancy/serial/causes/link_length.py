@@ -14,6 +14,7 @@ class LinkLength(Cause):
     title = "seat of {link} in the one before it"
     family = "geometry"
     part = "link"
+    laden = True
     parameters = ("x_m", "y_m", "z_m")
     tolerances = (rules.LENGTH_M,) * 3
     separate = "A gauge."
@@ -28,7 +29,7 @@ class LinkLength(Cause):
     def most(self, tree, at):
         return [rules.MOST_LENGTH_M] * 3
 
-    def applied(self, signals, at, values):
+    def applied(self, signals, at, values, shape):
         tree, b = signals.tree, int(signals.tree.joint_body[at])
         here = np.arange(len(tree.mass)) == b
         return with_tree(signals, position=tree.position + here[:, None] * values)

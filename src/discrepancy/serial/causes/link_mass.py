@@ -38,7 +38,7 @@ class LinkMass(Cause):
     def most(self, tree, at):
         return [rules.MOST_INERTIA_SHARE * float(tree.mass[tree.joint_body[at]])]
 
-    def applied(self, signals, at, values):
+    def applied(self, signals, at, values, shape):
         tree, b = signals.tree, int(signals.tree.joint_body[at])
         here = np.arange(len(tree.mass)) == b
         factor = 1.0 + here * values[0] / tree.mass[b]

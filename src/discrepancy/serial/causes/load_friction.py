@@ -15,6 +15,7 @@ class LoadFriction(Cause):
     title = "load-dependent friction in {joint}"
     family = "load_friction"
     dry = True
+    laden = True
     parameters = ("share",)
     scales = (0.05,)
     positive = ("share",)

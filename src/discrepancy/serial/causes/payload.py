@@ -7,6 +7,7 @@ from discrepancy.serial.causes.base import Cause
 from discrepancy.serial.causes.link_inertia import AXES as MOMENTS
 from discrepancy.serial.causes.link_inertia import symmetric
 from discrepancy.serial.mechanics.regressor import body_regressor, inertial_parameters
+from discrepancy.serial.rows.moved import with_tree
 
 AXES: tuple[str, ...] = ("x_m", "y_m", "z_m")
 
@@ -24,6 +25,7 @@ class Payload(Cause):
     scales = (1.0, *(rules.PAYLOAD_INERTIA_SHARE * rules.PAYLOAD_GYRATION_M**2,) * 6)
     separate = "The arm without it."
     reversible = True
+    merges = True
 
     def sentence(self, n):
         at = ", ".join(n(axis, "", 1e3, signed=True) for axis in AXES)
@@ -42,6 +44,24 @@ class Payload(Cause):
         regressor = body_regressor(signals.motion, int(signals.tree.joint_body[at]))
         mass = regressor @ inertial_parameters(1.0, centre, ball_inertia(1.0))
         return np.concatenate([mass[..., None], regressor[..., 4:]], axis=2)
+
+    def applied(self, signals, at, values, shape):
+        tree, b = signals.tree, int(signals.tree.joint_body[at])
+        centre = np.array([shape[axis] for axis in AXES])
+        moments = ball_inertia(values[0]) + symmetric(values[1:])
+        mass = tree.mass[b] + values[0]
+        com = (tree.mass[b] * tree.com[b] + values[0] * centre) / mass
+        about = [
+            inertia + m * ((c - com) @ (c - com) * np.eye(3) - np.outer(c - com, c - com))
+            for m, c, inertia in ((tree.mass[b], tree.com[b], tree.inertia[b]), (values[0], centre, moments))
+        ]
+        here = np.arange(len(tree.mass)) == b
+        return with_tree(
+            signals,
+            mass=np.where(here, mass, tree.mass),
+            com=np.where(here[:, None], com, tree.com),
+            inertia=np.where(here[:, None, None], sum(about), tree.inertia),
+        )
 
     def shapes(self, hints, at):
         away = [sign * d * e for d in rules.PAYLOAD_M for e in np.eye(3) for sign in (1.0, -1.0)]

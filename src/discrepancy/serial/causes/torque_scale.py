@@ -15,6 +15,7 @@ class TorqueScale(Cause):
 
     title = "scale of the torque of {joint}"
     family = "torque_scale"
+    laden = True
     parameters = ("scale",)
     tolerances = (rules.SCALE_SHARE,)
     separate = "A known weight on the arm."
