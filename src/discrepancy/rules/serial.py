@@ -195,6 +195,9 @@ STEP_RAD, STEP_M = 1e-4, 1e-5
 STEP_RATE, STEP_ACCELERATION = 1e-2, 1e-1
 """Of differences by a joint's rate and by its acceleration, per second and per second squared. Derived: torques are
 quadratic in the one and linear in the other, so that any will do that rounding does not see."""
+LOAD_STEP = 1e-3
+"""Of differences by torques that the model asks for, as a share of a column. Derived: what depends on loads is linear
+in them but where they change sign; rounding is far below."""
 ALIKE_SHARE, MOST_UNITS = 0.02, 30.0
 """Of a trace's square, that another cause may leave of it to be the same, and how many units of that it may take.
 Chosen: a seventh of the trace itself; what would take more is no imitation."""

@@ -2,7 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -69,6 +69,7 @@ class Cause(base.Cause):
         alike: how many shapes at every place are equally likely beforehand; 0 where that is not charged.
         merges: whether it becomes a part of a link in the tree, whose own numbers are meant without it.
         laden: whether its columns depend on all that hangs on the arm.
+        moves: whether its joint is elsewhere than it reads.
     """
 
     where = "arm"
@@ -79,6 +80,7 @@ class Cause(base.Cause):
     alike: ClassVar[int] = 0
     merges: ClassVar[bool] = False
     laden: ClassVar[bool] = False
+    moves: ClassVar[bool] = False
 
     @abstractmethod
     def columns(self, signals: Signals, at: int, shape: Shape) -> Array:
@@ -93,6 +95,16 @@ class Cause(base.Cause):
     def exact(self, signals: Signals, at: int, values: Array, shape: Shape) -> Array:
         """What the given values add, shape (W, J), where that is not linear in them."""
         return self.columns(signals, at, shape) @ values
+
+    def slopes(self, model: Signals, signals: Signals, at: int, shape: Shape) -> Array:
+        """Columns where the tree has other numbers and the joints other zeros than the model, shape (W, J, k)."""
+        return self.columns(signals, at, shape)
+
+    def by_load(self, signals: Signals, at: int, values: Array, shape: Shape, torque: Array) -> Array:
+        """What it adds for a little more torque asked for, over that, shape (W, J) -> (W, J); if it is laden."""
+        more = replace(signals, inverse=signals.inverse + rules.LOAD_STEP * torque)
+        both = (self.exact(one, at, values, shape) for one in (more, signals))
+        return (next(both) - next(both)) / rules.LOAD_STEP
 
     def applied(self, signals: Signals, at: int, values: Array, shape: Shape) -> Signals | None:
         """The signals with its values in the tree and the motion, the torques asked for left alone; None: not there."""

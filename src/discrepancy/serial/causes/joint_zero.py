@@ -15,6 +15,7 @@ class JointZero(Cause):
     title = "zero of {joint}"
     family = "zero"
     laden = True
+    moves = True
     parameters = ("zero_rad",)
     separate = "A mark, or an inclinometer on the link."
 

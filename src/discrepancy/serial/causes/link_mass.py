@@ -45,6 +45,9 @@ class LinkMass(Cause):
         return with_tree(signals, mass=tree.mass * factor, inertia=tree.inertia * factor[:, None, None])
 
     def columns(self, signals, at, shape):
-        tree, b = signals.tree, int(signals.tree.joint_body[at])
-        each = inertial_parameters(tree.mass[b], tree.com[b], tree.inertia[b]) / tree.mass[b]
+        return self.slopes(signals, signals, at, shape)
+
+    def slopes(self, model, signals, at, shape):
+        tree, b = model.tree, int(model.tree.joint_body[at])
+        each = inertial_parameters(1.0, signals.tree.com[b], tree.inertia[b] / tree.mass[b])
         return (body_regressor(signals.motion, b) @ each)[..., None]

@@ -54,3 +54,12 @@ class TorqueScale(Cause):
         if shape["bend"]:
             asked = asked * (1.0 + shape["bend"] * (np.abs(asked) / shape["typical_load"] - 1.0))
         return at_joint(signals, at, asked)
+
+    def by_load(self, signals, at, values, shape, torque):
+        share = values[0]
+        if shape["bend"]:
+            load = np.abs(signals.asked[:, at])
+            share = share * (1.0 + shape["bend"] * (2.0 * load / shape["typical_load"] - 1.0))
+        out = np.zeros_like(torque)
+        out[:, at] = share * torque[:, at]
+        return out

@@ -65,7 +65,7 @@ def _rigid_torque(motion: Motion) -> Array:
     force, moment = vectors(len(tree.parent), samples), vectors(len(tree.parent), samples)
     out = np.zeros((len(tree.joint_body), samples)).T
     for b in range(len(tree.parent) - 1, 0, -1):
-        if tree.mass[b] > 0:
+        if tree.mass[b]:  # a fit may pass through masses below nought
             R, w, al = motion.rotation[b], motion.omega[b], motion.alpha[b]
             own = R.swapaxes(1, 2)
             lever = turned(R, tree.com[b])

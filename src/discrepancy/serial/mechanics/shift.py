@@ -38,7 +38,7 @@ def by_displacement(motion: Motion, body: int) -> Array:
     tree, up = motion.tree, motion.tree.parent[body]
     mass, moment = _masses(motion)
     below = np.flatnonzero(carried(tree)[body])
-    force = sum((_force(motion, int(b)) for b in below if tree.mass[b] > 0), np.zeros_like(motion.origin[0]))
+    force = sum((_force(motion, int(b)) for b in below if tree.mass[b]), np.zeros_like(motion.origin[0]))
     out = np.zeros((motion.origin.shape[1], len(tree.joint_body), 3))
     for k in range(3):
         d = motion.rotation[up][:, :, k]
