@@ -210,6 +210,7 @@ def settled(
             if gap < needed(without, judged):
                 best, changed = exact(rig, without, nothing), True
                 break
+            impossible = rig.curved and not best.possible(rig, index)  # by straight columns it was possible
             candidate = best.problem.candidates[index]
             # Its own shape may be another beside what was found since.
             others = proposals(
@@ -222,9 +223,14 @@ def settled(
                 if one.candidate.key != candidate.key
             ]
             rivals[index].append(Rival(None, gap))
-            if others.best is not None and others.best.score > judged.score + rules.EXCHANGED_NATS:
+            if impossible and others.best is None:
+                best, changed = exact(rig, without, nothing), True
+                break
+            if others.best is not None and (
+                impossible or others.best.score > judged.score + rules.EXCHANGED_NATS
+            ):
                 other = exact(rig, others.best, nothing)
-                if _likelier(other, best):
+                if impossible or _likelier(other, best):
                     best, changed = other, True
                     break
                 # Not likelier where it is exact; and none of the others was likelier than that one.
