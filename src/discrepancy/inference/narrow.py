@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.inference.refit import exact
+from discrepancy.inference.refit import exact, near
 from discrepancy.inference.scan import Scanned, in_best_shape, score_of
 from discrepancy.inference.shape.sharpen import sharpened
 from discrepancy.least_squares.fit import Fit
@@ -41,7 +41,8 @@ def with_kinds_narrow(rig: Rig, base: Hypothesis, nothing: Hypothesis) -> list[H
     for index, candidate in rigid:
         item = in_best_shape(rig, fit, Scanned(index, candidate, score_of(fit, index)))
         if item.score > rules.LOOKED_AT_NATS:
-            found.append(exact(rig, sharpened(rig, base, item, near=True, start=narrow), nothing))
+            new = sharpened(rig, base, item, near=True, start=narrow)
+            found.append(exact(rig, new, nothing) if near(rig, base) else new)
     return found
 
 
@@ -56,7 +57,7 @@ def _scattering(base: Hypothesis) -> NDArray[np.bool_]:
 def _as_modelled(rig: Rig, base: Hypothesis) -> Hypothesis:
     """The same with residuals and slopes of the machine as it is modelled, in the noise that is left there."""
     problem = base.problem
-    if not rig.curved:
+    if not near(rig, base):
         return base
     fresh = Problem.of(rig.rows(problem.candidates), problem.candidates)
     fresh = replace(

@@ -64,7 +64,7 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
     anew, rounds = False, rules.REFIT_ROUNDS
     for tried in range(rules.SHORT_ROUNDS):
         if share == 1.0 and tried >= rounds:
-            if not rig.curved or anew or last < 1.0:
+            if anew or last < 1.0 or not near(rig, hypothesis):
                 break
             anew, last, rounds = True, np.inf, tried + rules.REFIT_ROUNDS  # it settles, but slowly
         fit = hypothesis.fit
@@ -102,11 +102,13 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
             back.append(total + problem.raw_times(t, values))
         new = Hypothesis.of(problem.with_residual(back), hypothesis.free, hypothesis.allowed)
         lost = hypothesis.learnt.log_evidence - new.learnt.log_evidence
-        if lost > (rules.BENT_NATS if (bends or anew) and hypothesis is linear else rules.DIVERGED_NATS):
-            if rig.curved and not anew:
+        shortens = rig.curved and (anew or at is not None)
+        most = rules.BENT_NATS if (bends or anew) and hypothesis is linear else rules.DIVERGED_NATS
+        if lost > most:
+            if not anew and near(rig, hypothesis):
                 anew, last = True, np.inf  # slopes there are others than where all is linear
                 continue
-            if rig.curved and share > rules.LEAST_STEP:
+            if shortens and share > rules.LEAST_STEP:
                 share *= 0.5
                 continue
             break  # it diverges: the linear answer is the better one
@@ -116,10 +118,10 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         )  # what nothing tells stays where it is
         way = float(step.max(initial=0.0))
         if way > max(last, 1.0) and not (anew and lost < 0.0):
-            if rig.curved and not anew:
+            if not anew and near(rig, hypothesis):
                 anew, last = True, np.inf
                 continue
-            if rig.curved and share > rules.LEAST_STEP:
+            if shortens and share > rules.LEAST_STEP:
                 share *= 0.5
                 continue
             return linear  # steps grow: columns take up whatever a value that runs away leaves
@@ -127,6 +129,14 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         if way < rules.SETTLED_SE:
             break
     return hypothesis if hypothesis is linear else _from_nought(rig, hypothesis)
+
+
+def near(rig: Rig, hypothesis: Hypothesis) -> bool:
+    """Whether slopes are worth making anew; where much more than noise is left, what is missing counts for more.
+
+    A model without friction and rotors has links then that no machine has, and slopes of these.
+    """
+    return rig.curved and hypothesis.fit.chi2 < rules.NEAR_CHI2 * hypothesis.problem.samples
 
 
 def _from_nought(rig: Rig, hypothesis: Hypothesis) -> Hypothesis:

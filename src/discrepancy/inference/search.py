@@ -12,7 +12,7 @@ from discrepancy.inference.other_forms import beside_other_forms
 from discrepancy.inference.pays import gained, healthy, needed, tolerated
 from discrepancy.inference.probability import probability
 from discrepancy.inference.propose import Offer, Proposed, proposals
-from discrepancy.inference.refit import exact
+from discrepancy.inference.refit import exact, near
 from discrepancy.inference.remainder import is_noise, nats_left, share_left, unlisted_nats
 from discrepancy.inference.shape.reshape import reshaped, settled_shape
 from discrepancy.least_squares.problem import Key, Problem
@@ -210,7 +210,9 @@ def settled(
             if gap < needed(without, judged):
                 best, changed = exact(rig, without, nothing), True
                 break
-            impossible = rig.curved and not best.possible(rig, index)  # by straight columns it was possible
+            impossible = near(rig, best) and not best.possible(
+                rig, index
+            )  # by straight columns it was possible
             candidate = best.problem.candidates[index]
             # Its own shape may be another beside what was found since.
             others = proposals(
