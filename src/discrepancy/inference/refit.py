@@ -106,7 +106,8 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         most = rules.BENT_NATS if (bends or anew) and hypothesis is linear else rules.DIVERGED_NATS
         if lost > most:
             if not anew and near(rig, hypothesis):
-                anew, last = True, np.inf  # slopes there are others than where all is linear
+                # Slopes there are others than where all is linear.
+                anew, last, rounds = True, np.inf, tried + 1 + rules.REFIT_ROUNDS
                 continue
             if shortens and share > rules.LEAST_STEP:
                 share *= 0.5
@@ -119,7 +120,7 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         way = float(step.max(initial=0.0))
         if way > max(last, 1.0) and not (anew and lost < 0.0):
             if not anew and near(rig, hypothesis):
-                anew, last = True, np.inf
+                anew, last, rounds = True, np.inf, tried + 1 + rules.REFIT_ROUNDS
                 continue
             if shortens and share > rules.LEAST_STEP:
                 share *= 0.5
