@@ -40,9 +40,10 @@ def sentence(candidate: LawCandidate, values: Mapping[str, float], se: Mapping[s
 
 
 def _is_share(candidate: LawCandidate) -> bool:
-    """Whether the amplitude is a pure number: a reading that takes in another of its kind."""
-    term = candidate.term
-    return term.function == "linear" and term.times is None and term.of.unit == candidate.at.unit
+    """Whether the amplitude is a pure number: a reading that takes in another of its kind; vectors have several."""
+    term, place = candidate.term, candidate.at
+    alike = term.of.unit == place.unit and len(place.axes) == 1 and not term.of.parts
+    return alike and term.function == "linear" and term.times is None
 
 
 def _formula(candidate: LawCandidate, values: Mapping[str, float], se: Mapping[str, float]) -> str:
