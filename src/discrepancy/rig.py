@@ -163,6 +163,10 @@ class Rig(ABC):
         """The same candidate in shapes that have more to them, to try once its own is the best of its kind."""
         return []
 
+    def closer(self, candidate: Candidate) -> list[Candidate]:
+        """The same in shapes of which a value is larger for the same trace, little by little; none of most causes."""
+        return []
+
     def grown(self, candidate: Candidate) -> list[Candidate]:
         """The same candidate with a number more to its shape, nought so far, where it may have one."""
         return []

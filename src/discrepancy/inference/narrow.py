@@ -11,6 +11,7 @@ from discrepancy import rules
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.refit import exact, near
 from discrepancy.inference.scan import Scanned, in_best_shape, score_of
+from discrepancy.inference.shape.reshape import in_shape
 from discrepancy.inference.shape.sharpen import sharpened
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
@@ -42,8 +43,21 @@ def with_kinds_narrow(rig: Rig, base: Hypothesis, nothing: Hypothesis) -> list[H
         item = in_best_shape(rig, fit, Scanned(index, candidate, score_of(fit, index)))
         if item.score > rules.LOOKED_AT_NATS:
             new = sharpened(rig, base, item, near=True, start=narrow)
-            found.append(exact(rig, new, nothing) if near(rig, base) else new)
+            found.append(_exact(rig, new, nothing) if near(rig, base) else new)
     return found
+
+
+def _exact(rig: Rig, straight: Hypothesis, nothing: Hypothesis) -> Hypothesis:
+    """With exact residuals, and values that can be there: in a shape nearer by if they cannot."""
+    new = exact(rig, straight, nothing)
+    index = new.free[-1]
+    if new.possible(rig, index):
+        return new
+    for shape in rig.closer(new.causes[-1]):
+        other = exact(rig, in_shape(rig, straight, index, shape), nothing)
+        if other.possible(rig, index):
+            return other
+    return new
 
 
 def _scattering(base: Hypothesis) -> NDArray[np.bool_]:

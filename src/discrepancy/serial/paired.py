@@ -142,6 +142,9 @@ class PairedRig(Rig):
     def steps(self, candidate: Candidate) -> list[tuple[Candidate, Candidate, float]]:
         return self.inner.steps(candidate)
 
+    def closer(self, candidate: Candidate) -> list[Candidate]:
+        return self.inner.closer(candidate)
+
     def undecidable(self) -> list[dict[str, Any]]:
         return self.inner.undecidable()
 

@@ -203,6 +203,10 @@ class SerialRig(SerialRows, Rig):
         """For every number of its shape that the data determine: a little less, a little more, and the difference."""
         return shapes.steps(candidate)
 
+    def closer(self, candidate: Candidate) -> list[Candidate]:
+        """A payload nearer to its link's frame: its first moment is known better than its mass."""
+        return [candidate.in_shape(shape) for shape in CAUSES[candidate.cause].closer(candidate.shape)]
+
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]],
         healthy: Sequence[tuple[Candidate, Array]] = (),

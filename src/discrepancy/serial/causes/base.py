@@ -118,6 +118,10 @@ class Cause(base.Cause):
         """Shapes near a chosen one, for a second look."""
         return []
 
+    def closer(self, shape: Shape) -> Sequence[Shape]:
+        """Shapes of which a value is larger for the same trace, little by little."""
+        return []
+
     def steps(self, shape: Shape) -> Mapping[str, float]:
         """Numbers of a shape that the data determine, and over which to take differences."""
         return {}

@@ -70,6 +70,9 @@ class Payload(Cause):
     def finer(self, shape):
         return [dict(shape) | {a: shape[a] + d} for a in AXES for d in rules.PAYLOAD_FINER_M]
 
+    def closer(self, shape):
+        return [{axis: share * shape[axis] for axis in AXES} for share in rules.PAYLOAD_CLOSER]
+
     def steps(self, shape):
         return {axis: rules.PAYLOAD_STEP_M for axis in AXES}
 
