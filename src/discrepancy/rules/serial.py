@@ -184,7 +184,7 @@ what slopes by it are taken over. Chosen: all of the travel. A spring that is ne
 PAYLOAD_M, PAYLOAD_FINER_M, PAYLOAD_STEP_M = (0.1, 0.25), (-0.03, -0.01, 0.01, 0.03), 0.02
 """Where a payload's centre is looked for in the last link's frame, and differences by it. Chosen: hands are as long."""
 PAYLOAD_CLOSER = (0.85, 0.7, 0.5)
-"""Of how far its centre is away, where its inertia there is none that can be. Chosen: its first moment is known best."""
+"""Of how far its centre is away, where its inertia is none that can be. Chosen: its first moment is known best."""
 PAYLOAD_GYRATION_M, PAYLOAD_INERTIA_SHARE = 0.04, 0.5
 """Radius of gyration of a payload, and the share of its square by which its moments and products differ from those of
 such a ball. Chosen: a ball of 6 cm, within 30 %."""
