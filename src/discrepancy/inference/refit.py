@@ -51,7 +51,8 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
 
     Unknowns are moved as far as the causes move them. What they share with tolerances stays linear on both sides: moved
     alone, without the tolerances that make up for it, they would be far from where the data are. What is within its
-    tolerance is moved along where the rig says so (``Rig.curved``).
+    tolerance is moved along where the rig says so (``Rig.curved``). Slopes are the model's as long as steps with them
+    help, and then, where little more than noise is left, those of the machine as it is found (``Rig.slopes``).
 
     Args:
         rig: the rig.

@@ -13,9 +13,11 @@ from discrepancy.candidate import Candidate
 from discrepancy.least_squares.problem import Problem
 from discrepancy.least_squares.renewed import renewed
 from discrepancy.serial.applied import Applied
+from discrepancy.serial.causes import CAUSES
+from discrepancy.serial.causes.payload import ball_inertia
 from discrepancy.serial.diagnosis import diagnose_serial
 from discrepancy.serial.mechanics.motion import Motion
-from discrepancy.serial.mechanics.regressor import rigid_torque
+from discrepancy.serial.mechanics.regressor import inertial_parameters, rigid_torque
 from discrepancy.serial.rig import SerialRig
 from serial_made import nominal, simulated, spec
 
@@ -184,3 +186,30 @@ def test_a_payload_and_a_zero_are_two_causes(tmp_path: Path) -> None:
     for one in causes:
         truth = {"payload": MASS, "joint_zero": 0.04}[one.candidate.cause]
         assert abs(one.values[0] - truth) < 3.5 * np.sqrt(one.covariance[0, 0]), one.candidate.label
+
+
+def test_a_payload_nearer_by_has_the_same_first_moment_and_more_inertia_of_its_own() -> None:
+    """Beside the same moments about the frame: an inertia below nought, which none can have, goes away."""
+    cause, centre, mass, own = (
+        CAUSES["payload"],
+        np.array([0.1, -0.11, 0.05]),
+        1.0,
+        np.diag([-1e-3, -1e-3, 1e-3]),
+    )
+    shape = dict(zip(("x_m", "y_m", "z_m"), centre, strict=True))
+    wanted = inertial_parameters(mass, centre, own)
+    shares = []
+    for nearer in cause.closer(shape):
+        at = np.array([nearer[axis] for axis in ("x_m", "y_m", "z_m")])
+        share = at @ centre / (centre @ centre)
+        np.testing.assert_allclose(at, share * centre)
+        more = own + (1.0 - share) * mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+        np.testing.assert_allclose(inertial_parameters(mass / share, at, more)[1:], wanted[1:], atol=1e-15)
+        values = np.array(
+            [mass / share, *(more - ball_inertia(mass / share))[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]]
+        )
+        shares.append((share, cause.possible(None, 3, values, np.full(7, 1e-5))))
+    assert [share for share, _ in shares] == sorted((share for share, _ in shares), reverse=True)
+    six = (own - ball_inertia(mass))[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    assert not cause.possible(None, 3, np.array([mass, *six]), np.full(7, 1e-5))
+    assert shares[-1][1]
