@@ -14,7 +14,7 @@ from discrepancy.least_squares.problem import Problem
 from discrepancy.least_squares.renewed import renewed
 from discrepancy.serial.applied import Applied
 from discrepancy.serial.causes import CAUSES
-from discrepancy.serial.causes.payload import ball_inertia
+from discrepancy.serial.causes.payload import AXES, ball_inertia
 from discrepancy.serial.diagnosis import diagnose_serial
 from discrepancy.serial.mechanics.motion import Motion
 from discrepancy.serial.mechanics.regressor import inertial_parameters, rigid_torque
@@ -188,28 +188,24 @@ def test_a_payload_and_a_zero_are_two_causes(tmp_path: Path) -> None:
         assert abs(one.values[0] - truth) < 3.5 * np.sqrt(one.covariance[0, 0]), one.candidate.label
 
 
-def test_a_payload_nearer_by_has_the_same_first_moment_and_more_inertia_of_its_own() -> None:
-    """Beside the same moments about the frame: an inertia below nought, which none can have, goes away."""
-    cause, centre, mass, own = (
-        CAUSES["payload"],
-        np.array([0.1, -0.11, 0.05]),
-        1.0,
-        np.diag([-1e-3, -1e-3, 1e-3]),
-    )
-    shape = dict(zip(("x_m", "y_m", "z_m"), centre, strict=True))
-    wanted = inertial_parameters(mass, centre, own)
-    shares = []
-    for nearer in cause.closer(shape):
-        at = np.array([nearer[axis] for axis in ("x_m", "y_m", "z_m")])
-        share = at @ centre / (centre @ centre)
+def test_a_payload_nearer_by_has_the_same_first_moment_and_more_inertia_of_its_own(rig: SerialRig) -> None:
+    """Beside the same moments about the frame: what is told too far out, with less than none there, can be again."""
+    candidate, tree = found(rig, "payload", 4), rig.tree
+    centre = np.array([0.1, -0.11, 0.05])
+    away = centre / np.linalg.norm(centre)
+    second = 5e-4 * np.eye(3) - 3e-3 * np.outer(away, away)
+    own = np.trace(second) * np.eye(3) - second
+    wanted, shares = inertial_parameters(1.0, centre, own), []
+    far = candidate.in_shape(dict(zip(AXES, map(float, centre), strict=True)))
+    for nearer in (far, *rig.closer(far)):
+        at = np.array([nearer.shape[axis] for axis in AXES])
+        share = float(at @ centre / (centre @ centre))
         np.testing.assert_allclose(at, share * centre)
-        more = own + (1.0 - share) * mass * (centre @ centre * np.eye(3) - np.outer(centre, centre))
-        np.testing.assert_allclose(inertial_parameters(mass / share, at, more)[1:], wanted[1:], atol=1e-15)
-        values = np.array(
-            [mass / share, *(more - ball_inertia(mass / share))[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]]
-        )
-        shares.append((share, cause.possible(None, 3, values, np.full(7, 1e-5))))
-    assert [share for share, _ in shares] == sorted((share for share, _ in shares), reverse=True)
-    six = (own - ball_inertia(mass))[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-    assert not cause.possible(None, 3, np.array([mass, *six]), np.full(7, 1e-5))
-    assert shares[-1][1]
+        more = own + (1.0 - share) * (centre @ centre * np.eye(3) - np.outer(centre, centre))
+        np.testing.assert_allclose(inertial_parameters(1.0 / share, at, more)[1:], wanted[1:], atol=1e-15)
+        six = (more - ball_inertia(1.0 / share))[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        can_be = CAUSES["payload"].possible(tree, 3, np.array([1.0 / share, *six]), np.full(7, 1e-5))
+        shares.append((share, can_be))
+    assert shares[0] == (pytest.approx(1.0), False)
+    assert all(less < more for (less, _), (more, _) in zip(shares[1:], shares, strict=False))
+    assert all(can_be for _, can_be in shares[1:])
