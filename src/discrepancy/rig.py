@@ -183,6 +183,11 @@ class Rig(ABC):
         """Columns of what is no multiple of its values: slopes there, and per unit from nought on; None of others."""
         return None
 
+    @property
+    def slopes_vary(self) -> bool:
+        """Whether slopes are worth making anew where causes are."""
+        return False
+
     def slopes(self, active: Sequence[tuple[Candidate, Array]]) -> Sequence[Sequence[Array] | None]:
         """Columns of causes where all of them have these values; None of those that are what they always are."""
         return [None] * len(active)

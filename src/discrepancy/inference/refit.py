@@ -138,7 +138,7 @@ def near(rig: Rig, hypothesis: Hypothesis) -> bool:
 
     A model without friction and rotors has links then that no machine has, and slopes of these.
     """
-    return rig.curved and hypothesis.fit.chi2 < rules.NEAR_CHI2 * hypothesis.problem.samples
+    return rig.slopes_vary and hypothesis.fit.chi2 < rules.NEAR_CHI2 * hypothesis.problem.samples
 
 
 def _from_nought(rig: Rig, hypothesis: Hypothesis) -> Hypothesis:

@@ -111,6 +111,10 @@ class PairedRig(Rig):
     ) -> list[Array]:
         return self.merged(self.inner.residual(shared, local, active))
 
+    @property
+    def slopes_vary(self) -> bool:
+        return self.inner.slopes_vary
+
     def slopes(self, active: Sequence[tuple[Candidate, Array]]) -> Sequence[Sequence[Array] | None]:
         return [None if own is None else self.merged(own) for own in self.inner.slopes(active)]
 

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from discrepancy.candidate import Candidate
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rules import serial as rules
-from discrepancy.serial.applied import Applied, place_of
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.base import Hints
 from discrepancy.serial.logs import Part
 from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel
+from discrepancy.serial.rows.applied import Applied, place_of
 from discrepancy.serial.rows.remainder import Key
 from discrepancy.serial.servo.motor import Motor
 from estimator.arrays import Array
@@ -168,6 +168,11 @@ class SerialRows:
         if shared is not None and shared.size:
             out = [r + columns @ shared for r, columns in zip(out, self.common, strict=True)]
         return out
+
+    @property
+    def slopes_vary(self) -> bool:
+        """Not of drives that tell no torque: their gears leave more than noise, which other links would explain."""
+        return not self.motors
 
     def slopes(self, active: Sequence[tuple[Candidate, Array]]) -> Sequence[Sequence[Array] | None]:
         """Whitened columns of causes where all are, (n, C, k) per block; None where they are those of the model."""
