@@ -9,6 +9,7 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.renewed import renewed
 from discrepancy.rig import Rig
 from estimator.arrays import Array
@@ -72,40 +73,22 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         there = [
             i for i in range(len(fit.problem.candidates)) if i in fit.free or (rig.curved and fit.uses(i))
         ]
-        moved = [fit.problem.candidates[i] for i in there]
         to = _Point(
             fit.shared - nothing.fit.shared,
             [fit.local(t)[:own] - start for t, start in zip(trials, begin, strict=True)],
             [fit.part(i)[0] for i in there],
         )
         here = (to.origin if at is None else at).towards(to, share)
-        shared, local = here.shared, here.local
-        active = [(c, x * c.units) for x, c in zip(here.values, moved, strict=True)]
         try:
-            residual = rig.residual(-shared, [-x for x in local], active)
+            new, bends = _evaluated(rig, hypothesis, there, here, anew=anew)
         except InputError:  # no such machine: the linear answer is the better one
             return linear
-        problem, bends = fit.problem, False
-        for i, (cause, values) in zip(there, active, strict=True):
-            if (bent := rig.bent(cause, values)) is not None:
-                problem, bends = problem.with_columns(i, cause, bent[0]), True
-        if anew:
-            slopes = zip(there, rig.slopes(active), strict=True)
-            problem = renewed(problem, {i: columns for i, columns in slopes if columns is not None})
-        # The problem counts total values, so what its columns stand for is added back.
-        back = []
-        for t, total in zip(trials, residual, strict=True):
-            values = np.zeros(fit.problem.width)
-            values[: fit.problem.shared] = shared
-            total = total + fit.problem.local[t][..., :own] @ local[t]
-            for i, x in zip(there, here.values, strict=True):
-                values[fit.problem.spans[i]] = x
-            back.append(total + problem.raw_times(t, values))
-        new = Hypothesis.of(problem.with_residual(back), hypothesis.free, hypothesis.allowed)
         lost = hypothesis.learnt.log_evidence - new.learnt.log_evidence
         shortens = rig.curved and (anew or at is not None)
         most = rules.BENT_NATS if (bends or anew) and hypothesis is linear else rules.DIVERGED_NATS
-        if lost > most:
+        diverges = lost > most
+        way = np.inf if diverges else _way(fit, new.fit)
+        if diverges or (way > max(last, 1.0) and not (anew and lost < 0.0)):
             if not anew and near(rig, hypothesis):
                 # Slopes there are others than where all is linear.
                 anew, last, rounds = True, np.inf, tried + 1 + rules.REFIT_ROUNDS
@@ -113,24 +96,59 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
             if shortens and share > rules.LEAST_STEP:
                 share *= 0.5
                 continue
-            break  # it diverges: the linear answer is the better one
-        se = np.sqrt(np.diag(new.fit.covariance))
-        step = (
-            np.abs(new.fit.solution - fit.solution)[se > 0] / se[se > 0]
-        )  # what nothing tells stays where it is
-        way = float(step.max(initial=0.0))
-        if way > max(last, 1.0) and not (anew and lost < 0.0):
-            if not anew and near(rig, hypothesis):
-                anew, last, rounds = True, np.inf, tried + 1 + rules.REFIT_ROUNDS
-                continue
-            if shortens and share > rules.LEAST_STEP:
-                share *= 0.5
-                continue
+            if diverges:
+                break  # what was there before is the better one
             return linear  # steps grow: columns take up whatever a value that runs away leaves
         hypothesis, last, at = new, way, here
         if way < rules.SETTLED_SE:
             break
     return hypothesis if hypothesis is linear else _from_nought(rig, hypothesis)
+
+
+def _way(old: Fit, new: Fit) -> float:
+    """By how many standard errors the values moved at most; what nothing tells stays where it is."""
+    se = np.sqrt(np.diag(new.covariance))
+    step = np.abs(new.solution - old.solution)[se > 0] / se[se > 0]
+    return float(step.max(initial=0.0))
+
+
+def _evaluated(
+    rig: Rig, hypothesis: Hypothesis, there: Sequence[int], here: _Point, *, anew: bool
+) -> tuple[Hypothesis, bool]:
+    """The hypothesis with residuals exact at a point, and whether a cause there is no multiple of its values.
+
+    Args:
+        rig: the rig.
+        hypothesis: whose causes, spreads and powers these are.
+        there: candidates that have values at the point.
+        here: the point.
+        anew: whether slopes are those there.
+
+    Raises:
+        InputError: there is no such machine.
+    """
+    old, own = hypothesis.problem, rig.local_unknowns
+    active = [
+        (old.candidates[i], x * old.candidates[i].units) for i, x in zip(there, here.values, strict=True)
+    ]
+    residual = rig.residual(-here.shared, [-x for x in here.local], active)
+    problem, bends = old, False
+    for i, (cause, values) in zip(there, active, strict=True):
+        if (bent := rig.bent(cause, values)) is not None:
+            problem, bends = problem.with_columns(i, cause, bent[0]), True
+    if anew:
+        slopes = zip(there, rig.slopes(active), strict=True)
+        problem = renewed(problem, {i: columns for i, columns in slopes if columns is not None})
+    # The problem counts total values, so what its columns stand for is added back.
+    values = np.zeros(old.width)
+    values[: old.shared] = here.shared
+    for i, x in zip(there, here.values, strict=True):
+        values[old.spans[i]] = x
+    back = [
+        total + old.local[t][..., :own] @ here.local[t] + problem.raw_times(t, values)
+        for t, total in zip(old.trials, residual, strict=True)
+    ]
+    return Hypothesis.of(problem.with_residual(back), hypothesis.free, hypothesis.allowed), bends
 
 
 def near(rig: Rig, hypothesis: Hypothesis) -> bool:

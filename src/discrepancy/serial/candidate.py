@@ -50,3 +50,8 @@ def told_name(joint: int, called: str) -> str:
 
 def _some(part: str) -> str:
     return "two joints" if part == "pair" else f"a {part}"
+
+
+def place_of(candidate: Candidate) -> int:
+    """Which joint a candidate is at, from 0; -1 of the whole arm."""
+    return -1 if candidate.joint is None else candidate.joint - 1

@@ -9,9 +9,8 @@ import numpy as np
 from discrepancy.candidate import Candidate
 from discrepancy.causes.base import Shape
 from discrepancy.rules import serial as rules
-from discrepancy.serial.candidate import SerialCandidate
+from discrepancy.serial.candidate import SerialCandidate, place_of
 from discrepancy.serial.causes import CAUSES
-from discrepancy.serial.rows.applied import place_of
 from discrepancy.serial.rows.other_forms import other_forms
 from discrepancy.serial.serial_rows import SerialRows
 from estimator.arrays import Array

@@ -18,7 +18,7 @@ from discrepancy.rig import Channel, Rig, Rows
 from discrepancy.rules import LAW_SHARE
 from discrepancy.rules import serial as rules
 from discrepancy.serial import catalogue, shapes
-from discrepancy.serial.candidate import SerialCandidate
+from discrepancy.serial.candidate import SerialCandidate, place_of
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.forms import charged_as, forms_beside
@@ -26,7 +26,6 @@ from discrepancy.serial.logs import parts_of
 from discrepancy.serial.model import SerialModel, load_spec
 from discrepancy.serial.prediction import Within, unforetold
 from discrepancy.serial.recording.joint_log import JointLog
-from discrepancy.serial.rows.applied import place_of
 from discrepancy.serial.rows.common import combinations
 from discrepancy.serial.rows.remainder import Key
 from discrepancy.serial.rows.whiten import whiten

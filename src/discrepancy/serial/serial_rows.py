@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from discrepancy.candidate import Candidate
 from discrepancy.least_squares.whitening import Whitening
 from discrepancy.rules import serial as rules
+from discrepancy.serial.candidate import place_of
 from discrepancy.serial.catalogue import Tolerances
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.base import Hints
 from discrepancy.serial.logs import Part
 from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel
-from discrepancy.serial.rows.applied import Applied, place_of
+from discrepancy.serial.rows.applied import Applied
 from discrepancy.serial.rows.remainder import Key
 from discrepancy.serial.servo.motor import Motor
 from estimator.arrays import Array

@@ -39,17 +39,9 @@ def found(rig: SerialRig, cause: str, joint: int | None) -> Candidate:
 
 def payload(rig: SerialRig) -> tuple[Candidate, np.ndarray]:
     """A payload with the inertia of MOMENTS about its centre, which the cause counts from a ball's."""
-    candidate = found(rig, "payload", 4).in_shape(dict(zip(("x_m", "y_m", "z_m"), CENTRE, strict=True)))
-    ball = Applied.of(rig.parts[0].signals, [(candidate, np.array([MASS, *np.zeros(6)]))])
-    bare = rig.parts[0].signals.tree
-    b = int(bare.joint_body[3])
-    apart = [
-        m * ((c - ball.laden.tree.com[b]) @ (c - ball.laden.tree.com[b]) * np.eye(3)
-             - np.outer(c - ball.laden.tree.com[b], c - ball.laden.tree.com[b]))
-        for m, c in ((bare.mass[b], bare.com[b]), (MASS, np.array(CENTRE)))
-    ]  # fmt: skip
-    own = ball.laden.tree.inertia[b] - bare.inertia[b] - sum(apart)
-    return candidate, np.array([MASS, *(np.array(MOMENTS) - own[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])])
+    candidate = found(rig, "payload", 4).in_shape(dict(zip(AXES, CENTRE, strict=True)))
+    ball = ball_inertia(MASS)[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    return candidate, np.array([MASS, *(np.array(MOMENTS) - ball)])
 
 
 def everywhere_off(rig: SerialRig, spread: float) -> Values:
@@ -134,6 +126,11 @@ def test_slopes_of_the_model_are_its_columns(rig: SerialRig) -> None:
     for (candidate, _), columns in zip(active, rig.slopes(active), strict=True):
         for block, own in zip(columns or [], rig.columns(candidate), strict=False):
             np.testing.assert_allclose(block, own, atol=1e-5 * np.abs(own).max(initial=1.0))
+
+
+def test_drives_that_tell_no_torque_keep_the_models_slopes(rig: SerialRig) -> None:
+    assert rig.slopes_vary
+    assert not replace(rig, motors=(None,)).slopes_vary
 
 
 def test_torques_are_straight_in_a_mass_down_to_below_nought(rig: SerialRig) -> None:

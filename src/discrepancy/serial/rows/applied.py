@@ -9,6 +9,7 @@ import numpy as np
 
 from discrepancy.candidate import Candidate
 from discrepancy.rules import serial as rules
+from discrepancy.serial.candidate import place_of
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.rows.moved import asking
 from discrepancy.serial.rows.signals import Signals
@@ -92,8 +93,3 @@ class Applied:
 
 def _added(signals: Signals, candidate: Candidate, values: Array) -> Array:
     return CAUSES[candidate.cause].exact(signals, place_of(candidate), values, candidate.shape)
-
-
-def place_of(candidate: Candidate) -> int:
-    """Which joint a candidate is at, from 0; -1 of the whole arm."""
-    return -1 if candidate.joint is None else candidate.joint - 1
