@@ -76,8 +76,15 @@ def search(
 def continued(
     searched: Searched, most: int, say: Callable[[str], object],
     first: Callable[[Searched], Searched | None] | None = None,
+    until: Callable[[Hypothesis], bool] | None = None,
 ) -> Searched:  # fmt: skip
-    """Go on from what was found, until nothing pays; ``first`` as of ``search``."""
+    """Go on from what was found, until nothing pays.
+
+    Args:
+        searched: what was found.
+        most, say, first: as of ``search``.
+        until: asked of every step before it is refined: whether it is the last, and stays as it is; None for no.
+    """
     rig, nothing, best = searched.rig, searched.nothing, searched.best
     rivals = dict(zip(best.free, map(list, searched.rivals), strict=True))
     doubtful = 0
@@ -86,6 +93,9 @@ def continued(
         added, shapes = _added(best, proposed), proposed.shapes
         del proposed  # for the sake of memory
         if added is None:
+            break
+        if until is not None and until(added):
+            best = added
             break
         say(f"refit {added.causes[-1].label}")
         little = added.score - best.score < rules.LITTLE_SHARE * nats_left(best)

@@ -85,11 +85,14 @@ def with_laws(
             here = places if start is searched and places is not None else located_in(start, bench, say)
             first = first or tuple(here)
             step = with_one(start, bench, here, say, forms)
-            if step is not None:
+            # In place of what leaves noise it has to be likelier, and to do with as few (see ``replaces``).
+            if step is not None and (left or _may_replace(step[0].best, searched.best, least)):
                 # Beside noise it has to stand with all that it does not replace.
                 besides = rules.LAW_CAUSES if left else len(searched.best.free)
                 enough = min(most, len(step[0].best.free) + besides)
-                now = _of_their_own(continued(step[0], enough, say), forms)
+                # What would stand beside all that was named replaces nothing.
+                until = None if left else lambda more: _holds_all(more, searched.best)  # noqa: B023
+                now = _of_their_own(continued(step[0], enough, say, until=until), forms)
                 found.append((now, step[1]))
                 if suffices(now.best, searched.best):
                     break
@@ -118,10 +121,7 @@ def _of_their_own(searched: Searched, forms: Forms) -> Searched:
 
 def suffices(found: Hypothesis, named: Hypothesis) -> bool:
     """Whether a law, with what it goes with, is likelier than what was named and leaves noise, or holds all of that."""
-    enough = (
-        unlisted_nats(found) < rules.UNLISTED_NATS
-        or {cause.key for cause in named.causes} <= {cause.key for cause in found.causes}
-    )  # fmt: skip
+    enough = unlisted_nats(found) < rules.UNLISTED_NATS or _holds_all(found, named)
     return enough and found.score >= named.score + rules.NAMED_NATS
 
 
@@ -132,7 +132,7 @@ def replaces(found: Hypothesis, searched: Searched) -> bool:
     what would pass for noise if nobody named it call for a law.
     """
     named, more = searched.best, len(found.free) - len(searched.best.free)
-    if more > 0 or {cause.key for cause in named.causes} <= {cause.key for cause in found.causes}:
+    if more > 0 or _holds_all(found, named):
         return False
     if found.score - searched.nothing.score < rules.UNLISTED_NATS:
         return False
@@ -141,6 +141,14 @@ def replaces(found: Hypothesis, searched: Searched) -> bool:
     doubt = max((searched.rig.law_doubt(cause) for cause in named.causes), key=lambda one: one.towards_rivals)
     worth = named.score - searched.nothing.score
     return bool(parted([found.score - named.score], doubt, worth)[0] >= rules.NAMED_NATS)
+
+
+def _may_replace(law: Hypothesis, named: Hypothesis, least: float) -> bool:
+    return len(law.free) < len(named.free) or law.score >= named.score + least
+
+
+def _holds_all(found: Hypothesis, named: Hypothesis) -> bool:
+    return {cause.key for cause in named.causes} <= {cause.key for cause in found.causes}
 
 
 def located_in(searched: Searched, bench: Bench, say: Callable[[str], object]) -> list[Located]:

@@ -63,9 +63,8 @@ def remainder(
     size = np.linalg.norm(A, axis=0)
     size = np.where(size > 0, size, 1.0)
     b = np.concatenate([(z / scale).ravel() for z in seen])
-    U, s, Vt = np.linalg.svd(A / size, full_matrices=False)
-    told = s > rules.REDUNDANT**0.5 * s[0]
-    found = Vt[told].T @ ((U[:, told].T @ b) / s[told]) / size
+    found, _, told, _ = np.linalg.lstsq(A / size, b, rcond=rules.REDUNDANT**0.5)
+    found = found / size
     count = columns[0].shape[2]
     left, at = [], count
     for rows, x, own in zip(residual, columns, rests, strict=True):
@@ -75,7 +74,7 @@ def remainder(
         left.append(rows - x @ found[:count] - rested)
         at += len(own)
     ends = np.cumsum([own[0].shape[2] for own in traces])[:-1]
-    freedom = max(1.0 - np.count_nonzero(told) / len(b), rules.LEAST_FREEDOM)
+    freedom = max(1.0 - told / len(b), rules.LEAST_FREEDOM)
     return Remainder(left, freedom, np.split(found[:count], ends))
 
 
