@@ -59,7 +59,7 @@ class Proposed:
 
 def proposals(
     rig: Rig, base: Hypothesis, *, events: bool = True, nothing: Hypothesis | None = None,
-    known: Candidate | None = None, shapes: Mapping[Key, Candidate] | None = None,
+    known: Candidate | None = None, shapes: Mapping[Key, Candidate] | None = None, but: Collection[Key] = (),
 ) -> Proposed:  # fmt: skip
     """Hypotheses with one cause more.
 
@@ -71,9 +71,10 @@ def proposals(
             None not to.
         known: a cause that others are to be held against.
         shapes: of what was sought beside the same causes before, where a search begins and ends; None for nothing.
+        but: lasting causes that are none of them.
     """
     fit, shapes = base.fit, shapes or {}
-    scanned = _with_kinds_held(base)
+    scanned = [item for item in _with_kinds_held(base) if item.candidate.key not in but]
     loud = {item.candidate.joint for item in scanned if item.score > rules.LOOKED_AT_NATS}
     ranked = [in_best_shape(rig, fit, item, loud) for item in scanned]
     ranked += events_of(rig, fit) if events else []
@@ -86,7 +87,7 @@ def proposals(
     rough: list[tuple[Scanned, float]] = []  # what was not sharpened, and the score of the hypothesis with it
     sought: dict[Key, Candidate] = {}
     offered = chain(
-        _hypotheses(rig, base, ranked, shapes, nothing),
+        _hypotheses(rig, base, ranked, shapes, nothing, but),
         _sharper(rig, base, ranked, shapes, rough, offers),
     )
     for item, new in offered:
@@ -122,6 +123,7 @@ def _hypotheses(
     ranked: Sequence[Scanned],
     shapes: Mapping[Key, Candidate],
     nothing: Hypothesis | None,
+    but: Collection[Key],
 ) -> Iterator[tuple[Scanned | None, Hypothesis]]:
     """One after the other, each with one cause more, and its item where its shape has not been sharpened."""
     for item in _chosen(ranked, rules.LEADERS, base.problem.opened):
@@ -131,7 +133,8 @@ def _hypotheses(
             sharpened(rig, base, item, near=near, shape=shapes.get(item.candidate.key)),
         )
     if nothing is not None:
-        yield from ((None, new) for new in with_kinds_narrow(rig, base, nothing))
+        narrow = with_kinds_narrow(rig, base, nothing)
+        yield from ((None, new) for new in narrow if new.causes[-1].key not in but)
 
 
 def _sharper(
@@ -144,7 +147,9 @@ def _sharper(
 ) -> Iterator[tuple[None, Hypothesis]]:
     """After all, what is rough and the likeliest, or might be if its shape were not.
 
-    Kinds that scatter are scanned as if they did not: where robots are off everywhere nothing else is near.
+    Kinds that scatter are scanned as if they did not: where robots are off everywhere nothing else is near. What is at
+    the likeliest's place leaves much the same trace there, in a shape that the scan may not have: friction of a joint
+    beside that of its spring, a base beside its grasp.
 
     Args:
         rig: for columns of other shapes.
@@ -157,18 +162,29 @@ def _sharper(
     first = max(offers.values(), key=lambda one: one.score, default=None)
     most = first.score if first else base.score
     # One whose shapes are far apart, once it has the best, is no measure for others that have not: their scans are.
-    least = np.inf
-    if first is not None and first.candidate.cause in rig.coarse:
+    seen = np.inf
+    if first is not None:
         seen = max(
             (item.score for item in ranked if item.candidate.key == first.candidate.key), default=np.inf
         )
-        least = rules.COARSE_SHARE * seen if seen > 0.0 else seen
+    both_coarse = first is not None and first.candidate.cause in rig.coarse
     for item, score in list(rough):
         coarse = item.candidate.cause in rig.coarse
         reach = (1.0 - rules.COARSE_SHARE) * max(most - base.score, 0.0) if coarse else 0.0
-        near = score >= most - reach or (coarse and item.score >= least)
+        near = score >= most - reach
+        if coarse and both_coarse:
+            near = near or item.score >= min(rules.COARSE_SHARE * seen, seen)
+        elif first is not None and _at_one_place(item.candidate, first.candidate):
+            near = near or item.score >= max(rules.PLACE_SHARE * seen, 0.0)
         if near and (rig.refinements(item.candidate) or rig.steps(item.candidate)):
             yield None, sharpened(rig, base, item, near=True, shape=shapes.get(item.candidate.key))
+
+
+def _at_one_place(one: Candidate, other: Candidate) -> bool:
+    """Whether two lasting causes are at the same robot and joint, of which one may be of the robot as a whole."""
+    if one.transient or other.transient or one.robot != other.robot:
+        return False
+    return one.joint == other.joint or (one.robot is not None and None in (one.joint, other.joint))
 
 
 def _with_kinds_held(base: Hypothesis) -> list[Scanned]:

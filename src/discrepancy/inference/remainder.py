@@ -86,3 +86,10 @@ def share_left(hypothesis: Hypothesis, index: int) -> float:
     excess = np.maximum(left - rules.CLEAN_CHI2_PER_N * sizes, 0.0)
     shares = excess / np.maximum(excess + trace, 1e-300)
     return float(np.sqrt(trace @ shares / max(float(np.sum(trace)), 1e-300)))
+
+
+def trace_nats(hypothesis: Hypothesis, index: int) -> float:
+    """What a cause's trace would leave if nothing stood for it: half its sum of squares, in the noise that there is."""
+    problem, span = hypothesis.problem, hypothesis.problem.spans[index]
+    trace = _power(problem, span, hypothesis.fit.part(index)[0])
+    return 0.5 * float(np.sum(trace / np.concatenate(problem.power)))

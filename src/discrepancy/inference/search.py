@@ -13,7 +13,7 @@ from discrepancy.inference.pays import gained, healthy, needed, tolerated
 from discrepancy.inference.probability import probability
 from discrepancy.inference.propose import Offer, Proposed, proposals
 from discrepancy.inference.refit import exact, near
-from discrepancy.inference.remainder import is_noise, nats_left, share_left, unlisted_nats
+from discrepancy.inference.remainder import is_noise, nats_left, share_left, trace_nats, unlisted_nats
 from discrepancy.inference.shape.reshape import reshaped, settled_shape
 from discrepancy.least_squares.problem import Key, Problem
 from discrepancy.rig import Rig
@@ -87,9 +87,9 @@ def continued(
     """
     rig, nothing, best = searched.rig, searched.nothing, searched.best
     rivals = dict(zip(best.free, map(list, searched.rivals), strict=True))
-    doubtful = 0
-    while len(best.free) < most and doubtful < rules.DOUBTFUL:
-        proposed = proposals(rig, best, nothing=nothing)
+    doubtful, refused, but = 0, 0, set[Key]()
+    while len(best.free) < most and doubtful < rules.DOUBTFUL and refused < rules.REFUSED:
+        proposed = proposals(rig, best, nothing=nothing, but=but)
         added, shapes = _added(best, proposed), proposed.shapes
         del proposed  # for the sake of memory
         if added is None:
@@ -99,15 +99,25 @@ def continued(
             break
         say(f"refit {added.causes[-1].label}")
         little = added.score - best.score < rules.LITTLE_SHARE * nats_left(best)
-        added = exact(rig, added, nothing)
+        added, last = exact(rig, added, nothing), added.causes[-1]
         if scattered := tolerated(best, added):
+            if _form_of_a_fault(rig, best, last, scattered):
+                refused, but = (
+                    refused + 1,
+                    but | {c.key for c in best.problem.candidates if c.cause == last.cause},
+                )
+                continue
             found, beside = settled(rig, scattered, nothing)
-            if found.score - best.score < rules.SHAPE_NATS:
-                break
+            pays = found.score - best.score >= rules.SHAPE_NATS
         else:
             found, beside = settled(rig, added, nothing, shapes)
-            if gained(best, found) < needed(best, found):
-                break  # what pays where all is linear need not do so where it is exact
+            pays = gained(best, found) >= needed(best, found)
+        if not pays:  # where all is linear it did, which need not be so where it is exact
+            if last.transient:
+                break
+            refused, but = refused + 1, but | {last.key}
+            continue
+        refused, but = 0, set()
         best, rivals = found, beside
         if first is not None:
             instead = first(Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free)))
@@ -120,8 +130,8 @@ def continued(
                 continue
         if scattered:
             continue
-        last = best.free[-1] if best.free else None
-        likely = last is None or _law_holds(rig, best, last)
+        newest = best.free[-1] if best.free else None
+        likely = newest is None or _law_holds(rig, best, newest)
         doubtful = doubtful + 1 if little and not likely else 0
     return Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free))
 
@@ -170,6 +180,16 @@ def _law_holds(rig: Rig, hypothesis: Hypothesis, index: int) -> bool:
     """Whether a cause is likelier than something unlisted that looks like it."""
     doubt = rig.law_doubt(hypothesis.problem.candidates[index])
     return probability([], share_left(hypothesis, index), doubt) >= rules.LEAST_PROBABILITY
+
+
+def _form_of_a_fault(rig: Rig, base: Hypothesis, cause: Candidate, scattered: Hypothesis) -> bool:
+    """Whether a kind that scatters in another shape is what the law of a named fault of that kind may leave."""
+    worth = [
+        rig.law_doubt(other).share ** 2 * trace_nats(base, index)
+        for index, other in zip(base.free, base.causes, strict=True)
+        if other.cause == cause.cause
+    ]
+    return bool(worth) and scattered.score - base.score < max(worth)
 
 
 def _based(rig: Rig, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
