@@ -9,10 +9,11 @@ from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation, Found, explain
 from discrepancy.engine.gain import Gain, is_worse, mean_chi2, responses
+from discrepancy.inference.exchange import Rival
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.probability import probability
 from discrepancy.inference.refit import exact
-from discrepancy.inference.search import Rival, Searched
+from discrepancy.inference.search import Searched
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
 

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.engine.held_out import Foretold, foretold, predictive_nats, shares
+from discrepancy.inference.exchange import Rival
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.learn import worth_spreads
 from discrepancy.inference.probability import probability, told_nats
 from discrepancy.inference.remainder import is_noise, share_left, unlisted_nats
-from discrepancy.inference.search import Rival, Searched
+from discrepancy.inference.search import Searched
 from discrepancy.inference.shape.best_shape import covariance_with_shape
 from discrepancy.law_doubt import LawDoubt
 from discrepancy.least_squares.fit import Fit

@@ -2,34 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
+from discrepancy.inference.exchange import Rival, settled, without_healthy
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.inference.other_forms import beside_other_forms
-from discrepancy.inference.pays import gained, healthy, needed, tolerated
+from discrepancy.inference.offer.propose import Proposed, proposals
+from discrepancy.inference.pays import gained, needed, tolerated
 from discrepancy.inference.probability import probability
-from discrepancy.inference.propose import Offer, Proposed, proposals
-from discrepancy.inference.refit import exact, near
+from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import is_noise, nats_left, share_left, trace_nats, unlisted_nats
-from discrepancy.inference.shape.reshape import reshaped, settled_shape
 from discrepancy.least_squares.problem import Key, Problem
 from discrepancy.rig import Rig
-
-
-@dataclass(frozen=True, eq=False)
-class Rival:
-    """What could be there instead of a cause.
-
-    Attributes:
-        candidate: the other; None for nothing at all in its place.
-        gap: by how much the cause is likelier [nats].
-    """
-
-    candidate: Candidate | None
-    gap: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +73,7 @@ def continued(
     """
     rig, nothing, best = searched.rig, searched.nothing, searched.best
     rivals = dict(zip(best.free, map(list, searched.rivals), strict=True))
-    doubtful, refused, but = 0, 0, set[Key]()
+    doubtful, refused, but, all_exchanged = 0, 0, set[Key](), True
     while len(best.free) < most and doubtful < rules.DOUBTFUL and refused < rules.REFUSED:
         proposed = proposals(rig, best, nothing=nothing, but=but)
         added, shapes = _added(best, proposed), proposed.shapes
@@ -95,22 +81,20 @@ def continued(
         if added is None:
             break
         if until is not None and until(added):
-            best = added
+            best, all_exchanged = added, True
             break
         say(f"refit {added.causes[-1].label}")
         little = added.score - best.score < rules.LITTLE_SHARE * nats_left(best)
         added, last = exact(rig, added, nothing), added.causes[-1]
         if scattered := tolerated(best, added):
             if _form_of_a_fault(rig, best, last, scattered):
-                refused, but = (
-                    refused + 1,
-                    but | {c.key for c in best.problem.candidates if c.cause == last.cause},
-                )
+                alike = {c.key for c in best.problem.candidates if c.cause == last.cause}
+                refused, but = refused + 1, but | alike
                 continue
-            found, beside = settled(rig, scattered, nothing)
+            found, beside, exchanged = without_healthy(rig, scattered, nothing), rivals, False
             pays = found.score - best.score >= rules.SHAPE_NATS
         else:
-            found, beside = settled(rig, added, nothing, shapes)
+            (found, beside), exchanged = settled(rig, added, nothing, shapes), True
             pays = gained(best, found) >= needed(best, found)
         if not pays:  # where all is linear it did, which need not be so where it is exact
             if last.transient:
@@ -118,7 +102,7 @@ def continued(
             refused, but = refused + 1, but | {last.key}
             continue
         refused, but = 0, set()
-        best, rivals = found, beside
+        best, rivals, all_exchanged = found, beside, exchanged
         if first is not None:
             instead = first(Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free)))
             first = None
@@ -133,6 +117,8 @@ def continued(
         newest = best.free[-1] if best.free else None
         likely = newest is None or _law_holds(rig, best, newest)
         doubtful = doubtful + 1 if little and not likely else 0
+    if not all_exchanged:
+        best, rivals = settled(rig, best, nothing)
     return Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free))
 
 
@@ -147,33 +133,6 @@ def _added(base: Hypothesis, proposed: Proposed) -> Hypothesis | None:
     if open_ is None or is_noise(base.fit.chi2, base.problem.samples, unlisted_nats(base)):
         return None
     return open_ if tolerated(base, open_) else None
-
-
-def _but(shapes: Mapping[Key, Candidate] | None, cause: Candidate) -> dict[Key, Candidate]:
-    """Shapes of others: a cause's own may be settled further in the noise that is left with it."""
-    return {key: shape for key, shape in (shapes or {}).items() if key != cause.key}
-
-
-def _likelier(other: Hypothesis, best: Hypothesis, by: float = 0.0) -> bool:
-    """Whether another is to be there instead, by the data alone and beside what other forms of the rest could do.
-
-    What each is charged for these is of when it was added, beside what was known then: no reason alone for the other.
-    Nor is a fit alone that is mostly theirs, or the search would end where it had gone on.
-    """
-    return other.uncharged > best.uncharged + by and other.score > best.score + by
-
-
-def _gap(rig: Rig, best: Hypothesis, index: int, less: Hypothesis, judged: Hypothesis, other: Offer) -> float:
-    """By how much a cause is likelier than another in its place [nats].
-
-    Where other forms of the rest matter for one of the two alone, that is no reason for the other: both are judged
-    beside what matters for both, and share the probability where nothing else parts them.
-    """
-    gap = judged.score - other.score
-    if rig.charged_alike(best.problem.candidates[index], other.candidate):
-        return gap
-    alike = beside_other_forms(rig, best, index, less, other.candidate).score - other.alike
-    return min(gap, max(alike, 0.0))
 
 
 def _law_holds(rig: Rig, hypothesis: Hypothesis, index: int) -> bool:
@@ -210,76 +169,3 @@ def _nothing(rig: Rig, say: Callable[[str], object]) -> Hypothesis:
     say("columns")
     candidates = rig.candidates()
     return Hypothesis.of(Problem.of(rig.rows(candidates), candidates), ())
-
-
-def settled(
-    rig: Rig, best: Hypothesis, nothing: Hypothesis, shapes: Mapping[Key, Candidate] | None = None
-) -> tuple[Hypothesis, dict[int, list[Rival]]]:
-    """Exchange and take away causes until none is likelier, and what could be there instead of each.
-
-    Args:
-        rig: for columns.
-        best: what is there.
-        nothing: the hypothesis that nothing is.
-        shapes: what was sought in place of the last of the causes, in these shapes; None where it was not.
-    """
-    rivals: dict[int, list[Rival]] = {}
-    last = best.free[-1] if shapes and not rig.layered else None
-    for _ in range(rules.EXCHANGES):
-        changed = False
-        if rig.layered:
-            best = reshaped(rig, best, nothing)
-        for index in best.free:
-            if best.problem.candidates[index].transient:  # its interval was told beside what was known then
-                best = settled_shape(rig, best, index)
-        for index in best.free:
-            less = best.without(index)
-            # Its own loss to forms of the others is judged here, but counted once: not theirs to its forms, too.
-            judged = beside_other_forms(rig, best, index, less)
-            without, gap = healthy(best, index, less, judged)
-            if gap < needed(without, judged):
-                best, changed = exact(rig, without, nothing), True
-                break
-            impossible = near(rig, best) and not best.possible(
-                rig, index
-            )  # by straight columns it was possible
-            candidate = best.problem.candidates[index]
-            # Its own shape may be another beside what was found since.
-            others = proposals(
-                rig, less, events=candidate.transient is None, known=candidate,
-                shapes=_but(shapes, candidate) if index == last else None,
-            )  # fmt: skip
-            rivals[index] = [
-                Rival(one.candidate, _gap(rig, best, index, less, judged, one))
-                for one in others.offers
-                if one.candidate.key != candidate.key
-            ]
-            rivals[index].append(Rival(None, gap))
-            if impossible and others.best is None:
-                best, changed = exact(rig, without, nothing), True
-                break
-            if others.best is not None and (
-                impossible or others.best.score > judged.score + rules.EXCHANGED_NATS
-            ):
-                other = exact(rig, others.best, nothing)
-                if impossible or _likelier(other, best):
-                    best, changed = other, True
-                    break
-                # Not likelier where it is exact; and none of the others was likelier than that one.
-                least = max(best.uncharged - other.uncharged, 0.0)
-                rivals[index] = [
-                    rival if rival.candidate is None else replace(rival, gap=max(rival.gap, least))
-                    for rival in rivals[index]
-                ]
-            elif others.other is not None and others.other.score > judged.score - rules.EXCHANGED_NATS:
-                # Equally likely by straight columns; exact ones may part them.
-                other = exact(rig, others.other, nothing)
-                if _likelier(other, best, rules.EXCHANGED_NATS):
-                    best, changed = other, True
-                    break
-        if not changed:
-            break
-        last = None  # beside others by now
-    for index in set(best.free) - set(rivals):  # exchanged in the last round
-        rivals[index] = [Rival(None, best.score - best.without(index).score)]
-    return best, rivals

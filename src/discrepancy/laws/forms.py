@@ -10,8 +10,8 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.offer.propose import Proposed
 from discrepancy.inference.probability import probability
-from discrepancy.inference.propose import Proposed
 from discrepancy.inference.remainder import form_share_of, share_left
 from discrepancy.law_doubt import LawDoubt
 from discrepancy.laws.bench import Bench

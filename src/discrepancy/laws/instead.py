@@ -9,10 +9,11 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
+from discrepancy.inference.exchange import Rival
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.refit import exact
 from discrepancy.inference.scan import score_of
-from discrepancy.inference.search import Rival, Searched
+from discrepancy.inference.search import Searched
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.forms import Forms, likely_causes

@@ -9,13 +9,14 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.engine.held_out import held_out_gains
+from discrepancy.inference.exchange import Rival, settled
 from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.offer.propose import Offer, Proposed
 from discrepancy.inference.probability import parted
-from discrepancy.inference.propose import Offer, Proposed
 from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import unlisted_nats
 from discrepancy.inference.scan import Scanned
-from discrepancy.inference.search import Rival, Searched, continued, settled
+from discrepancy.inference.search import Searched, continued
 from discrepancy.inference.shape.sharpen import sharpened
 from discrepancy.laws.bench import Bench
 from discrepancy.laws.candidate import LawCandidate, candidate_of

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from discrepancy.inference.exchange import settled
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.other_forms import beside_other_forms
-from discrepancy.inference.search import settled
 from discrepancy.least_squares.problem import Problem
 from fake_rig import CATALOGUE, FakeRig, cause
 

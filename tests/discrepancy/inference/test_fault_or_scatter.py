@@ -8,7 +8,7 @@ import pytest
 from discrepancy import rules
 from discrepancy.engine.diagnose import diagnose
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.inference.propose import proposals
+from discrepancy.inference.offer.propose import proposals
 from discrepancy.inference.search import search
 from discrepancy.least_squares.problem import Problem
 from fake_rig import CATALOGUE, NINE, FakeRig, cause, found_in, names

@@ -5,7 +5,7 @@ import pytest
 
 from discrepancy import rules
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.inference.propose import proposals
+from discrepancy.inference.offer.propose import proposals
 from discrepancy.inference.search import search
 from discrepancy.least_squares.patches import Patches
 from discrepancy.result.evidence_list import evidence_list

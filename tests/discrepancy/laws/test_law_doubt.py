@@ -38,7 +38,7 @@ def test_it_has_to_pay_for_all_that_noise_may_hide(monkeypatch, unlisted, at_one
     monkeypatch.setattr(search, "line_nats", lambda fit, bench: 0.0)
     monkeypatch.setattr(search, "likely_causes", lambda found: ())
     monkeypatch.setattr(search, "located", lambda fit, bench, where: seen.append(where) or places)
-    monkeypatch.setattr(search, "continued", lambda searched, most, say: searched)
+    monkeypatch.setattr(search, "continued", lambda searched, most, say, until: searched)
     monkeypatch.setattr(search, "_of_their_own", lambda searched, forms: searched)
 
     def with_one(searched, bench, where, say, forms):

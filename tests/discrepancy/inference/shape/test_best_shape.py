@@ -8,7 +8,7 @@ import pytest
 from discrepancy import rules
 from discrepancy.engine.explanation import explain
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.inference.propose import proposals
+from discrepancy.inference.offer.propose import proposals
 from discrepancy.inference.scan import Scanned, score_with
 from discrepancy.inference.search import search
 from discrepancy.inference.shape.best_shape import best_shape

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.inference.propose import proposals
+from discrepancy.inference.offer.propose import proposals
 from discrepancy.inference.scan import Scanned
 from discrepancy.inference.search import search
 from discrepancy.inference.shape.best_shape import best_shape

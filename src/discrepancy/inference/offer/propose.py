@@ -11,8 +11,8 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.inference.imitation import imitated
-from discrepancy.inference.narrow import with_kinds_narrow
+from discrepancy.inference.offer.imitation import imitated
+from discrepancy.inference.offer.narrow import with_kinds_narrow
 from discrepancy.inference.other_forms import beside_other_forms
 from discrepancy.inference.scan import Scanned, events_of, in_best_shape, scan, score_of
 from discrepancy.inference.shape.sharpen import sharpened

@@ -1,0 +1,1 @@
+"""Causes that could be added to a hypothesis, in their best shapes."""
