@@ -51,3 +51,35 @@ def test_it_has_to_pay_for_all_that_noise_may_hide(monkeypatch, unlisted, at_one
     assert bool(seen) == looked
     assert (lawful.searched.best is after) == stated
     assert len(seen) <= 1 or unlisted >= rules.UNLISTED_NATS, "once, beside what is named"
+
+
+@pytest.mark.parametrize(
+    ("score", "named", "gone_on"),
+    [(90.0, ("payload",), False), (200.0, ("payload",), True), (90.0, ("payload", "zero"), True)],
+)
+def test_what_cannot_take_the_place_of_causes_that_leave_noise_is_not_gone_on_with(
+    monkeypatch, score, named, gone_on
+):
+    """A law has to do with as few, and to be likelier: so it needs room for another cause, or to be likelier by now."""
+    before, law, asked = hypothesis(100.0, *named), hypothesis(score, "law"), []
+    monkeypatch.setattr(search, "unlisted_nats", lambda found: 0.0)
+    monkeypatch.setattr(search, "line_nats", lambda fit, bench: 0.0)
+    monkeypatch.setattr(search, "likely_causes", lambda found: ())
+    monkeypatch.setattr(search, "located", lambda fit, bench, where: [])
+    monkeypatch.setattr(search, "_of_their_own", lambda searched, forms: searched)
+    monkeypatch.setattr(
+        search, "with_one", lambda start, *rest: (Searched(start.rig, start.nothing, law, ((),)), {})
+    )
+
+    def continued(searched, most, say, until):
+        both = hypothesis(300.0, "law", *named)
+        assert until(both)
+        assert not until(hypothesis(300.0, "law", "other"))
+        asked.append(most)
+        return Searched(searched.rig, searched.nothing, both, ((),) * (1 + len(named)))
+
+    monkeypatch.setattr(search, "continued", continued)
+    rig = SimpleNamespace(bench=SimpleNamespace(places=["anywhere"]))
+    lawful = with_laws(Searched(rig, hypothesis(0.0), before, ((),) * len(named)), 8, instead=True)
+    assert bool(asked) == gone_on
+    assert lawful.searched.best is before

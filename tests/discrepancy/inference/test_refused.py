@@ -1,0 +1,81 @@
+"""Steps that do not pay where they are exact, and what the law of a fault leaves, do not end a search."""
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from discrepancy import rules
+from discrepancy.inference import search as module
+from discrepancy.inference.hypothesis import Hypothesis
+from discrepancy.inference.remainder import trace_nats
+from discrepancy.inference.search import search
+from discrepancy.least_squares.fit import Fit
+from discrepancy.least_squares.problem import Problem
+from fake_rig import NINE, FakeRig
+
+
+def test_the_next_is_tried_where_the_likeliest_does_not_pay(monkeypatch):
+    asked = []
+
+    def nothing_of_cause_2(rig, best, *rest):
+        asked.append(best.causes[-1].cause)
+        for index in best.free:
+            if best.problem.candidates[index].cause == "cause 2":
+                return best.without(index), {}
+        return best, {}
+
+    monkeypatch.setattr(module, "settled", nothing_of_cause_2)
+    found = search(FakeRig({2: 60.0, 5: [30.0, -20.0]}))
+    assert asked[:2] == ["cause 2", "cause 5"]
+    assert [c.cause for c in found.best.causes] == ["cause 5"]
+    assert asked.count("cause 2") == 2  # once more beside the other, and no more
+
+
+def test_a_search_ends_with_as_many_refused_in_a_row(monkeypatch):
+    asked = []
+
+    def nothing_pays(rig, best, *rest):
+        asked.append(best.causes[-1].cause)
+        return best.without(best.free[-1]), {}
+
+    monkeypatch.setattr(module, "settled", nothing_pays)
+    found = search(FakeRig({1: 60.0, 2: 50.0, 4: 40.0}))
+    assert not found.best.free
+    assert len(asked) == len(set(asked)) == rules.REFUSED
+
+
+@pytest.fixture(scope="module")
+def there():
+    """One of nine places is off, in noise of 1."""
+    rig = FakeRig({4: 40.0}, catalogue=NINE)
+    candidates = rig.candidates()
+    problem = Problem.of(rig.rows(candidates), candidates)
+    return rig, cast("Hypothesis", SimpleNamespace(problem=problem, fit=Fit.of(problem, (4,)), free=(4,)))
+
+
+def test_a_trace_leaves_half_its_sum_of_squares(there):
+    _, hypothesis = there
+    problem, value = hypothesis.problem, hypothesis.fit.part(4)[0]
+    traces = [problem.rows(t)[..., problem.spans[4]] @ value for t in problem.trials]
+    assert trace_nats(hypothesis, 4) == pytest.approx(0.5 * sum(np.sum(x**2) for x in traces), rel=1e-6)
+    louder = [4.0 * power for power in problem.power]
+    noisy = SimpleNamespace(problem=problem.with_noise(louder, problem.spread), fit=hypothesis.fit)
+    assert trace_nats(cast("Any", noisy), 4) == pytest.approx(trace_nats(hypothesis, 4) / 4.0)
+
+
+@pytest.mark.parametrize(
+    ("share", "kind", "refused"), [(0.9, "many", True), (1.1, "many", False), (0.9, "few", False)]
+)
+def test_a_kind_scatters_beside_a_fault_of_it_by_more_than_its_law_may_leave(there, share, kind, refused):
+    rig, hypothesis = there
+    gain = share * rules.LAW_SHARE**2 * trace_nats(hypothesis, 4)
+    base = SimpleNamespace(
+        problem=hypothesis.problem, fit=hypothesis.fit, free=(4,), causes=[NINE[4]], score=7.0
+    )
+    scattered = SimpleNamespace(score=7.0 + gain)
+    cause = SimpleNamespace(cause=kind)
+    assert (
+        module._form_of_a_fault(rig, cast("Any", base), cast("Any", cause), cast("Any", scattered)) == refused
+    )
