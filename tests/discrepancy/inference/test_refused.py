@@ -79,3 +79,19 @@ def test_a_kind_scatters_beside_a_fault_of_it_by_more_than_its_law_may_leave(the
     assert (
         module._form_of_a_fault(rig, cast("Any", base), cast("Any", cause), cast("Any", scattered)) == refused
     )
+
+
+def test_causes_are_exchanged_once_where_kinds_were_found_to_scatter(monkeypatch):
+    """As often as anything was added, their rivals had been sought in vain: each time anew beside the next scatter."""
+    settled, asked = module.settled, []
+
+    def counted(rig, best, *rest):
+        asked.append(len(best.free))
+        return settled(rig, best, *rest)
+
+    monkeypatch.setattr(module, "settled", counted)
+    monkeypatch.setattr(module, "tolerated", lambda base, added: added)
+    found = search(FakeRig({2: 60.0, 5: [30.0, -20.0]}))
+    assert {c.cause for c in found.best.causes} == {"cause 2", "cause 5"}
+    assert asked == [2]
+    assert all(found.rivals)
