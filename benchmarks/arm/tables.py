@@ -95,16 +95,13 @@ def _is(named: Item, effect: Item, cause: str) -> bool:
 
 
 def _is_its_disc(named: Item, effect: Item) -> bool:
-    """A law that says what a hidden zero has besides: its disc is off its axis, by 15 % of the zero once a turn.
-
-    Of a joint that turns little the sine is a square or a line.
-    """
+    """A law that says what a hidden zero has besides: its disc is off its axis, by 15 % of the zero once a turn."""
     law = named.get("law") or {}
     return (
         effect["name"] == "zero"
         and named.get("joint") == effect["joint"]
-        and (law.get("place"), law.get("of")) == ("joint position", f"q_{effect['joint']}")
-        and (law.get("function") != "sine" or law["numbers"]["times"] == 1.0)
+        and (law.get("place"), law.get("function")) == ("joint position", "sine")
+        and law["numbers"]["times"] == 1.0
     )
 
 

@@ -73,9 +73,8 @@ def settled(
             if gap < needed(without, judged):
                 best, changed = exact(rig, without, nothing), True
                 break
-            impossible = near(rig, best) and not best.possible(
-                rig, index
-            )  # by straight columns it was possible
+            # By straight columns it was possible.
+            impossible = near(rig, best) and not best.possible(rig, index)
             candidate = best.problem.candidates[index]
             # Its own shape may be another beside what was found since.
             others = proposals(

@@ -91,18 +91,18 @@ def continued(
                 alike = {c.key for c in best.problem.candidates if c.cause == last.cause}
                 refused, but = refused + 1, but | alike
                 continue
-            found, beside, exchanged = without_healthy(rig, scattered, nothing), rivals, False
+            found, beside = without_healthy(rig, scattered, nothing), rivals
             pays = found.score - best.score >= rules.SHAPE_NATS
         else:
-            (found, beside), exchanged = settled(rig, added, nothing, shapes), True
+            found, beside = settled(rig, added, nothing, shapes)
             pays = gained(best, found) >= needed(best, found)
         if not pays:  # where all is linear it did, which need not be so where it is exact
-            if last.transient:
+            if last.transient:  # its key is that of every other
                 break
             refused, but = refused + 1, but | {last.key}
             continue
         refused, but = 0, set()
-        best, rivals, all_exchanged = found, beside, exchanged
+        best, rivals, all_exchanged = found, beside, not scattered
         if first is not None:
             instead = first(Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free)))
             first = None

@@ -156,6 +156,9 @@ RAMPS = 150.0
 number more. Without it, a push without ramps would always have short ones."""
 LOOKED_AT_NATS = -5.0
 """Log odds in the scan, from which a candidate is looked at closely. Chosen: what it leaves open may make up for it."""
+NARROW_NATS = 0.0
+"""The same with every kind within its tolerance, from which what has a shape is sought to the end there. Chosen: kinds
+that scatter can only take of it, and exact steps take seconds; the shapes of a scan have been tried by then."""
 HELD_FACTOR = 1.5
 """Spread of a kind from which it is scanned within its tolerance, too. Chosen."""
 WORST_EVENTS = 3

@@ -2,7 +2,7 @@
 
 import pytest
 
-from arm.tables import _is_its_disc, score, strangers, tables
+from arm.tables import score, strangers, tables
 from discrepancy.serial.causes import CAUSES
 
 
@@ -62,20 +62,3 @@ def test_every_set_left_out_is_in_one_column():
         "| **all** | 5 | 1 | 1 | 1 | 2 | 1 |",
     ]
     assert "Left out" not in tables([result("ripple") | {"kind": "single"}])
-
-
-@pytest.mark.parametrize(
-    ("joint", "law", "right"),
-    [
-        (3, {"place": "joint position", "of": "q_3", "function": "sine", "numbers": {"times": 1.0}}, True),
-        (3, {"place": "joint position", "of": "q_3", "function": "square", "numbers": {}}, True),
-        (3, {"place": "joint position", "of": "q_3", "function": "sine", "numbers": {"times": 2.0}}, False),
-        (3, {"place": "joint position", "of": "load_3", "function": "line", "numbers": {}}, False),
-        (3, {"place": "joint torque", "of": "q_3", "function": "sine", "numbers": {"times": 1.0}}, False),
-        (4, {"place": "joint position", "of": "q_3", "function": "sine", "numbers": {"times": 1.0}}, False),
-    ],
-)
-def test_a_law_of_the_disc_of_a_zero_is_right(joint, law, right):
-    """It was hidden with the zero; over a short way a sine is a square or a line."""
-    assert _is_its_disc({"joint": joint, "law": law}, {"name": "zero", "joint": 3}) == right
-    assert not _is_its_disc({"joint": joint, "law": law}, {"name": "gain", "joint": 3})

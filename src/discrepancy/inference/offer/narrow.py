@@ -41,7 +41,7 @@ def with_kinds_narrow(rig: Rig, base: Hypothesis, nothing: Hypothesis) -> list[H
     fit, found = Fit.of(narrow, base.free), []
     for index, candidate in rigid:
         item = in_best_shape(rig, fit, Scanned(index, candidate, score_of(fit, index)))
-        if item.score > 0.0:  # kinds that scatter can but take of it
+        if item.score > rules.NARROW_NATS:
             new = sharpened(rig, base, item, near=True, start=narrow)
             found.append(_exact(rig, new, nothing) if near(rig, base) else new)
     return found

@@ -162,19 +162,16 @@ def _sharper(
     first = max(offers.values(), key=lambda one: one.score, default=None)
     most = first.score if first else base.score
     # One whose shapes are far apart, once it has the best, is no measure for others that have not: their scans are.
-    seen = np.inf
-    if first is not None:
-        seen = max(
-            (item.score for item in ranked if item.candidate.key == first.candidate.key), default=np.inf
-        )
-    both_coarse = first is not None and first.candidate.cause in rig.coarse
+    its_own = (item.score for item in ranked if first and item.candidate.key == first.candidate.key)
+    seen = max(its_own, default=np.inf)
+    first_coarse = first is not None and first.candidate.cause in rig.coarse
     for item, score in list(rough):
         coarse = item.candidate.cause in rig.coarse
         reach = (1.0 - rules.COARSE_SHARE) * max(most - base.score, 0.0) if coarse else 0.0
         near = score >= most - reach
-        if coarse and both_coarse:
+        if coarse and first_coarse:
             near = near or item.score >= min(rules.COARSE_SHARE * seen, seen)
-        elif first is not None and _at_one_place(item.candidate, first.candidate):
+        elif first and _at_one_place(item.candidate, first.candidate):
             near = near or item.score >= max(rules.PLACE_SHARE * seen, 0.0)
         if near and (rig.refinements(item.candidate) or rig.steps(item.candidate)):
             yield None, sharpened(rig, base, item, near=True, shape=shapes.get(item.candidate.key))
