@@ -57,7 +57,8 @@ def simulate_and_diagnose(
 
     def work(request: SealedSet) -> None:
         if not store.is_simulated(request, out):
-            _simulate(request, out)
+            # In a process of its own: its memory is none of the diagnosis'.
+            apart([request], lambda one: _simulate(one, out), 1)
         if store.is_simulated(request, out):
             _diagnose(request, out, path, closed_loop=closed_loop, keep=keep)
 

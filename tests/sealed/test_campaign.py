@@ -1,5 +1,6 @@
 """Sets of the sealed campaign and their scores."""
 
+import os
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from discrepancy.team.causes import CAUSES
 from hidden.schedule import Schedule
 from mocobot_sim.effects import EFFECTS
-from sealed import store
+from sealed import campaign, store
 from sealed.backgrounds import BACKGROUNDS, limit_over_nominal, tolerated
 from sealed.draw import CATALOGUE, NOWHERE, OTHER, family, largest
 from sealed.forms.masses import MassDrift, MassOfTrials
@@ -307,3 +308,16 @@ def test_interval_of_none_is_clopper_and_pearsons():
     """1 - 0.025^(1/n)."""
     assert interval(0, 20) == pytest.approx((0.0, 1.0 - 0.025 ** (1 / 20)))
     assert interval(20, 20) == pytest.approx((0.025 ** (1 / 20), 1.0))
+
+
+def test_simulation_and_diagnosis_are_apart(tmp_path, monkeypatch):
+    """The peak memory of a diagnosis is that of its process: a simulation must not count."""
+    done = tmp_path / "done"
+    note = lambda what: done.open("a").write(f"{what} {os.getpid()}\n")  # noqa: E731
+    monkeypatch.setattr(campaign.store, "is_simulated", lambda request, out: done.exists())
+    monkeypatch.setattr(campaign, "_simulate", lambda request, out: note("simulate"))
+    monkeypatch.setattr(campaign, "_diagnose", lambda *rest, **how: note("diagnose"))
+    campaign.simulate_and_diagnose([plan("clean", 0)], tmp_path, "results", 1, closed_loop=False, keep=True)
+    (first, one), (second, other) = (line.split() for line in done.read_text().splitlines())
+    assert (first, second) == ("simulate", "diagnose")
+    assert len({one, other, str(os.getpid())}) == 3

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 
 from discrepancy import rules
@@ -46,8 +46,9 @@ def without_healthy(rig: Rig, best: Hypothesis, nothing: Hypothesis) -> Hypothes
 
 
 def settled(
-    rig: Rig, best: Hypothesis, nothing: Hypothesis, shapes: Mapping[Key, Candidate] | None = None
-) -> tuple[Hypothesis, dict[int, list[Rival]]]:
+    rig: Rig, best: Hypothesis, nothing: Hypothesis, shapes: Mapping[Key, Candidate] | None = None,
+    reach: Collection[Key] | None = None,
+) -> tuple[Hypothesis, dict[int, list[Rival]]]:  # fmt: skip
     """Exchange and take away causes until none is likelier, and what could be there instead of each.
 
     Args:
@@ -55,6 +56,7 @@ def settled(
         best: what is there.
         nothing: the hypothesis that nothing is.
         shapes: what was sought in place of the last of the causes, in these shapes; None where it was not.
+        reach: lasting causes that may be there instead of that; None for any.
     """
     rivals: dict[int, list[Rival]] = {}
     last = best.free[-1] if shapes and not rig.layered else None
@@ -80,6 +82,7 @@ def settled(
             others = proposals(
                 rig, less, events=candidate.transient is None, known=candidate,
                 shapes=_but(shapes, candidate) if index == last else None,
+                among=reach if index == last else None,
             )  # fmt: skip
             rivals[index] = [
                 Rival(one.candidate, _gap(rig, best, index, less, judged, one))

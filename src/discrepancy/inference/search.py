@@ -76,7 +76,7 @@ def continued(
     doubtful, refused, but, all_exchanged = 0, 0, set[Key](), True
     while len(best.free) < most and doubtful < rules.DOUBTFUL and refused < rules.REFUSED:
         proposed = proposals(rig, best, nothing=nothing, but=but)
-        added, shapes = _added(best, proposed), proposed.shapes
+        added, shapes, reach = _added(best, proposed), proposed.shapes, proposed.within_reach(best)
         del proposed  # for the sake of memory
         if added is None:
             break
@@ -94,7 +94,7 @@ def continued(
             found, beside = without_healthy(rig, scattered, nothing), rivals
             pays = found.score - best.score >= rules.SHAPE_NATS
         else:
-            found, beside = settled(rig, added, nothing, shapes)
+            found, beside = settled(rig, added, nothing, shapes, reach)
             pays = gained(best, found) >= needed(best, found)
         if not pays:  # where all is linear it did, which need not be so where it is exact
             if last.transient:  # its key is that of every other

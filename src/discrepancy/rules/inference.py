@@ -73,6 +73,12 @@ two cables it sees 0.46 and 0.60."""
 PLACE_SHARE = 0.25
 """Of what the likeliest is worth in a scan, from which others at its place are sharpened. Measured: friction of a joint
 that creeps has 0.35 of that of its spring, and a base 0.75 of a grasp; sharpened they are 8.5 and 1.8 times as much."""
+REACH_NATS, REACH_SHARE = 50.0, 0.5
+"""What is less likely than the likeliest by that, and worth less than that share of it, is not looked at once more in
+its place. Chosen: its odds are 2e-22; where rows are not straight the likeliest may be overrated, but not twofold."""
+SIZE_SETTLED = 0.02
+"""Share to which the size of what a cause leaves open is found. Derived: of a hundred unknowns a share x changes the
+log evidence by some 100 x^2, 0.04 nats."""
 AMBIGUOUS_NATS = CLOSE_NATS / 4.0
 """Rivals that the rows put closer are simulated; what the closed loop does not part either cannot be told apart.
 Chosen."""

@@ -6,8 +6,11 @@ import pytest
 from discrepancy import rules
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.offer.propose import proposals
+from discrepancy.inference.scan import scan
 from discrepancy.inference.search import search
+from discrepancy.inference.shape.sharpen import sharpened
 from discrepancy.least_squares.patches import Patches
+from discrepancy.least_squares.problem import Problem
 from discrepancy.result.evidence_list import evidence_list
 from fake_rig import CHANNELS, ROWS, FakeRig, cause, found_in, names
 
@@ -77,3 +80,25 @@ def test_what_is_left_open_at_rest_is_not_charged_where_it_tells_nothing():
     explanation = found_in(OpenRig({2: 25.0, 5: 400.0}, catalogue=SMALL))
     assert names(explanation.found) == ["cause 5", "cause 2"]
     assert explanation.problem.opened == {}
+
+
+@pytest.mark.parametrize(("value", "times"), [(25.0, 2), (2000.0, 1)])
+def test_the_size_of_what_is_left_open_is_sought_until_it_is_found(monkeypatch, value, times):
+    """Where what is open changes the cause's value by less than a share of it, that size is the one."""
+    rig = OpenRig({2: value}, catalogue=SMALL)
+    rng = np.random.default_rng(5)
+    for t, u in enumerate(rig.unknowns(SMALL[2])):
+        x, *own = rig.data[t]
+        rig.data[t] = x + 2.5 * u.dense() @ rng.standard_normal(60), *own
+    base = search(rig, most=0).nothing
+    item = next(one for one in scan(base.fit) if one.candidate.cause == "cause 2")
+    sizes, with_open = [], Problem.with_open
+
+    def spied(problem, key, along, size):
+        sizes.append(size)
+        return with_open(problem, key, along, size)
+
+    monkeypatch.setattr(Problem, "with_open", spied)
+    new = sharpened(rig, base, item, near=False)
+    assert len(sizes) == times
+    assert abs(new.fit.part(2)[0][0] * SMALL[2].units[0]) == pytest.approx(sizes[-1], rel=rules.SIZE_SETTLED)

@@ -4,10 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
 from discrepancy.team.linear.signals import with_rates
+from estimator.arm.delta import forward_kinematics
 from estimator.rigid_team.residual import balance, grasp_data, pose_error, pose_residual, poses
+from estimator.rigid_team.slots import PHI
 from estimator.rigid_team.start import start_bases
 from recorded_team import GRASPS
 from team_case import DESIGN, exact, residual_of, true_bases, true_shared
@@ -187,3 +190,20 @@ def test_truth_is_the_truth():
         np.testing.assert_allclose(shared.grasps.p_1i[i], p_1i)
     bases = true_bases()
     np.testing.assert_allclose(bases.R[2] @ bases.R[2].T, np.eye(3), atol=1e-12)
+
+
+def test_wrists_are_accelerated_as_the_second_derivative_of_where_they_are(case, linear):
+    """By forward kinematics of each sample, and central differences in time."""
+    s, step = linear.signals, 1.0 / linear.signals.rate_hz
+    for robot in range(3):
+        # A spline through the joints' own filtered motion: the second difference of samples is too coarse.
+        at = [
+            make_interp_spline(s.time, linear.s[:, robot, PHI], k=5)(s.time + x * step / 8)
+            for x in (-1, 0, 1)
+        ]
+        before, here, after = (forward_kinematics(phi, DESIGN) for phi in at)
+        expected = (after - 2.0 * here + before) / (step / 8) ** 2
+        inner = slice(200, -200)
+        found = linear.wrist_accelerations[inner, robot]
+        assert np.abs(expected[inner]).max() > 0.05
+        np.testing.assert_allclose(found, expected[inner], atol=0.01 * np.abs(expected[inner]).max())

@@ -56,10 +56,19 @@ class Proposed:
     open: Hypothesis | None = None
     shapes: Mapping[Key, Candidate] = field(default_factory=dict)
 
+    def within_reach(self, base: Hypothesis) -> set[Key]:
+        """Lasting causes that may be in the place of the likeliest: those worth enough beside what was there before."""
+        most = self.offers[0].score if self.offers else base.score
+        least = min(most - rules.REACH_NATS, base.score + rules.REACH_SHARE * (most - base.score))
+        return {
+            one.candidate.key for one in self.offers if one.score >= least and not one.candidate.transient
+        }
+
 
 def proposals(
     rig: Rig, base: Hypothesis, *, events: bool = True, nothing: Hypothesis | None = None,
     known: Candidate | None = None, shapes: Mapping[Key, Candidate] | None = None, but: Collection[Key] = (),
+    among: Collection[Key] | None = None,
 ) -> Proposed:  # fmt: skip
     """Hypotheses with one cause more.
 
@@ -72,9 +81,11 @@ def proposals(
         known: a cause that others are to be held against.
         shapes: of what was sought beside the same causes before, where a search begins and ends; None for nothing.
         but: lasting causes that are none of them.
+        among: the only lasting causes that are; None for any.
     """
     fit, shapes = base.fit, shapes or {}
-    scanned = [item for item in _with_kinds_held(base) if item.candidate.key not in but]
+    left_out = {c.key for c in base.problem.candidates if among is not None and c.key not in among} | {*but}
+    scanned = [item for item in _with_kinds_held(base) if item.candidate.key not in left_out]
     loud = {item.candidate.joint for item in scanned if item.score > rules.LOOKED_AT_NATS}
     ranked = [in_best_shape(rig, fit, item, loud) for item in scanned]
     ranked += events_of(rig, fit) if events else []
@@ -87,7 +98,7 @@ def proposals(
     rough: list[tuple[Scanned, float]] = []  # what was not sharpened, and the score of the hypothesis with it
     sought: dict[Key, Candidate] = {}
     offered = chain(
-        _hypotheses(rig, base, ranked, shapes, nothing, but),
+        _hypotheses(rig, base, ranked, shapes, nothing, left_out),
         _sharper(rig, base, ranked, shapes, rough, offers),
     )
     for item, new in offered:

@@ -89,10 +89,13 @@ def _opened(rig: Rig, base: Hypothesis, problem: Problem, new: Hypothesis) -> Hy
     along, opened, other = start.along(rig.unknowns(shaped)), start, new
     if not any(len(one.opened.stretch) for one in along):
         return new
+    last = 0.0
     for _ in range(2):  # its size is found with them, and is theirs
-        size = abs(float(other.fit.part(index)[0][0] * shaped.units[0]))
-        opened, other = start, new  # the last ones go first, for the sake of memory
-        opened = start.with_open(shaped.key, along, max(size, shaped.parameters[0].tolerance))
+        size = max(abs(float(other.fit.part(index)[0][0] * shaped.units[0])), shaped.parameters[0].tolerance)
+        if abs(size - last) < rules.SIZE_SETTLED * size:
+            break
+        last, opened, other = size, start, new  # the last ones go first, for the sake of memory
+        opened = start.with_open(shaped.key, along, size)
         other = Hypothesis.of(opened, new.free, base.allowed)
     if other.score <= new.score:
         return new

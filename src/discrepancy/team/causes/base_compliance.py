@@ -7,8 +7,6 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.team.causes.base import stack
 from discrepancy.team.causes.yielding import Yielding, lagging
-from estimator.arm.delta import leg_geometry, wrist_motion
-from estimator.rigid_team.slots import PHI, PHI_DDOT, PHI_DOT
 
 
 class BaseCompliance(Yielding):
@@ -51,9 +49,10 @@ class BaseCompliance(Yielding):
         return {**given, "mass_kg": inertia_s2 / (given["compliance_m_per_N"] or np.inf)}
 
     def columns(self, trial, robot, joint, shape):
-        design, s = trial.design, trial.s[:, robot]
+        design = trial.design
         force = np.einsum("qij,qj->qi", trial.data.R_bi[:, robot], trial.data.wrench[:, robot, 3:])
-        _, h_ddot = wrist_motion(leg_geometry(s[:, PHI], trial.arm(robot)), s[:, PHI_DOT], s[:, PHI_DDOT])
-        force = force + (design.wrist_mass_kg + 1.5 * design.rod_mass_kg) * h_ddot
+        force = (
+            force + (design.wrist_mass_kg + 1.5 * design.rod_mass_kg) * trial.wrist_accelerations[:, robot]
+        )
         horizontal = lagging(-force * np.array([1.0, 1.0, 0.0]), trial.signals.rate_hz, shape)
         return stack([trial.of_pose(robot, None, horizontal @ trial.bases.R[robot].T)])

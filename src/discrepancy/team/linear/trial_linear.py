@@ -16,18 +16,13 @@ from discrepancy.team.linear.jacobian import BySignals, by_signals
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals, with_rates
 from estimator.arm.arms import Arms, arm_of, design_of
+from estimator.arm.delta import leg_geometry, wrist_motion
 from estimator.arm.design import OmnidDesign
 from estimator.arrays import Array
 from estimator.estimate.fusion import BodyMotion, fuse, fusion_matrix
 from estimator.rigid_team.changes import needed_wrench
-from estimator.rigid_team.residual import (
-    Bases,
-    Shared,
-    balance,
-    grasp_data,
-    pose_residual,
-)
-from estimator.rigid_team.slots import COUNT, PHI, TAU, THETA, with_its_rates
+from estimator.rigid_team.residual import Bases, Shared, balance, grasp_data, pose_residual
+from estimator.rigid_team.slots import COUNT, PHI, PHI_DDOT, PHI_DOT, TAU, THETA, with_its_rates
 from estimator.signals.grasp_data import GraspData
 from estimator.so3 import skew
 
@@ -80,6 +75,16 @@ class TrialLinear:
         """By how much more a point of the payload is accelerated the further it is, [alpha] + [omega]^2, (Q, 3, 3)."""
         turn = skew(self.motion.omega)
         return skew(self.motion.alpha) + turn @ turn
+
+    @cached_property
+    def wrist_accelerations(self) -> Array:
+        """Of every wrist in {b_i} [m/s^2], shape (Q, N, 3)."""
+        each = [
+            wrist_motion(leg_geometry(s[:, PHI], self.arm(i)), s[:, PHI_DOT], s[:, PHI_DDOT])[1]
+            for i, s in enumerate(np.moveaxis(self.s, 1, 0))
+        ]
+        found = np.stack(each, axis=1)
+        return stored(found) if is_stored(self.s) else found
 
     @property
     def robots(self) -> int:
