@@ -107,15 +107,22 @@ class _Search:
     def of_far_apart(self, best: Candidate, score: float) -> _Scored:
         """The likeliest that steps lead to from any of the shapes that are far apart."""
         least = rules.COARSE_SHARE * score if score > 0.0 else score
+        others: list[_Scored] = []
         for lead, first in self._leads(self.scored(self.rig.further(best))):
             if first <= least:
                 break
             ends = [self.polished(lead, first, rules.LEAD_ROUNDS)]
-            if others := self.scored(self.rig.refinements(ends[0][0], finer=True)):
-                ends.append(self.polished(*max(others, key=_score), rules.LEAD_ROUNDS))
+            if near := self.scored(self.rig.refinements(ends[0][0], finer=True)):
+                ends.append(self.polished(*max(near, key=_score), rules.LEAD_ROUNDS))
             best, score = self._likelier(ends, best, score)
+            others += ends
         best, score = self.polished(best, score, rules.LEAD_ROUNDS)
-        ends = [self.polished(grown, score, rules.LEAD_ROUNDS) for grown in self.rig.grown(best)]
+        # What cannot grow may be likelier than what can, and not than what becomes of that: a spring than a cable.
+        others = sorted(others, key=_score, reverse=True)
+        start = next((one for one in ((best, score), *others) if self.rig.grown(one[0])), None)
+        if start is None:
+            return best, score
+        ends = [self.polished(grown, start[1], rules.LEAD_ROUNDS) for grown in self.rig.grown(start[0])]
         return self._likelier(ends, best, score)
 
     def _likelier(self, ends: Sequence[_Scored], best: Candidate, score: float) -> _Scored:

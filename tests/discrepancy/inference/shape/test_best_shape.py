@@ -287,6 +287,41 @@ def test_a_shape_grows_where_that_is_likelier():
     assert best.shape["from"] == pytest.approx(CREST, abs=0.02)
 
 
+class BentOrPlain(Bent):
+    """In the shape that a search begins with it cannot grow, and looks likelier than any that can and has not."""
+
+    low = -0.25
+
+    def columns(self, candidate):
+        if "plain" not in candidate.shape:
+            return super().columns(candidate)
+        rng = np.random.default_rng(2)
+        true = super().columns(replace(HALF, shape={"side": 1.0, "from": CREST, "bend": 0.8}))
+        return [c + 0.03 * rng.standard_normal(c.shape) for c in true]
+
+    def refinements(self, candidate, *, finer=False):
+        return [] if "plain" in candidate.shape else super().refinements(candidate, finer=finer)
+
+    def grown(self, candidate):
+        return [] if "plain" in candidate.shape else super().grown(candidate)
+
+    def steps(self, candidate):
+        return [] if "plain" in candidate.shape else super().steps(candidate)
+
+
+def test_what_can_grow_does_so_though_another_shape_is_likelier_before():
+    """As a strap that stiffens, which looks more like a spring than like a cable of one stiffness."""
+    plain = replace(HALF, shape={"plain": 0.0})
+    rig = BentOrPlain({}, catalogue=(*CATALOGUE, plain), seed=1)
+    nothing = nothing_in(rig)
+    straight = replace(HALF, shape={"side": 1.0, "from": 0.227})  # the best without
+    bent = replace(HALF, shape={**straight.shape, "bend": 0.8})
+    likelier = [score_with(nothing.fit, c, rig.columns(c)) for c in (straight, plain, bent)]
+    assert likelier == sorted(likelier)
+    best = best_shape(rig, nothing.problem, (), Scanned(len(nothing.problem.candidates) - 1, plain, 0.0))
+    assert best.shape["bend"] == pytest.approx(0.8, abs=0.1)
+
+
 class Apart(Half):
     """Steps from where a search begins lead away; another start of the same kind is offered at the end of the lead."""
 
