@@ -19,6 +19,13 @@ BACKGROUNDS: tuple[Background, ...] = get_args(Background)
 TIMES: dict[Background, float] = {"x1": 1.0, "x3": 3.0, "x10": 10.0}
 SIGMAS = 6.2
 """Tolerances at a detection limit, however precise the data: sqrt(38)."""
+OVER_NOMINAL: dict[str, tuple[float, float, float, float]] = {
+    "tether": (1.24, 1.54, 1.70, 1.52),
+    "payload_tether": (1.60, 2.19, 2.74, 2.34),
+}
+"""Limit over that of ``hidden.limits`` of what has no tolerance and yet looks like what has one: a force that stays is
+a torque's zero and a tilt. Measured: ``sealed.measure``, medians of eight places on payloads (b) and (c). Masses and
+what swings have 0.91 to 1.03 in all backgrounds."""
 
 
 def units_of(background: Background, robots: int, rng: np.random.Generator) -> tuple[AsBuilt, ...]:
@@ -41,6 +48,8 @@ def limit_over_nominal(cause: str, background: Background) -> float:
 
     A limit is six tolerances and what noise adds to them in squares; a wider background has wider tolerances.
     """
+    if cause in OVER_NOMINAL:
+        return dict(zip(BACKGROUNDS, OVER_NOMINAL[cause], strict=True))[background]
     tolerance, times = default_tolerances().get(cause, {}), TIMES.get(background, 1.0)
     ratios = [
         hypot(times * SIGMAS * value, _by_noise(LIMITS[cause][name], SIGMAS * value)) / LIMITS[cause][name]

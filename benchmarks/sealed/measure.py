@@ -4,14 +4,21 @@ A trial is simulated with and without the form, and read by ideal sensors. The d
 against grasps, payload, bases and every cause of the catalogue within its tolerance. At the limit of a listed cause
 chi-square falls by 38 (``mocobot.campaign.limits``) when its answer is freed from its tolerance; at that of an unlisted
 one, 38 are left that no healthy team explains. Both grow with the square of the size.
+
+``python benchmarks/sealed/measure.py tether payload_cable`` prints them.
 """
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
+import tyro
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from discrepancy.candidate import Candidate, Transient
 from discrepancy.team.causes import CAUSES
@@ -233,3 +240,20 @@ def limits_of(
                 found[background].append(size / over if over else np.inf)
         out[name] = {background: float(np.median(values)) for background, values in found.items()}
     return out
+
+
+def main(names: tyro.conf.Positional[tuple[str, ...]], draws: int = 8) -> None:
+    """Print detection limits over those of the tables for robots within tolerances.
+
+    Args:
+        names: causes and forms.
+        draws: places of each.
+    """
+    benches = [Bench.of(payload) for payload in ("b", "c")]
+    for name in names:
+        (found,) = limits_of([name], benches, draws=draws).values()
+        print(name, *(f"{background} {over:.3g}" for background, over in found.items()), sep="  ", flush=True)
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

@@ -14,6 +14,7 @@ from sealed.backgrounds import BACKGROUNDS, limit_over_nominal, tolerated
 from sealed.draw import CATALOGUE, NOWHERE, OTHER, family, largest
 from sealed.forms.masses import MassDrift, MassOfTrials
 from sealed.limits import LIMITS
+from sealed.measure import Bench, limits_of
 from sealed.registry import FORMS, LISTED, UNLISTED
 from sealed.score import score
 from sealed.sets import KINDS, generate, plan
@@ -64,6 +65,22 @@ def test_limits_follow_the_background():
         [1, 2.86, 9.4, 1], rel=0.05
     )
     assert [limit_over_nominal("slosh", b) for b in BACKGROUNDS] == [1.0] * 4
+    x1, x3, x10, uncalibrated = (limit_over_nominal("payload_tether", b) for b in BACKGROUNDS)
+    assert x1 < x3 < x10
+    assert x1 < uncalibrated
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "forms"), [("payload_tether", False), ("stiffening_strap", True)])
+def test_limits_of_cables_are_those_of_their_traces(name, forms):
+    """From the simulation, whatever a diagnosis says; half as many places as the tables have."""
+    benches = [Bench.of(payload) for payload in ("b", "c")]
+    (found,) = limits_of([name], benches, draws=4).values()
+    for background, over in found.items():
+        table = (
+            LIMITS[name][background] / LIMITS[name]["x1"] if forms else limit_over_nominal(name, background)
+        )
+        assert over == pytest.approx(table, rel=0.6), background
 
 
 @pytest.mark.slow
