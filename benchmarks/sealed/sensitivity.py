@@ -38,7 +38,7 @@ CONSTANTS = (
     "NAMED_NATS", "PRIOR_ODDS", "LEAST_SLAB", "SLAB_OCTAVES", "SPREAD_NUMBERS", "POWER_NUMBERS", "LEAST_POWER",
     "SCATTER_FACTOR", "CELL_NATS", "UNLISTED_NATS", "FRICTION_FORM_SHARE", "LAW_SHARE", "LISTED_ODDS",
     "LAW_ERROR_SHARE", "INTERVALS", "EXCHANGED_NATS", "LEAST_PROBABILITY", "LITTLE_SHARE", "CLOSE_NATS", "HELD_FACTOR",
-    "PLACE_SHARE",
+    "PLACE_SHARE", "REACH_NATS", "REACH_SHARE",
 )  # fmt: skip
 """Those that are chosen, or derived from what is, and can change a verdict; the others are steps, guards and time."""
 FACTORS = (0.5, 2.0)
