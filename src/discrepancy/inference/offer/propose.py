@@ -184,7 +184,8 @@ def _sharper(
             near = near or item.score >= min(rules.COARSE_SHARE * seen, seen)
         elif first and _at_one_place(item.candidate, first.candidate):
             near = near or item.score >= max(rules.PLACE_SHARE * seen, 0.0)
-        if near and (rig.refinements(item.candidate) or rig.steps(item.candidate)):
+        shapes_of = (rig.refinements, rig.steps, rig.further)
+        if near and any(of(item.candidate) for of in shapes_of):
             yield None, sharpened(rig, base, item, near=True, shape=shapes.get(item.candidate.key))
 
 
