@@ -39,7 +39,7 @@ class Squares(FakeRig):
 
 
 def test_more_to_a_shape_is_sought_though_a_scan_puts_others_before_it():
-    """Where a kind scatters, a scan puts all its places first, and so had the likeliest looked at in one shape alone."""
+    """Where a kind scatters, a scan puts all its places first; the likeliest had been looked at in one shape alone."""
     rig = Squares({}, catalogue=(*CATALOGUE, DRAG), seed=2)
     candidates = rig.candidates()
     base = Hypothesis.of(Problem.of(rig.rows(candidates), candidates), ())
