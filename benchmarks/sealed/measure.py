@@ -35,9 +35,10 @@ from mocobot_sim.trial.sensors import measure, sensor_preset
 from mocobot_sim.trial.trial import run_trial
 from mocobot_sim.trial.trial_log import TrialLog
 from sealed.backgrounds import BACKGROUNDS, TIMES, Background
-from sealed.draw import MOST, draw
+from sealed.draw import CATALOGUE, MOST, draw
 from sealed.forms.base import Form
 from sealed.ground import Ground
+from sealed.registry import FORMS
 from sealed.sets import SCHEDULE, TIMESTEP_S
 
 SHORT = Schedule(randoms=1, vias=16, periodic_s=20.0, hold_s=None)
@@ -249,6 +250,13 @@ def main(names: tyro.conf.Positional[tuple[str, ...]], draws: int = 8) -> None:
         names: causes and forms.
         draws: places of each.
     """
+    known = {*CATALOGUE, *FORMS}
+    if not names or not known.issuperset(names) or draws < 1:
+        wrong = ", ".join(sorted({*names} - known)) or (f"--draws {draws}" if names else "no name")
+        print(
+            f"measure.py: {wrong}; names are of {', '.join(sorted(known))}, draws 1 or more", file=sys.stderr
+        )
+        sys.exit(2)
     benches = [Bench.of(payload) for payload in ("b", "c")]
     for name in names:
         (found,) = limits_of([name], benches, draws=draws).values()

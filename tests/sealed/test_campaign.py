@@ -9,9 +9,9 @@ import pytest
 from discrepancy.team.causes import CAUSES
 from hidden.schedule import Schedule
 from mocobot_sim.effects import EFFECTS
-from sealed import campaign, store
+from sealed import campaign, measure, store
 from sealed.backgrounds import BACKGROUNDS, limit_over_nominal, tolerated
-from sealed.draw import CATALOGUE, NOWHERE, OTHER, family, largest
+from sealed.draw import CATALOGUE, NOWHERE, OTHER, family, largest, over_nominal
 from sealed.forms.masses import MassDrift, MassOfTrials
 from sealed.limits import LIMITS
 from sealed.measure import Bench, limits_of
@@ -71,16 +71,24 @@ def test_limits_follow_the_background():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("name", "forms"), [("payload_tether", False), ("stiffening_strap", True)])
-def test_limits_of_cables_are_those_of_their_traces(name, forms):
-    """From the simulation, whatever a diagnosis says; half as many places as the tables have."""
+def test_limits_of_cables_are_those_of_their_traces():
+    """From the simulation, whatever a diagnosis says; with the places that the tables were made with."""
     benches = [Bench.of(payload) for payload in ("b", "c")]
-    (found,) = limits_of([name], benches, draws=4).values()
-    for background, over in found.items():
-        table = (
-            LIMITS[name][background] / LIMITS[name]["x1"] if forms else limit_over_nominal(name, background)
-        )
-        assert over == pytest.approx(table, rel=0.6), background
+    for name, found in limits_of(["payload_tether", "stiffening_strap"], benches, draws=8).items():
+        for background, over in found.items():
+            table = over_nominal(name, background) / over_nominal(name, "x1")
+            assert over == pytest.approx(table, rel=0.1), (name, background)
+
+
+@pytest.mark.parametrize(
+    ("names", "draws", "said"),
+    [((), 8, "no name"), (("tehter",), 8, "tehter"), (("tether",), 0, "--draws 0")],
+)
+def test_limits_of_what_there_is_not_are_refused(names, draws, said, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        measure.main(names, draws)
+    assert stopped.value.code == 2
+    assert capsys.readouterr().err.startswith(f"measure.py: {said};")
 
 
 @pytest.mark.slow

@@ -49,10 +49,8 @@ class BaseCompliance(Yielding):
         return {**given, "mass_kg": inertia_s2 / (given["compliance_m_per_N"] or np.inf)}
 
     def columns(self, trial, robot, joint, shape):
-        design = trial.design
+        mass_kg = trial.design.wrist_mass_kg + 1.5 * trial.design.rod_mass_kg
         force = np.einsum("qij,qj->qi", trial.data.R_bi[:, robot], trial.data.wrench[:, robot, 3:])
-        force = (
-            force + (design.wrist_mass_kg + 1.5 * design.rod_mass_kg) * trial.wrist_accelerations[:, robot]
-        )
+        force = force + mass_kg * trial.wrist_accelerations[:, robot]
         horizontal = lagging(-force * np.array([1.0, 1.0, 0.0]), trial.signals.rate_hz, shape)
         return stack([trial.of_pose(robot, None, horizontal @ trial.bases.R[robot].T)])
