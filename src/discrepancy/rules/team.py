@@ -80,6 +80,10 @@ TEAM_PUSH_S = (0.4, 0.8, 1.6, 3.2, 6.4)
 """Durations searched. Chosen: octaves."""
 REST_RAD_PER_S, REST_NM_PER_S = 1e-3, 0.2
 """Below which a joint, or a spring's torque, rests and its friction is noise. Chosen: as of the causes."""
+NOISY_RAD_PER_S, NOISY_NM_PER_S, NOISY_STEPS = 1.3e-3, 0.22, 0.15
+"""Noise of rates up to which these, and the causes' own, tell rest from motion: a third of the larger ones. What is
+noisier rests up to so much faster. Noise counts from that share of a rounding step on: below, a joint at rest repeats
+one reading. Derived: 3 standard deviations; white noise of a reading is found within a tenth of its step."""
 REST_KNOTS_S = 0.05
 """Between knots of friction at rest, which follows the load. Measured on three sets (0.17 N m in a joint, 0.17 inside a
 spring, 0.24 in a gimbal): chi2/n 1.75, 1.25 and 1.24 with knots every 0.5 s (0.1 inside springs) and rests of less than

@@ -173,12 +173,12 @@ class TeamRig(LawfulRows):
         """
         units, shared = found.there.units, found.there.shared
         known = replace(recording, metadata=replace(recording.metadata, units=units))
-        trial = trial_at(known, shared, full=False)
+        trial = trial_at(known, shared, self.noise, full=False)
         own = replace(self, recordings=(known,), linear=(trial,), kept={})
         signals, others = own._without(0, found.causes)
         rows = exact_residual(signals, shared, trial.bases, units, trial.reduction)
         if others:
-            own = replace(own, linear=(trial_at(known, shared, full=True),))
+            own = replace(own, linear=(trial_at(known, shared, self.noise, full=True),))
             rows -= sum(own._unwhitened(0, candidate) @ values for candidate, values in others)
         return trial.reduction, without_bases(trial, rows)
 

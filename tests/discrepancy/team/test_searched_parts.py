@@ -12,6 +12,7 @@ from discrepancy import rules
 from discrepancy.result.read import WrittenDiagnosis
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.linear.elsewhere import Elsewhere
+from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import start_shared
@@ -208,7 +209,8 @@ def test_a_rest_too_short_for_a_row(recording) -> None:
     still = replace(recording, time=recording.time[:450], **fields)
     reduction = Reduction.of(Signals.of(still))
     assert len(reduction.time) == 0
-    trial = trial_at(still, start_shared(estimate_payload([recording])), full=False)
+    noise = Noise.of([Signals.of(recording)])
+    trial = trial_at(still, start_shared(estimate_payload([recording])), noise, full=False)
     rows = without_bases(trial, trial.residual)
     left = Left.of(reduction, rows)
     assert len(left.means) == len(left.holds) == 0

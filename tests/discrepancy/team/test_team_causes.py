@@ -17,7 +17,7 @@ from discrepancy.team.causes.shift import Late
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.start import Sensed
-from discrepancy.team.linear.trial_linear import linearise
+from discrepancy.team.linear.trial_linear import filtered, linearise
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances
 from estimator.arm.delta import LEG_DIRECTIONS, forward_kinematics, jacobian
@@ -289,7 +289,8 @@ def test_friction_at_rest_takes_any_force_that_passes_the_filter(case):
     start, stop = 600, 800
     frozen[start:stop, 1, 0] = frozen[start, 1, 0]
     frozen[stop:, 1, 0] += frozen[start, 1, 0] - s.phi[stop, 1, 0]
-    linear = replace(case.linear, signals=replace(s, phi=frozen))
+    still = replace(s, phi=frozen)
+    linear = replace(case.linear, signals=still, s=filtered(still))
     cause = CAUSES["joint_friction"]
     unknowns = cause.unknowns(linear, 1, 0, {"slow_rad_per_s": 1e-3}).dense()
     moves = cause.unknowns(case.linear, 1, 0, {"slow_rad_per_s": 1e-3}).dense()

@@ -67,14 +67,14 @@ class Friction(Cause):
         return trial.J(robot, TAU, np.eye(3)[joint])
 
     def columns(self, trial: TrialLinear, robot: int, joint: int, shape: Shape) -> Array:
-        states = np.stack(self._sliding(trial.signals, robot, joint, shape), axis=-1)
+        states = np.stack(self._sliding(trial.signals, trial, robot, joint, shape), axis=-1)
         return trial.reduction(self.direction(trial, robot, joint)[..., None] * states[:, None])
 
     def undo(
         self, signals: Signals, trial: TrialLinear, robot: int, joint: int, values: Array, shape: Shape
     ) -> Signals | None:
         torque = np.zeros(len(signals.time))
-        for value, state in zip(values, self._sliding(signals, robot, joint, shape), strict=True):
+        for value, state in zip(values, self._sliding(signals, trial, robot, joint, shape), strict=True):
             torque += value * state
         return signals.minus(tau=one_robot(one_joint(torque, joint), trial.robots, robot))
 
@@ -84,7 +84,9 @@ class Friction(Cause):
         Where it gives way, how far it had before it slips for the first time; and as no bristles do so in proportion,
         it may be another by a share of its limit until it slips.
         """
-        rate_hz, state = trial.signals.rate_hz, np.abs(self._sliding(trial.signals, robot, joint, shape)[0])
+        rate_hz, state = trial.signals.rate_hz, np.abs(
+            self._sliding(trial.signals, trial, robot, joint, shape)[0]
+        )
         rests = pieces_while(state < 1.0 - 1e-9, rate_hz, rules.REST_KNOTS_S)
         rests = in_parts(rests, rules.PATCH_COLUMNS)
         if self.gives in shape:
@@ -94,16 +96,23 @@ class Friction(Cause):
             rests = chain([(before, np.ones((before.stop, 1)))] if before.stop else [], rests)
         return trial.reduction.of_pieces(self.direction(trial, robot, joint), rests)
 
-    def _sliding(self, signals: Signals, robot: int, joint: int, shape: Shape) -> Sequence[Array]:
+    def _sliding(
+        self, signals: Signals, trial: TrialLinear, robot: int, joint: int, shape: Shape
+    ) -> Sequence[Array]:
         """Direction of motion in [-1, 1], which fades to zero at rest, and rate; as many as there are parameters.
 
-        Where it gives way, how far it is bent in place of the direction.
+        Where it gives way, how far it is bent in place of the direction. Angles are taken without their noise: that of
+        a parallel axis, which moves alike, would else be told apart by noise, and both together have less.
         """
         (number,) = shape.values()
         x, rate_hz = getattr(signals, self.moves)[:, robot, joint], signals.rate_hz
+        if self.moves != "tau":
+            read, quiet = (getattr(one, self.moves)[:, robot, joint] for one in (trial.signals, trial.adjusted))
+            x = x - (read - quiet)
         smooth = low_pass(x, rate_hz, rules.TEAM_SMOOTH_HZ)
         rate = self.sign * differentiate(smooth, rate_hz)
-        bent = (
-            self.sign * (smooth - played(smooth, number)) / number if self.gives in shape else rate / number
-        )
+        if self.gives in shape:
+            bent = self.sign * (smooth - played(smooth, number)) / number
+        else:
+            bent = rate / (number * signals.hasty(self.moves)[robot, joint])
         return (np.clip(bent, -1.0, 1.0), rate)[: len(self.parameters)]

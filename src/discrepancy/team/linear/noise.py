@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -37,6 +38,14 @@ class Noise:
         step = np.median([_steps(trial) for trial in trials], axis=0)
         white = np.sqrt(np.mean([_white(trial) ** 2 for trial in trials], axis=0))
         return cls(step, np.sqrt(np.maximum(white**2 - step**2 / 12.0, 0.0)))
+
+    def known_to(self, signals: Signals) -> Signals:
+        """The signals with what their noise does to rates (``Signals.haste``)."""
+        noisy = self.sigma > rules.NOISY_STEPS * self.step
+        white = np.where(noisy, np.hypot(self.sigma, self.step / np.sqrt(12.0)), 0.0)
+        rates = white * np.sqrt(signals.rate_hz / _native_hz(signals))[:, None] * _rate_gain(signals.rate_hz)
+        usual = np.array([rules.NOISY_RAD_PER_S, rules.NOISY_RAD_PER_S, rules.NOISY_NM_PER_S])
+        return replace(signals, haste=np.maximum(rates / usual[:, None, None], 1.0))
 
     def draws(self, signals: Signals, rng: np.random.Generator, count: int) -> Iterator[Signals]:
         """Realisations of the sensors' errors on a trial: what they add to its smooth signals.
@@ -95,6 +104,15 @@ def _native_hz(signals: Signals) -> Array:
     if signals.sampling is None:
         return np.full(signals.phi.shape[1], signals.rate_hz)
     return np.array([sampling.native_hz for sampling in signals.sampling])
+
+
+@cache
+def _rate_gain(rate_hz: float) -> float:
+    """Standard deviation of the rates that tell rest from motion, of white noise of 1 at every sample [1/s]."""
+    impulse = np.zeros(int(4.0 * rate_hz) + 1)
+    impulse[len(impulse) // 2] = 1.0
+    smooth = low_pass(impulse, rate_hz, rules.TEAM_SMOOTH_HZ)
+    return float(np.linalg.norm(differentiate(smooth, rate_hz)))
 
 
 def _columns(signals: Signals) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,13 @@ from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
 from estimator.rigid_team.slots import TAU, THETA
 
+Moves = Literal["phi", "theta", "tau"]
+KINDS: tuple[tuple[Moves, str, str], ...] = (
+    ("phi", "joint_friction", "coulomb_Nm"),
+    ("tau", "sea_hysteresis", "friction_Nm"),
+    ("theta", "gimbal_friction", "coulomb_Nm"),
+)
+"""What friction is told by, its cause, and the parameter that is its limit."""
 Tolerances = Mapping[str, Mapping[str, float]]
 
 
@@ -37,13 +45,8 @@ class Resting:
     def __init__(self, trial: TrialLinear, tolerances: Tolerances) -> None:
         """Find the rests of a trial."""
         self._trial = trial
-        self._limit_Nm = {
-            moves: tolerances.get(cause, {}).get(name, 0.0)
-            for moves, cause, name in (
-                ("phi", "joint_friction", "coulomb_Nm"),
-                ("tau", "sea_hysteresis", "friction_Nm"),
-                ("theta", "gimbal_friction", "coulomb_Nm"),
-            )
+        self._limit_Nm: dict[Moves, float] = {
+            moves: tolerances.get(cause, {}).get(name, 0.0) for moves, cause, name in KINDS
         }
         slow = {"phi": rules.REST_RAD_PER_S, "theta": rules.REST_RAD_PER_S, "tau": rules.REST_NM_PER_S}
         self._play_m = tolerances.get("grasp_play", {}).get("play_m", 0.0)
@@ -91,7 +94,7 @@ class Resting:
         between = np.abs(trial.data.wrench[:, robot, 3:]) < rules.PLAY_FORCE_N
         return np.asarray(self._play_m * np.stack(anywhere, axis=1) * between)
 
-    def _torque(self, moves: str, rng: np.random.Generator) -> Array:
+    def _torque(self, moves: Moves, rng: np.random.Generator) -> Array:
         """Torque at rest [N m], shape (Q, N, 3); 0 in motion."""
         rests = self._rests[moves]
         each = self._limit_Nm[moves] * rng.standard_normal((int(rests.max(initial=0)) + 1, *rests.shape[1:]))
@@ -104,10 +107,10 @@ def draws_at_a_time(trial: TrialLinear) -> int:
     return max(1, min(rules.DRAWS_AT_A_TIME, int(rules.DRAWN_TOGETHER // trial.s[..., 0].size)))
 
 
-def _numbered(signals: Signals, moves: str, slow: float) -> NDArray[np.intp]:
+def _numbered(signals: Signals, moves: Moves, slow: float) -> NDArray[np.intp]:
     """Number of the rest that each sample is in, from 1, and 0 in motion, shape (Q, N, 3)."""
     rate_hz = signals.rate_hz
     rate = differentiate(low_pass(getattr(signals, moves), rate_hz, rules.TEAM_SMOOTH_HZ), rate_hz)
-    still = np.abs(rate) < slow
+    still = np.abs(rate) < slow * signals.hasty(moves)
     starts = still & ~np.concatenate([np.zeros_like(still[:1]), still[:-1]])
     return np.asarray(np.where(still, np.cumsum(starts, axis=0), 0), dtype=np.intp)

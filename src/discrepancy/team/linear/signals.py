@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -23,6 +24,8 @@ class Signals:
         phi, theta, tau: as the robots' calibration and the causes correct what was recorded, shape (Q, N, 3).
         rate_hz: sampling rate [Hz].
         sampling: how each robot's sensors were read, where the samples are not as they were read.
+        haste: how many times as fast as with good sensors a joint, or a spring's torque, may seem to move while it
+            rests, at least 1, shape (3, N, 3): phi, theta, tau; None: not known to be faster.
     """
 
     time: Array
@@ -31,6 +34,7 @@ class Signals:
     tau: Array
     rate_hz: float
     sampling: tuple[Sampling, ...] | None = None
+    haste: Array | None = None
 
     @classmethod
     def of(cls, recording: Recording) -> Signals:
@@ -44,6 +48,12 @@ class Signals:
     ) -> Signals:
         """The signals without an error of the sensors."""
         return replace(self, phi=self.phi - phi, theta=self.theta - theta, tau=self.tau - tau)
+
+    def hasty(self, moves: Literal["phi", "theta", "tau"]) -> Array:
+        """``haste`` of one kind of signal, shape (N, 3)."""
+        if self.haste is None:
+            return np.ones(self.phi.shape[1:])
+        return np.asarray(self.haste[("phi", "theta", "tau").index(moves)])
 
     @property
     def keep(self) -> slice:

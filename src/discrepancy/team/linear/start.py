@@ -85,6 +85,7 @@ def linearised_trials(
     arms = recordings[0].metadata.arms
     signals = [Signals.of(recording) for recording in recordings]
     noise = Noise.of(signals) if sensed is None else sensed.noise
+    signals = [noise.known_to(one) for one in signals]
     reductions = [Reduction.of(s) for s in signals]
     for recording, reduction in zip(recordings, reductions, strict=True):
         if len(reduction.time) < 4:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -100,7 +100,7 @@ class TrialLinear:
     def adjusted(self) -> Signals:
         """The signals filtered, and at their adjusted values."""
         phi, theta, tau = (self.s[..., kind] for kind in (PHI, THETA, TAU))
-        return Signals(self.signals.time, phi, theta, tau, self.signals.rate_hz)
+        return replace(self.signals, phi=phi, theta=theta, tau=tau, sampling=None)
 
     def of_signals(
         self, robot: int, phi: Array | None = None, theta: Array | None = None, tau: Array | None = None

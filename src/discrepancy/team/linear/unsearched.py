@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.reduction import Reduction
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear, linearise
@@ -11,9 +12,9 @@ from estimator.rigid_team.residual import Shared, poses
 from estimator.rigid_team.start import start_bases
 
 
-def trial_at(recording: Recording, shared: Shared, *, full: bool) -> TrialLinear:
+def trial_at(recording: Recording, shared: Shared, noise: Noise, *, full: bool) -> TrialLinear:
     """The trial where its bases fit it on average; without ``full`` the robots' signals are left out."""
-    signals, arms = Signals.of(recording), recording.metadata.arms
+    signals, arms = noise.known_to(Signals.of(recording)), recording.metadata.arms
     angles = signals.phi[signals.keep], signals.theta[signals.keep]
     bases = start_bases(*poses(*angles, arms), shared)
     return linearise(signals, shared, bases, arms, Reduction.of(signals), full=full, known=True)

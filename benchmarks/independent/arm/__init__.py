@@ -1,0 +1,1 @@
+"""One Delta arm with its gimbal: geometry and inverse dynamics."""

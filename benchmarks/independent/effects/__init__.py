@@ -1,0 +1,1 @@
+"""What can be hidden, and how it is drawn."""
