@@ -30,6 +30,7 @@ from mocobot_sim.scene.scene import build_team
 from sealed import store
 from sealed.backgrounds import BACKGROUNDS, Background
 from sealed.campaign import apart
+from sealed.draw import largest
 from sealed.score import family_of
 from sealed.tables import misses, tables
 from sealed.verdict import engine, verdict_on
@@ -40,7 +41,9 @@ KINDS: tuple[Kind, ...] = ("clean", "single", "forms", "single", "pairs", "singl
 SHARES = (0.4, 0.25, 0.2, 0.15)
 """Of the backgrounds, as in the sealed campaign."""
 SIZES = (4.0, 15.0)
-"""Over the limit; drawn evenly in logarithm. Limits are the simulator's, as the motions are much like its own."""
+"""Over the limit; drawn evenly in logarithm, up to what the simulator can run. Limits are the simulator's."""
+LEFT_OUT = ("slosh",)
+"""What is not hidden: motions below 0.6 Hz hardly swing a pendulum of 0.1 to 0.4 m, so it has another limit."""
 PAYLOADS = ("a", "b", "c", "d")
 OFF: dict[str, dict[str, str]] = {
     "phi_zero": {"phi_zero": "zero_rad"},
@@ -103,14 +106,18 @@ def plan(seed: int, kind: Kind | None = None) -> IndependentSet:
     names: list[str] = []
     while len(names) < {"clean": 0, "pairs": 2}.get(kind, 1):
         other = kind == "forms" or (kind == "pairs" and rng.uniform() < 1.0 / 3.0)
-        name = str(rng.choice([one for one in ANSWERS if (one in FORMS) == other]))
+        name = str(rng.choice([one for one in ANSWERS if (one in FORMS) == other and one not in LEFT_OUT]))
         if background == "uncalibrated" and ANSWERS[name] in SPREAD_IN_UNCALIBRATED:
             continue
         if _family(name) not in map(_family, names):
             names.append(name)
-    low, high = np.log(SIZES)
-    factors = tuple(float(np.exp(rng.uniform(low, high))) for _ in names)
+    factors = tuple(_size(ANSWERS[name], background, rng) for name in names)
     return IndependentSet(kind, seed, background, tuple(names), factors, payload)
+
+
+def _size(cause: str, background: Background, rng: np.random.Generator) -> float:
+    high = min(SIZES[1], largest(cause, background))
+    return float(np.exp(rng.uniform(*np.log([min(SIZES[0], high), high]))))
 
 
 def _family(name: str) -> str | None:
