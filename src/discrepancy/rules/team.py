@@ -80,10 +80,11 @@ TEAM_PUSH_S = (0.4, 0.8, 1.6, 3.2, 6.4)
 """Durations searched. Chosen: octaves."""
 REST_RAD_PER_S, REST_NM_PER_S = 1e-3, 0.2
 """Below which a joint, or a spring's torque, rests and its friction is noise. Chosen: as of the causes."""
-NOISY_RAD_PER_S, NOISY_NM_PER_S, NOISY_STEPS = 1.3e-3, 0.22, 0.15
-"""Noise of rates up to which these, and the causes' own, tell rest from motion: a third of the larger ones. What is
-noisier rests up to so much faster. Noise counts from that share of a rounding step on: below, a joint at rest repeats
-one reading. Derived: 3 standard deviations; white noise of a reading is found within a tenth of its step."""
+QUIET_RAD_PER_S, QUIET_NM_PER_S, QUIET_HZ, NOISY_STEPS = 3e-4, 0.22, 6.0, 0.15
+"""Noise of the rates that tell rest from sliding, up to which they are smoothed as usual; signals with more are
+smoothed more, down to that cut-off. Derived: a joint that turns round at 0.3 rad/s^2 is told to do so within 1 ms, of a
+row's 80; a torque's is that of the sensors with which thresholds were chosen; rows have nothing above 5 Hz. Noise
+counts from that share of a rounding step on: with less a joint at rest repeats one reading; its error is a tenth."""
 REST_KNOTS_S = 0.05
 """Between knots of friction at rest, which follows the load. Measured on three sets (0.17 N m in a joint, 0.17 inside a
 spring, 0.24 in a gimbal): chi2/n 1.75, 1.25 and 1.24 with knots every 0.5 s (0.1 inside springs) and rests of less than

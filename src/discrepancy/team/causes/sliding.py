@@ -15,15 +15,19 @@ from discrepancy.team.causes.base import Cause, one_joint, one_robot
 from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
-from estimator.filtering import differentiate, low_pass
+from estimator.filtering import differentiate
 from estimator.rigid_team.slots import TAU
+
+KEPT = "kept_below_rad_per_s"
+"""Rate of a shape below which friction keeps its direction: so stiff that no encoder shows how it gives way."""
 
 
 class Friction(Cause):
     """Friction of what a joint's signal tells the motion of: Coulomb and, unless a cause has one parameter, viscous.
 
-    At rest, below the rate that is its shape, it may have any value up to its limit. Or it gives way in proportion
-    before it slips, as a slider behind a spring does (Prandtl): it is reversed in full over twice what it gives way by.
+    At rest, below the rate that is its shape, it may have any value up to its limit, or it keeps what it had. Or it
+    gives way in proportion before it slips, as a slider behind a spring does (Prandtl): it is reversed in full over
+    twice what it gives way by.
 
     Attributes:
         moves: the signal.
@@ -37,7 +41,8 @@ class Friction(Cause):
     tolerances = (2e-3, 2e-3)
     clipped = ("coulomb_Nm", "viscous_Nms_per_rad")
     shapes = (
-        {"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3}, *({"presliding_rad": x} for x in rules.PRESLIDINGS_RAD)
+        {"slow_rad_per_s": 1e-3}, {"slow_rad_per_s": 4e-3}, {KEPT: 4e-3},
+        *({"presliding_rad": x} for x in rules.PRESLIDINGS_RAD),
     )  # fmt: skip
     determined: ClassVar[Mapping[str, float]] = {"presliding_rad": 0.1}
     positive = ("coulomb_Nm",)
@@ -84,12 +89,10 @@ class Friction(Cause):
         Where it gives way, how far it had before it slips for the first time; and as no bristles do so in proportion,
         it may be another by a share of its limit until it slips.
         """
-        rate_hz, state = trial.signals.rate_hz, np.abs(
-            self._sliding(trial.signals, trial, robot, joint, shape)[0]
-        )
-        rests = pieces_while(state < 1.0 - 1e-9, rate_hz, rules.REST_KNOTS_S)
+        state = np.abs(self._sliding(trial.signals, trial, robot, joint, shape)[0])
+        rests = pieces_while(state < 1.0 - 1e-9, trial.signals.rate_hz, rules.REST_KNOTS_S)
         rests = in_parts(rests, rules.PATCH_COLUMNS)
-        if self.gives in shape:
+        if self.gives in shape or KEPT in shape:
             slips = np.flatnonzero(state >= 1.0 - 1e-9)
             before = slice(0, slips[0] if len(slips) else len(state))
             rests = ((at, rules.PRESLIDING_OPEN_SHARE * values) for at, values in rests)
@@ -105,14 +108,29 @@ class Friction(Cause):
         a parallel axis, which moves alike, would else be told apart by noise, and both together have less.
         """
         (number,) = shape.values()
-        x, rate_hz = getattr(signals, self.moves)[:, robot, joint], signals.rate_hz
+        smooth = signals.smooth(self.moves, robot, joint)
         if self.moves != "tau":
-            read, quiet = (getattr(one, self.moves)[:, robot, joint] for one in (trial.signals, trial.adjusted))
-            x = x - (read - quiet)
-        smooth = low_pass(x, rate_hz, rules.TEAM_SMOOTH_HZ)
-        rate = self.sign * differentiate(smooth, rate_hz)
+            read, quiet = (one.smooth(self.moves, robot, joint) for one in (trial.signals, trial.adjusted))
+            smooth = smooth - (read - quiet)
+        rate = self.sign * differentiate(smooth, signals.rate_hz)
         if self.gives in shape:
             bent = self.sign * (smooth - played(smooth, number)) / number
         else:
-            bent = rate / (number * signals.hasty(self.moves)[robot, joint])
+            bent = _kept(rate, number) if KEPT in shape else rate / number
         return (np.clip(bent, -1.0, 1.0), rate)[: len(self.parameters)]
+
+
+def _kept(rate: Array, slow: float) -> Array:
+    """Direction of motion, and at rest of the motion before, 0 until the first, shape (Q,).
+
+    Which way it moves is told where it is fast; since when, by where its rate left zero before.
+    """
+    way = np.sign(rate)
+    starts = np.flatnonzero(np.diff(way, prepend=0.0))
+    # Motions one way, of which only those count that become fast.
+    fastest = np.maximum.reduceat(np.abs(rate), starts) if len(starts) else np.zeros(0)
+    starts = starts[fastest >= slow]
+    out = np.zeros_like(rate)
+    for start in starts:
+        out[start:] = way[start]
+    return out

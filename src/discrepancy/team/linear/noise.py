@@ -40,12 +40,14 @@ class Noise:
         return cls(step, np.sqrt(np.maximum(white**2 - step**2 / 12.0, 0.0)))
 
     def known_to(self, signals: Signals) -> Signals:
-        """The signals with what their noise does to rates (``Signals.haste``)."""
+        """The signals with what they have to be smoothed at for the sake of their rates (``Signals.smooth_hz``)."""
         noisy = self.sigma > rules.NOISY_STEPS * self.step
         white = np.where(noisy, np.hypot(self.sigma, self.step / np.sqrt(12.0)), 0.0)
         rates = white * np.sqrt(signals.rate_hz / _native_hz(signals))[:, None] * _rate_gain(signals.rate_hz)
-        usual = np.array([rules.NOISY_RAD_PER_S, rules.NOISY_RAD_PER_S, rules.NOISY_NM_PER_S])
-        return replace(signals, haste=np.maximum(rates / usual[:, None, None], 1.0))
+        quiet = np.array([rules.QUIET_RAD_PER_S, rules.QUIET_RAD_PER_S, rules.QUIET_NM_PER_S])
+        # Noise of a rate grows with the cut-off to the power 3/2.
+        less = (quiet[:, None, None] / np.maximum(rates, 1e-300)).clip(max=1.0) ** (2.0 / 3.0)
+        return replace(signals, smooth_hz=np.maximum(rules.TEAM_SMOOTH_HZ * less, rules.QUIET_HZ))
 
     def draws(self, signals: Signals, rng: np.random.Generator, count: int) -> Iterator[Signals]:
         """Realisations of the sensors' errors on a trial: what they add to its smooth signals.

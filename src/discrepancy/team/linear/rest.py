@@ -14,7 +14,7 @@ from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arm.gimbal import rate_matrix
 from estimator.arrays import Array
-from estimator.filtering import differentiate, low_pass
+from estimator.filtering import differentiate
 from estimator.rigid_team.slots import TAU, THETA
 
 Moves = Literal["phi", "theta", "tau"]
@@ -109,8 +109,10 @@ def draws_at_a_time(trial: TrialLinear) -> int:
 
 def _numbered(signals: Signals, moves: Moves, slow: float) -> NDArray[np.intp]:
     """Number of the rest that each sample is in, from 1, and 0 in motion, shape (Q, N, 3)."""
-    rate_hz = signals.rate_hz
-    rate = differentiate(low_pass(getattr(signals, moves), rate_hz, rules.TEAM_SMOOTH_HZ), rate_hz)
-    still = np.abs(rate) < slow * signals.hasty(moves)
+    each = [
+        [signals.smooth(moves, robot, joint) for joint in range(3)] for robot in range(signals.phi.shape[1])
+    ]
+    rate = differentiate(np.moveaxis(np.array(each), 2, 0), signals.rate_hz)
+    still = np.abs(rate) < slow
     starts = still & ~np.concatenate([np.zeros_like(still[:1]), still[:-1]])
     return np.asarray(np.where(still, np.cumsum(starts, axis=0), 0), dtype=np.intp)

@@ -24,8 +24,7 @@ class Signals:
         phi, theta, tau: as the robots' calibration and the causes correct what was recorded, shape (Q, N, 3).
         rate_hz: sampling rate [Hz].
         sampling: how each robot's sensors were read, where the samples are not as they were read.
-        haste: how many times as fast as with good sensors a joint, or a spring's torque, may seem to move while it
-            rests, at least 1, shape (3, N, 3): phi, theta, tau; None: not known to be faster.
+        smooth_hz: cut-off at which rates tell rest from sliding, shape (3, N, 3): phi, theta, tau; None: as usual.
     """
 
     time: Array
@@ -34,7 +33,7 @@ class Signals:
     tau: Array
     rate_hz: float
     sampling: tuple[Sampling, ...] | None = None
-    haste: Array | None = None
+    smooth_hz: Array | None = None
 
     @classmethod
     def of(cls, recording: Recording) -> Signals:
@@ -49,11 +48,11 @@ class Signals:
         """The signals without an error of the sensors."""
         return replace(self, phi=self.phi - phi, theta=self.theta - theta, tau=self.tau - tau)
 
-    def hasty(self, moves: Literal["phi", "theta", "tau"]) -> Array:
-        """``haste`` of one kind of signal, shape (N, 3)."""
-        if self.haste is None:
-            return np.ones(self.phi.shape[1:])
-        return np.asarray(self.haste[("phi", "theta", "tau").index(moves)])
+    def smooth(self, moves: Literal["phi", "theta", "tau"], robot: int, joint: int) -> Array:
+        """A signal of one joint, filtered so that its rate tells rest from sliding, shape (Q,)."""
+        usual, kind = rules.TEAM_SMOOTH_HZ, ("phi", "theta", "tau").index(moves)
+        cutoff_hz = usual if self.smooth_hz is None else float(self.smooth_hz[kind, robot, joint])
+        return low_pass(getattr(self, moves)[:, robot, joint], self.rate_hz, cutoff_hz)
 
     @property
     def keep(self) -> slice:
