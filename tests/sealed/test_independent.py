@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from estimator.arm.design import load_design
+from estimator.recording.parquet import write_recording
 from independent.arm.delta import OUT, Legs, driven_angles, legs_of, link_directions, wrist_position
 from independent.arm.dynamics import arm_load
 from independent.as_built import draw_as_built
@@ -277,3 +278,20 @@ def test_everything_can_be_hidden_and_shows():
         assert np.abs(recordings[1].tau - plain[1].tau).max() > 1e-3
     with pytest.raises(ValueError, match="cannot be hidden"):
         generate(9, "x1", [("gremlins", 1.0)], "a")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("seed", "size"), [(113, 7.0), (2001, 6.34)])
+def test_gimbal_friction_is_found_with_coarse_encoders(seed, size, tmp_path):
+    """Of 14 and 16 bits whose readings scatter; the parallel axis of another robot moves alike."""
+    import mocobot
+
+    recordings, _ = generate(seed, "x1", [("gimbal_friction", size)], "b", noise="white")
+    files = [tmp_path / f"trial{k}.parquet" for k in range(len(recordings))]
+    for recording, file in zip(recordings, files, strict=True):
+        write_recording(recording, file)
+    (cause,) = mocobot.diagnose(files, closed_loop=False).to_dict()["causes"]
+    assert (cause["cause"], cause["robot"], cause["joint"]) == ("gimbal_friction", 2, 2)
+    assert cause["probability"] > 0.9
+    value = cause["parameters"]["coulomb_Nm"]
+    assert value["value"] == pytest.approx(size * 0.017, abs=4.0 * value["se"])

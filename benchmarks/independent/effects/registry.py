@@ -63,22 +63,22 @@ PLAIN: Mapping[str, Form] = {
 """The catalogue's own laws, by cause."""
 
 FORMS: Mapping[str, Form] = {
-    "grasp_relaxing_independent": Form("grasp_flex", True, draw_robot.grasp_relaxing),
-    "grasp_anisotropic_independent": Form("grasp_flex", True, draw_robot.grasp_anisotropic),
-    "spring_progressive_independent": Form("sea_hardening", True, draw_robot.spring_progressive),
-    "spring_dahl_independent": Form("sea_hysteresis", True, draw_robot.spring_dahl),
-    "bias_settling_independent": Form("sea_bias", True, draw_robot.bias_settling),
-    "driven_tanh_independent": Form("joint_friction", True, draw_robot.driven_tanh),
-    "driven_stribeck_independent": Form("joint_friction", True, draw_robot.driven_stribeck),
-    "gimbal_dahl_independent": Form("gimbal_friction", True, draw_robot.gimbal_dahl),
-    "torque_second_order_independent": Form("torque_lag", True, draw_robot.torque_second_order),
-    "tether_slack_independent": Form("tether", True, draw_payload.tether_slack),
-    "payload_tether_slack_independent": Form("payload_tether", True, draw_payload.payload_tether_slack),
-    "push_half_sine_independent": Form("push", True, draw_payload.push_half_sine),
-    "push_trapezoid_independent": Form("push", True, draw_payload.push_trapezoid),
-    "drag_turning_independent": Form("drag", True, draw_payload.drag_turning),
-    "drag_quadratic_independent": Form("drag", True, draw_payload.drag_quadratic),
-    "mass_settling_independent": Form("payload_mass", True, draw_payload.mass_settling),
+    "grasp_relaxing": Form("grasp_flex", True, draw_robot.grasp_relaxing),
+    "grasp_anisotropic": Form("grasp_flex", True, draw_robot.grasp_anisotropic),
+    "spring_progressive": Form("sea_hardening", True, draw_robot.spring_progressive),
+    "spring_dahl": Form("sea_hysteresis", True, draw_robot.spring_dahl),
+    "bias_settling": Form("sea_bias", True, draw_robot.bias_settling),
+    "driven_tanh": Form("joint_friction", True, draw_robot.driven_tanh),
+    "driven_stribeck": Form("joint_friction", True, draw_robot.driven_stribeck),
+    "gimbal_dahl": Form("gimbal_friction", True, draw_robot.gimbal_dahl),
+    "torque_second_order": Form("torque_lag", True, draw_robot.torque_second_order),
+    "tether_slack": Form("tether", True, draw_payload.tether_slack),
+    "payload_tether_slack": Form("payload_tether", True, draw_payload.payload_tether_slack),
+    "push_half_sine": Form("push", True, draw_payload.push_half_sine),
+    "push_trapezoid": Form("push", True, draw_payload.push_trapezoid),
+    "drag_turning": Form("drag", True, draw_payload.drag_turning),
+    "drag_quadratic": Form("drag", True, draw_payload.drag_quadratic),
+    "mass_settling": Form("payload_mass", True, draw_payload.mass_settling),
 }
 """Other laws than the catalogue's, by names of their own."""
 

@@ -5,6 +5,7 @@ from itertools import chain
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.causes.base import Shape
@@ -87,15 +88,19 @@ class Friction(Cause):
         """What it does while it holds: any torque that it takes, as it changes with the load.
 
         Where it gives way, how far it had before it slips for the first time; and as no bristles do so in proportion,
-        it may be another by a share of its limit until it slips.
+        it may be another by a share of its limit until it slips. Where it is kept, whatever it is while the joint seems
+        to move the other way, and too slowly to be sure.
         """
-        state = np.abs(self._sliding(trial.signals, trial, robot, joint, shape)[0])
-        rests = pieces_while(state < 1.0 - 1e-9, trial.signals.rate_hz, rules.REST_KNOTS_S)
+        bent, rate, *_ = (*self._sliding(trial.signals, trial, robot, joint, shape), None)
+        state = np.abs(bent)
+        open_ = state < 1.0 - 1e-9 if KEPT not in shape else _doubtful(bent, rate)
+        rests = pieces_while(open_, trial.signals.rate_hz, rules.REST_KNOTS_S)
         rests = in_parts(rests, rules.PATCH_COLUMNS)
         if self.gives in shape or KEPT in shape:
             slips = np.flatnonzero(state >= 1.0 - 1e-9)
             before = slice(0, slips[0] if len(slips) else len(state))
-            rests = ((at, rules.PRESLIDING_OPEN_SHARE * values) for at, values in rests)
+            share = rules.PRESLIDING_OPEN_SHARE if self.gives in shape else 1.0
+            rests = ((at, share * values) for at, values in rests)
             rests = chain([(before, np.ones((before.stop, 1)))] if before.stop else [], rests)
         return trial.reduction.of_pieces(self.direction(trial, robot, joint), rests)
 
@@ -125,12 +130,22 @@ def _kept(rate: Array, slow: float) -> Array:
 
     Which way it moves is told where it is fast; since when, by where its rate left zero before.
     """
-    way = np.sign(rate)
-    starts = np.flatnonzero(np.diff(way, prepend=0.0))
-    # Motions one way, of which only those count that become fast.
-    fastest = np.maximum.reduceat(np.abs(rate), starts) if len(starts) else np.zeros(0)
-    starts = starts[fastest >= slow]
-    out = np.zeros_like(rate)
-    for start in starts:
+    out, way = np.zeros_like(rate), np.sign(rate)
+    starts, fastest = _motions(rate)
+    for start in starts[fastest >= slow]:
         out[start:] = way[start]
     return out
+
+
+def _doubtful(kept: Array, rate: Array) -> NDArray[np.bool_]:
+    """Where a joint may move against the direction that is kept, shape (Q,)."""
+    starts, fastest = _motions(rate)
+    counts = np.diff([*starts, len(rate)])
+    fast = np.concatenate([np.zeros(len(rate) - int(counts.sum())), np.repeat(fastest, counts)])
+    return (kept * rate < 0.0) & (fast >= rules.REST_RAD_PER_S)
+
+
+def _motions(rate: Array) -> tuple[NDArray[np.intp], Array]:
+    """Where each motion one way begins, and how fast it becomes."""
+    starts = np.flatnonzero(np.diff(np.sign(rate), prepend=0.0))
+    return starts, np.maximum.reduceat(np.abs(rate), starts) if len(starts) else np.zeros(0)
