@@ -73,6 +73,7 @@ class Rig(ABC):
     behind: ClassVar[tuple[str, ...]] = ()  # causes with a shape that shows only beside what they leave open
     curved: ClassVar[bool] = False  # whether exact residuals hold what is within its tolerance, too
     layered: ClassVar[bool] = False  # whether the shapes of causes show beside all others only
+    missed: float = 0.0  # chi-square per n that columns missed here, from where they were made linear again
     normal: ClassVar[bool] = False  # whether a simulation has what is normal as the other trials have it
 
     @property
@@ -200,8 +201,8 @@ class Rig(ABC):
         """What recordings of this rig cannot decide, whatever the data: statements with a reason and a remedy."""
         return []
 
-    def relinearised(self, nothing: Any) -> Any:
-        """The same rig linear around where a fit (``engine.hypothesis.Hypothesis``) finds it; None where it is near."""
+    def relinearised(self, found: Any) -> Any:
+        """The same rig linear around where a fit (``inference.hypothesis.Hypothesis``) finds it; None where near."""
         return None
 
     @property

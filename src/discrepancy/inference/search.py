@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+
+import numpy as np
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
+from discrepancy.inference.base import based, without_any
 from discrepancy.inference.exchange import Rival, settled, without_healthy
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.offer.propose import Proposed, proposals
@@ -14,7 +17,7 @@ from discrepancy.inference.pays import gained, needed, tolerated
 from discrepancy.inference.probability import probability
 from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import is_noise, nats_left, share_left, trace_nats, unlisted_nats
-from discrepancy.least_squares.problem import Key, Problem
+from discrepancy.least_squares.problem import Key
 from discrepancy.rig import Rig
 
 
@@ -53,10 +56,29 @@ def search(
             is taken; None where that is to stay.
     """
     say = progress or (lambda what: None)
-    rig, nothing = _based(rig, say)
-    nothing = replace(nothing, learnt=replace(nothing.learnt, problem=replace(nothing.problem, odds=odds)))
+    rig, nothing, straight = based(rig, odds, say)
     say("scan")
+    if not straight:
+        rig, nothing = _beside_a_cause(rig, nothing, say)
     return continued(Searched(rig, nothing, nothing, ()), most, say, first)
+
+
+def _beside_a_cause(rig: Rig, nothing: Hypothesis, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
+    """The rig linear around machines as they are found beside the likeliest cause, and that nothing is there.
+
+    Where machines of which little is known are found without a strong cause is where none of them are.
+    """
+    odds, missed = nothing.problem.odds, np.inf
+    for _ in range(rules.BASE_ROUNDS):
+        found = continued(Searched(rig, nothing, nothing, ()), 1, say).best
+        moved = rig.relinearised(found) if found.free else None
+        if moved is None or moved.missed > rules.STRAIGHTER * missed:
+            break
+        say("linearise")
+        rig, missed = moved, moved.missed
+        del nothing, found, moved  # for the sake of memory
+        nothing = without_any(rig, odds, say)
+    return rig, nothing
 
 
 def continued(
@@ -149,23 +171,3 @@ def _form_of_a_fault(rig: Rig, base: Hypothesis, cause: Candidate, scattered: Hy
         if other.cause == cause.cause
     ]
     return bool(worth) and scattered.score - base.score < max(worth)
-
-
-def _based(rig: Rig, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
-    """The rig linear around where it is, and the hypothesis that nothing is there beyond its kind's spread."""
-    nothing = _nothing(rig, say)
-    for _ in range(rules.BASE_ROUNDS - 1):
-        moved = rig.relinearised(nothing)
-        if moved is None:
-            break
-        say("linearise")
-        rig = moved
-        del nothing, moved  # for the sake of memory
-        nothing = _nothing(rig, say)
-    return rig, exact(rig, nothing, nothing) if rig.curved else nothing
-
-
-def _nothing(rig: Rig, say: Callable[[str], object]) -> Hypothesis:
-    say("columns")
-    candidates = rig.candidates()
-    return Hypothesis.of(Problem.of(rig.rows(candidates), candidates), ())

@@ -1,6 +1,6 @@
-"""Every cause at every place, and in every shape."""
+"""Every cause at every place, in every shape, and what it puts into a trial."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,10 @@ from discrepancy.candidate import Candidate
 from discrepancy.causes.base import Shape
 from discrepancy.causes.intervals import worst_intervals
 from discrepancy.team.causes import CAUSES
+from discrepancy.team.linear.origin import beyond, places_of
 from discrepancy.team.linear.reduction import Reduction
+from discrepancy.team.linear.trial_linear import TrialLinear
+from estimator.arm.unit import ArmUnit
 from estimator.arrays import Array
 
 Tolerances = Mapping[str, float]
@@ -35,6 +38,21 @@ def every_candidate(
         given = tolerances.get(cause.name, {})
         out += [cause.candidate(given, cause.shapes[0], robot, joint) for robot in places for joint in joints]
     return out
+
+
+def other_shapes(candidate: Candidate, trials: int, *, finer: bool = False) -> list[Candidate]:
+    """The candidate in every other shape of the catalogue, or in finer ones around its own, in so many trials."""
+    if candidate.transient:
+        return []
+    cause = CAUSES[candidate.cause]
+    return in_shapes(candidate, cause.finer(candidate.shape) if finer else cause.shapes, trials)
+
+
+def further_shapes(candidate: Candidate, trials: int) -> list[Candidate]:
+    """The same in shapes that are far apart, in which no scan has it."""
+    if candidate.transient or candidate.cause not in CAUSES:
+        return []
+    return in_shapes(candidate, CAUSES[candidate.cause].further(candidate.shape), trials)
 
 
 def in_shapes(candidate: Candidate, shapes: Sequence[Shape], trials: int) -> list[Candidate]:
@@ -95,6 +113,30 @@ def worst_events(
         worst = worst_intervals(t, time, square, rules.TEAM_PUSH_S, two_sided=False)
         out += [cause.event(tolerances.get(cause.name, {}), when) for cause in causes for when in worst]
     return out
+
+
+def explained_by(
+    active: Sequence[tuple[Candidate, Array]], origin: ArmUnit
+) -> Callable[[int, TrialLinear], Array] | None:
+    """What causes put into every sample's residual of a trial, given its number, shape (Q, C); None of none.
+
+    Args:
+        active: causes with their values, in their own units.
+        origin: how far the robots are from where they were believed to be: what these are off by is not explained.
+    """
+    others = [(c, beyond(c, values, origin)) for c, values in active if places_of(c) is None]
+    if not others:
+        return None
+
+    def explained(trial: int, linear: TrialLinear) -> Array:
+        every = replace(linear, reduction=Reduction.none(linear.signals.time))
+        out = np.zeros((len(linear.s), linear.channels))
+        for candidate, values in others:
+            if candidate.acts_in(trial):
+                out += CAUSES[candidate.cause].columns(every, *indices(candidate), candidate.shape) @ values
+        return out
+
+    return explained
 
 
 def indices(candidate: Candidate) -> tuple[int, int]:

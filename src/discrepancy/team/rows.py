@@ -18,10 +18,12 @@ from discrepancy.least_squares.whitening import Whitening, whitened
 from discrepancy.rig import Channel, Rig, Rows
 from discrepancy.team.candidates import (
     every_candidate,
-    in_shapes,
+    explained_by,
+    further_shapes,
     indices,
     is_adjusted,
     is_kept,
+    other_shapes,
     shape_steps,
     worst_events,
 )
@@ -58,6 +60,7 @@ class TeamRows(Rig):
         origin: how far from the robots as they were believed to be all is linear; None for not at all.
         resting: spread over its tolerance of each kind that leaves something open, such as friction at rest: noise.
         jobs: parallel processes.
+        missed: chi-square per n that columns missed here, from where all was linear before.
         kept: whitened columns that are asked for again and again.
     """
 
@@ -69,6 +72,7 @@ class TeamRows(Rig):
     origin: ArmUnit | None = None
     resting: Mapping[str, float] = field(default_factory=dict)
     jobs: int = 1
+    missed: float = 0.0
     kept: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -100,9 +104,10 @@ class TeamRows(Rig):
         resting: Mapping[str, float],
         jobs: int,
         sensed: Sensed | None = None,
+        explained: Callable[[int, TrialLinear], Array] | None = None,
     ) -> Self:
         limits = limits_of(tolerances, resting)
-        linear, known = linearised_trials(recordings, shared, limits, jobs, sensed)
+        linear, known = linearised_trials(recordings, shared, limits, jobs, sensed, explained)
         return cls(tuple(recordings), known, linear, tolerances, excluded, origin, resting, jobs)
 
     @property
@@ -115,27 +120,27 @@ class TeamRows(Rig):
         """Of every trial."""
         return self.sensed.whitening
 
-    def relinearised(self, nothing: Hypothesis) -> Self | None:
-        """The rig at the robots as a fit with tolerances finds them, where straight columns do not reach that far."""
+    def relinearised(self, found: Hypothesis) -> Self | None:
+        """The rig at the robots as a fit finds them, with its causes, where straight columns do not reach that far."""
         try:
-            there = found_at(self.linear, self.whitening, nothing, self.origin)
+            there = found_at(self.linear, self.whitening, found, self.origin)
         except InputError:  # no such robots: what acts on these is something else
             return None
-        resting = resting_of(nothing)
+        resting = resting_of(found)
         same = all(0.5 < resting[kind] / self.resting[kind] < 2.0 for kind in resting)
         straight = there.curvature < rules.STRAIGHT_CHI2_PER_N
         if straight and same:
             return None
-        sensed = self.sensed
+        sensed, limits = self.sensed, limits_of(self.tolerances, resting)
         if not same:  # what noise leaves where what rests scatters so; the sensors are the same
-            limits = limits_of(self.tolerances, resting)
             sensed = sensed_in(self.linear, self.noise, limits, self.jobs, sensed)
         resting = self.resting if same else resting
         if straight:  # robots and unknowns stay
-            return replace(self, sensed=sensed, resting=resting, kept={})
+            return replace(self, sensed=sensed, resting=resting, kept={}, missed=there.curvature)
         moved = [replace(r, metadata=replace(r.metadata, units=there.units)) for r in self.recordings]
-        catalogue = self.tolerances, self.excluded
-        return self._at(moved, there.shared, *catalogue, there.origin, resting, self.jobs, sensed)
+        known = there.origin, resting, self.jobs, sensed, explained_by(found.fit.active, there.origin)
+        rig = self._at(moved, there.shared, self.tolerances, self.excluded, *known)
+        return replace(rig, missed=there.curvature)
 
     @property
     def trials(self) -> Sequence[str]:
@@ -276,16 +281,10 @@ class TeamRows(Rig):
 
     def refinements(self, candidate: Candidate, *, finer: bool = False) -> list[Candidate]:
         """The candidate with every other shape of its cause; any interval of a transient is found by its steps."""
-        if candidate.transient:
-            return []
-        cause = CAUSES[candidate.cause]
-        shapes = cause.finer(candidate.shape) if finer else cause.shapes
-        return in_shapes(candidate, shapes, len(self.linear))
+        return other_shapes(candidate, len(self.linear), finer=finer)
 
     def further(self, candidate: Candidate) -> list[Candidate]:
-        if candidate.transient or candidate.cause not in CAUSES:
-            return []
-        return in_shapes(candidate, CAUSES[candidate.cause].further(candidate.shape), len(self.linear))
+        return further_shapes(candidate, len(self.linear))
 
     def transients(self, remaining: Sequence[Array]) -> list[Candidate]:
         """Pushes at the intervals where the wrench balance is worst."""

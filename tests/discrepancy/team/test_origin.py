@@ -7,7 +7,7 @@ import pytest
 
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.least_squares.problem import Problem
-from discrepancy.team.candidates import every_candidate
+from discrepancy.team.candidates import every_candidate, explained_by
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.adjust import SignalNoise
 from discrepancy.team.linear.elsewhere import found_at
@@ -152,3 +152,24 @@ def test_the_fit_finds_the_robots_where_they_are(case):
     torque = AT["tau_zero"]
     wrong = np.abs(there.units.x[:, torque] - truth[:, torque]).max()
     assert wrong < 0.3 * np.abs(truth[:, torque]).max()
+
+
+def test_what_causes_explain_of_every_sample_is_what_they_explain_of_the_rows(case):
+    """Reduction is linear, so that it does not matter when it is done."""
+    rig, nowhere = team(case), ArmUnit(DESIGN, np.zeros((3, COUNT)))
+    tether, zero = CAUSES["tether"], CAUSES["phi_zero"]
+    shape = dict(tether.shapes[0]) | {"anchor_z_m": 0.5}
+    pulling = tether.candidate({}, shape, 2, None)
+    off = zero.candidate({}, zero.shapes[0], 1, 3)
+    values = np.linspace(20.0, 30.0, len(pulling.parameters))
+    explained = explained_by([(pulling, values), (off, np.array([0.01]))], nowhere)
+    rows = case.reduction(explained(0, case.linear))
+    expected = rig._unwhitened(0, pulling) @ values
+    assert np.abs(expected).max() > 1.0
+    np.testing.assert_allclose(rows, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+
+
+def test_what_robots_are_off_by_is_not_explained():
+    zero = CAUSES["phi_zero"].candidate({}, {}, 1, 3)
+    assert explained_by([(zero, np.array([0.01]))], ArmUnit(DESIGN, np.zeros((3, COUNT)))) is None
+    assert explained_by([], ArmUnit(DESIGN, np.zeros((3, COUNT)))) is None

@@ -54,10 +54,18 @@ def _regression(rows: Array, signals: Array) -> Array:
     return np.asarray(np.einsum("kns,kc->nsc", s, r, optimize=True) @ inverse)
 
 
-def with_adjusted_signals(linear: TrialLinear, noise: SignalNoise) -> TrialLinear:
-    """The trial linear at its signals moved the likeliest way that leaves no residual."""
+def with_adjusted_signals(
+    linear: TrialLinear, noise: SignalNoise, explained: Array | float = 0.0
+) -> TrialLinear:
+    """The trial linear at its signals moved the likeliest way that leaves no residual but what causes explain.
+
+    Args:
+        linear: the trial.
+        noise: what its residual tells of its signals.
+        explained: what causes put into every sample's residual, shape (Q, C).
+    """
     shared, bases, arms = linear.shared, linear.bases, linear.arms
-    s = linear.s - _noise_in(linear.data, shared, bases, linear.reduction, noise)
+    s = linear.s - _noise_in(linear.data, shared, bases, linear.reduction, noise, explained)
     data = grasp_data(s, arms, linear.signals.rate_hz)
     return replace(
         linear,
@@ -70,16 +78,23 @@ def with_adjusted_signals(linear: TrialLinear, noise: SignalNoise) -> TrialLinea
 
 
 def noise_of(
-    signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear, noise: SignalNoise
-) -> Signals:
-    """What residuals tell of the noise in signals without any error, angles and torques of shape (Q, N, 3)."""
+    signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear, noise: SignalNoise,
+    explained: Array | float = 0.0,
+) -> Signals:  # fmt: skip
+    """What residuals tell of the noise in signals without any error, angles and torques of shape (Q, N, 3).
+
+    Arguments as of ``with_adjusted_signals``.
+    """
     data = grasp_data(filtered(signals), linear.arms, signals.rate_hz)
-    each = _noise_in(data, shared, bases, linear.reduction, noise)
+    each = _noise_in(data, shared, bases, linear.reduction, noise, explained)
     phi, theta, tau = (each[..., kind] for kind in (PHI, THETA, TAU))
     return Signals(signals.time, phi, theta, tau, signals.rate_hz)
 
 
-def as_loud(signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear, noise: SignalNoise) -> Array:
+def as_loud(
+    signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear, noise: SignalNoise,
+    explained: Array | float = 0.0,
+) -> Array:  # fmt: skip
     """What has to be added to a residual so that its noise is as loud as where the trial is linear, rows (n, C).
 
     Noise of accelerations is in the residual as often as there is mass, and that of a spring's reading at the lever of
@@ -87,7 +102,7 @@ def as_loud(signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear,
     """
     s = filtered(signals)
     data = grasp_data(s, linear.arms, signals.rate_hz)
-    each = _noise_in(data, shared, bases, linear.reduction, noise)
+    each = _noise_in(data, shared, bases, linear.reduction, noise, explained)
     quiet = grasp_data(s - each, linear.arms, signals.rate_hz)
     here = _residual(data, shared, bases) - _residual(quiet, shared, bases)
     there = sum(linear.J(robot, slice(None), each[:, robot]) for robot in range(linear.robots))
@@ -100,10 +115,15 @@ def _residual(data: GraspData, shared: Shared, bases: Bases) -> Array:
 
 
 def _noise_in(
-    data: GraspData, shared: Shared, bases: Bases, reduction: Reduction, noise: SignalNoise
+    data: GraspData,
+    shared: Shared,
+    bases: Bases,
+    reduction: Reduction,
+    noise: SignalNoise,
+    explained: Array | float,
 ) -> Array:
     """Of every sample's signals, shape (Q, N, 21)."""
-    residual = _residual(data, shared, bases)
+    residual = _residual(data, shared, bases) - explained
     held = np.zeros(len(residual), dtype=bool)
     held[reduction.operator[reduction.moving :].indices] = True
     moves, holds = (np.einsum("nsc,qc->qns", told, residual, optimize=True) for told in noise.told)

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csc_array, csr_array
+from scipy.sparse import csc_array, csr_array, eye_array
 
 from discrepancy import rules
 from discrepancy.least_squares.patches import Patch, Patches
@@ -42,6 +42,11 @@ class Reduction:
     moving: int
     step: int
     sample: NDArray[np.intp]
+
+    @classmethod
+    def none(cls, time: Array) -> Reduction:
+        """Every sample a row, times (Q,) in s."""
+        return cls(csr_array(eye_array(len(time), format="csr")), time, len(time), 1, np.arange(len(time)))
 
     def __call__(self, x: Array) -> Array:
         """Reduce samples, shape (Q, ...) -> (n, ...); what is there for a while only takes as long as that."""

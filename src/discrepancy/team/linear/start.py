@@ -1,6 +1,6 @@
 """The unknowns before any cause: from the estimate, then Gauss-Newton on the whitened residual."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import cast
@@ -69,6 +69,7 @@ def linearised_trials(
     tolerances: Tolerances,
     jobs: int = 1,
     sensed: Sensed | None = None,
+    explained: Callable[[int, TrialLinear], Array] | None = None,
 ) -> tuple[tuple[TrialLinear, ...], Sensed]:
     """Every trial linearised around the best unknowns, and what noise and friction at rest leave in its rows.
 
@@ -78,6 +79,8 @@ def linearised_trials(
         tolerances: standard deviations by cause and parameter.
         jobs: parallel processes.
         sensed: what noise leaves, where that is known already.
+        explained: what causes put into every sample's residual of a trial, shape (Q, C); None for none. With causes the
+            shared unknowns stay where they are: those that fit best without them are others.
 
     Raises:
         InputError: a recording is too short.
@@ -99,7 +102,7 @@ def linearised_trials(
         if is_another(shared, likely):
             linear = _linearised(run, signals, likely, bases, arms, reductions, full=True)
             sensed = sensed_in(linear, noise, tolerances, jobs)
-    for _ in range(2):
+    for _ in range(0 if explained else 2):
         shared, bases = gauss_newton(linear, sensed.whitening)
         linear = tuple(
             replace(
@@ -107,8 +110,9 @@ def linearised_trials(
             )
             for t, b in zip(linear, bases, strict=True)
         )
-    pairs = zip(linear, sensed.signals, strict=True)
-    return held(with_adjusted_signals(*pair) for pair in pairs), sensed
+    there = [explained(k, t) if explained else 0.0 for k, t in enumerate(linear)]
+    parts = zip(linear, sensed.signals, there, strict=True)
+    return held(with_adjusted_signals(*part) for part in parts), sensed
 
 
 def _processes(jobs: int) -> Parallel:
