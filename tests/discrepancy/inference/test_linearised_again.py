@@ -92,5 +92,12 @@ def test_beside_a_cause_too_it_ends_where_steps_do_not_help():
 
 def test_what_is_straight_is_not_linearised_beside_causes():
     asked = []
-    search(Bending({2: 25.0}, before=(600.0, 0.5), beside=(50.0,), asked=asked, seed=1))
-    assert asked == [(), (), ()]
+    search(Bending({2: 25.0}, before=(600.0, 0.2, 0.5), beside=(50.0,), asked=asked, seed=1))
+    assert asked == [(), (), ()]  # nor where what it misses is less than noise
+
+
+def test_what_is_not_straight_when_steps_end_is_linearised_beside_a_cause():
+    asked = []
+    searched = search(Bending({2: 25.0}, before=(400.0, 90.0, 30.0), beside=(50.0,), asked=asked, seed=1))
+    assert asked == [(), (), (), (2,), (2,)]
+    assert searched.rig.seed == 5
