@@ -299,10 +299,10 @@ def test_gimbal_friction_is_found_with_coarse_encoders(seed, size, tmp_path):
 
 @pytest.mark.slow
 def test_a_strong_tether_is_found_beside_robots_that_nobody_calibrated(tmp_path):
-    """What it pulls was taken for spring scales at first, farther away with every linearisation: up to 2.4 for 1."""
+    """What it pulls is taken for scales of springs as long as it is unknown, the more so with every linearisation."""
     import mocobot
 
-    recordings, truth = generate(3009, "uncalibrated", [("tether", 9.69)], "b", noise="white")
+    recordings, truth = generate(3009, "uncalibrated", [("tether", 3.0)], "b", noise="white")
     files = [tmp_path / f"trial{k}.parquet" for k in range(len(recordings))]
     for recording, file in zip(recordings, files, strict=True):
         write_recording(recording, file)
@@ -310,5 +310,6 @@ def test_a_strong_tether_is_found_beside_robots_that_nobody_calibrated(tmp_path)
     (hidden,) = truth["effects"]
     assert (cause["cause"], cause["robot"]) == ("tether", hidden["answer"]["robot"])
     value, true = cause["parameters"]["stiffness_N_per_m"], hidden["parameters"]["stiffness_N_per_m"]
-    assert 40.0 < true == pytest.approx(value["value"], abs=4.0 * value["se"])
+    assert true > 10.0
+    assert true == pytest.approx(value["value"], abs=4.0 * value["se"])
     assert value["se"] < 0.05 * true
