@@ -167,6 +167,26 @@ def test_torques_are_moved_as_little_as_balances_the_wrenches(case):
     np.testing.assert_array_equal(adjusted.s[:, :, :18], linear.s[:, :, :18])
 
 
+def test_what_causes_explain_is_no_noise(case):
+    """Beside a wrench of 5 N that is known, signals are adjusted as if it were not there."""
+    rng = np.random.default_rng(4)
+    linear = measured(case, noise_of(0.0, 0.0, 0.02), rng)
+    rows = rng.standard_normal((1, 500, 18))
+    errors = np.zeros((1, 500, 3, 21))
+    errors[..., 18:] = 0.02 * rows[..., 9:].reshape(1, 500, 3, 3)
+    told = SignalNoise.of(rows, errors, 500)
+    pulled = np.zeros((len(linear.s), 18))
+    pulled[:, 12:15] = [3.0, 0.0, 4.0]
+    alone = with_adjusted_signals(linear, told)
+    beside = with_adjusted_signals(linear, told, -pulled)
+    without = with_adjusted_signals(linear, told, np.zeros_like(pulled))
+    np.testing.assert_array_equal(without.s, alone.s)
+    torques = (beside.s - alone.s)[:, :, 18:].reshape(len(pulled), 9)
+    # That it is explained counts as if so much less were there.
+    expected = -0.02 * pulled[:, 9:]
+    np.testing.assert_allclose(torques, expected, atol=0.15 * np.abs(expected).max())
+
+
 def test_holds_have_a_noise_of_their_own():
     """What residuals tell of signals in motion and in holds is that of their own draws; none where there are none."""
     rng = np.random.default_rng(3)
