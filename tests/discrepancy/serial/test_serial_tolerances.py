@@ -11,11 +11,13 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
+from discrepancy.inference.base import without_any
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.other_forms import beside_other_forms
 from discrepancy.inference.scan import scan
-from discrepancy.inference.search import _nothing, search
+from discrepancy.inference.search import search
 from discrepancy.least_squares.problem import Problem
+from discrepancy.rules import PRIOR_ODDS
 from discrepancy.rules import serial as rules
 from discrepancy.serial.causes import CAUSES
 from discrepancy.serial.causes.friction import bent
@@ -99,7 +101,7 @@ def test_what_is_left_out_keeps_its_tolerance(tmp_path: Path) -> None:
     friction = [c for c in rig.candidates() if c.cause == "friction"]
     assert [c.hidden for c in friction] == [True] * 4
     assert friction[0].parameters[0].tolerance == pytest.approx(0.15 * rules.JOINT_SHARE)
-    nothing = _nothing(rig, lambda what: None)
+    nothing = without_any(rig, PRIOR_ODDS, lambda what: None)
     assert "friction" not in {item.candidate.cause for item in scan(nothing.fit)}
     assert {item.candidate.cause for item in scan(nothing.fit)} >= {"stribeck", "joint_zero"}
 
