@@ -78,23 +78,16 @@ def with_adjusted_signals(
 
 
 def noise_of(
-    signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear, noise: SignalNoise,
-    explained: Array | float = 0.0,
-) -> Signals:  # fmt: skip
-    """What residuals tell of the noise in signals without any error, angles and torques of shape (Q, N, 3).
-
-    Arguments as of ``with_adjusted_signals``.
-    """
+    signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear, noise: SignalNoise
+) -> Signals:
+    """What residuals tell of the noise in signals without any error, angles and torques of shape (Q, N, 3)."""
     data = grasp_data(filtered(signals), linear.arms, signals.rate_hz)
-    each = _noise_in(data, shared, bases, linear.reduction, noise, explained)
+    each = _noise_in(data, shared, bases, linear.reduction, noise)
     phi, theta, tau = (each[..., kind] for kind in (PHI, THETA, TAU))
     return Signals(signals.time, phi, theta, tau, signals.rate_hz)
 
 
-def as_loud(
-    signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear, noise: SignalNoise,
-    explained: Array | float = 0.0,
-) -> Array:  # fmt: skip
+def as_loud(signals: Signals, shared: Shared, bases: Bases, linear: TrialLinear, noise: SignalNoise) -> Array:
     """What has to be added to a residual so that its noise is as loud as where the trial is linear, rows (n, C).
 
     Noise of accelerations is in the residual as often as there is mass, and that of a spring's reading at the lever of
@@ -102,7 +95,7 @@ def as_loud(
     """
     s = filtered(signals)
     data = grasp_data(s, linear.arms, signals.rate_hz)
-    each = _noise_in(data, shared, bases, linear.reduction, noise, explained)
+    each = _noise_in(data, shared, bases, linear.reduction, noise)
     quiet = grasp_data(s - each, linear.arms, signals.rate_hz)
     here = _residual(data, shared, bases) - _residual(quiet, shared, bases)
     there = sum(linear.J(robot, slice(None), each[:, robot]) for robot in range(linear.robots))
@@ -120,7 +113,7 @@ def _noise_in(
     bases: Bases,
     reduction: Reduction,
     noise: SignalNoise,
-    explained: Array | float,
+    explained: Array | float = 0.0,
 ) -> Array:
     """Of every sample's signals, shape (Q, N, 21)."""
     residual = _residual(data, shared, bases) - explained

@@ -42,17 +42,17 @@ class Elsewhere:
 def found_at(
     linear: Sequence[TrialLinear],
     whitening: Sequence[Whitening],
-    nothing: Hypothesis,
+    found: Hypothesis,
     origin: ArmUnit | None,
 ) -> Elsewhere:
-    """Where a fit with no cause in it finds the robots.
+    """Where a fit finds the robots, with the causes that are in it or without any.
 
     Args:
         linear, whitening: of every trial.
-        nothing: the fit; its values are counted from where the robots were believed to be.
+        found: the fit; its values are counted from where the robots were believed to be.
         origin: how far from there the trials are linear.
     """
-    problem, fit, own = nothing.problem, nothing.fit, linear[0].by_bases.shape[2]
+    problem, fit, own = found.problem, found.fit, linear[0].by_bases.shape[2]
     at = linear[0].arms.x if isinstance(linear[0].arms, ArmUnit) else np.zeros((linear[0].robots, COUNT))
     step, moved = np.zeros_like(at), []
     for index, candidate in enumerate(problem.candidates):
@@ -63,7 +63,7 @@ def found_at(
     units, shared = ArmUnit(linear[0].design, at + step), linear[0].shared.moved(-fit.shared)
     square = [
         np.mean(
-            (white(_exact(trial, units, shared, fit.local(t)[:own])) - _straight(nothing, t, own, moved)) ** 2
+            (white(_exact(trial, units, shared, fit.local(t)[:own])) - _straight(found, t, own, moved)) ** 2
         )
         for t, (trial, white) in enumerate(zip(linear, whitening, strict=True))
     ]
@@ -89,9 +89,9 @@ def _as_read(trial: TrialLinear) -> tuple[Array, Array, Array]:
     return s.phi + arms.of("phi_zero"), s.theta + arms.of("theta_zero"), tau
 
 
-def _straight(nothing: Hypothesis, t: int, own: int, moved: Sequence[int]) -> Array:
+def _straight(found: Hypothesis, t: int, own: int, moved: Sequence[int]) -> Array:
     """What straight columns say of the same rows, shape (n, C)."""
-    problem, fit = nothing.problem, nothing.fit
+    problem, fit = found.problem, found.fit
     values = np.append(np.zeros(problem.width - 1), 1.0)
     values[: problem.shared] = -fit.shared
     for index in moved:
@@ -99,11 +99,11 @@ def _straight(nothing: Hypothesis, t: int, own: int, moved: Sequence[int]) -> Ar
     return problem.raw_times(t, values) - problem.local[t][..., :own] @ fit.local(t)[:own]
 
 
-def resting_of(nothing: Hypothesis) -> dict[str, float]:
+def resting_of(found: Hypothesis) -> dict[str, float]:
     """Spread over its tolerance, at least 1, of each kind that leaves something open: noise of that size."""
     sizes: dict[str, list[float]] = {kind: [] for kind in HEALTHY}
-    for index, candidate in enumerate(nothing.problem.candidates):
-        if candidate.cause in sizes and nothing.problem.has_tolerance(index):
-            sizes[candidate.cause].append(abs(float(nothing.fit.part(index)[0][0])))
+    for index, candidate in enumerate(found.problem.candidates):
+        if candidate.cause in sizes and found.problem.has_tolerance(index):
+            sizes[candidate.cause].append(abs(float(found.fit.part(index)[0][0])))
     # By the median, as one of them may be at fault; 0.67 is that of a normal one.
     return {kind: max(1.0, float(np.median(x)) / 0.6745) if x else 1.0 for kind, x in sizes.items()}

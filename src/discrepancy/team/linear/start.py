@@ -110,7 +110,9 @@ def linearised_trials(
             )
             for t, b in zip(linear, bases, strict=True)
         )
-    there = [explained(k, t) if explained else 0.0 for k, t in enumerate(linear)]
+    there = (
+        explained(k, t) if explained else 0.0 for k, t in enumerate(linear)
+    )  # one by one: they may be long
     parts = zip(linear, sensed.signals, there, strict=True)
     return held(with_adjusted_signals(*part) for part in parts), sensed
 
