@@ -68,56 +68,72 @@ def settled(
             if best.problem.candidates[index].transient:  # its interval was told beside what was known then
                 best = settled_shape(rig, best, index)
         for index in best.free:
-            less = best.without(index)
-            # Its own loss to forms of the others is judged here, but counted once: not theirs to its forms, too.
-            judged = beside_other_forms(rig, best, index, less)
-            without, gap = healthy(best, index, less, judged)
-            if gap < needed(without, judged):
-                best, changed = exact(rig, without, nothing), True
+            among, known = (reach, shapes) if index == last else (None, None)
+            other, told = _exchanged(rig, best, nothing, index, among, known)
+            rivals |= {index: told} if told else {}
+            if other is not None:
+                best, changed = other, True
                 break
-            # By straight columns it was possible.
-            impossible = near(rig, best) and not best.possible(rig, index)
-            candidate = best.problem.candidates[index]
-            # Its own shape may be another beside what was found since.
-            others = proposals(
-                rig, less, events=candidate.transient is None, known=candidate,
-                shapes=_but(shapes, candidate) if index == last else None,
-                among=reach if index == last else None,
-            )  # fmt: skip
-            rivals[index] = [
-                Rival(one.candidate, _gap(rig, best, index, less, judged, one))
-                for one in others.offers
-                if one.candidate.key != candidate.key
-            ]
-            rivals[index].append(Rival(None, gap))
-            if impossible and others.best is None:
-                best, changed = exact(rig, without, nothing), True
-                break
-            if others.best is not None and (
-                impossible or others.best.score > judged.score + rules.EXCHANGED_NATS
-            ):
-                other = exact(rig, others.best, nothing)
-                if impossible or _likelier(other, best):
-                    best, changed = other, True
-                    break
-                # Not likelier where it is exact; and none of the others was likelier than that one.
-                least = max(best.uncharged - other.uncharged, 0.0)
-                rivals[index] = [
-                    rival if rival.candidate is None else replace(rival, gap=max(rival.gap, least))
-                    for rival in rivals[index]
-                ]
-            elif others.other is not None and others.other.score > judged.score - rules.EXCHANGED_NATS:
-                # Equally likely by straight columns; exact ones may part them.
-                other = exact(rig, others.other, nothing)
-                if _likelier(other, best, rules.EXCHANGED_NATS):
-                    best, changed = other, True
-                    break
         if not changed:
             break
         last = None  # beside others by now
     for index in set(best.free) - set(rivals):  # exchanged in the last round
         rivals[index] = [Rival(None, best.score - best.without(index).score)]
     return best, rivals
+
+
+def _exchanged(
+    rig: Rig, best: Hypothesis, nothing: Hypothesis, index: int, among: Collection[Key] | None,
+    shapes: Mapping[Key, Candidate] | None,
+) -> tuple[Hypothesis | None, list[Rival]]:  # fmt: skip
+    """What is likelier with another in place of one of the causes, or nothing, if any; and what else could be there.
+
+    Of what goes for nothing no others are sought.
+
+    Args:
+        rig, best, nothing: as of ``settled``.
+        index: which of the causes.
+        among, shapes: as of ``proposals``.
+    """
+    less = best.without(index)
+    # Its own loss to forms of the others is judged here, but counted once: not theirs to its forms, too.
+    judged = beside_other_forms(rig, best, index, less)
+    without, gap = healthy(best, index, less, judged)
+    if gap < needed(without, judged):
+        return exact(rig, without, nothing), []
+    # By straight columns it was possible.
+    impossible = near(rig, best) and not best.possible(rig, index)
+    candidate = best.problem.candidates[index]
+    # Its own shape may be another beside what was found since.
+    others = proposals(
+        rig,
+        less,
+        events=candidate.transient is None,
+        known=candidate,
+        shapes=_but(shapes, candidate),
+        among=among,
+    )
+    rivals = [
+        Rival(one.candidate, _gap(rig, best, index, less, judged, one))
+        for one in others.offers
+        if one.candidate.key != candidate.key
+    ]
+    rivals.append(Rival(None, gap))
+    if impossible and others.best is None:
+        return exact(rig, without, nothing), rivals
+    if others.best is not None and (impossible or others.best.score > judged.score + rules.EXCHANGED_NATS):
+        other = exact(rig, others.best, nothing)
+        if impossible or _likelier(other, best):
+            return other, rivals
+        # Not likelier where it is exact; and none of the others was likelier than that one.
+        least = max(best.uncharged - other.uncharged, 0.0)
+        rivals = [r if r.candidate is None else replace(r, gap=max(r.gap, least)) for r in rivals]
+    elif others.other is not None and others.other.score > judged.score - rules.EXCHANGED_NATS:
+        # Equally likely by straight columns; exact ones may part them.
+        other = exact(rig, others.other, nothing)
+        if _likelier(other, best, rules.EXCHANGED_NATS):
+            return other, rivals
+    return None, rivals
 
 
 def _but(shapes: Mapping[Key, Candidate] | None, cause: Candidate) -> dict[Key, Candidate]:

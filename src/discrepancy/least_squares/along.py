@@ -74,8 +74,9 @@ class Along:
         if not len(self.edge):
             return opened, self.edge, grams
         shares = opened.shrink[:, None] * self.edge
-        taken = cells.spectrum(opened.basis.times(shares, self._first))
-        left = (self.columns(self._first) - taken).reshape(-1, shares.shape[1])
+        left = self.columns(self._first)
+        left -= cells.spectrum(opened.basis.times(shares, self._first))  # in place: they are many
+        left = left.reshape(-1, shares.shape[1])
         weights = opened.basis.weights @ shares
         # Elsewhere what is taken out is but the share of the trial's own unknowns, which are few.
         own = cells.spectrum(opened.basis.own)

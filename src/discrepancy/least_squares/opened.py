@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -40,23 +39,19 @@ class Opened:
         """Unknowns of a size.
 
         Args:
-            columns: n, C, k; possibly k = 0.
+            columns: n, C, k; possibly k = 0. Best as few as there can be (``Patches.fewer``).
             size: standard deviation of their values.
             own: orthonormal columns that the rows are without, shape (n, C, l).
             before: unknowns that the rows are transformed for already, in turn.
         """
-        # A search looks at the same columns again and again.
-        made = _MADE.setdefault(columns, {})
-        key = (id(own), *((id(one.basis), one.size) for one in before))
-        if key not in made:
-            if len(made) >= rules.OPEN_KEPT:
-                made.clear()
-            made[key] = _Made(cls._unit(columns.fewer(), own, before), own, tuple(before))
-        return made[key].opened.of_size(size)
+        made = _MADE.get(columns)  # a search looks at the same columns again and again
+        if made is None or not made.is_beside(own, before):
+            made = _MADE[columns] = _Made(cls._unit(columns, own, before), own, tuple(before))
+        return made.opened.of_size(size)
 
     @classmethod
     def _unit(cls, columns: Patches, own: Array, before: Sequence[Opened]) -> Opened:
-        """The same of unit size, with columns that all show."""
+        """The same of unit size."""
         left = Mixed.of(columns, own)
         squares = columns.cross(columns)
         shown = rules.PATCH_SHOWS**2 * np.max(np.diag(squares), initial=0.0)
@@ -99,15 +94,23 @@ class Opened:
 
 @dataclass(frozen=True, eq=False)
 class _Made:
-    """Unknowns, and beside what they were made: as long as these are kept, nothing else has their identity."""
+    """Unknowns, and beside what they were made."""
 
     opened: Opened
     own: Array
     before: tuple[Opened, ...]
 
+    def is_beside(self, own: Array, before: Sequence[Opened]) -> bool:
+        """Whether they were made beside the same, of the same sizes."""
+        same = [
+            one.basis is two.basis and one.size == two.size
+            for one, two in zip(self.before, before, strict=False)
+        ]
+        return self.own is own and len(self.before) == len(before) and all(same)
 
-_MADE: WeakKeyDictionary[Patches, dict[tuple[Any, ...], _Made]] = WeakKeyDictionary()
-"""What was made of columns that are in use, by what was there before."""
+
+_MADE: WeakKeyDictionary[Patches, _Made] = WeakKeyDictionary()
+"""What was made last of columns that are in use."""
 
 
 def through(opened: Sequence[Opened], x: Array) -> Array:

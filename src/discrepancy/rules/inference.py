@@ -132,8 +132,6 @@ SAME_TRACE = 1e-6
 OPEN_SHOWS = 1e-4
 """Of what a cause leaves open, trace over the largest from which it counts. Derived: the largest is some hundred times
 the noise, so that one dropped is a hundredth of it."""
-OPEN_KEPT = 4
-"""Of how many sets of what is there before it is known what such columns become beside them. Chosen: memory."""
 PATCH_COLUMNS = 48
 """Of what a cause leaves open that are kept together. Chosen: a few seconds of friction at rest; of fewer, calls cost
 more than numbers, of more, most numbers are nought."""

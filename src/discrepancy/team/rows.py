@@ -224,7 +224,7 @@ class TeamRows(Rig):
         if (key := ("open", *candidate.trace)) in self.kept:
             return self.kept[key]
         of, place = CAUSES[candidate.cause].unknowns, (*indices(candidate), candidate.shape)
-        own = [w.of_patches(of(t, *place)) for w, t in zip(self.whitening, self.linear, strict=True)]
+        own = [w.of_patches(of(t, *place)).fewer() for w, t in zip(self.whitening, self.linear, strict=True)]
         if not is_filed(self.linear[0]):  # of long recordings they would fill the memory
             self.kept[key] = own
         return own

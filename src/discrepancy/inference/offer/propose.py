@@ -46,7 +46,7 @@ class Proposed:
         offers: what is added, the likeliest first.
         other: the likeliest whose added cause is not the one that is known; None without one.
         open: the one that would be likeliest if its added cause were as far off as its kind scatters, of those that
-            leave something open; None without one.
+            leave something open; None without one, or where a cause is known.
         shapes: lasting causes whose shapes were sought to the end, in these.
     """
 
@@ -90,42 +90,71 @@ def proposals(
     ranked = [in_best_shape(rig, fit, item, loud) for item in scanned]
     ranked += events_of(rig, fit) if events else []
     ranked.sort(key=lambda item: -item.score)
-    best: Hypothesis | None = None  # each has its own columns: all together would be gigabytes
-    other: Hypothesis | None = None
-    open_: Hypothesis | None = None
-    most = -np.inf  # score of that, tolerated
-    offers: dict[tuple[object, ...], Offer] = {}
-    rough: list[tuple[Scanned, float]] = []  # what was not sharpened, and the score of the hypothesis with it
-    sought: dict[Key, Candidate] = {}
+    most = _Most(rig, base, known)  # each has its own columns: all together would be gigabytes
     offered = chain(
         _hypotheses(rig, base, ranked, shapes, nothing, left_out),
-        _sharper(rig, base, ranked, shapes, rough, offers),
+        _sharper(rig, base, ranked, shapes, most.rough, most.offers),
     )
     for item, new in offered:
-        bare = new
+        most.hold(item, new)
+        del new  # for the sake of memory
+    offers = sorted(most.offers.values(), key=lambda one: -one.score)
+    return Proposed(most.best, tuple(offers), most.other, most.open, most.sought)
+
+
+@dataclass(eq=False)
+class _Most:
+    """The likeliest of the hypotheses so far, as in ``Proposed``, and of all what is offered.
+
+    Attributes:
+        rig, base, known: as of ``proposals``.
+        most: score of the likeliest that leaves something open, tolerated.
+        offers: by what is added.
+        rough: what was not sharpened, and the score of the hypothesis with it.
+    """
+
+    rig: Rig
+    base: Hypothesis
+    known: Candidate | None
+    best: Hypothesis | None = None
+    other: Hypothesis | None = None
+    open: Hypothesis | None = None
+    most: float = -np.inf
+    offers: dict[tuple[object, ...], Offer] = field(default_factory=dict)
+    rough: list[tuple[Scanned, float]] = field(default_factory=list)
+    sought: dict[Key, Candidate] = field(default_factory=dict)
+
+    def hold(self, item: Scanned | None, bare: Hypothesis) -> None:
+        """Hold one more against the others; with its item where its shape has not been sharpened."""
+        rig, base, known = self.rig, self.base, self.known
         new = beside_other_forms(rig, bare, bare.free[-1], base)
         last = new.causes[-1]
         which = (last.key, last.transient)
-        if which in offers and offers[which].score >= new.score:
-            continue
-        if new.possible(rig, new.free[-1]) and not imitated(rig, base, new):
-            alike = new.score
-            if known is not None and not rig.charged_alike(last, known):
-                alike = beside_other_forms(rig, bare, bare.free[-1], base, known).score
-            offers[which] = Offer(last, new.score, alike)
-            if item is not None:
-                rough.append((item, new.score))
-            elif last.transient is None:
-                sought[last.key] = last
-            if best is None or new.score > best.score:
-                best = new
-            if last.key in new.problem.opened and last.key not in base.problem.opened:
-                tolerated = new.tolerating(new.free[-1])
-                if tolerated is not None and tolerated.score > most:
-                    open_, most = new, tolerated.score
-            if known is not None and last.key != known.key and (other is None or new.score > other.score):
-                other = new
-    return Proposed(best, tuple(sorted(offers.values(), key=lambda one: -one.score)), other, open_, sought)
+        if which in self.offers and self.offers[which].score >= new.score:
+            return
+        if not new.possible(rig, new.free[-1]) or imitated(rig, base, new):
+            return
+        alike = new.score
+        if known is not None and not rig.charged_alike(last, known):
+            alike = beside_other_forms(rig, bare, bare.free[-1], base, known).score
+        self.offers[which] = Offer(last, new.score, alike)
+        if item is not None:
+            self.rough.append((item, new.score))
+        elif last.transient is None:
+            self.sought[last.key] = last
+        if self.best is None or new.score > self.best.score:
+            self.best = new
+        if known is None:
+            self._hold_open(new)
+        elif last.key != known.key and (self.other is None or new.score > self.other.score):
+            self.other = new
+
+    def _hold_open(self, new: Hypothesis) -> None:
+        key = new.causes[-1].key
+        if key in new.problem.opened and key not in self.base.problem.opened:
+            tolerated = new.tolerating(new.free[-1])
+            if tolerated is not None and tolerated.score > self.most:
+                self.open, self.most = new, tolerated.score
 
 
 def _hypotheses(
