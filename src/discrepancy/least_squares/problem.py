@@ -127,9 +127,7 @@ class Problem:
     def _channels(self, trial: int, first: int) -> Array:
         """The same of all columns, of channels from one on, shape (n, C - first, columns)."""
         x, taken = self.columns[trial].channels(first), self._taken(trial)
-        if taken.each:
-            x -= taken.of(slice(None), first)  # in place: they are many
-        return x
+        return np.subtract(x, taken.of(slice(None), first), out=x) if taken.each else x
 
     def _taken(self, trial: int) -> Taken:
         """What lies along what causes leave open in a trial."""
