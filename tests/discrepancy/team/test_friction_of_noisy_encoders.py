@@ -6,7 +6,7 @@ from helpers.team_case import exact
 
 from discrepancy import rules
 from discrepancy.team.causes import CAUSES
-from discrepancy.team.causes.sliding import KEPT
+from discrepancy.team.causes.sliding import KEPT, _doubtful
 from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.signals import Signals
 from estimator.filtering import differentiate
@@ -88,3 +88,22 @@ def test_friction_that_is_kept_never_moves_without_motion() -> None:
     signals = Signals(case.signals.time, still, still, case.signals.tau, RATE_HZ)
     state, _ = CAUSES["gimbal_friction"]._sliding(signals, case.linear, 0, 0, {KEPT: 4e-3})
     np.testing.assert_array_equal(state, 0.0)
+
+
+def test_what_no_encoder_shows_of_a_turn_is_open() -> None:
+    """Friction that gives way by 10 urad is reversed later than one that is kept: by Prandtl's law, step by step."""
+    case, cause, shape = exact(), CAUSES["joint_friction"], {KEPT: 4e-3}
+    bent, rate = cause._sliding(case.signals, case.linear, 1, 2, shape)
+    late, state = np.empty_like(bent), bent[np.flatnonzero(bent)[0]]
+    for k, step in enumerate(np.diff(case.signals.phi[:, 1, 2], prepend=case.signals.phi[0, 1, 2])):
+        state = late[k] = min(max(state + cause.sign * step / 1e-5, -1.0), 1.0)
+    missed = late - bent
+    turns = np.flatnonzero(np.diff(bent[bent != 0.0]))
+    assert len(turns) > 3
+    assert np.abs(missed).max() > 0.5
+    left = case.linear.reduction(cause.direction(case.linear, 1, 2) * missed[:, None]).ravel()
+    open_ = cause.unknowns(case.linear, 1, 2, shape).dense().reshape(len(left), -1)
+    beside = left - open_ @ np.linalg.lstsq(open_, left, rcond=1e-9)[0]
+    assert np.linalg.norm(beside) < 0.1 * np.linalg.norm(left)
+    # Where it slides, it is known.
+    assert np.mean(_doubtful(bent, rate)) < 0.2

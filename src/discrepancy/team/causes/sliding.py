@@ -88,8 +88,8 @@ class Friction(Cause):
         """What it does while it holds: any torque that it takes, as it changes with the load.
 
         Where it gives way, how far it had before it slips for the first time; and as no bristles do so in proportion,
-        it may be another by a share of its limit until it slips. Where it is kept, whatever it is while the joint seems
-        to move the other way, and too slowly to be sure.
+        it may be another by a share of its limit until it slips. Where it is kept, whatever it is while the joint turns
+        round, or seems to move the other way, and too slowly to be sure.
         """
         bent, rate, *_ = (*self._sliding(trial.signals, trial, robot, joint, shape), None)
         state = np.abs(bent)
@@ -138,11 +138,19 @@ def _kept(rate: Array, slow: float) -> Array:
 
 
 def _doubtful(kept: Array, rate: Array) -> NDArray[np.bool_]:
-    """Where a joint may move against the direction that is kept, shape (Q,)."""
+    """Where a joint may move against the direction that is kept, or turns round, shape (Q,).
+
+    Dry friction is reversed only once a joint has moved by more than it gives way, be that less than encoders show: a
+    law that reverses it at once takes that for a late torque sensor.
+    """
     starts, fastest = _motions(rate)
     counts = np.diff([*starts, len(rate)])
     fast = np.concatenate([np.zeros(len(rate) - int(counts.sum())), np.repeat(fastest, counts)])
-    return (kept * rate < 0.0) & (fast >= rules.REST_RAD_PER_S)
+    slow = np.abs(rate) < rules.TURN_RAD_PER_S
+    stretch = np.cumsum(np.diff(slow, prepend=False))
+    turns = np.flatnonzero(np.diff(kept))
+    turning = slow & np.isin(stretch, stretch[[turns, turns + 1]])
+    return turning | ((kept * rate < 0.0) & (fast >= rules.REST_RAD_PER_S))
 
 
 def _motions(rate: Array) -> tuple[NDArray[np.intp], Array]:
