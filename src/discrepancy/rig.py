@@ -70,6 +70,7 @@ class Rig(ABC):
     reshaped: ClassVar[tuple[str, ...]] = ()  # the same, where what is healthy would have that shape, too
     coarse: ClassVar[tuple[str, ...]] = ()  # causes of which a scan has shapes that are far apart
     plain_first: ClassVar[tuple[str, ...]] = ()  # causes with more to them only where there is any
+    apart: ClassVar[tuple[str, ...]] = ()  # numbers of shapes that leave something else open than others do
     behind: ClassVar[tuple[str, ...]] = ()  # causes with a shape that shows only beside what they leave open
     curved: ClassVar[bool] = False  # whether exact residuals hold what is within its tolerance, too
     layered: ClassVar[bool] = False  # whether the shapes of causes show beside all others only

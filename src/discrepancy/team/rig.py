@@ -15,6 +15,7 @@ from discrepancy.laws.candidate import LawCandidate
 from discrepancy.team.candidates import in_shapes, inexact_numbers
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
+from discrepancy.team.causes.sliding import KEPT
 from discrepancy.team.closed_loop import (
     effect_of,
     impossible,
@@ -62,6 +63,7 @@ class TeamRig(LawfulRows):
     coarse = ("tether", "payload_tether")
     plain_first = ("slosh",)
     behind = ("grasp_play",)
+    apart = (KEPT,)
 
     def effect_parameters(
         self, candidate: Candidate, values: Array, covariance: Array

@@ -43,7 +43,19 @@ def sharpened(
     new = max((_in_shape(rig, base, start, item, shape, near) for shape in tried), key=lambda one: one.score)
     if new.causes[-1].transient:
         return _beyond_tolerance(base, new.problem, new)
-    return _opened(rig, base, new.problem, new)
+    new = _opened(rig, base, new.problem, new)
+    for shape in _apart(rig, new.causes[-1]) if near else ():
+        other = _in_shape(rig, base, start, item, shape, near)
+        other = _opened(rig, base, other.problem, other)
+        if other.score > new.score + rules.SHAPE_NATS:
+            new = other
+    return new
+
+
+def _apart(rig: Rig, candidate: Candidate) -> list[Candidate]:
+    """The candidate in shapes that leave something else open, beside which alone they can be held against its own."""
+    names = [name for name in rig.apart if name not in candidate.shape]
+    return [shape for shape in rig.refinements(candidate) if any(name in shape.shape for name in names)]
 
 
 def _with_kind_held(problem: Problem, item: Scanned) -> Problem | None:
