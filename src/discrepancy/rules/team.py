@@ -83,8 +83,8 @@ REST_RAD_PER_S, REST_NM_PER_S = 1e-3, 0.2
 TURN_RAD_PER_S = 1e-2
 """Below which friction that is kept may not be reversed yet when a joint turns round. Derived: from a turn at 0.5
 rad/s^2 until then it moves by 0.1 mrad, a step of 16 bits. Measured on four recordings (0.096 N m in a joint that gives
-way by 10 urad): chi2/n 1.72, 1.29, 2.55, 1.23 without, 1.13, 0.99, 1.29, 1.06 with 4e-3, 1.12, 0.98, 1.15, 1.05 with
-this; viscous friction is off by 7, 5, 14, 0.3 standard errors, by 1.2, 1.0, 2.2, 0.7, and by 0.3, 0.4, 0.7, 1.1."""
+way by 10 urad): chi2/n 1.72, 1.29, 2.55, 1.23 without, 1.13, 0.99, 1.29, 1.05 with 4e-3, 1.12, 0.98, 1.15, 1.05 with
+this; viscous friction is off by 6.9, 5.4, 14, 0.4 standard errors, by 1.1, 0.9, 2.2, 0.9, and by 0.3, 1.1, 0.7, 1.3."""
 QUIET_RAD_PER_S, QUIET_NM_PER_S, QUIET_HZ, NOISY_STEPS = 3e-4, 0.22, 6.0, 0.15
 """Noise of the rates that tell rest from sliding, up to which they are smoothed as usual; signals with more are
 smoothed more, down to that cut-off. Derived: a joint that turns round at 0.3 rad/s^2 is told to do so within 1 ms, of a
