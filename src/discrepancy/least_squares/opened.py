@@ -10,7 +10,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from discrepancy import rules
-from discrepancy.least_squares.patches import Mixed, Patches
+from discrepancy.least_squares.patches import Patches
+from discrepancy.least_squares.span import Span
 from estimator.arrays import Array
 
 
@@ -20,17 +21,19 @@ class Opened:
 
     Rows y = U u + noise of unit power have the covariance I + size^2 U U^T, and (I + size^2 U U^T)^(-1/2) y is white
     again. With U = Q diag(s) V^T that is y - Q diag(f) Q^T y, f = 1 - 1 / sqrt(1 + size^2 s^2). Q is dense, as the
-    trial's own unknowns are taken out of it; it is kept as what it is made of.
+    trial's own unknowns are taken out of it; it is kept as sums of what it is made of.
 
     Attributes:
         columns: of the unknowns, n, C, k.
-        basis: Q, of what others leave of these columns, r of them.
+        span: the trial's own unknowns, those of the causes before, and these, m columns.
+        basis: Q, of what others leave of these columns, as how much of the span's it is the sum of, shape (m, r).
         stretch: s, shape (r,).
         size: standard deviation of the unknowns.
     """
 
     columns: Patches
-    basis: Mixed
+    span: Span
+    basis: Array
     stretch: Array
     size: float
 
@@ -52,25 +55,36 @@ class Opened:
     @classmethod
     def _unit(cls, columns: Patches, own: Array, before: Sequence[Opened]) -> Opened:
         """The same of unit size."""
-        left = Mixed.of(columns, own)
-        squares = columns.cross(columns)
+        others = before[-1].span if before else Span(own)
+        span = others.beside(columns)
+        gram = span.gram
+        new = slice(len(gram) - columns.width, len(gram))
+        squares, left = gram[new, new], np.zeros((len(gram), columns.width))
         shown = rules.PATCH_SHOWS**2 * np.max(np.diag(squares), initial=0.0)
-        squares -= left.weights.T @ left.weights
+        left[new] = np.eye(columns.width)
+        left[span.dense] = -gram[span.dense, new]
+        squares = squares - left[span.dense].T @ left[span.dense]
         for one in before:
-            inside = one.basis.cross(left)
+            inside = one.basis.T @ (gram[: len(one.basis)] @ left)
             squares -= inside.T @ (inside * (1.0 - (1.0 - one.shrink) ** 2)[:, None])
-            left = left.less(one.basis.at(one.shrink[:, None] * inside))
+            left[: len(one.basis)] -= one.basis @ (one.shrink[:, None] * inside)
         # Of their products, as of all rows it takes many times as long; so small an s is still known to 1e-8 of the
         # largest.
         squares, V = np.linalg.eigh(squares)
         keep = squares > max(rules.OPEN_SHOWS**2 * squares.max(initial=0.0), shown)
         s = np.sqrt(squares[keep])
-        return cls(columns, left.at(V[:, keep] / s), s, 1.0)
+        # With a span of its own: products with these columns are kept only where others come beside them.
+        return cls(columns, others.beside(columns), left @ (V[:, keep] / s), s, 1.0)
 
     @cached_property
     def shrink(self) -> Array:
         """f, shape (r,)."""
         return 1.0 - (1.0 + (self.size * self.stretch) ** 2) ** -0.5
+
+    @cached_property
+    def inside(self) -> Array:
+        """Products of the basis with the span's columns, shape (r, m)."""
+        return self.basis.T @ self.span.gram
 
     @property
     def price(self) -> float:
@@ -81,15 +95,9 @@ class Opened:
         """The same unknowns of another size."""
         return replace(self, size=size)
 
-    def along(self, x: Array) -> Array:
-        """How much of columns lies along the unknowns, and is taken out, shape (n, C, l) -> (r, l)."""
-        return self.shrink[:, None] * self.basis.products(x)
-
     def __call__(self, x: Array) -> Array:
         """Rows that are white with these unknowns integrated out, shape (n, C, l) -> the same."""
-        if not len(self.stretch) or not x.size:
-            return x
-        return np.asarray(x - self.basis.times(self.along(x)))
+        return through((self,), x)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,11 +121,30 @@ _MADE: WeakKeyDictionary[Patches, _Made] = WeakKeyDictionary()
 """What was made last of columns that are in use."""
 
 
+def shares_of(opened: Sequence[Opened], products: Array) -> Array:
+    """How much of the span's columns lies along unknowns of others, and is taken out, for one cause after the other.
+
+    Args:
+        opened: of every cause, in turn.
+        products: of the last one's span with the others, shape (m, l).
+
+    Returns:
+        Shape (m, l).
+    """
+    out = np.zeros_like(products)
+    for one in opened:
+        m = len(one.basis)
+        along = one.basis.T @ products[:m] - one.inside @ out[:m]
+        out[:m] += one.basis @ (one.shrink[:, None] * along)
+    return out
+
+
 def through(opened: Sequence[Opened], x: Array) -> Array:
     """Rows with the unknowns of one cause after the other integrated out."""
-    for one in opened:
-        x = one(x)
-    return x
+    if not x.size or not any(len(one.stretch) for one in opened):
+        return x
+    span = opened[-1].span
+    return np.asarray(x - span.times(shares_of(opened, span.products(x))))
 
 
 def best_of(opened: Sequence[Opened], x: Array) -> tuple[Array, Array]:

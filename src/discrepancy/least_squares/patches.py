@@ -5,7 +5,7 @@ A trial has hundreds of them, each in some rows and some channels: dense, they w
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from discrepancy import rules
-from discrepancy.least_squares.gram import gram_of
 from estimator.arrays import Array
 
 
@@ -115,10 +114,14 @@ class Patches:
     def times(self, z: Array, first: int = 0) -> Array:
         """The columns, each times its numbers in z, of channels from one on, shape (k, l) -> (n, C - first, l)."""
         out = np.zeros((self.shape[0], self.shape[1] - first, z.shape[1]))
+        self.add_times(z, out, first)
+        return out
+
+    def add_times(self, z: Array, out: Array, first: int = 0) -> None:
+        """Add the same to rows, shape (n, C - first, l), in place."""
         for patch, span in zip(self.each, self.spans, strict=True):
             sums = (patch.flat @ z[span]).reshape(*patch.values.shape[:2], -1)
             out[patch.where, max(patch.first - first, 0) :] += sums[:, max(first - patch.first, 0) :]
-        return out
 
     def products(self, x: Array, first: int = 0) -> Array:
         """Products with other columns over rows and channels from one on, shape (n, C - first, l) -> (k, l)."""
@@ -174,75 +177,3 @@ def _joined(patches: Sequence[Patch]) -> Patch:
         values[np.searchsorted(rows, patch.rows), patch.first - first :, at:stop] = patch.values
         at = stop
     return Patch(rows, first, values)
-
-
-@dataclass(frozen=True, eq=False)
-class Mixed:
-    """Columns made of such ones and of orthonormal dense ones.
-
-    Attributes:
-        parts: patches, and how much of each of their columns is in each of these, shape (k, r).
-        own: orthonormal columns, shape (n, C, l).
-        weights: how much of each of those is in each of these, shape (l, r).
-    """
-
-    parts: tuple[tuple[Patches, Array], ...]
-    own: Array
-    weights: Array
-
-    @classmethod
-    def of(cls, patches: Patches, own: Array) -> Mixed:
-        """Patches without what orthonormal columns (n, C, l) can explain."""
-        weights = -patches.products(own).T
-        return cls(((patches, np.eye(patches.width)),), own, weights)
-
-    @property
-    def first(self) -> int:
-        """Channel below which there is nothing but the dense ones."""
-        return min((patches.first for patches, _ in self.parts), default=self.own.shape[1])
-
-    def at(self, turn: Array) -> Mixed:
-        """These columns times a matrix, shape (r, s)."""
-        return Mixed(tuple((p, w @ turn) for p, w in self.parts), self.own, self.weights @ turn)
-
-    def less(self, other: Mixed) -> Mixed:
-        """Without as many others of the same trial and dense columns."""
-        mine = dict(self._by_patches)
-        for key, (patches, w) in other._by_patches:
-            mine[key] = (patches, mine[key][1] - w if key in mine else -w)
-        return Mixed(tuple(mine.values()), self.own, self.weights - other.weights)
-
-    @property
-    def _by_patches(self) -> Iterator[tuple[int, tuple[Patches, Array]]]:
-        return ((id(patches), (patches, w)) for patches, w in self.parts)
-
-    def times(self, z: Array, first: int = 0) -> Array:
-        """The columns, each times its numbers in z, of channels from one on, shape (r, l) -> (n, C - first, l)."""
-        out = self.own[:, first:] @ (self.weights @ z)
-        for patches, w in self.parts:
-            out += patches.times(w @ z, first)
-        return out
-
-    def products(self, x: Array, first: int | None = None) -> Array:
-        """Products with other columns over rows and channels, shape (n, C, l) -> (r, l).
-
-        Args:
-            x: the others; of channels from ``first`` on only, where the dense columns can explain none of them.
-            first: at most that of the patches.
-        """
-        out = np.zeros((self.weights.shape[1], x.shape[2]))
-        if first is None:
-            out += self.weights.T @ gram_of(self.own, x)
-        for patches, w in self.parts:
-            out += w.T @ patches.products(x, first or 0)
-        return out
-
-    def cross(self, other: Mixed) -> Array:
-        """The same with columns that are mixed of the same dense ones, shape (r, s)."""
-        out = self.weights.T @ other.weights
-        for patches, w in self.parts:
-            own = patches.products(self.own)
-            out += w.T @ (own @ other.weights + sum(patches.cross(p) @ v for p, v in other.parts))
-        for patches, v in other.parts:
-            out += self.weights.T @ (patches.products(self.own).T @ v)
-        return out

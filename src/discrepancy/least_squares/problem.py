@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import cached_property
 from itertools import chain
 
 import numpy as np
@@ -47,7 +47,7 @@ class Problem:
         tolerant: which candidate columns have a tolerance and are no event, shape (all candidate columns,).
         spread: standard deviation of the candidates' parameters in units, shape (all candidate columns,).
         opened: what causes leave open in every trial, by cause.
-        shares: how much of every column lies along what they leave open, (r, columns) per trial, by cause.
+        taken: what lies along that of every trial's columns, and is taken out of them; empty where nothing is open.
         odds: of any cause being there before the data are seen, at all its places together.
         by_own: products of the columns with a trial's own unknowns over every cell, (K, columns, l), once asked for.
         again: what further columns were asked about, of every trial.
@@ -66,7 +66,7 @@ class Problem:
     tolerant: NDArray[np.bool_]
     spread: Array
     opened: Mapping[Key, tuple[Opened, ...]] = field(default_factory=dict)
-    shares: Mapping[Key, tuple[Array, ...]] = field(default_factory=dict)
+    taken: tuple[Taken, ...] = ()
     odds: float = rules.PRIOR_ODDS
     by_own: dict[int, Array] = field(default_factory=dict, repr=False)
     again: tuple[Again, ...] = field(default=(), repr=False)
@@ -122,27 +122,21 @@ class Problem:
     def spectra_of(self, trial: int, span: slice) -> Array:
         """Some columns without what the trial's own unknowns and those of causes can explain, in the transform."""
         x, taken = self.columns[trial].take(span), self._taken(trial)
-        return x - taken.of(span) if taken.each else x
+        return x - taken.of(span) if taken else x
 
-    def _channels(self, trial: int, first: int) -> Array:
-        """The same of all columns, of channels from one on, shape (n, C - first, columns)."""
-        x, taken = self.columns[trial].channels(first), self._taken(trial)
-        return np.subtract(x, taken.of(slice(None), first), out=x) if taken.each else x
-
-    def _taken(self, trial: int) -> Taken:
-        """What lies along what causes leave open in a trial."""
-        pairs = ((own[trial], self.shares[key][trial]) for key, own in self.opened.items())
-        return Taken(self.cells[trial], tuple((one, shares) for one, shares in pairs if len(shares)))
+    def _taken(self, trial: int) -> Taken | None:
+        """What lies along what causes leave open in a trial; None where that is nothing."""
+        return self.taken[trial] if self.taken and not self.taken[trial].is_nothing else None
 
     def products(self, trial: int, b: Array) -> Array:
         """Products of all such columns with others in the transform, (n, C, k) -> (columns, k)."""
         out, taken = self.columns[trial].products(b), self._taken(trial)
-        return out - taken.products(self.cells[trial].series(b)) if taken.each else out
+        return out - taken.products(self.cells[trial].series(b)) if taken else out
 
     def _grams(self, trial: int, b: Array) -> Array:
         """The same over every cell, shape (n, C, k) -> (K, columns, k)."""
         out, taken = self.columns[trial].grams(self.cells[trial], b), self._taken(trial)
-        return out - taken.grams(b) if taken.each else out
+        return out - taken.grams(b) if taken else out
 
     @property
     def samples(self) -> int:
@@ -224,24 +218,24 @@ class Problem:
         self, start: int, columns: Sequence[Array], candidates: tuple[Candidate, ...], room: int = 0
     ) -> Problem:
         """With other columns from ``start`` on, for which so many of them may be made first."""
-        made, grams = [], []
-        shares: dict[Key, list[Array]] = {key: [] for key in self.opened}
+        made, grams, taken, by_own = [], [], [], dict[int, Array]()
         for t, raw in enumerate(columns):
             stop = start if room else start + raw.shape[2]
             new = Columns.of(raw, self.explicable[t], self.cells[t])
             made.append(self.columns[t].replaced(start, stop, new))
             left = project(raw, self.explicable[t])
-            for key, own in self.opened.items():
-                along, old = own[t].along(left), self.shares[key][t]
-                left = left - own[t].basis.times(along)
-                shares[key].append(np.concatenate([old[:, :start], along, old[:, stop:]], axis=1))
+            if self.taken:
+                now, left = self.taken[t].replaced(start, stop, left)
+                taken.append(now)
             left = self.cells[t].spectrum(left)
             edge, inside = self._grams(t, left), self.cells[t].grams(left, left)
-            edge = np.concatenate([edge[:, :start], inside, edge[:, stop:]], axis=1)
-            grams.append(self.cell_grams[t].replaced(start, stop, edge))
+            grams.append(self.cell_grams[t].replaced(start, stop, _replaced(edge, start, stop, inside)))
+            if t in self.by_own:
+                beside = self.cells[t].grams(left, self.cells[t].spectrum(self.explicable[t]))
+                by_own[t] = _replaced(self.by_own[t], start, stop, beside)
         return replace(
-            self, candidates=candidates, columns=tuple(made), cell_grams=tuple(grams),
-            shares={key: tuple(each) for key, each in shares.items()}, by_own={},
+            self, candidates=candidates, columns=tuple(made), cell_grams=tuple(grams), taken=tuple(taken),
+            by_own=by_own,
         )  # fmt: skip
 
     def along(self, unknowns: Sequence[Patches]) -> tuple[Along, ...]:
@@ -249,21 +243,22 @@ class Problem:
         return tuple(self._along(t, u) for t, u in enumerate(unknowns))
 
     def _along(self, trial: int, unknowns: Patches) -> Along:
-        before = [each[trial] for each in self.opened.values()]
-        one = Opened.of(unknowns, 1.0, self.explicable[trial], before)
+        own, cells = self.explicable[trial], self.cells[trial]
+        taken = self.taken[trial] if self.taken else Taken.nothing(cells, own.shape[2], self.width)
         if trial not in self.by_own:
-            self.by_own[trial] = self._grams(trial, self.cells[trial].spectrum(self.explicable[trial]))
-        return Along.of(one, self.cells[trial], partial(self._channels, trial), self.by_own[trial])
+            self.by_own[trial] = self._grams(trial, cells.spectrum(own))
+        one = Opened.of(unknowns, 1.0, own, taken.each)
+        return Along.of(taken, one, self.columns[trial].channels, self.by_own[trial])
 
     def with_open(self, key: Key, along: Sequence[Along], size: float) -> Problem:
         """The problem with what a cause leaves open, whose values scatter by ``size``."""
         if key in self.opened or not any(len(one.opened.stretch) for one in along):
             return self
         pairs = zip(along, self.cell_grams, strict=True)
-        opened, shares, grams = zip(*(one.of_size(size, own) for one, own in pairs), strict=True)
+        opened, taken, grams, by_own = zip(*(one.of_size(size, own) for one, own in pairs), strict=True)
         return replace(
-            self, cell_grams=grams, opened={**self.opened, key: opened}, shares={**self.shares, key: shares},
-            by_own={},
+            self, cell_grams=grams, opened={**self.opened, key: opened}, taken=taken,
+            by_own=dict(enumerate(by_own)),
         )  # fmt: skip
 
     def with_unknowns(self, key: Key, unknowns: Sequence[Patches], size: float) -> Problem:
@@ -276,7 +271,7 @@ class Problem:
             return self
         pairs = zip(self.columns, self.cells, strict=True)
         grams = tuple(CellGrams.of_columns(*pair) for pair in pairs)
-        again = replace(self, cell_grams=grams, opened={}, shares={}, by_own={})
+        again = replace(self, cell_grams=grams, opened={}, taken=(), by_own={})
         for key, own in self.opened.items():
             if key in keep:
                 again = again.with_unknowns(key, [one.columns for one in own], own[0].size)
@@ -297,3 +292,8 @@ class Problem:
             tolerant=np.append(self.tolerant, candidate.tolerant).astype(bool),
             spread=np.append(self.spread, np.ones(count)),
         )
+
+
+def _replaced(old: Array, start: int, stop: int, new: Array) -> Array:
+    """Others in place of some of the second axis."""
+    return np.concatenate([old[:, :start], new, old[:, stop:]], axis=1)

@@ -186,6 +186,17 @@ def test_what_changes_later_is_transformed_too(rng, rows):
     )
 
 
+@pytest.mark.parametrize("first", [0, 2])
+def test_what_changes_between_two_is_transformed_by_both(rng, rows, first):
+    problem, U, V = Problem.of(rows, CANDIDATES), unknowns(rng, rows, 4, first), unknowns(rng, rows, 2, first)
+    columns, other = unknowns(rng, rows, 1), unknowns(rng, rows, 1)
+    V[2] = V[2][..., :0]  # nothing is open in the third trial
+    opened = problem.with_unknowns(ONE, patches(U), 3.0).with_columns(0, CANDIDATES[0], columns)
+    opened = opened.with_unknowns(TWO, patches(V), 0.5).extended(CANDIDATES[2], other)
+    anew = problem.with_columns(0, CANDIDATES[0], columns).extended(CANDIDATES[2], other)
+    same_problem(opened, anew.with_unknowns(ONE, patches(U), 3.0).with_unknowns(TWO, patches(V), 0.5))
+
+
 def test_nothing_stays_nothing() -> None:
     """A trial in which another cause leaves nothing open beside one that does."""
     opened = alone(np.random.default_rng(0).standard_normal((5, 2, 3)), 2.0)

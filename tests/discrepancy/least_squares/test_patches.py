@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from discrepancy.least_squares.gram import gram_of, orthonormal
-from discrepancy.least_squares.patches import Mixed, Patches
+from discrepancy.least_squares.gram import gram_of
+from discrepancy.least_squares.patches import Patches
 from discrepancy.least_squares.whitening import Whitening
 
 N, C, MOVING = 60, 5, 50
@@ -83,24 +83,3 @@ def test_whitened_as_whole_columns_are(rng, case):
     np.testing.assert_allclose(white.of_patches(patches).dense(), white(whole), atol=1e-12)
     together = white.of_patches(patches.together(4))
     np.testing.assert_allclose(together.dense(), white(whole), atol=1e-12)
-
-
-def test_mixed_with_dense_columns(rng, case):
-    whole, patches = case
-    own = orthonormal(rng.standard_normal((N, C, 3)))
-    left = whole - own @ gram_of(own, whole)
-    mixed, turn, x = Mixed.of(patches, own), rng.standard_normal((10, 6)), rng.standard_normal((N, C, 2))
-    np.testing.assert_allclose(mixed.times(np.eye(10)), left, atol=1e-12)
-    np.testing.assert_allclose(mixed.products(x), gram_of(left, x), atol=1e-12)
-    _, other = columns(rng, [(3, 33), (40, 60)], [3, 4])
-    first = Mixed.of(other, own).at(rng.standard_normal((4, 6)))
-    both = mixed.at(turn).less(first)
-    dense = left @ turn - first.times(np.eye(6))
-    np.testing.assert_allclose(both.times(np.eye(6), 2), dense[:, 2:], atol=1e-12)
-    np.testing.assert_allclose(both.cross(first), gram_of(dense, first.times(np.eye(6))), atol=1e-10)
-    np.testing.assert_allclose(both.cross(both), gram_of(dense, dense), atol=1e-10)
-    # Of what the dense columns can explain nothing of, channels with patches are enough.
-    apart = x - own @ gram_of(own, x)
-    np.testing.assert_allclose(
-        first.products(apart[:, 3:], 3), gram_of(first.times(np.eye(6)), apart), atol=1e-12
-    )
