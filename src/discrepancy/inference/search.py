@@ -106,8 +106,9 @@ def continued(
             best, all_exchanged = added, True
             break
         say(f"refit {added.causes[-1].label}")
-        little = added.score - best.score < rules.LITTLE_SHARE * nats_left(best)
-        added, last = exact(rig, added, nothing), added.causes[-1]
+        last, least = added.causes[-1], rules.LITTLE_SHARE * nats_left(best)
+        little, alone = added.score - best.score < least, added.score - best.score < needed(best, added)
+        added = exact(rig, added, nothing)
         if scattered := tolerated(best, added):
             if _form_of_a_fault(rig, best, last, scattered):
                 alike = {c.key for c in best.problem.candidates if c.cause == last.cause}
@@ -123,7 +124,7 @@ def continued(
                 break
             refused, but = refused + 1, but | {last.key}
             continue
-        refused, but = 0, set()
+        refused, but, before = 0, set(), best.score
         best, rivals, all_exchanged = found, beside, not scattered
         if first is not None:
             instead = first(Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free)))
@@ -135,6 +136,8 @@ def continued(
                 )
                 continue
         if scattered:
+            # One after the other, such would account for any misfit.
+            doubtful += alone and best.score - before < least
             continue
         newest = best.free[-1] if best.free else None
         likely = newest is None or _law_holds(rig, best, newest)

@@ -232,5 +232,8 @@ STRAIGHTER = 0.5
 cause a team 1 deg off, at which a spring of 42 N/m pulls, misses 54, 2.3, 0.28 and 0.011 in chi-square per n, one whose
 payload is held with play besides 0.41 and 0.39; each such step takes as long as a cause."""
 DOUBTFUL, LITTLE_SHARE = 2, 0.05
-"""Causes in a row that are less likely than not when they are added, and the share of what is left (in nats) that they
-explain at most, after which no more are looked for. Chosen: one may become likely beside the next."""
+"""Steps in a row that explain at most such a share of what is left (in nats), after which no more are looked for:
+causes that are less likely than not when they are added, and what is no more than healthy ones have where no cause
+would pay. Chosen: one may become likely beside the next. Measured: in a team ten times off of which a base gives way,
+and no cause is one that does, eight springs and joints one after the other account for 388 to 13 nats of 8000, each
+more costly than the one before."""

@@ -95,3 +95,17 @@ def test_causes_are_exchanged_once_where_kinds_were_found_to_scatter(monkeypatch
     assert {c.cause for c in found.best.causes} == {"cause 2", "cause 5"}
     assert asked == [2]
     assert all(found.rivals)
+
+
+@pytest.mark.parametrize(("needed", "left", "found"), [(1e9, 1e9, 2), (1e9, 1.0, 4), (0.0, 1e9, 4)])
+def test_no_more_are_looked_for_where_scatters_account_for_little_of_what_is_left(
+    monkeypatch, needed, left, found
+):
+    """Of what nobody lists, a little looks like the scatter of one place after the other.
+
+    Not so where one accounts for much, or would pay as a fault.
+    """
+    monkeypatch.setattr(module, "tolerated", lambda base, added: added)
+    monkeypatch.setattr(module, "needed", lambda base, more: needed)
+    monkeypatch.setattr(module, "nats_left", lambda best: left)
+    assert len(search(FakeRig({1: 60.0, 2: 55.0, 4: 50.0, 5: 45.0})).best.free) == found
