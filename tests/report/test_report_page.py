@@ -534,3 +534,5 @@ def test_places_of_a_kind_that_scatters_are_told(tmp_path: Path) -> None:
         "Zero of a gimbal axis: farthest off are robot 2, joint 3 (−9.1 mrad), robot 1, joint 1 (7.2 mrad)"
         in page
     )
+    assert "What it is worth to know the robots" in page
+    assert "The payload's estimate before and after" in page

@@ -85,13 +85,13 @@ class Taken:
         """
         beside = self.span.products(new)
         shares = shares_of(self.each, beside)
-        kept = [_replaced(old, start, stop, beside) for old in self.kept]
-        taken = Taken(self.cells, self.each, _replaced(self.shares, start, stop, shares), kept)
+        kept = [spliced(old, start, stop, beside) for old in self.kept]
+        taken = Taken(self.cells, self.each, spliced(self.shares, start, stop, shares), kept)
         return taken, new - self.span.times(shares)
 
 
-def _replaced(old: Array, start: int, stop: int, new: Array) -> Array:
-    """Others in place of some columns."""
+def spliced(old: Array, start: int, stop: int, new: Array) -> Array:
+    """With others in place of some columns, those of the second axis."""
     return np.concatenate([old[:, :start], new, old[:, stop:]], axis=1)
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
-from discrepancy.least_squares.along import Along, Taken
+from discrepancy.least_squares.along import Along, Taken, spliced
 from discrepancy.least_squares.asked import Again
 from discrepancy.least_squares.cell_grams import CellGrams
 from discrepancy.least_squares.cells import Cells
@@ -229,10 +229,10 @@ class Problem:
                 taken.append(now)
             left = self.cells[t].spectrum(left)
             edge, inside = self._grams(t, left), self.cells[t].grams(left, left)
-            grams.append(self.cell_grams[t].replaced(start, stop, _replaced(edge, start, stop, inside)))
+            grams.append(self.cell_grams[t].replaced(start, stop, spliced(edge, start, stop, inside)))
             if t in self.by_own:
                 beside = self.cells[t].grams(left, self.cells[t].spectrum(self.explicable[t]))
-                by_own[t] = _replaced(self.by_own[t], start, stop, beside)
+                by_own[t] = spliced(self.by_own[t], start, stop, beside)
         return replace(
             self, candidates=candidates, columns=tuple(made), cell_grams=tuple(grams), taken=tuple(taken),
             by_own=by_own,
@@ -292,8 +292,3 @@ class Problem:
             tolerant=np.append(self.tolerant, candidate.tolerant).astype(bool),
             spread=np.append(self.spread, np.ones(count)),
         )
-
-
-def _replaced(old: Array, start: int, stop: int, new: Array) -> Array:
-    """Others in place of some of the second axis."""
-    return np.concatenate([old[:, :start], new, old[:, stop:]], axis=1)

@@ -23,14 +23,18 @@ def gain_lines(values: Values) -> list[str]:
     gain = values["gain"]
     if gain is None:
         return []
-    named = bool(values["causes"])
-    lines = list(_closed_loop(gain, named=named))
+    lines, known = list(_closed_loop(gain, named=bool(values["causes"]))), something_is_off(values)
     if "errors" in gain:
         lines += ["", "[[Error of the payload's estimate (the truth is known)]]"]
-        lines += _table(gain["errors"], ERRORS, named=named)
-    if "estimates" in gain and named:
+        lines += _table(gain["errors"], ERRORS, named=known)
+    if "estimates" in gain and known:
         lines += ["", "[[Payload's estimate]]", *_table(*_rows(gain["estimates"]), named=True)]
     return lines
+
+
+def something_is_off(values: Values) -> bool:
+    """Whether the payload's estimate with what is off is of interest: a cause is named, or a kind scatters."""
+    return bool(values["causes"] or values["scatter"])
 
 
 def _closed_loop(gain: Values, *, named: bool) -> Iterable[str]:

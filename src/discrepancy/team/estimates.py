@@ -1,4 +1,4 @@
-"""What a diagnosis does to the payload's estimate: without and with the causes, and errors where truth is known."""
+"""What a diagnosis does to the payload's estimate: without and with what is off, and errors where truth is known."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -17,21 +17,18 @@ Estimate = dict[str, Any]
 
 
 def estimates(rig: TeamRig, explanation: Explanation) -> dict[str, Estimate]:
-    """Payload estimates of the same least squares ``before`` (nothing is off) and ``after`` (the causes are in it).
+    """Payload estimates ``before`` and ``after`` the robots and causes are known.
+
+    Before, by least squares in which nothing is off. After, the most probable: the causes are in it, and all else is as
+    far off as the data say of robots that scatter as these do, in noise as it was found.
 
     Returns:
         Two dictionaries ``mass_kg``, ``p_1c_m`` [3], ``principal_inertia_kgm2`` [3] ascending, and ``grasps``: a list
         of ``p_1i_m`` [3] and ``R_1i_rotvec_deg`` [3].
     """
-    out = {}
-    named = [found.index for found in explanation.found]
-    for name, hypothesis, free in (
-        ("before", explanation.nothing, []),
-        ("after", explanation.hypothesis, named),
-    ):
-        fit = Fit.of(hypothesis.problem.as_whitened, free, background=False)
-        out[name] = to_dict(rig.linear[0].shared.moved(-fit.shared))
-    return out
+    designed = Fit.of(explanation.nothing.problem.as_whitened, background=False)
+    fits = {"before": designed, "after": explanation.hypothesis.fit}
+    return {name: to_dict(rig.linear[0].shared.moved(-fit.shared)) for name, fit in fits.items()}
 
 
 def to_dict(shared: Shared) -> Estimate:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.result.text_gain import ERRORS, foretold_torques, response_units
+from discrepancy.result.text_gain import ERRORS, foretold_torques, response_units, something_is_off
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.charts import chart, column_axis, dots, figure, literal, log_axis
 from mocobot_report.blocks.html import Node, el
@@ -29,30 +29,32 @@ def gain_section(book: Book, values: Values, names: Sequence[str]) -> Node | Non
     gain, named = values["gain"], bool(values["causes"])
     if gain is None:
         return None
-    shown = {"before": BEFORE, "after": AFTER} if named else {"before": ERROR}
+    shown, known = {"before": BEFORE, "after": AFTER}, something_is_off(values)
     blocks: list[Node] = []
     if gain["held_out"]["before"] is not None and gain["held_out"]["after"] is not None:
         # Later parts of a long recording are not simulated again.
         short = dict(zip(values["recordings"], names, strict=True))
-        blocks += _closed_loop(book, gain, [short[trial["name"]] for trial in gain["trials"]], shown)
+        trials = [short[trial["name"]] for trial in gain["trials"]]
+        blocks += _closed_loop(book, gain, trials, shown if named else {"before": ERROR})
     elif values["not_simulated"]:
         blocks.append(
             verdict("plain", "The closed loop was not simulated", tidy(f"{values['not_simulated']}."))
         )
     if "errors" in gain:
-        blocks.append(_errors(gain["errors"], shown))
-    if gain.get("estimates") and named:
+        blocks.append(_errors(gain["errors"], list(shown) if known else ["before"]))
+    if gain.get("estimates") and known:
         blocks.append(folded("The payload's estimate before and after", _estimates(gain["estimates"])))
     if not blocks:
         return None
-    return section(book, "What the causes are worth" if named else "Response to the commands", *blocks)
+    title = "What the causes are worth" if named else "Response to the commands"
+    return section(book, "What it is worth to know the robots" if known and not named else title, *blocks)
 
 
 def _heads(shown: Mapping[str, Key]) -> list[str]:
     return list(shown) if len(shown) > 1 else ["error"]
 
 
-def _errors(errors: Values, shown: Mapping[str, Key]) -> Node:
+def _errors(errors: Values, shown: Sequence[str]) -> Node:
     rows: list[list[Entry]] = [
         [
             name.split(" [")[0],
@@ -62,7 +64,8 @@ def _errors(errors: Values, shown: Mapping[str, Key]) -> Node:
         for key, name in ERRORS.items()
     ]
     note = "the truth lies beside the recordings; it was opened after the verdict"
-    return table("Error of the payload's estimate", ["error of", "unit", *_heads(shown)], rows, note=note)
+    heads = shown if len(shown) > 1 else ["error"]
+    return table("Error of the payload's estimate", ["error of", "unit", *heads], rows, note=note)
 
 
 def _closed_loop(book: Book, gain: Values, names: Sequence[str], shown: Mapping[str, Key]) -> list[Node]:

@@ -18,7 +18,7 @@ from discrepancy.result.json import plain
 from discrepancy.result.pictures.plots import file_names
 from discrepancy.result.pictures.plots_evidence import closed_loop_figure
 from discrepancy.result.text import WIDTH, format_diagnosis, probability_words
-from discrepancy.result.text_gain import response_units
+from discrepancy.result.text_gain import ERRORS, response_units
 from discrepancy.result.traces import Trace, group_units, groups
 from discrepancy.rig import Channel
 from discrepancy.team.causes import CAUSES
@@ -79,6 +79,19 @@ def test_miscalibrated_robots_are_to_be_calibrated() -> None:
     assert '"mocobot calibrate" does so for a team' in said
     assert "with nothing named and everything a little off, as far as its kind scatters" in said
     assert "What would have been noticed" in text
+
+
+@pytest.mark.parametrize(
+    ("verdict", "shown"), [("miscalibrated", True), ("explained", True), ("consistent", False)]
+)
+def test_the_payload_is_told_without_and_with_what_is_off(verdict, shown) -> None:
+    values = small_diagnosis(verdict)
+    better = values["gain"]["estimates"]["before"] | {"mass_kg": 10.5}
+    values["gain"]["estimates"] = {"before": better | {"mass_kg": 10.9}, "after": better}
+    values["gain"]["errors"] = {"before": dict.fromkeys(ERRORS, 4.0), "after": dict.fromkeys(ERRORS, 0.25)}
+    lines = [line.split() for line in format_diagnosis(values).splitlines()]
+    assert (["mass", "[kg]", "10.9", "10.5"] in lines) == shown
+    assert ["mass", "[%]", "4", *(["0.25"] if shown else [])] in lines
 
 
 def test_a_suspicion_is_told_with_its_probability() -> None:

@@ -1,0 +1,33 @@
+"""A payload is estimated better with what the robots are off by: against the payload that was simulated."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from discrepancy.team.diagnosis import diagnose_team
+from discrepancy.team.estimates import errors
+from hidden.schedule import Schedule
+from mocobot_sim.scene.scene import build_team
+from mocobot_sim.trial.truth import GroundTruth
+from sealed.sets import generate, plan
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("background", "share"),
+    [("x3", {"com_mm": 0.5, "grasp_position_mm": 0.5}), ("uncalibrated", {"principal_inertia_percent": 0.3})],
+)
+def test_after_a_calibration_the_payload_is_nearer_to_what_it_is(background, share):
+    """Where a robot is off in its gimbals' last axes its grasp turns with it, and no data tell."""
+    request = plan("clean", 61, background)
+    recordings, _ = generate(replace(request, schedule=Schedule(randoms=1, vias=12, periodic_s=20.0)))
+    found = diagnose_team(recordings, closed_loop=False)
+    assert found.diagnosis.verdict == "miscalibrated"
+    truth = GroundTruth.of(build_team(request.payload)).to_dict()
+    assert found.estimates is not None
+    before, after = (errors(found.estimates[name], truth) for name in ("before", "after"))
+    for key, most in share.items():
+        assert after[key] < most * before[key]
+    assert after["mass_percent"] < 1.0
+    assert np.all(np.diff(found.estimates["after"]["principal_inertia_kgm2"]) > 0.0)
