@@ -11,6 +11,7 @@ import numpy as np
 from mocobot.campaign.shares import interval, reliability
 from sealed.backgrounds import BACKGROUNDS
 from sealed.grounded import law_of_the_background
+from sealed.payload_table import payload_header, payload_rows
 from sealed.score import HEALTHY, Score, Scored, family_of, score
 
 SIZES = ((0.0, 3.0, "2 to 3"), (3.0, 6.0, "3 to 6"), (6.0, np.inf, "6 and more"))
@@ -29,7 +30,12 @@ def tables(results: Iterable[Mapping[str, Any]]) -> str:
         out += [_by_size(title, sets), _by_name(title, sets)]
     out.append(_several([one for kind in ("pairs", "triples", "pushes") for one in by_kind.get(kind, [])]))
     nobody = [one for one in scored if one.scores and not any(s.listed for s in one.scores)]
-    out += [_nobodys("Not in the catalogue", nobody), _laws(scored), _reliability(scored), _cost(scored)]
+    out += [_nobodys("Not in the catalogue", nobody), _laws(scored), _reliability(scored)]
+    payloads = payload_rows(one.result for one in scored)
+    out += [
+        _markdown("Errors of the payload's estimate, before and after", payload_header(), payloads),
+        _cost(scored),
+    ]
     if failed := [result for result in results if result["error"]]:
         lines = Counter(result["error"].splitlines()[-1] for result in failed)
         out.append(

@@ -9,12 +9,15 @@ import pytest
 from discrepancy.team.causes import CAUSES
 from hidden.schedule import Schedule
 from mocobot_sim.effects import EFFECTS
+from mocobot_sim.scene.scene import build_team
+from mocobot_sim.trial.truth import GroundTruth
 from sealed import campaign, measure, store
 from sealed.backgrounds import BACKGROUNDS, limit_over_nominal, tolerated
 from sealed.draw import CATALOGUE, NOWHERE, OTHER, family, largest, over_nominal
 from sealed.forms.masses import MassDrift, MassOfTrials
 from sealed.limits import LIMITS
 from sealed.measure import Bench, limits_of
+from sealed.payload_table import payload_rows
 from sealed.registry import FORMS, LISTED, UNLISTED
 from sealed.score import score
 from sealed.sets import KINDS, generate, plan
@@ -327,6 +330,21 @@ def test_tables_and_misses_of_a_small_campaign():
     assert f"Brier {brier:.4f}" in text
     assert "1 x ValueError: no" in text
     assert len(misses(results).splitlines()) == 3
+
+
+def test_payloads_are_held_against_the_ones_that_were_simulated():
+    """One estimate that is the truth, and one that is 2 % too heavy and 3 mm off."""
+    truth = GroundTruth.of(build_team("a")).to_dict()
+    x, *others = truth["p_1c_m"]
+    worse = truth | {"mass_kg": 1.02 * truth["mass_kg"], "p_1c_m": [x + 3e-3, *others]}
+    results = [_result([], [], "miscalibrated", "clean", names=[], background="x3") for _ in range(3)]
+    for result in results:
+        result["set"]["payload"] = "a"
+        result["verdict"] = result["verdict"] | {"gain": {"estimates": {"before": worse, "after": truth}}}
+    results[0]["verdict"]["gain"] = {"estimates": {"before": truth, "after": worse}}
+    results.append(_result([], [], "consistent", "clean", names=[]))  # without estimates
+    ((name, sets, mass, com, *_),) = payload_rows(results)
+    assert (name, sets, mass, com) == ("x3", "3", "2 -> 0, 2", "3 -> 0, 2")
 
 
 def test_interval_of_none_is_clopper_and_pearsons():
