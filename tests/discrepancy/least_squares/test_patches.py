@@ -6,6 +6,7 @@ import pytest
 from discrepancy.least_squares.gram import gram_of
 from discrepancy.least_squares.patches import Patches
 from discrepancy.least_squares.whitening import Whitening
+from patchwork import patchwork
 
 N, C, MOVING = 60, 5, 50
 
@@ -15,20 +16,9 @@ def rng():
     return np.random.default_rng(31)
 
 
-def columns(rng, spans, firsts):
-    """Whole columns, and patches of two each, in some rows from some channel on."""
-    whole, parts = [], []
-    for (start, stop), first in zip(spans, firsts, strict=True):
-        x = np.zeros((N, C, 2))
-        x[start:stop, first:] = rng.standard_normal((stop - start, C - first, 2))
-        whole.append(x)
-        parts.append(Patches.of(x))
-    return np.concatenate(whole, axis=2), Patches((N, C)).beside(parts)
-
-
 @pytest.fixture
 def case(rng):
-    return columns(rng, [(0, 9), (5, 20), (30, 55), (48, 60), (52, 60)], [2, 0, 3, 2, 4])
+    return patchwork(rng, N, C, [(0, 9), (5, 20), (30, 55), (48, 60), (52, 60)], [2, 0, 3, 2, 4])
 
 
 def test_sums_and_products(rng, case):
@@ -41,7 +31,7 @@ def test_sums_and_products(rng, case):
     np.testing.assert_allclose(patches.times(z, 3), (whole @ z)[:, 3:], atol=1e-12)
     np.testing.assert_allclose(patches.products(x), gram_of(whole, x), atol=1e-12)
     np.testing.assert_allclose(patches.cross(patches), gram_of(whole, whole), atol=1e-12)
-    other_whole, other = columns(rng, [(3, 33), (59, 60)], [1, 3])
+    other_whole, other = patchwork(rng, N, C, [(3, 33), (59, 60)], [1, 3])
     np.testing.assert_allclose(patches.cross(other), gram_of(whole, other_whole), atol=1e-12)
     np.testing.assert_array_equal(patches.together(4).dense(), whole)
     assert len(patches.together(4).each) == 3

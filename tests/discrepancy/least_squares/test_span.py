@@ -6,6 +6,7 @@ import pytest
 from discrepancy.least_squares.gram import gram_of, orthonormal
 from discrepancy.least_squares.patches import Patches
 from discrepancy.least_squares.span import Span
+from patchwork import patchwork
 
 N, C = 40, 5
 
@@ -15,21 +16,13 @@ def rng():
     return np.random.default_rng(31)
 
 
-def patches(rng, spans, firsts):
-    """Two columns in some rows from some channel on, each, whole and as patches."""
-    whole, parts = [], []
-    for (start, stop), first in zip(spans, firsts, strict=True):
-        x = np.zeros((N, C, 2))
-        x[start:stop, first:] = rng.standard_normal((stop - start, C - first, 2))
-        whole.append(x)
-        parts.append(Patches.of(x))
-    return np.concatenate(whole, axis=2), Patches((N, C)).beside(parts)
-
-
 @pytest.mark.parametrize("own", [0, 3])
 def test_sums_and_products_are_those_of_whole_columns(rng, own):
     dense = orthonormal(rng.standard_normal((N, C, own)))
-    cases = [patches(rng, [(0, 9), (5, 20)], [2, 3]), patches(rng, [(30, 38), (12, 33), (38, 40)], [3, 1, 4])]
+    cases = [
+        patchwork(rng, N, C, [(0, 9), (5, 20)], [2, 3]),
+        patchwork(rng, N, C, [(30, 38), (12, 33), (38, 40)], [3, 1, 4]),
+    ]
     span, whole = Span(dense), dense
     np.testing.assert_array_equal(span.gram, np.eye(own))
     assert span.first == C
@@ -47,7 +40,7 @@ def test_sums_and_products_are_those_of_whole_columns(rng, own):
 def test_nothing_more_is_the_same(rng):
     """Of a trial in which a cause leaves nothing open."""
     dense = orthonormal(rng.standard_normal((N, C, 3)))
-    _, part = patches(rng, [(4, 7)], [1])
+    _, part = patchwork(rng, N, C, [(4, 7)], [1])
     span = Span(dense).beside(Patches((N, C))).beside(part)
     np.testing.assert_array_equal(span.gram, Span(dense).beside(part).gram)
     assert span.first == 1
