@@ -136,8 +136,8 @@ def continued(
                 )
                 continue
         if scattered:
-            # One after the other, such would account for any misfit.
-            doubtful += alone and best.score - before < least
+            if alone:  # one after the other, such would account for any misfit
+                doubtful = doubtful + 1 if best.score - before < least else 0
             continue
         newest = best.free[-1] if best.free else None
         likely = newest is None or _law_holds(rig, best, newest)

@@ -109,3 +109,12 @@ def test_no_more_are_looked_for_where_scatters_account_for_little_of_what_is_lef
     monkeypatch.setattr(module, "needed", lambda base, more: needed)
     monkeypatch.setattr(module, "nats_left", lambda best: left)
     assert len(search(FakeRig({1: 60.0, 2: 55.0, 4: 50.0, 5: 45.0})).best.free) == found
+
+
+def test_a_scatter_that_accounts_for_much_lets_a_search_go_on(monkeypatch):
+    """As many as end it are in a row: after the second, that accounts for all that is left, it is as at first."""
+    left = iter([1e9, 1.0, 1e9, 1e9, 1e9])
+    monkeypatch.setattr(module, "tolerated", lambda base, added: added)
+    monkeypatch.setattr(module, "needed", lambda base, more: 1e9)
+    monkeypatch.setattr(module, "nats_left", lambda best: next(left))
+    assert len(search(FakeRig({k: 60.0 - 5.0 * k for k in range(1, 7)})).best.free) == 4
