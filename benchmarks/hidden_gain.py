@@ -3,7 +3,7 @@
     python benchmarks/hidden_gain.py --factor 4 --first 20 --jobs 2
 
 Errors are of the closed loop on trials that cause and payload were not fitted to, and of the payload's estimate against
-the simulated truth, without and with the named cause. Finished sets are kept in the output folder.
+the simulated truth, as if nothing were off and with what is. Finished sets are kept in the output folder.
 """
 
 from __future__ import annotations

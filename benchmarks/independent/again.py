@@ -12,9 +12,8 @@ from pathlib import Path
 from typing import Literal
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-os.environ.setdefault(
-    "OPENBLAS_NUM_THREADS", "1"
-)  # threads that share small matrices only wait for each other
+# As mocobot does, which is imported too late here: threads that share small matrices only wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import numpy as np
 import tyro

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from discrepancy.team.diagnosis import diagnose_team
@@ -18,7 +17,7 @@ from sealed.sets import generate, plan
     ("background", "share"),
     [("x3", {"com_mm": 0.5, "grasp_position_mm": 0.5}), ("uncalibrated", {"principal_inertia_percent": 0.3})],
 )
-def test_after_a_calibration_the_payload_is_nearer_to_what_it_is(background, share):
+def test_with_what_the_robots_are_off_by_the_payload_is_nearer_to_what_it_is(background, share):
     """Where a robot is off in its gimbals' last axes its grasp turns with it, and no data tell."""
     request = plan("clean", 61, background)
     recordings, _ = generate(replace(request, schedule=Schedule(randoms=1, vias=12, periodic_s=20.0)))
@@ -30,4 +29,3 @@ def test_after_a_calibration_the_payload_is_nearer_to_what_it_is(background, sha
     for key, most in share.items():
         assert after[key] < most * before[key]
     assert after["mass_percent"] < 1.0
-    assert np.all(np.diff(found.estimates["after"]["principal_inertia_kgm2"]) > 0.0)

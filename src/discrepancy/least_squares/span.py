@@ -40,9 +40,9 @@ class Span:
         if self.before is None:
             return np.eye(self.own.shape[2])
         width, k = self._edge.shape
-        out = np.empty((width, width))
-        out[: -k or width, : -k or width] = self.before.gram
-        out[:, width - k :], out[width - k :] = self._edge, self._edge.T
+        out, at = np.empty((width, width)), width - k
+        out[:at, :at] = self.before.gram
+        out[:, at:], out[at:] = self._edge, self._edge.T
         return out
 
     @cached_property

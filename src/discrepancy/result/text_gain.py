@@ -33,8 +33,8 @@ def gain_lines(values: Values) -> list[str]:
 
 
 def something_is_off(values: Values) -> bool:
-    """Whether the payload's estimate with what is off is of interest: a cause is named, or a kind scatters."""
-    return bool(values["causes"] or values["scatter"])
+    """Whether the payload is to be told with what is off: a cause is named, or the robots are found all the same."""
+    return bool(values["causes"]) or values["verdict"] == "miscalibrated"
 
 
 def _closed_loop(gain: Values, *, named: bool) -> Iterable[str]:

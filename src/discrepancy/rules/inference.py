@@ -235,5 +235,5 @@ DOUBTFUL, LITTLE_SHARE = 2, 0.05
 """Steps in a row that explain at most such a share of what is left (in nats), after which no more are looked for:
 causes that are less likely than not when they are added, and what is no more than healthy ones have where no cause
 would pay. Chosen: one may become likely beside the next. Measured: in a team ten times off of which a base gives way,
-and no cause is one that does, eight springs and joints one after the other account for 388 to 13 nats of 8000, each
-more costly than the one before."""
+and no cause is one that does, a grasp, five springs and three joints one after the other account for 388 to 13 nats
+of more than 8000, the last at ten times the cost of the first."""

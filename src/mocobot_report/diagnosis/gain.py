@@ -1,6 +1,6 @@
 """What the causes are worth: response to the recorded commands, and estimates of the payload, before and after."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -29,19 +29,19 @@ def gain_section(book: Book, values: Values, names: Sequence[str]) -> Node | Non
     gain, named = values["gain"], bool(values["causes"])
     if gain is None:
         return None
-    shown, known = {"before": BEFORE, "after": AFTER}, something_is_off(values)
+    both, known = {"before": BEFORE, "after": AFTER}, something_is_off(values)
     blocks: list[Node] = []
     if gain["held_out"]["before"] is not None and gain["held_out"]["after"] is not None:
         # Later parts of a long recording are not simulated again.
         short = dict(zip(values["recordings"], names, strict=True))
         trials = [short[trial["name"]] for trial in gain["trials"]]
-        blocks += _closed_loop(book, gain, trials, shown if named else {"before": ERROR})
+        blocks += _closed_loop(book, gain, trials, both if named else {"before": ERROR})
     elif values["not_simulated"]:
         blocks.append(
             verdict("plain", "The closed loop was not simulated", tidy(f"{values['not_simulated']}."))
         )
     if "errors" in gain:
-        blocks.append(_errors(gain["errors"], list(shown) if known else ["before"]))
+        blocks.append(_errors(gain["errors"], both if known else ["before"]))
     if gain.get("estimates") and known:
         blocks.append(folded("The payload's estimate before and after", _estimates(gain["estimates"])))
     if not blocks:
@@ -50,11 +50,11 @@ def gain_section(book: Book, values: Values, names: Sequence[str]) -> Node | Non
     return section(book, "What it is worth to know the robots" if known and not named else title, *blocks)
 
 
-def _heads(shown: Mapping[str, Key]) -> list[str]:
+def _heads(shown: Collection[str]) -> list[str]:
     return list(shown) if len(shown) > 1 else ["error"]
 
 
-def _errors(errors: Values, shown: Sequence[str]) -> Node:
+def _errors(errors: Values, shown: Collection[str]) -> Node:
     rows: list[list[Entry]] = [
         [
             name.split(" [")[0],
@@ -64,8 +64,7 @@ def _errors(errors: Values, shown: Sequence[str]) -> Node:
         for key, name in ERRORS.items()
     ]
     note = "the truth lies beside the recordings; it was opened after the verdict"
-    heads = shown if len(shown) > 1 else ["error"]
-    return table("Error of the payload's estimate", ["error of", "unit", *heads], rows, note=note)
+    return table("Error of the payload's estimate", ["error of", "unit", *_heads(shown)], rows, note=note)
 
 
 def _closed_loop(book: Book, gain: Values, names: Sequence[str], shown: Mapping[str, Key]) -> list[Node]:
