@@ -75,6 +75,8 @@ class Rig(ABC):
     curved: ClassVar[bool] = False  # whether exact residuals hold what is within its tolerance, too
     layered: ClassVar[bool] = False  # whether the shapes of causes show beside all others only
     missed: float = 0.0  # chi-square per n that columns missed here, from where they were made linear again
+    beside: bool = False  # whether that is where unknowns and machines are found beside causes
+    rewhitened: bool = False  # whether its noise is another than before that
     normal: ClassVar[bool] = False  # whether a simulation has what is normal as the other trials have it
 
     @property

@@ -14,11 +14,11 @@ from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
 
 
-def based(rig: Rig, odds: float, say: Callable[[str], object]) -> tuple[Rig, Hypothesis, bool]:
-    """The rig linear around where it is, that nothing is there, and whether columns are straight as far as that.
+def based(rig: Rig, odds: float, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
+    """The rig linear around where it is, and that nothing is there.
 
-    They are not where a strong fault drives machines that may be off by much: they go farther than columns reach, and
-    no step halves what these miss. All stays linear where it was before that.
+    A strong fault may drive machines farther than columns reach, and no step halves what these miss. Then all stays
+    linear where it was before that.
 
     Args:
         rig: the rig.
@@ -28,18 +28,13 @@ def based(rig: Rig, odds: float, say: Callable[[str], object]) -> tuple[Rig, Hyp
     nothing, missed = without_any(rig, odds, say), np.inf
     for _ in range(rules.BASE_ROUNDS - 1):
         moved = rig.relinearised(nothing)
-        if moved is None:
-            missed = 0.0
-            break
-        if moved.missed > max(rules.STRAIGHTER * missed, rules.BENT_CHI2_PER_N):
-            missed = np.inf
+        if moved is None or moved.missed > max(rules.STRAIGHTER * missed, rules.BENT_CHI2_PER_N):
             break
         say("linearise")
         rig, missed = moved, moved.missed
         del nothing, moved  # for the sake of memory
         nothing = without_any(rig, odds, say)
-    straight = missed <= rules.BENT_CHI2_PER_N
-    return rig, exact(rig, nothing, nothing) if rig.curved else nothing, straight
+    return rig, exact(rig, nothing, nothing) if rig.curved else nothing
 
 
 def without_any(rig: Rig, odds: float, say: Callable[[str], object]) -> Hypothesis:

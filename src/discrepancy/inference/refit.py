@@ -50,8 +50,9 @@ class _Point:
 def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
     """The hypothesis with exact residuals: Gauss-Newton on causes and unknowns until the values have settled.
 
-    Unknowns are moved as far as the causes move them. What they share with tolerances stays linear on both sides: moved
-    alone, without the tolerances that make up for it, they would be far from where the data are. What is within its
+    Unknowns are moved as far as the causes move them, from where they are without any, or from where all is linear if
+    that is beside causes. What they share with tolerances stays linear on both sides: moved alone, without the
+    tolerances that make up for it, they would be far from where the data are. What is within its
     tolerance is moved along where the rig says so (``Rig.curved``). Slopes are the model's as long as steps with them
     help, and then, where little more than noise is left, those of the machine as it is found (``Rig.slopes``).
 
@@ -61,7 +62,8 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         nothing: the hypothesis that nothing is.
     """
     own, trials = rig.local_unknowns, hypothesis.problem.trials
-    begin = [nothing.fit.local(t)[:own] for t in trials]
+    far = 0.0 if rig.beside else 1.0
+    begin = far * nothing.fit.shared, [far * nothing.fit.local(t)[:own] for t in trials]
     linear, last, share, at = hypothesis, np.inf, 1.0, None
     anew, rounds = False, rules.REFIT_ROUNDS
     for tried in range(rules.SHORT_ROUNDS):
@@ -74,8 +76,8 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
             i for i in range(len(fit.problem.candidates)) if i in fit.free or (rig.curved and fit.uses(i))
         ]
         to = _Point(
-            fit.shared - nothing.fit.shared,
-            [fit.local(t)[:own] - start for t, start in zip(trials, begin, strict=True)],
+            fit.shared - begin[0],
+            [fit.local(t)[:own] - start for t, start in zip(trials, begin[1], strict=True)],
             [fit.part(i)[0] for i in there],
         )
         here = (to.origin if at is None else at).towards(to, share)

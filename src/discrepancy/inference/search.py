@@ -9,7 +9,7 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
-from discrepancy.inference.base import based, without_any
+from discrepancy.inference.base import based
 from discrepancy.inference.exchange import Rival, settled, without_healthy
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.offer.propose import Proposed, proposals
@@ -17,6 +17,7 @@ from discrepancy.inference.pays import gained, needed, tolerated
 from discrepancy.inference.probability import probability
 from discrepancy.inference.refit import exact
 from discrepancy.inference.remainder import is_noise, nats_left, share_left, trace_nats, unlisted_nats
+from discrepancy.inference.straightened import Beside, straightened
 from discrepancy.least_squares.problem import Key
 from discrepancy.rig import Rig
 
@@ -56,29 +57,12 @@ def search(
             is taken; None where that is to stay.
     """
     say = progress or (lambda what: None)
-    rig, nothing, straight = based(rig, odds, say)
+    return continued(_begun(*based(rig, odds, say), say), most, say, first)
+
+
+def _begun(rig: Rig, nothing: Hypothesis, say: Callable[[str], object]) -> Searched:
     say("scan")
-    if not straight:
-        rig, nothing = _beside_a_cause(rig, nothing, say)
-    return continued(Searched(rig, nothing, nothing, ()), most, say, first)
-
-
-def _beside_a_cause(rig: Rig, nothing: Hypothesis, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
-    """The rig linear around machines as they are found beside the likeliest cause, and that nothing is there.
-
-    Where machines of which little is known are found without a strong cause is where none of them are.
-    """
-    odds, missed = nothing.problem.odds, np.inf
-    for _ in range(rules.BASE_ROUNDS):
-        found = continued(Searched(rig, nothing, nothing, ()), 1, say).best
-        moved = rig.relinearised(found) if found.free else None
-        if moved is None or moved.missed > rules.STRAIGHTER * missed:
-            break
-        say("linearise")
-        rig, missed = moved, moved.missed
-        del nothing, found, moved  # for the sake of memory
-        nothing = without_any(rig, odds, say)
-    return rig, nothing
+    return Searched(rig, nothing, nothing, ())
 
 
 def continued(
@@ -94,7 +78,8 @@ def continued(
         until: asked of every step before it is refined: whether it is the last, and stays as it is; None for no.
     """
     rig, nothing, best = searched.rig, searched.nothing, searched.best
-    rivals = dict(zip(best.free, map(list, searched.rivals), strict=True))
+    rivals: dict[int, list[Rival]] = dict(zip(best.free, map(list, searched.rivals), strict=True))
+    del searched  # for the sake of memory
     doubtful, refused, but, all_exchanged = 0, 0, set[Key](), True
     while len(best.free) < most and doubtful < rules.DOUBTFUL and refused < rules.REFUSED:
         proposed = proposals(rig, best, nothing=nothing, but=but)
@@ -117,6 +102,10 @@ def continued(
             found, beside = without_healthy(rig, scattered, nothing), rivals
             pays = found.score - best.score >= rules.SHAPE_NATS
         else:
+            if added.score - best.score >= needed(best, added):
+                told = [rivals.get(i, []) for i in best.free]
+                rig, nothing, best, added = _where_found(rig, nothing, best, added, say)
+                rivals = dict(zip(best.free, told, strict=True))
             found, beside = settled(rig, added, nothing, shapes, reach)
             pays = gained(best, found) >= needed(best, found)
         if not pays:  # where all is linear it did, which need not be so where it is exact
@@ -127,7 +116,7 @@ def continued(
         refused, but, before = 0, set(), best.score
         best, rivals, all_exchanged = found, beside, not scattered
         if first is not None:
-            instead = first(Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free)))
+            instead = first(Searched(rig, nothing, best, tuple(tuple(rivals.get(i, [])) for i in best.free)))
             first = None
             if instead is not None:
                 best, rivals = (
@@ -144,7 +133,24 @@ def continued(
         doubtful = doubtful + 1 if little and not likely else 0
     if not all_exchanged:
         best, rivals = settled(rig, best, nothing)
-    return Searched(rig, nothing, best, tuple(tuple(rivals.get(i, ())) for i in best.free))
+    return Searched(rig, nothing, best, tuple(tuple(rivals.get(i, [])) for i in best.free))
+
+
+def _where_found(
+    rig: Rig, nothing: Hypothesis, base: Hypothesis, added: Hypothesis, say: Callable[[str], object]
+) -> tuple[Rig, Hypothesis, Hypothesis, Hypothesis]:
+    """All linear where machines are found beside the causes, step by step as long as that helps.
+
+    Returns:
+        The rig, that nothing is there, what was there before the last cause, and what is with it.
+    """
+    here, missed = Beside.of(rig, nothing, added), np.inf
+    while (there := straightened(here, say)) is not None:
+        if there.rig.missed > rules.STRAIGHTER * missed:
+            break
+        here, missed = there, there.rig.missed
+    before = base if here.found is added else here.found.without(here.found.free[-1])
+    return here.rig, here.nothing, before, here.found
 
 
 def _added(base: Hypothesis, proposed: Proposed) -> Hypothesis | None:

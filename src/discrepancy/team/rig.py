@@ -175,18 +175,18 @@ class TeamRig(LawfulRows):
         """
         units, shared = found.there.units, found.there.shared
         known = replace(recording, metadata=replace(recording.metadata, units=units))
-        trial = trial_at(known, shared, self.noise, full=False)
+        trial = trial_at(known, shared, self.sensed.noise, full=False)
         own = replace(self, recordings=(known,), linear=(trial,), kept={})
         signals, others = own._without(0, found.causes)
         rows = exact_residual(signals, shared, trial.bases, units, trial.reduction)
         if others:
-            own = replace(own, linear=(trial_at(known, shared, self.noise, full=True),))
+            own = replace(own, linear=(trial_at(known, shared, self.sensed.noise, full=True),))
             rows -= sum(own._unwhitened(0, candidate) @ values for candidate, values in others)
         return trial.reduction, without_bases(trial, rows)
 
     def response_scale(self, trial: int) -> dict[str, tuple[Array, Array]]:
         """Standard deviation of the noise and of the motion, by channel, shape (N, 3) each."""
-        return scale_of_response(self.noise, self.linear[trial].signals)
+        return scale_of_response(self.sensed.noise, self.linear[trial].signals)
 
     def write_extended(self, explanation: Explanation, folder: Path) -> None:
         """Write the estimated team with the named causes in it; ``mocobot simulate --model`` takes it.

@@ -33,7 +33,6 @@ from discrepancy.team.imitators import wrong_torques
 from discrepancy.team.linear.adjust import as_loud, noise_of
 from discrepancy.team.linear.elsewhere import HEALTHY, found_at, resting_of
 from discrepancy.team.linear.filed import OneByOne, is_filed, rested
-from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.origin import beyond, origin_of
 from discrepancy.team.linear.rest import limits_of
 from discrepancy.team.linear.signals import Signals
@@ -60,7 +59,7 @@ class TeamRows(Rig):
         origin: how far from the robots as they were believed to be all is linear; None for not at all.
         resting: spread over its tolerance of each kind that leaves something open, such as friction at rest: noise.
         jobs: parallel processes.
-        missed: chi-square per n that columns missed here, from where all was linear before.
+        missed, beside, rewhitened: as of ``Rig``.
         kept: whitened columns that are asked for again and again.
     """
 
@@ -73,6 +72,8 @@ class TeamRows(Rig):
     resting: Mapping[str, float] = field(default_factory=dict)
     jobs: int = 1
     missed: float = 0.0
+    beside: bool = False
+    rewhitened: bool = False
     kept: dict[tuple[Any, ...], Any] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -111,11 +112,6 @@ class TeamRows(Rig):
         return cls(tuple(recordings), known, linear, tolerances, excluded, origin, resting, jobs)
 
     @property
-    def noise(self) -> Noise:
-        """Resolution of the sensors."""
-        return self.sensed.noise
-
-    @property
     def whitening(self) -> tuple[Whitening, ...]:
         """Of every trial."""
         return self.sensed.whitening
@@ -128,19 +124,22 @@ class TeamRows(Rig):
             return None
         resting = resting_of(found)
         same = all(0.5 < resting[kind] / self.resting[kind] < 2.0 for kind in resting)
-        straight = there.curvature < rules.STRAIGHT_CHI2_PER_N
+        near = rules.STRAIGHT_BESIDE_CHI2_PER_N if found.free else rules.STRAIGHT_CHI2_PER_N
+        straight = there.curvature < near
         if straight and same:
             return None
         sensed, limits = self.sensed, limits_of(self.tolerances, resting)
         if not same:  # what noise leaves where what rests scatters so; the sensors are the same
-            sensed = sensed_in(self.linear, self.noise, limits, self.jobs, sensed)
+            sensed = sensed_in(self.linear, self.sensed.noise, limits, self.jobs, sensed)
         resting = self.resting if same else resting
         if straight:  # robots and unknowns stay
-            return replace(self, sensed=sensed, resting=resting, kept={}, missed=there.curvature)
+            return replace(
+                self, sensed=sensed, resting=resting, kept={}, missed=there.curvature, rewhitened=True
+            )
         moved = [replace(r, metadata=replace(r.metadata, units=there.units)) for r in self.recordings]
         known = there.origin, resting, self.jobs, sensed, explained_by(found.fit.active, there.origin)
         rig = self._at(moved, there.shared, self.tolerances, self.excluded, *known)
-        return replace(rig, missed=there.curvature)
+        return replace(rig, missed=there.curvature, beside=bool(found.free), rewhitened=not same)
 
     @property
     def trials(self) -> Sequence[str]:

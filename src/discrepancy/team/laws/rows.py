@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Self
 
 from discrepancy.candidate import Candidate
+from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.laws.candidate import LawCandidate
 from discrepancy.laws.lawful import Lawful
 from discrepancy.team.laws.bench import TeamBench
@@ -26,6 +28,12 @@ class LawfulRows(Lawful, TeamRows):
     @cached_property
     def _bench(self) -> TeamBench:
         return TeamBench(self.linear, self.whitening)
+
+    def relinearised(self, found: Hypothesis) -> Self | None:
+        """As of a rig without laws; beside laws it stays, as these are of signals as they are where they were found."""
+        if any(isinstance(candidate, LawCandidate) for candidate in found.causes):
+            return None
+        return super().relinearised(found)
 
     def _unwhitened(self, trial: int, candidate: Candidate) -> Array:
         if isinstance(candidate, LawCandidate):

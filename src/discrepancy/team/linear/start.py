@@ -95,7 +95,8 @@ def linearised_trials(
             raise InputError(f"{recording.name}: too short to diagnose")
     bases = [start_bases(*poses(s.phi[s.keep], s.theta[s.keep], arms), shared) for s in signals]
     run = _processes(jobs)
-    linear = _linearised(run, signals, shared, bases, arms, reductions, full=sensed is None)
+    full = sensed is None or explained is not None  # causes may be errors of the signals
+    linear = _linearised(run, signals, shared, bases, arms, reductions, full=full)
     if sensed is None:
         sensed = sensed_in(linear, noise, tolerances, jobs)
         likely, _ = gauss_newton(linear, sensed.whitening, inertia_is_like_held(shared))
