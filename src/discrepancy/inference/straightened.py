@@ -57,11 +57,10 @@ def straightened(here: Beside, say: Callable[[str], object]) -> Beside | None:
     say("linearise")
     nothing = without_any(rig, here.nothing.problem.odds, say)
     found = _settled(rig, exact(rig, _carried(rig, nothing, here), nothing), nothing)
-    return (
-        None
-        if found.score < here.found.score - rules.EXCHANGED_NATS
-        else Beside(rig, nothing, found, here.opened)
-    )
+    # With another noise scores do not compare.
+    if not rig.rewhitened and found.score < here.found.score - rules.EXCHANGED_NATS:
+        return None
+    return Beside(rig, nothing, found, here.opened)
 
 
 def _carried(rig: Rig, nothing: Hypothesis, here: Beside) -> Hypothesis:

@@ -111,12 +111,13 @@ class Turned(FakeRig):
 
     there: int = 0
     is_moved: bool = False
+    is_louder: bool = False
 
     def relinearised(self, found):
         if self.is_moved or not found.free:
             return None
         other = Turned(self.present, seed=self.there, burst=self.burst, is_moved=True)
-        other.missed = 5.0
+        other.missed, other.rewhitened = 5.0, self.is_louder
         return other
 
     def unknowns(self, candidate):
@@ -150,7 +151,7 @@ def test_causes_are_carried_over_with_their_intervals_and_what_they_leave_open()
 
 
 def test_where_it_is_less_likely_it_is_not_linearised():
-    """Columns may flatter what is there, for something else that is missing."""
+    """Columns may flatter what is there, for something else that is missing. Where noise is another nothing tells."""
     for there in range(10):
         rig = Turned({2: 25.0}, seed=4, there=there)
         _, nothing = based(rig, rules.PRIOR_ODDS, str)
@@ -159,6 +160,8 @@ def test_where_it_is_less_likely_it_is_not_linearised():
         expected = Hypothesis.of(Problem.of(other.rows(CATALOGUE), CATALOGUE), (2,)).score
         if expected < found.score - 1.0:
             assert straightened(Beside.of(rig, nothing, found), str) is None
+            louder = replace(rig, is_louder=True)
+            assert straightened(Beside.of(louder, nothing, found), str) is not None
         elif expected > found.score + 1.0:
             assert straightened(Beside.of(rig, nothing, found), str).found.score == pytest.approx(
                 expected, abs=0.1
