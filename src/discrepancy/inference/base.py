@@ -14,8 +14,8 @@ from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
 
 
-def based(rig: Rig, odds: float, say: Callable[[str], object]) -> tuple[Rig, Hypothesis]:
-    """The rig linear around where it is, and that nothing is there.
+def based(rig: Rig, odds: float, say: Callable[[str], object]) -> tuple[Rig, Hypothesis, bool]:
+    """The rig linear around where it is, that nothing is there, and whether columns are straight as far as that.
 
     A strong fault may drive machines farther than columns reach, and no step halves what these miss. Then all stays
     linear where it was before that.
@@ -28,13 +28,18 @@ def based(rig: Rig, odds: float, say: Callable[[str], object]) -> tuple[Rig, Hyp
     nothing, missed = without_any(rig, odds, say), np.inf
     for _ in range(rules.BASE_ROUNDS - 1):
         moved = rig.relinearised(nothing)
-        if moved is None or moved.missed > max(rules.STRAIGHTER * missed, rules.BENT_CHI2_PER_N):
+        if moved is None:
+            missed = 0.0
+            break
+        if moved.missed > max(rules.STRAIGHTER * missed, rules.BENT_CHI2_PER_N):
+            missed = np.inf
             break
         say("linearise")
         rig, missed = moved, moved.missed
         del nothing, moved  # for the sake of memory
         nothing = without_any(rig, odds, say)
-    return rig, exact(rig, nothing, nothing) if rig.curved else nothing
+    straight = missed <= rules.BENT_CHI2_PER_N
+    return rig, exact(rig, nothing, nothing) if rig.curved else nothing, straight
 
 
 def without_any(rig: Rig, odds: float, say: Callable[[str], object]) -> Hypothesis:

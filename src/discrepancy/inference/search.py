@@ -9,7 +9,7 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
-from discrepancy.inference.base import based
+from discrepancy.inference.base import based, without_any
 from discrepancy.inference.exchange import Rival, settled, without_healthy
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.offer.propose import Proposed, proposals
@@ -60,8 +60,23 @@ def search(
     return continued(_begun(*based(rig, odds, say), say), most, say, first)
 
 
-def _begun(rig: Rig, nothing: Hypothesis, say: Callable[[str], object]) -> Searched:
+def _begun(rig: Rig, nothing: Hypothesis, straight: bool, say: Callable[[str], object]) -> Searched:
+    """Where a search begins: that nothing is there, linear around machines as they are found without any cause.
+
+    Where machines of which little is known are found without a strong cause is where none of them are. Then it is
+    linear around them as they are found beside the likeliest; which one that is may be another there.
+    """
     say("scan")
+    odds, missed = nothing.problem.odds, np.inf
+    for _ in range(0 if straight else rules.BASE_ROUNDS):
+        found = continued(Searched(rig, nothing, nothing, ()), 1, say, moves=False).best
+        moved = rig.relinearised(found) if found.free else None
+        if moved is None or moved.missed > rules.STRAIGHTER * missed:
+            break
+        say("linearise")
+        rig, missed = moved, moved.missed
+        del nothing, found, moved  # for the sake of memory
+        nothing = without_any(rig, odds, say)
     return Searched(rig, nothing, nothing, ())
 
 
@@ -69,6 +84,7 @@ def continued(
     searched: Searched, most: int, say: Callable[[str], object],
     first: Callable[[Searched], Searched | None] | None = None,
     until: Callable[[Hypothesis], bool] | None = None,
+    *, moves: bool = True,
 ) -> Searched:  # fmt: skip
     """Go on from what was found, until nothing pays.
 
@@ -76,6 +92,7 @@ def continued(
         searched: what was found.
         most, say, first: as of ``search``.
         until: asked of every step before it is refined: whether it is the last, and stays as it is; None for no.
+        moves: whether all is linear where machines are found beside each cause; else it stays.
     """
     rig, nothing, best = searched.rig, searched.nothing, searched.best
     rivals: dict[int, list[Rival]] = dict(zip(best.free, map(list, searched.rivals), strict=True))
@@ -102,7 +119,7 @@ def continued(
             found, beside = without_healthy(rig, scattered, nothing), rivals
             pays = found.score - best.score >= rules.SHAPE_NATS
         else:
-            if added.score - best.score >= needed(best, added):
+            if moves and added.score - best.score >= needed(best, added):
                 told = [rivals.get(i, []) for i in best.free]
                 rig, nothing, best, added = _where_found(rig, nothing, best, added, say)
                 rivals = dict(zip(best.free, told, strict=True))

@@ -85,14 +85,14 @@ def test_what_bends_is_linearised_beside_the_likeliest_cause():
     searched = search(
         Bending({2: 25.0}, before=(600.0, 800.0), beside=(50.0, 2.0, 0.02), asked=asked, seed=1)
     )
-    assert asked == [(), (), (2,), (2,), (2,), (2,)]
+    assert asked == [(), (), (2,), (2,), (2,), (2,), (2,)]  # once more where the search has begun
     assert searched.rig.moves == 4
     assert [cause.key for cause in searched.best.causes] == [CATALOGUE[2].key]
 
 
 def test_beside_a_cause_too_it_ends_where_steps_do_not_help():
-    searched = search(Bending({2: 25.0}, before=(600.0, 800.0), beside=(50.0, 40.0), asked=[], seed=1))
-    assert searched.rig.moves == 2
+    searched = search(Bending({2: 25.0}, before=(600.0, 800.0), beside=(50.0, 40.0, 30.0), asked=[], seed=1))
+    assert searched.rig.moves == 3  # 50 before the search and 40 in it
 
 
 def test_beside_every_cause_that_pays_it_is_asked_whether_columns_reach():
@@ -130,7 +130,7 @@ class Turned(FakeRig):
 
 def test_causes_are_carried_over_with_their_intervals_and_what_they_leave_open():
     rig = Turned({2: 25.0}, burst=(1, 6.0, 3), seed=4, there=6)
-    _, nothing = based(rig, rules.PRIOR_ODDS, str)
+    _, nothing, _ = based(rig, rules.PRIOR_ODDS, str)
     push, problem = rig.transients([])[0], nothing.problem
     looked_at = replace(push, transient=replace(push.transient, trial=2))  # and is not there
     problem = problem.extended(looked_at, rig.columns(looked_at))
@@ -154,7 +154,7 @@ def test_where_it_is_less_likely_it_is_not_linearised():
     """Columns may flatter what is there, for something else that is missing. Where noise is another nothing tells."""
     for there in range(10):
         rig = Turned({2: 25.0}, seed=4, there=there)
-        _, nothing = based(rig, rules.PRIOR_ODDS, str)
+        _, nothing, _ = based(rig, rules.PRIOR_ODDS, str)
         found = Hypothesis.of(nothing.problem, (2,))
         other = replace(rig, seed=there)
         expected = Hypothesis.of(Problem.of(other.rows(CATALOGUE), CATALOGUE), (2,)).score
