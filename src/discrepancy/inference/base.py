@@ -17,8 +17,8 @@ from discrepancy.rig import Rig
 def based(rig: Rig, odds: float, say: Callable[[str], object]) -> tuple[Rig, Hypothesis, bool]:
     """The rig linear around where it is, that nothing is there, and whether columns are straight as far as that.
 
-    A strong fault may drive machines farther than columns reach, and no step halves what these miss. Then all stays
-    linear where it was before that.
+    They are not where a strong fault drives machines that may be off by much: they go farther than columns reach, and
+    no step halves what these miss. All stays linear where it was before that.
 
     Args:
         rig: the rig.

@@ -162,8 +162,9 @@ def _where_found(
         The rig, that nothing is there, what was there before the last cause, and what is with it.
     """
     here, missed = Beside.of(rig, nothing, added), np.inf
-    while (there := straightened(here, say)) is not None:
-        if there.rig.missed > rules.STRAIGHTER * missed:
+    for _ in range(rules.BASE_ROUNDS):
+        there = straightened(here, say)
+        if there is None or there.rig.missed > rules.STRAIGHTER * missed:
             break
         here, missed = there, there.rig.missed
     before = base if here.found is added else here.found.without(here.found.free[-1])

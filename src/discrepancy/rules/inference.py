@@ -224,9 +224,9 @@ REFUSED = 2
 BASE_ROUNDS = 4
 """Linearisations at most. Measured: robots 1 deg off take two."""
 BENT_CHI2_PER_N = 1.0
-"""What columns may miss where a fit without causes finds machines, if a step does not lessen it. Derived: as much as
-noise. Measured: 0.47 and less from the second step on in ten sets of teams at three and ten times their tolerances and
-uncalibrated; 543 to 2266 in three that a strong tether drives away."""
+"""What columns may miss where a fit without causes finds machines. Derived: as much as noise. Measured: 0.47 and less
+from the second step on in ten sets of teams at three and ten times their tolerances and uncalibrated; 543 to 2266 in
+three that a strong tether drives away."""
 STRAIGHTER = 0.5
 """Share to which a step has to lessen what columns miss, or all stays linear where it is. Chosen. Measured: beside its
 cause a team 1 deg off, at which a spring of 42 N/m pulls, misses 54, 2.3, 0.28 and 0.011 in chi-square per n, one whose

@@ -35,8 +35,8 @@ SHORTEST_HOLD_S = 1.2
 STRAIGHT_CHI2_PER_N = 0.01
 """What curvature adds to chi-square, from which all is linearised again. Chosen: a hundredth of the noise."""
 STRAIGHT_BESIDE_CHI2_PER_N = 0.1
-"""The same beside causes, where each step takes as long as finding one. Measured: a tether's pull down, 0.67 N off by
-0.09 N where columns miss 34 in chi-square per n, is 0.33, 0.18 and 0.10 N off where they miss 2.0, 0.45 and 0.07."""
+"""The same beside causes, where a step takes 6 to 10 s. Chosen. Measured: a tether's pull down, known to 0.09 N, is
+0.67 N off where columns miss 34 in chi-square per n, and 0.34, 0.18 and 0.11 N where they miss 2.0, 0.45 and 0.07."""
 
 # Noise of the sensors.
 

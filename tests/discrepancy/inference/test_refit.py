@@ -76,6 +76,25 @@ def test_what_is_allowed_stays_allowed():
     assert CATALOGUE[2] in linear.causes
 
 
+@pytest.mark.parametrize("beside", [False, True])
+def test_unknowns_are_moved_from_where_they_are_without_causes_or_from_where_all_is_linear_beside_some(
+    beside, monkeypatch
+):
+    rig = FakeRig({2: 25.0})
+    rig.beside = beside
+    linear, nothing = hypotheses(rig, [2])
+    asked, residual = [], rig.residual
+    monkeypatch.setattr(rig, "residual", lambda *args: asked.append(args) or residual(*args), raising=True)
+    exact(rig, linear, nothing)
+    shared, local, _ = asked[0]
+    start = 0.0 * nothing.fit.shared if beside else nothing.fit.shared
+    np.testing.assert_allclose(-shared, linear.fit.shared - start, atol=1e-9)
+    assert np.abs(nothing.fit.shared).max() > 1.0  # and so it matters
+    for t, x in enumerate(local):
+        there = 0.0 * nothing.fit.local(t) if beside else nothing.fit.local(t)
+        np.testing.assert_allclose(-x, linear.fit.local(t) - there, atol=1e-9)
+
+
 class Told(Bent):
     """Cause 2 alone bends, and the rig says how."""
 

@@ -13,6 +13,7 @@ from discrepancy.laws.term import Term
 from discrepancy.laws.variable import TIME
 from discrepancy.least_squares.problem import Problem
 from discrepancy.team import rows
+from discrepancy.team.linear import start
 from discrepancy.team.linear.elsewhere import HEALTHY
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances
@@ -67,12 +68,24 @@ def test_beside_errors_of_signals_and_forces_alike_it_is_linear_elsewhere(team, 
     nothing = Hypothesis.of(Problem.of(rig.rows(candidates), candidates), ())
     index = next(i for i, c in enumerate(candidates) if c.cause == cause)
     found = Hypothesis.of(nothing.problem, (index,))
-    real = rows.found_at
+    real, adjusted, put = rows.found_at, start.with_adjusted_signals, []
     monkeypatch.setattr(rows, "found_at", lambda *args: replace(real(*args), curvature=2.0))
+
+    def noted(linear, noise, explained):
+        put.append(linear.reduction(explained))
+        return adjusted(linear, noise, explained)
+
+    monkeypatch.setattr(start, "with_adjusted_signals", noted)
     moved = rig.relinearised(found)
     assert moved is not None
     assert moved.missed == 2.0
     np.testing.assert_array_equal(moved.origin.x, real(rig.linear, rig.whitening, found, None).origin.x)
+    assert moved.beside
+    # Signals are adjusted to what it leaves.
+    ((candidate, values),) = found.fit.active
+    for trial, rows_of_it in enumerate(put):
+        expected = rig._unwhitened(trial, candidate) @ values
+        np.testing.assert_allclose(rows_of_it, expected, atol=0.05 * np.abs(expected).max(axis=0).max())
     there = Problem.of(moved.rows(candidates), candidates)
     value, se = (x.ravel() for x in found.fit.part(index))
     again = Hypothesis.of(there, (index,)).fit.part(index)
