@@ -46,7 +46,9 @@ class _Parts:
     Attributes:
         grams: upper triangles of the Gram matrices of every cell that has numbers, the residual last, shape (K, half)
             with half = m (m + 1) / 2 and m = used + 1.
-        upper: rows and columns of these, shape (half,) each.
+        upper: which of a whole matrix's numbers, one row after the other, these are, shape (half,).
+        at: which of these each of a whole matrix's numbers is, shape (m, m).
+        lower: which of the numbers of a matrix (used, used) are in its lower triangle.
         sizes: numbers in every cell that trials' own unknowns leave, shape (K,).
         group: of every used column: -1 for shared unknowns, else the number of its spread.
         least, most: spread that a group has at least and at most, shape (groups,).
@@ -57,7 +59,9 @@ class _Parts:
     """
 
     grams: Array
-    upper: tuple[Indices, Indices]
+    upper: Indices
+    at: Indices
+    lower: NDArray[np.bool_]
     sizes: Array
     group: Indices
     least: Array
@@ -158,16 +162,18 @@ def _parts(problem: Problem, free: Sequence[int]) -> tuple[list[Indices], _Parts
     used = np.flatnonzero(group > -2)
     both = np.append(used, count)
     sizes = [own[c.sizes > 0] for own, c in zip(problem.degrees, problem.cells, strict=True)]
-    upper = np.triu_indices(len(both))
-    at = both[upper[0]] * (count + 1) + both[upper[1]]
+    rows, columns = np.triu_indices(len(both))
+    whole = both[rows] * (count + 1) + both[columns]
+    at = np.empty((len(both), len(both)), dtype=np.intp)
+    at[rows, columns] = at[columns, rows] = np.arange(len(rows))
     pairs = zip(problem.cell_grams, problem.cells, strict=True)
     filled = (gram for own, c in pairs for gram in own.each(np.flatnonzero(c.sizes).tolist()))
-    grams = np.empty((sum(map(len, sizes)), len(at)))
+    grams = np.empty((sum(map(len, sizes)), len(rows)))
     for one, gram in zip(grams, filled, strict=True):
-        np.take(gram, at, out=one, mode="clip")
+        np.take(gram, whole, out=one, mode="clip")
     parts = _Parts(
-        grams, upper, np.concatenate(sizes), group[used], np.array(least), np.array(most),
-        np.array(several, dtype=bool), np.array(own, dtype=bool), groups, like,
+        grams, rows * len(both) + columns, at, np.tri(len(used), dtype=bool), np.concatenate(sizes), group[used],
+        np.array(least), np.array(most), np.array(several, dtype=bool), np.array(own, dtype=bool), groups, like,
     )  # fmt: skip
     return names, parts
 
@@ -189,9 +195,7 @@ def _like(
 def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Array, Level]:
     """Log evidence with its priors at given powers and spreads, the next ones, and the kinds' level."""
     count = len(parts.group) + 1
-    gram = np.zeros((count, count))
-    gram[parts.upper] = (1.0 / power) @ parts.grams
-    gram += np.triu(gram, 1).T
+    gram = ((1.0 / power) @ parts.grams).take(parts.at)
     H, b, c = gram[:-1, :-1], gram[:-1, -1], gram[-1, -1]
     shared = parts.group < 0
     with np.errstate(divide="ignore"):
@@ -202,7 +206,7 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
     solution = scale * cho_solve((factor, True), scale * b) if len(H) else b
     (potri,) = get_lapack_funcs(("potri",), (factor,))
     inverse = potri(factor, lower=1)[0] if len(H) else H
-    inverse = np.tril(inverse) + np.tril(inverse, -1).T
+    inverse = np.where(parts.lower, inverse, inverse.T)
     covariance = inverse * np.outer(scale, scale)
     log_det = 2.0 * float(np.sum(np.log(np.diag(factor)) - np.log(scale)))
     numbers = np.bincount(parts.group[~shared], minlength=len(spread)).astype(float)
@@ -222,7 +226,7 @@ def _step(parts: _Parts, power: Array, spread: Array) -> tuple[float, Array, Arr
     both = np.zeros((2, count, count))
     both[0], both[1, :-1, :-1] = np.outer(x, x), covariance
     both *= 2.0 - np.eye(count)  # what is below the diagonal counts, too
-    left, spent = (parts.grams @ one[parts.upper] for one in both)
+    left, spent = (parts.grams @ one.take(parts.upper) for one in both)
     spent = spent / power
     power_next = (left + rules.POWER_NUMBERS) / (np.maximum(parts.sizes - spent, 1.0) + rules.POWER_NUMBERS)
     # Next spreads: squares over the numbers that the data determine.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -34,6 +34,7 @@ class Signals:
     rate_hz: float
     sampling: tuple[Sampling, ...] | None = None
     smooth_hz: Array | None = None
+    _last: dict[tuple[str, int, int], Array] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(cls, recording: Recording) -> Signals:
@@ -52,7 +53,11 @@ class Signals:
         """A signal of one joint, filtered so that its rate tells rest from sliding, shape (Q,)."""
         usual, kind = rules.TEAM_SMOOTH_HZ, ("phi", "theta", "tau").index(moves)
         cutoff_hz = usual if self.smooth_hz is None else float(self.smooth_hz[kind, robot, joint])
-        return low_pass(getattr(self, moves)[:, robot, joint], self.rate_hz, cutoff_hz)
+        which = moves, robot, joint
+        if which not in self._last:  # shapes of one cause are asked for one after the other
+            self._last.clear()
+            self._last[which] = low_pass(getattr(self, moves)[:, robot, joint], self.rate_hz, cutoff_hz)
+        return self._last[which]
 
     @property
     def keep(self) -> slice:

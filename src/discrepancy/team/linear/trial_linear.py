@@ -96,7 +96,7 @@ class TrialLinear:
         """Number of residual channels, 6 N."""
         return 6 * self.robots
 
-    @property
+    @cached_property
     def adjusted(self) -> Signals:
         """The signals filtered, and at their adjusted values."""
         phi, theta, tau = (self.s[..., kind] for kind in (PHI, THETA, TAU))
