@@ -20,7 +20,7 @@ FREE = {
     "discrepancy.result.read": {"VERSION"},
     "discrepancy.result.pictures.residual_statistics": {"RUNNING_S", "BINS", "SEGMENT_S", "LEAST_ROWS"},
     "discrepancy.result.sensitivity": {"FINER", "LEARNT"},  # a grid
-    "discrepancy.result.text": {"SAID", "WIDTH"},
+    "discrepancy.result.text": {"NEAREST", "SAID", "WIDTH"},
     "discrepancy.result.text_rollouts": {"WIDTH"},
     "discrepancy.result.traces_file": {"VERSION"},
     "discrepancy.team.linear.by_unknowns": {"STEP"},  # of a difference

@@ -423,6 +423,25 @@ def test_a_number_of_a_form_that_a_cause_does_not_have_is_left_out(
         assert ("presliding" in Reader(write_report(folder).read_bytes()).rows()) == shown
 
 
+def test_what_fits_much_worse_is_folded_away(tmp_path: Path, no_pictures: pytest.MonkeyPatch) -> None:
+    folder = diagnosis_folder(tmp_path / "one")
+    values = json.loads((folder / "diagnosis.json").read_text())
+    cause = values["causes"][0]
+    rival = cause["alternatives"][0]
+    others = [{**rival, "name": f"rival {k}", "evidence_gap": 9.0 + k, "ambiguous": False} for k in range(7)]
+    likely = {**rival, "name": "a rare rival", "evidence_gap": 7.0, "ambiguous": False, "probability": 0.002}
+    cause["alternatives"] = [rival, *({**one, "probability": 1e-5} for one in others), likely]
+    (folder / "diagnosis.json").write_text(json.dumps(values))
+    page = write_report(folder).read_text(encoding="utf-8")
+    shown, folded = page.split("What fits worse still")
+    table = shown.split("What else it might be")[-1]
+    for name in ("Rival 0", "Rival 3", "A rare rival", "Spring stiffness of joint 1 of robot 2"):
+        assert name in table
+    assert "Rival 4" not in table
+    for k in range(7):
+        assert (f"Rival {k}" in folded) == (k >= 4)
+
+
 def test_terms_are_explained_where_they_stand(pages: dict[str, Reader]) -> None:
     for page in pages.values():
         entries = {a["id"] for tag, a in page.tags if tag == "dt" and "id" in a}

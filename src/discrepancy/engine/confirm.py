@@ -7,6 +7,7 @@ import numpy as np
 
 from discrepancy import rules
 from discrepancy.candidate import Candidate
+from discrepancy.digits import three_digits
 from discrepancy.engine.explanation import Explanation, Found, explain
 from discrepancy.engine.gain import Gain, is_worse, mean_chi2, responses
 from discrepancy.inference.exchange import Rival
@@ -96,7 +97,7 @@ def confirm(
         if value < best * (1.0 - rules.MARGIN_SHARE):
             notes.append(
                 f"The rows alone could not tell {swap.cause.candidate.label} from {swap.rival.label}; in closed loop "
-                f"the latter does better (chi2/n {value:.3g} against {best:.3g})."
+                f"the latter does better (chi2/n {three_digits(value)} against {three_digits(best)})."
             )
             best, winner, after = value, swap, response
     if winner is not None:
@@ -105,7 +106,7 @@ def confirm(
     contradicted = is_worse(best, none)
     if contradicted:
         loop = (
-            f"makes the response to the commands worse (chi2/n {none:.3g} to {best:.3g})"
+            f"makes the response to the commands worse (chi2/n {three_digits(none)} to {three_digits(best)})"
             if np.isfinite(best)
             else "cannot be simulated with the recorded commands"
         )

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from discrepancy import rules
+from discrepancy.digits import three_digits
 from discrepancy.engine.confirm import labels
 from discrepancy.engine.explanation import Explanation, Found
 from discrepancy.engine.gain import mean_chi2, responses
@@ -50,7 +51,11 @@ def responding(
     )
     if not np.isfinite(without) or with_ <= without * (1.0 + rules.MARGIN_SHARE):
         return lawful, []
-    worse = f"(chi2/n {without:.3g} to {with_:.3g})" if np.isfinite(with_) else "(it cannot be simulated)"
+    worse = (
+        f"(chi2/n {three_digits(without)} to {three_digits(with_)})"
+        if np.isfinite(with_)
+        else "(it cannot be simulated)"
+    )
     return listed, [
         f"{labels(laws_of(lawful))}: a formula fits what is left, but makes the response to the commands worse "
         f"{worse}, so none is stated."

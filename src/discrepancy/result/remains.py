@@ -5,6 +5,7 @@ from typing import Any
 
 from discrepancy import rules
 from discrepancy.causes.units import one_each, parameter
+from discrepancy.digits import three_digits
 from discrepancy.engine.explanation import Scatter
 from discrepancy.result.read import kind_of
 
@@ -20,8 +21,8 @@ def remedy(values: Values) -> str:
     if told is None:
         return what
     return (
-        f"{what} As the other recordings find it, each one is foretold to chi2/n {told['as_found']:.3g}, as designed "
-        f"to {told['as_designed']:.3g}."
+        f"{what} As the other recordings find it, each one is foretold to chi2/n {three_digits(told['as_found'])}, "
+        f"as designed to {three_digits(told['as_designed'])}."
     )
 
 
@@ -36,12 +37,12 @@ def remains(values: Values) -> list[str]:
     if residual["chi2_per_n"] > rules.CLEAN_CHI2_PER_N:
         before = residual["nominal"]["chi2_per_n"]
         out.append(
-            f"A misfit of chi2/n {residual['chi2_per_n']:.3g} remains of {before:.3g}, where up to "
+            f"A misfit of chi2/n {three_digits(residual['chi2_per_n'])} remains of {three_digits(before)}, where up to "
             f"{rules.CLEAN_CHI2_PER_N:g} is clean: {residual['signature']['sentence'].rstrip('.')}."
         )
     elif residual["unlisted_nats"] >= rules.UNLISTED_NATS:
         out.append(
-            f"What remains is small (chi2/n {residual['chi2_per_n']:.3g}), but no noise (by "
+            f"What remains is small (chi2/n {three_digits(residual['chi2_per_n'])}), but no noise (by "
             f"{residual['unlisted_nats']:.0f} nats): {residual['signature']['sentence'].rstrip('.')}."
         )
     return [*out, *of_scatter(values), *_of_response(values)]
@@ -60,7 +61,7 @@ def _of_response(values: Values) -> list[str]:
     told = gain and (gain["held_out"]["after"] or gain["held_out"]["before"])
     if not told or told["chi2_per_n"] <= rules.VISIBLE_CHI2_PER_N:
         return []
-    left = f"{told['chi2_per_n']:.3g}"
+    left = three_digits(told["chi2_per_n"])
     if not values["causes"]:
         why = {
             "consistent": "tolerances, assumed or given, account for it, or what the other trials leave open of the "
@@ -76,8 +77,8 @@ def _of_response(values: Values) -> list[str]:
         return []
     before = gain["held_out"]["before"]["chi2_per_n"]
     return [
-        f"With the named causes the simulated response to the commands is still off by chi2/n {left} ({before:.3g} "
-        "without them; noise alone leaves 1)."
+        f"With the named causes the simulated response to the commands is still off by chi2/n {left} "
+        f"({three_digits(before)} without them; noise alone leaves 1)."
     ]
 
 

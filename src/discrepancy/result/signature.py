@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from discrepancy.digits import three_digits
 from discrepancy.least_squares.fit import Fit
 from discrepancy.rig import Rig
 from estimator.arrays import Array
@@ -74,6 +75,6 @@ def _sentence(out: dict[str, Any]) -> str:
     source, share = next(iter(out["along"].items()), ("no single source", 0.0))
     motion = "while it moves" if out["moving_share"] > 0.6 else "at rest and in motion alike"
     return (
-        f"chi2/n is {out['kind'][kind]:.2f} in the {kind} channels (worst: {out['worst_channel']}, around "
+        f"chi2/n is {three_digits(out['kind'][kind])} in the {kind} channels (worst: {out['worst_channel']}, around "
         f"{out['frequency_hz']:.1f} Hz); {100 * share:.0f} % of the misfit lies along {source}, {motion}."
     )

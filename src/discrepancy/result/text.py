@@ -6,6 +6,7 @@ from typing import Any
 
 from discrepancy import rules
 from discrepancy.causes.units import Shown, one_each, parameter
+from discrepancy.digits import three_digits
 from discrepancy.result.evidence_list import label
 from discrepancy.result.read import kind_of, name_of
 from discrepancy.result.remains import farthest, of_scatter, remains, remedy, sizes_of
@@ -18,6 +19,8 @@ NOTHING_WRONG_HERE = ("consistent", "miscalibrated")
 """Verdicts with which no place stands out."""
 SAID = 0.001
 """Probabilities below are not told."""
+NEAREST = 4
+"""How many of what else it might be are told."""
 
 
 def format_diagnosis(values: Values) -> str:
@@ -110,7 +113,7 @@ def _cause(cause: Values, *, further: bool) -> Iterable[str]:
         advice = dict.fromkeys(text for rival in [cause, *alike] if (text := rival["separate"]))
         yield from _wrapped("To tell them apart: " + " ".join(advice)) if advice else ()
     if ruled_out:
-        yield from _wrapped("Fits worse: " + ", ".join(map(_rival, list(ruled_out.values())[:4])) + ".")
+        yield from _wrapped("Fits worse: " + ", ".join(map(_rival, list(ruled_out.values())[:NEAREST])) + ".")
     if not cause["alternatives"]:
         yield from _wrapped("No other cause comes near.")
 
@@ -123,7 +126,7 @@ def _else(cause: Values) -> str:
         (instead["unlisted"], "something unlisted that looks like it"),
         (instead["nothing"], "nothing"),
     ]
-    likely = sorted((pair for pair in others if pair[0] >= SAID), key=lambda pair: -pair[0])[:4]
+    likely = sorted((pair for pair in others if pair[0] >= SAID), key=lambda pair: -pair[0])[:NEAREST]
     told = ", ".join(f"{name} ({probability_words(share)})" for share, name in likely)
     return f"; else {told}" if told else ""
 
@@ -156,7 +159,7 @@ def _times(factor: float) -> str:
 
 
 def _rival(rival: Values) -> str:
-    loop = "" if rival["chi2_per_n"] is None else f", closed loop chi2/n {rival['chi2_per_n']:.3g}"
+    loop = "" if rival["chi2_per_n"] is None else f", closed loop chi2/n {three_digits(rival['chi2_per_n'])}"
     gap = rival["evidence_gap"]
     return f"{name_of(rival)} ({abs(gap):.0f} nats {'worse' if gap >= 0 else 'better in the rows'}{loop})"
 
@@ -164,14 +167,14 @@ def _rival(rival: Values) -> str:
 def _residual(values: Values) -> Iterable[str]:
     residual = values["residual"]
     text = (
-        f"chi2/n is {residual['nominal']['chi2_per_n']:.3g} as simulated, "
-        f"{residual['chi2_per_n_tolerated']:.3g} with nothing named and everything a little off, as far as its kind "
-        "scatters"
+        f"chi2/n is {three_digits(residual['nominal']['chi2_per_n'])} as simulated, "
+        f"{three_digits(residual['chi2_per_n_tolerated'])} with nothing named and everything a little off, "
+        "as far as its kind scatters"
     )
     if values["causes"] or values["suspected"]:
-        text += f", {residual['chi2_per_n']:.3g} with what is {'named' if values['causes'] else 'suspected'}"
+        text += f", {three_digits(residual['chi2_per_n'])} with what is {'named' if values['causes'] else 'suspected'}"
     elif f"{residual['chi2_per_n']:.3g}" != f"{residual['chi2_per_n_tolerated']:.3g}":
-        text += f", {residual['chi2_per_n']:.3g} where what scatters does so by its own law"
+        text += f", {three_digits(residual['chi2_per_n'])} where what scatters does so by its own law"
     yield f"{text} (up to {rules.CLEAN_CHI2_PER_N:g} counts as clean)."
     if values["verdict"] != "consistent":
         yield f"As simulated: {residual['nominal']['signature']['sentence']}"

@@ -43,7 +43,8 @@ def facts(entries: Sequence[tuple[str, Child]]) -> Node:
 
 def tidy(sentence: str, *, inside: bool = False) -> str:
     """A sentence of a result in the page's typography: ``+-`` and powers as signs, a capital unless it goes on."""
-    text = sentence.replace(" +- ", f"\u00a0{PLUS_MINUS}\u00a0").replace("chi2/n", "chi²/n")
+    text = sentence.replace(" +- ", f"\u00a0{PLUS_MINUS}\u00a0").replace("+-(", f"{PLUS_MINUS}(")
+    text = text.replace("chi2/n", "chi²/n")
     text = re.sub(r"(?<![\w.])-(?=\d)", MINUS, text)
     text = re.sub(r"(?<=\d )u(?=m\b)", "µ", text).replace("rad^3", "rad³")
     return text if inside else text[:1].upper() + text[1:]

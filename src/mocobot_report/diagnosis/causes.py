@@ -5,6 +5,7 @@ from typing import Any
 
 from discrepancy.causes.units import one_each, parameter
 from discrepancy.result.read import name_of
+from discrepancy.result.text import NEAREST, SAID
 from mocobot_report.blocks.html import Node, el
 from mocobot_report.blocks.numbers import NONE, plain, spelled
 from mocobot_report.blocks.prose import bullets, facts, folded, tidy, verdict
@@ -67,19 +68,18 @@ def _said(cause: Values, name: str) -> tuple[str, str]:
 
 def _rivals(causes: Sequence[Values]) -> list[Node]:
     rows: list[list[Entry]] = []
+    farther: list[list[Entry]] = []
     advice: dict[str, None] = {}
     for cause in causes:
         alike = [rival for rival in cause["alternatives"] if rival["ambiguous"]]
         if alike:
             advice |= dict.fromkeys(text for entry in [cause, *alike] if (text := entry["separate"]))
-        for k, rival in enumerate(cause["alternatives"]):
-            gap, chi2 = value(rival["evidence_gap"]), value(rival["chi2_per_n"])
-            chance = Num(chance_of(rival["probability"]))
-            said = "cannot be told apart" if rival["ambiguous"] else "fits worse"
-            named = tidy(name_of(cause)) if k == 0 else ""
-            other = el("span", cause_name(name_of(rival), rival["cause"]), " ", el("em", said))
-            rows.append([named, other, chance, gap, chi2])
-        named = "" if cause["alternatives"] else tidy(name_of(cause))
+        near, far = _apart(cause["alternatives"])
+        named = tidy(name_of(cause))
+        farther += [[named if k == 0 else "", *_rival(rival)] for k, rival in enumerate(far)]
+        for rival in near:
+            rows.append([named, *_rival(rival)])
+            named = ""
         for which, words in (
             ("unlisted", "something unlisted"),
             ("nothing", "nothing at all"),
@@ -90,7 +90,30 @@ def _rivals(causes: Sequence[Values]) -> list[Node]:
     head = ["named", "what else", "chance [%]", "behind [nats]", "loop chi²/n"]
     note = "probability and nats: by the rows; with that of the cause the probabilities add up to 100 %"
     out = [table("What else it might be", head, rows, note=note, groups=True, stack=True)]
+    if farther:
+        out.append(
+            folded("What fits worse still", table("Farther behind", head, farther, groups=True, stack=True))
+        )
     return [*out, verdict("warn", "What would tell them apart", bullets(list(advice)))] if advice else out
+
+
+def _apart(rivals: Sequence[Values]) -> tuple[list[Values], list[Values]]:
+    """What could be there instead and the nearest of what could not, which the report names, too; and the others."""
+    near: list[Values] = []
+    far: list[Values] = []
+    for rival in rivals:
+        likely = rival["ambiguous"] or rival["probability"] >= SAID
+        worse = sum(not one["ambiguous"] for one in near)
+        (near if likely or worse < NEAREST else far).append(rival)
+    return near, far
+
+
+def _rival(rival: Values) -> list[Entry]:
+    """Its row but for whose it is."""
+    said = "cannot be told apart" if rival["ambiguous"] else "fits worse"
+    other = el("span", cause_name(name_of(rival), rival["cause"]), " ", el("em", said))
+    gap, chi2 = value(rival["evidence_gap"]), value(rival["chi2_per_n"])
+    return [other, Num(chance_of(rival["probability"])), gap, chi2]
 
 
 def _shapes(causes: Sequence[Values]) -> list[Node]:

@@ -26,7 +26,7 @@ def test_a_misfit_beside_a_verdict_is_told_with_its_place() -> None:
     values["residual"] |= {"chi2_per_n": 5.16}
     values["residual"]["nominal"] = values["residual"]["nominal"] | {"chi2_per_n": 7350.0}
     (said,) = remains(values)
-    assert said == "A misfit of chi2/n 5.16 remains of 7.35e+03, where up to 1.15 is clean: somewhere."
+    assert said == "A misfit of chi2/n 5.16 remains of 7350, where up to 1.15 is clean: somewhere."
     text = words(format_diagnosis(values))
     assert text.startswith(
         "PARTLY EXPLAINED. Robot 2, joint 1: the torque sensor reads 0.0500 +- 0.0010 N m too much."
@@ -39,7 +39,7 @@ def test_consistent_within_wide_tolerances_says_what_the_response_is_off_by() ->
     response = values["gain"]["held_out"]["before"] | {"chi2_per_n": 6123.0}
     values["gain"]["held_out"] = {"before": response, "after": response}
     (said,) = remains(values)
-    assert "off by chi2/n 6.12e+03, where noise alone leaves 1" in said
+    assert "off by chi2/n 6120, where noise alone leaves 1" in said
     assert "tolerances" in said
     assert said in words(format_diagnosis(values))
 
@@ -68,7 +68,7 @@ def test_a_small_rest_that_is_no_noise_is_told() -> None:
 def test_the_remedy_of_what_is_off_everywhere_says_what_it_is_worth(verdict: str) -> None:
     values = small_diagnosis(verdict)
     values["scatter"] = [scattered()]
-    worth = "each one is foretold to chi2/n 1.07, as designed to 8.53e+03."
+    worth = "each one is foretold to chi2/n 1.07, as designed to 8530."
     assert worth not in words(format_diagnosis(values))
     values["foretold"] = {"as_designed": 8530.0, "as_found": 1.07}
     assert words(format_diagnosis(values)).count(worth) == 1
