@@ -78,6 +78,7 @@ class Rig(ABC):
     beside: bool = False  # whether that is where unknowns and machines are found beside causes
     rewhitened: bool = False  # whether its noise is another than before that
     normal: ClassVar[bool] = False  # whether a simulation has what is normal as the other trials have it
+    whole: ClassVar[bool] = False  # whether one can have every healthy part as it is found
 
     @property
     @abstractmethod

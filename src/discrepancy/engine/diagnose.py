@@ -9,7 +9,7 @@ import numpy as np
 from discrepancy import rules
 from discrepancy.engine.confirm import Alternative, confirm, labels, not_simulated
 from discrepancy.engine.explanation import Explanation, Found, explain
-from discrepancy.engine.gain import Gain, responses
+from discrepancy.engine.gain import Gain, responses, with_all_as_found
 from discrepancy.engine.lawful import laws_of, refining, responding
 from discrepancy.engine.verdict import Verdict, verdict_of
 from discrepancy.inference.odds import check_odds
@@ -135,6 +135,9 @@ def diagnose(
     elif why_not is None:
         before = responses(rig, explanation.problem, [[]], jobs, simulated)[0]
         gain = Gain(before, before, len(rig.trials) > 1)
+    if gain is not None:
+        free = explanation.fit.free
+        gain = with_all_as_found(gain, rig, explanation.problem, free, jobs, simulated)
     notes += [
         f"{labels([found])}: as the others tell it, {rig.trials[int(np.argmin(found.folds))]} is less likely with it, "
         f"by {-min(found.folds):.0f} nats; beside what is not explained that speaks against it."

@@ -1,7 +1,7 @@
 """What a cause is worth: recorded commands resimulated, with and without it, on trials it was not fitted to."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from joblib import Parallel, delayed
@@ -41,11 +41,13 @@ class Gain:
         before, after: one per trial; None where the simulation failed.
         held_out: False for a single trial, which predicts itself, and where a cause is there in some trials only, which
             all have to tell it.
+        as_found: with the causes and every healthy part as far off as it is found, too; empty where that was not asked.
     """
 
     before: tuple[Response | None, ...]
     after: tuple[Response | None, ...]
     held_out: bool
+    as_found: tuple[Response | None, ...] = ()
 
     @property
     def pairs(self) -> list[tuple[Response, Response]]:
@@ -73,7 +75,7 @@ def _excess(chi2_per_n: float) -> float:
 
 def responses(
     rig: Rig, problem: Problem, hypotheses: Sequence[Sequence[int]], jobs: int = 1,
-    progress: Callable[[int], object] | None = None,
+    progress: Callable[[int], object] | None = None, *, whole: bool = False,
 ) -> list[tuple[Response | None, ...]]:  # fmt: skip
     """Simulate every trial under every hypothesis, with unknowns and causes fitted to the other trials.
 
@@ -83,6 +85,7 @@ def responses(
         hypotheses: sets of candidates (indices into the problem) that are in the model.
         jobs: parallel processes.
         progress: called with 1 for every simulated trial.
+        whole: as of ``fit_to_simulate``.
     """
     trials = problem.trials
     tasks = []
@@ -92,7 +95,7 @@ def responses(
             # What is there in some trials only says nothing about others; its own trials have to tell it.
             if any(problem.candidates[i].of_trials for i in free):
                 others = list(trials)
-            fit, healthy = fit_to_simulate(rig, problem, free, others)
+            fit, healthy = fit_to_simulate(rig, problem, free, others, whole=whole)
             tasks.append((t, -fit.shared, -fit.local(t)[: rig.local_unknowns], fit.active, healthy))
     run = Parallel(n_jobs=jobs, return_as="generator")
     done = []
@@ -104,18 +107,43 @@ def responses(
     return [tuple(done[k * count : (k + 1) * count]) for k in range(len(hypotheses))]
 
 
+def with_all_as_found(
+    gain: Gain, rig: Rig, problem: Problem, free: Sequence[int], jobs: int = 1,
+    progress: Callable[[int], object] | None = None,
+) -> Gain:  # fmt: skip
+    """The gain with responses of healthy parts as they are found, where more than noise is left without.
+
+    Args:
+        gain: with responses.
+        rig, problem, jobs, progress: as of ``responses``.
+        free: the causes.
+    """
+    left = [b.chi2_per_n for _, b in gain.pairs]
+    if not rig.whole or not left or np.mean(left) <= rules.VISIBLE_CHI2_PER_N:
+        return gain
+    return replace(gain, as_found=responses(rig, problem, [free], jobs, progress, whole=True)[0])
+
+
 def fit_to_simulate(
-    rig: Rig, problem: Problem, free: Sequence[int], trials: Sequence[int] | None = None
-) -> tuple[Fit, Active]:
+    rig: Rig, problem: Problem, free: Sequence[int], trials: Sequence[int] | None = None, *,
+    whole: bool = False,
+) -> tuple[Fit, Active]:  # fmt: skip
     """Unknowns and causes as a simulation takes them, and how far off healthy parts are in it.
 
     Those are as designed; but where a rig had to be linearised elsewhere, as they are found there beside the causes.
     Where a simulation finds what is normal by itself, causes are what they are beside that.
+
+    Args:
+        rig, problem, free: as of ``responses``.
+        trials: that tell; None for all.
+        whole: whether a simulation has every healthy part as it is found, within its tolerance, too.
     """
     if rig.normal:
         return Fit.of(problem, free, trials), []
     carried = [
-        i for i, candidate in enumerate(problem.candidates) if i not in free and rig.carried(candidate)
+        i
+        for i, candidate in enumerate(problem.candidates)
+        if i not in free and (rig.carried(candidate) or (whole and problem.has_tolerance(i)))
     ]
     if not carried:
         return Fit.of(problem, free, trials, background=False), []

@@ -43,7 +43,8 @@ foretold            {as_designed, as_found}: chi2/n of trials left out, the mach
 evidence            the strongest candidates, see ``evidence_list``: {before, after} with nothing found and with what
                     is found (null), lists of {cause, kind, name, family, robot, joint, place, at, nats, needed}
 gain                null where the closed loop was not simulated and there is nothing to estimate, or
-    held_out        {before, after}: {<channel>_nrmse, <channel>_rms, chi2_per_n}, means over trials, null if failed
+    held_out        {before, after}: {<channel>_nrmse, <channel>_rms, chi2_per_n}, means over trials, null if failed;
+                    as_found: with every healthy part as it is found, too; null where noise is left without or not asked
     units           of the channels' rms
     noise           {<channel>_rms}: what noise and integration error alone would leave
     removed         share of the excess error removed, with interval [low, high] over trials, or null
@@ -118,7 +119,7 @@ def diagnosis_to_dict(
     gain = None if diagnosis.gain is None else _gain(diagnosis.gain, rig, words)
     if estimates is not None:
         gain = gain or {
-            "held_out": {"before": None, "after": None},
+            "held_out": {"before": None, "after": None, "as_found": None},
             "units": {},
             "noise": {},
             "removed": None,
@@ -249,7 +250,8 @@ def _gain(gain: Gain, rig: Rig, words: Words) -> dict[str, Any]:
     return {
         "held_out": {
             name: _mean([pair[k] for pair in gain.pairs]) for k, name in enumerate(("before", "after"))
-        },
+        }
+        | {"as_found": _mean([one for one in gain.as_found if one is not None])},
         "units": {name: words.unit(name) for name in channels},
         "noise": {f"{name}_rms": _noise(rig, name) for name in channels},
         "removed": None

@@ -63,6 +63,7 @@ class TeamRig(LawfulRows):
     coarse = ("tether", "payload_tether")
     plain_first = ("slosh",)
     behind = ("grasp_play",)
+    whole = True
     apart = (KEPT,)
 
     def effect_parameters(
@@ -144,6 +145,12 @@ class TeamRig(LawfulRows):
             if own is None:
                 return impossible
             effects += own
+        as_designed = self.recordings[trial].metadata.units is None
+        for candidate, values in healthy:
+            if (
+                as_designed or places_of(candidate) is None
+            ):  # of what cannot be less than nothing there is nothing
+                effects += self.effects(candidate, values) or []
         return partial(
             resimulation_errors,
             self._robots(trial, healthy),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from discrepancy.engine.gain import Gain, Response, mean_chi2, responses
+from discrepancy.engine.gain import Gain, Response, mean_chi2, responses, with_all_as_found
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
 from fake_rig import FakeRig
@@ -138,3 +138,52 @@ def test_single_trial_predicts_itself():
     problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
     responses(rig, problem, [[2]])
     assert rig.calls[0][3][0][1][0] == pytest.approx(Fit.of(problem, [2], background=False).part(2)[0][0])
+
+
+class Whole(FakeRig):
+    """A simulation that has healthy parts, and what they were off by when it was asked."""
+
+    whole = True
+    off = 5.0
+
+    def simulation(self, trial, shared, local, active, healthy=()):
+        self.calls.append((trial, shared, {c.cause: v for c, v in (*active, *healthy)}))
+        return lambda: {"phi": np.full((10, 3), 1.0 if healthy else self.off)}
+
+
+def test_healthy_parts_are_as_the_other_trials_find_them():
+    rig = Whole({2: 25.0})
+    problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
+    before, after = responses(rig, problem, [[], [2]])
+    rig.calls.clear()
+    gain = with_all_as_found(Gain(before, after, held_out=True), rig, problem, [2])
+    assert [one.chi2_per_n for one in gain.as_found] == [1.0] * 4
+    for trial, shared, values in rig.calls:
+        # Least squares of the other trials' rows with a row for every tolerance, none for the cause.
+        rows, right, place = [], [], 0
+        for t, (x, own, common) in enumerate(rig.data):
+            if t != trial:
+                nuisance = np.zeros((*x.shape, 6))
+                nuisance[..., 2 * place : 2 * place + 2], place = own, place + 1
+                causes = [rig.columns_of[c.key][t] for c in rig.catalogue]
+                rows.append(np.concatenate([nuisance, common, *causes], axis=2).reshape(x.size, -1))
+                right.append(x.ravel())
+        prior = np.diag(
+            [0.0] * 9 + [0.0 if c.cause == "cause 2" else 1.0 for c in rig.catalogue for _ in c.parameters]
+        )
+        A, b = np.concatenate([*rows, prior]), np.concatenate([*right, np.zeros(len(prior))])
+        solution = np.linalg.lstsq(A, b, rcond=None)[0]
+        np.testing.assert_allclose(-shared, solution[6:9], rtol=1e-6)
+        found = np.concatenate([values[c.cause] for c in rig.catalogue])
+        np.testing.assert_allclose(found, solution[9:], rtol=1e-6, atol=1e-9)
+
+
+def test_nothing_is_asked_for_where_only_noise_is_left_or_a_simulation_cannot_have_such_parts():
+    quiet, plain, failed = Whole({}), Whole({}), Whole({})
+    quiet.off, plain.whole = 1.5, False
+    for rig in (quiet, plain, failed):
+        problem = Problem.of(rig.rows(rig.candidates()), rig.candidates())
+        (before,) = responses(rig, problem, [[]])
+        before = (None,) * 4 if rig is failed else before
+        gain = Gain(before, before, held_out=True)
+        assert with_all_as_found(gain, rig, problem, []) is gain

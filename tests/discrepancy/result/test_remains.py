@@ -54,6 +54,28 @@ def test_a_response_that_causes_hardly_mend_is_told(share: float, told: bool) ->
     assert remains(values) == []
 
 
+def test_the_response_of_parts_as_they_are_found_is_told() -> None:
+    values = small_diagnosis()
+    assert "as far off as it is found" not in format_diagnosis(values)
+    found = values["gain"]["held_out"]["after"] | {"chi2_per_n": 12.34}
+    values["gain"]["held_out"] |= {"as_found": found}
+    assert "chi2/n 12.3 with every part as far off as it is found, within its tolerance, too" in words(
+        format_diagnosis(values)
+    )
+    values["gain"]["held_out"]["after"] |= {"chi2_per_n": 69.0}
+    values["gain"]["removed"]["share"] = 0.4
+    (said,) = remains(values)
+    assert said.endswith(
+        "by chi2/n 69 (90 without them; noise alone leaves 1), by 12.3 with every part as far off as it is found, "
+        "within its tolerance, too."
+    )
+    values = small_diagnosis("consistent")
+    values["gain"]["held_out"] = dict.fromkeys(("before", "after"), found | {"chi2_per_n": 75.0}) | {
+        "as_found": found
+    }
+    assert remains(values)[-1].startswith("It is by 12.3 with every part")
+
+
 def test_a_small_rest_that_is_no_noise_is_told() -> None:
     values = small_diagnosis("partly_explained")
     values["residual"]["unlisted_nats"] = 1.2 * rules.UNLISTED_NATS
