@@ -90,7 +90,7 @@ def test_one_trial_without_commands_says_what_stays_open(
     assert "has no commands (ref_x, ref_y, ref_z)" in words
     assert "One trial only: nothing could be validated" in words
     assert "has no commands" in values["not_simulated"]
-    assert values["gain"]["held_out"] == {"before": None, "after": None}
+    assert values["gain"]["held_out"] == {"before": None, "after": None, "as_found": None}
     assert "errors" not in values["gain"]
     assert not (out / "closed_loop.png").exists()
 

@@ -155,7 +155,7 @@ def test_command_shows_names_extends_and_measures(tmp_path: Path, capsys: pytest
     words = " ".join(text.split())
     assert code == 0
     assert text.startswith("PARTLY EXPLAINED. Axis: rubs with ")
-    assert "remains of 3.74e+03, where up to 1.15 is clean" in words
+    assert "remains of 3740, where up to 1.15 is clean" in words
     assert "the drive's gain (force per volt) against the mass" in words
     assert "a known weight on the carriage" in words
     # A hysteresis within 4 um of a turn fits what smoothed velocities leave there; no such friction was simulated.
