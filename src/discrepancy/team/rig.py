@@ -145,11 +145,11 @@ class TeamRig(LawfulRows):
             if own is None:
                 return impossible
             effects += own
+        there = {candidate.key for candidate, _ in active}
         as_designed = self.recordings[trial].metadata.units is None
         for candidate, values in healthy:
-            if (
-                as_designed or places_of(candidate) is None
-            ):  # of what cannot be less than nothing there is nothing
+            if (as_designed or places_of(candidate) is None) and candidate.key not in there:
+                # Of what is found to be less than nothing there is nothing.
                 effects += self.effects(candidate, values) or []
         return partial(
             resimulation_errors,

@@ -173,3 +173,28 @@ def test_what_robots_are_off_by_is_not_explained():
     zero = CAUSES["phi_zero"].candidate({}, {}, 1, 3)
     assert explained_by([(zero, np.array([0.01]))], ArmUnit(DESIGN, np.zeros((3, COUNT)))) is None
     assert explained_by([], ArmUnit(DESIGN, np.zeros((3, COUNT)))) is None
+
+
+def test_a_simulation_has_every_healthy_part_once_and_of_less_than_nothing_nothing(case):
+    """Robots as designed have theirs as effects, zeros of encoders among them; a cause stands in its kind's place."""
+    rig = team(case)
+    at = {c.key: c for c in rig.candidates()}
+    rubs, healthy, less, lag, zero = (
+        at[key]
+        for key in (
+            ("joint_friction", 2, 1), ("joint_friction", 1, 3), ("joint_friction", 3, 2), ("sensor_lag", 1, 1),
+            ("phi_zero", 1, 2),
+        )
+    )  # fmt: skip
+    off = [
+        (rubs, np.array([0.001, 0.001])), (healthy, np.array([0.002, -0.001])), (less, np.array([-0.002, -0.001])),
+        (lag, np.full(len(lag.parameters), -1e-3)), (zero, np.array([1e-4])),
+    ]  # fmt: skip
+    unknowns = np.zeros(rig.linear[0].by_shared.shape[2]), np.zeros(rig.local_unknowns)
+    effects = rig.simulation(0, *unknowns, [(rubs, np.array([0.06, 0.02]))], off).args[3]
+    told = {(e.cause, e.robot, e.joint): e for e in effects}
+    assert len(told) == len(effects) == 4
+    assert told[rubs.key].coulomb_Nm == 0.06
+    assert (told[healthy.key].coulomb_Nm, told[healthy.key].viscous_Nms_per_rad) == (0.002, 0.0)
+    assert (told[less.key].coulomb_Nm, told[less.key].viscous_Nms_per_rad) == (0.0, 0.0)
+    assert told[zero.key].zero_rad == 1e-4
