@@ -423,7 +423,9 @@ def test_a_number_of_a_form_that_a_cause_does_not_have_is_left_out(
         assert ("presliding" in Reader(write_report(folder).read_bytes()).rows()) == shown
 
 
-def test_what_fits_much_worse_is_folded_away(tmp_path: Path, no_pictures: pytest.MonkeyPatch) -> None:
+def test_what_fits_much_worse_is_folded_away_and_parts_as_found_are_told(
+    tmp_path: Path, no_pictures: pytest.MonkeyPatch
+) -> None:
     folder = diagnosis_folder(tmp_path / "one")
     values = json.loads((folder / "diagnosis.json").read_text())
     cause = values["causes"][0]
@@ -431,8 +433,12 @@ def test_what_fits_much_worse_is_folded_away(tmp_path: Path, no_pictures: pytest
     others = [{**rival, "name": f"rival {k}", "evidence_gap": 9.0 + k, "ambiguous": False} for k in range(7)]
     likely = {**rival, "name": "a rare rival", "evidence_gap": 7.0, "ambiguous": False, "probability": 0.002}
     cause["alternatives"] = [rival, *({**one, "probability": 1e-5} for one in others), likely]
+    cause["sentence"] = "The grasp is loose by +-(196.6 +- 3.9 um) along each axis."
+    values["gain"]["held_out"]["as_found"] = values["gain"]["held_out"]["after"] | {"chi2_per_n": 4.321}
     (folder / "diagnosis.json").write_text(json.dumps(values))
     page = write_report(folder).read_text(encoding="utf-8")
+    assert "loose by ±(196.6\u00a0±\u00a03.9 µm) along" in page
+    assert "is 4.32 with every part as far off as it is found" in page
     shown, folded = page.split("What fits worse still")
     table = shown.split("What else it might be")[-1]
     for name in ("Rival 0", "Rival 3", "A rare rival", "Spring stiffness of joint 1 of robot 2"):

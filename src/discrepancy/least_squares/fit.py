@@ -247,7 +247,7 @@ def _there(
     kept = not problem.opened and not problem.columns[trial].is_single
     for k, (columns, unit) in enumerate(zip(sets, units, strict=True)):
         own = columns[trial]
-        if own[len(own) // 2].any() or own.any():  # of most one row tells, in less time
+        if own[len(own) // 2 :][:1].any() or own.any():  # of most one row tells, in less time
             asked = problem.again[trial].of(own, partial(problem.spectrum, trial)) if kept else None
             if asked is not None:
                 again.append((k, asked))

@@ -247,11 +247,10 @@ def _gain(gain: Gain, rig: Rig, words: Words) -> dict[str, Any]:
     removed = gain.removed()
     names = [rig.trials[t] for t in rig.resimulated]
     both = zip(names, gain.before, gain.after, strict=True)
+    before, after = [a for a, _ in gain.pairs], [b for _, b in gain.pairs]
+    told = {"before": before, "after": after, "as_found": gain.as_found}
     return {
-        "held_out": {
-            name: _mean([pair[k] for pair in gain.pairs]) for k, name in enumerate(("before", "after"))
-        }
-        | {"as_found": _mean([one for one in gain.as_found if one is not None])},
+        "held_out": {name: _mean(each) for name, each in told.items()},
         "units": {name: words.unit(name) for name in channels},
         "noise": {f"{name}_rms": _noise(rig, name) for name in channels},
         "removed": None
@@ -277,9 +276,11 @@ def _response(response: Response | None) -> dict[str, float] | None:
     )
 
 
-def _mean(responses: Sequence[Response]) -> dict[str, float] | None:
+def _mean(responses: Sequence[Response | None]) -> dict[str, float] | None:
+    """That of some trials is not to be held against that of all."""
     each = [values for values in map(_response, responses) if values is not None]
-    return {key: float(np.mean([values[key] for values in each])) for key in each[0]} if each else None
+    whole = each and len(each) == len(responses)
+    return {key: float(np.mean([values[key] for values in each])) for key in each[0]} if whole else None
 
 
 def _finite(value: float | None) -> float | None:

@@ -70,19 +70,19 @@ def _of_response(values: Values) -> list[str]:
             "miscalibrated": "robots as designed do not answer like these",
         }.get(values["verdict"], "nothing that is known accounts for it")
         said = f"The simulated response to the commands is off by chi2/n {left}, where noise alone leaves 1: {why}."
-        return [said, *(f"It is by {found}." for found in with_all_as_found(gain))]
+        return [said, *(f"It is by {found}." for found in all_as_found(gain))]
     removed = gain["removed"]
     if removed is not None and removed["share"] >= rules.RESPONSE_SHARE:
         return []
     before = gain["held_out"]["before"]["chi2_per_n"]
-    found = "".join(f", by {found}" for found in with_all_as_found(gain))
+    found = "".join(f", by {found}" for found in all_as_found(gain))
     return [
         f"With the named causes the simulated response to the commands is still off by chi2/n {left} "
         f"({three_digits(before)} without them; noise alone leaves 1){found}."
     ]
 
 
-def with_all_as_found(gain: Values) -> list[str]:
+def all_as_found(gain: Values) -> list[str]:
     """What it is off by where a simulation has healthy parts as they are found; nothing where that was not asked."""
     told = gain["held_out"].get("as_found")
     if told is None:

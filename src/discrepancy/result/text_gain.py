@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from discrepancy.causes.units import Shown, one_each
-from discrepancy.result.remains import with_all_as_found
+from discrepancy.result.remains import all_as_found
 
 Values = Mapping[str, Any]
 
@@ -63,7 +63,7 @@ def _closed_loop(gain: Values, *, named: bool) -> Iterable[str]:
         if low is not None and high is not None and count > 1:
             text += f" (95 % interval over {count} trials: {100 * low:.1f} to {100 * high:.1f} %)"
         yield text
-    yield from (f"    chi2/n {found}" for found in with_all_as_found(gain))
+    yield from (f"    chi2/n {found}" for found in all_as_found(gain))
 
 
 def foretold_torques(gain: Values) -> bool:

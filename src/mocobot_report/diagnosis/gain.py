@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from discrepancy.result.remains import with_all_as_found
+from discrepancy.result.remains import all_as_found
 from discrepancy.result.text_gain import ERRORS, foretold_torques, response_units, something_is_off
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.charts import chart, column_axis, dots, figure, literal, log_axis
@@ -86,7 +86,7 @@ def _closed_loop(book: Book, gain: Values, names: Sequence[str], shown: Mapping[
         if low is not None and high is not None and count > 1:
             said += f" (95 % interval over {count} trials: {percent(low)} to {percent(high)})"
         said += "."
-    said += "".join(f" Chi²/n is {found}." for found in with_all_as_found(gain))
+    said += "".join(f" Chi²/n is {found}." for found in all_as_found(gain))
     charts = [_trials_chart(book, gain, f"{channel}_rms", names, shown) for channel in gain["units"]]
     charts.append(_trials_chart(book, gain, "chi2_per_n", names, shown))
     return [

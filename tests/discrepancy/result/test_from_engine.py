@@ -130,3 +130,26 @@ def test_an_event_is_in_the_list_before_it_is_named() -> None:
     assert entry["at"] == [2, 3.2]
     assert named["cause"] == entry["cause"] == "push"
     assert entry["nats"] > entry["needed"]
+
+
+class AsFound(FakeRig):
+    """A response that is off unless healthy parts are as they are found; one trial may not be simulated so."""
+
+    whole, fails = True, False
+
+    def simulation(self, trial, shared, local, active, healthy=()):
+        failed = self.fails and healthy and trial == 1
+        return lambda: None if failed else {"phi": np.full((10, 3), 1.5 if healthy else 4.0)}
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_a_response_of_parts_as_found_is_of_all_trials_or_none(fails: bool) -> None:
+    rig = AsFound({}, loop=lambda causes, trial: 16.0)
+    rig.fails = fails
+    values = diagnosis_to_dict(diagnose(rig), rig, Words())  # pyright: ignore[reportArgumentType]
+    told = values["gain"]["held_out"]
+    assert told["after"]["chi2_per_n"] == 16.0
+    if fails:
+        assert told["as_found"] is None
+    else:
+        assert told["as_found"]["chi2_per_n"] == 2.25
