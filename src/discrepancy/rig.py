@@ -250,3 +250,7 @@ class Rig(ABC):
     @abstractmethod
     def write_extended(self, explanation: Any, folder: Path) -> None:
         """Write the model with the causes in it, for the user to take away."""
+
+    def write_as_found(self, explanation: Any, folder: Path) -> None:
+        """Write the same with every healthy part as it is found, too; asked of rigs that are ``whole`` only."""
+        raise NotImplementedError

@@ -423,6 +423,19 @@ def test_a_number_of_a_form_that_a_cause_does_not_have_is_left_out(
         assert ("presliding" in Reader(write_report(folder).read_bytes()).rows()) == shown
 
 
+def test_models_to_take_away_are_told_where_they_are(
+    tmp_path: Path, no_pictures: pytest.MonkeyPatch
+) -> None:
+    folder = diagnosis_folder(tmp_path / "one")
+    assert "--model as_found" not in write_report(folder).read_text(encoding="utf-8")
+    (folder / "as_found").mkdir()
+    (folder / "as_found" / "team.xml").write_text("<mujoco/>")
+    page = write_report(folder).read_text(encoding="utf-8")
+    for name in ("extended", "as_found"):
+        assert f"mocobot simulate --model {name}" in page
+        assert f"{name}/team.xml" in page
+
+
 def test_what_fits_much_worse_is_folded_away_and_parts_as_found_are_told(
     tmp_path: Path, no_pictures: pytest.MonkeyPatch
 ) -> None:

@@ -55,6 +55,11 @@ class Gain:
         both = zip(self.before, self.after, strict=True)
         return [(a, b) for a, b in both if a is not None and b is not None]
 
+    @property
+    def is_better_as_found(self) -> bool:
+        """Whether every trial can be simulated with all as found, and is told better so than with the causes alone."""
+        return bool(self.as_found) and mean_chi2(self.as_found) < mean_chi2([b for _, b in self.pairs])
+
     def removed(self) -> tuple[float, float, float] | None:
         """Share of the excess error (root mean square over noise) removed: mean over trials, 95 % interval."""
         shares = [

@@ -20,7 +20,8 @@ from estimator.errors import InputError
 from estimator.extras import draws_plots
 from estimator.files import write_json, write_text
 
-REPORT, EXTENDED, PAGE = "report.txt", "extended", "report.html"
+REPORT, PAGE = "report.txt", "report.html"
+EXTENDED, AS_FOUND = "extended", "as_found"
 PLOTS = ("residual_*.png", "evidence.png", "closed_loop.png", "law.png")
 
 
@@ -57,7 +58,7 @@ class Diagnosed:
         return format_diagnosis(self._values)
 
     def write_into(self, folder: Path, **more: Any) -> None:
-        """Write extended model, residuals, pictures, JSON and report into an existing folder.
+        """Write extended models, residuals, pictures, JSON and report into an existing folder.
 
         Args:
             folder: where.
@@ -73,6 +74,9 @@ class Diagnosed:
             except InputError as error:  # values that no effect can have, such as a negative friction
                 note = f"There is no extended model: {error}."
                 values["notes"] = [*(n for n in values["notes"] if n != note), note]
+        gain = self.diagnosis.gain
+        if gain is not None and gain.is_better_as_found:
+            self.rig.write_as_found(self.diagnosis.explanation, folder / AS_FOUND)
         residuals = self.traces()
         save_traces(residuals, self.rig.channels, folder / RESIDUALS)
         if draws_plots():
@@ -89,5 +93,5 @@ def is_diagnosis(folder: Path) -> bool:
         ours = json.loads((folder / NAME).read_text(encoding="utf-8"))["format"] == FORMAT
     except (OSError, ValueError, TypeError, KeyError):
         return False
-    known = [NAME, REPORT, RESIDUALS, EXTENDED, PAGE, *PLOTS]
+    known = [NAME, REPORT, RESIDUALS, EXTENDED, AS_FOUND, PAGE, *PLOTS]
     return ours and all(any(path.match(pattern) for pattern in known) for path in folder.iterdir())

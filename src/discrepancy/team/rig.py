@@ -129,6 +129,19 @@ class TeamRig(LawfulRows):
         known = replace(recording.metadata, units=ArmUnit(units.design, x))
         return replace(recording, metadata=known)
 
+    def _of_healthy(
+        self, trial: int, causes: Sequence[Candidate], healthy: Sequence[tuple[Candidate, Array]]
+    ) -> list[Effect]:
+        """What healthy parts are as effects, beside causes: those that ``_robots`` does not have."""
+        there = {candidate.key for candidate in causes}
+        as_designed = self.recordings[trial].metadata.units is None
+        effects: list[Effect] = []
+        for candidate, values in healthy:
+            if (as_designed or places_of(candidate) is None) and candidate.key not in there:
+                # Of what is found to be less than nothing there is nothing.
+                effects += self.effects(candidate, values) or []
+        return effects
+
     def simulation(
         self, trial: int, shared: Array, local: Array, active: Sequence[tuple[Candidate, Array]],
         healthy: Sequence[tuple[Candidate, Array]] = (),
@@ -145,12 +158,7 @@ class TeamRig(LawfulRows):
             if own is None:
                 return impossible
             effects += own
-        there = {candidate.key for candidate, _ in active}
-        as_designed = self.recordings[trial].metadata.units is None
-        for candidate, values in healthy:
-            if (as_designed or places_of(candidate) is None) and candidate.key not in there:
-                # Of what is found to be less than nothing there is nothing.
-                effects += self.effects(candidate, values) or []
+        effects += self._of_healthy(trial, [candidate for candidate, _ in active], healthy)
         return partial(
             resimulation_errors,
             self._robots(trial, healthy),
@@ -201,15 +209,28 @@ class TeamRig(LawfulRows):
         Raises:
             InputError: the folder cannot be written, or a cause has values that no effect can have.
         """
+        self._write(explanation, folder, whole=False)
+
+    def write_as_found(self, explanation: Explanation, folder: Path) -> None:
+        """Write the same with every healthy part as it is found, within its tolerance, too.
+
+        Raises:
+            InputError: as ``write_extended``.
+        """
+        self._write(explanation, folder, whole=True)
+
+    def _write(self, explanation: Explanation, folder: Path, *, whole: bool) -> None:
         effects: list[Effect] = []
         for found in explanation.found:
             effects += named_effects(found.candidate, self.effects(found.candidate, found.values))
-        fit, healthy = fit_to_simulate(self, explanation.problem, explanation.fit.free)
+        fit, healthy = fit_to_simulate(self, explanation.problem, explanation.fit.free, whole=whole)
+        causes = [found.candidate for found in explanation.found]
+        parts = self._of_healthy(0, causes, healthy) if whole else []
         shared = self.linear[0].shared.moved(-fit.shared)
         bases = self.linear[0].bases.moved(-fit.local(0)[: self.local_unknowns])
-        scene = team_of(shared, bases, effects, *posture(self._robots(0, healthy)))
-        causes = [found.candidate.label for found in explanation.found]
-        write_extended(scene, effects, folder, {"recordings": list(self.trials), "causes": causes})
+        scene = team_of(shared, bases, [*effects, *parts], *posture(self._robots(0, healthy)))
+        told = {"recordings": list(self.trials), "causes": [cause.label for cause in causes]}
+        write_extended(scene, effects, folder, told, parts)
 
     def undecidable(self) -> list[dict[str, Any]]:
         """What recordings of a parked team with a rigid payload cannot decide."""

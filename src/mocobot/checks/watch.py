@@ -9,7 +9,7 @@ from mocobot.options import Watch
 VERDICT, PAGE = "verdict.txt", "report.html"
 OURS = {
     VERDICT, PAGE, "estimate.json", "calibration.json", "calibration", "recordings", "diagnosis.json", "report.txt",
-    "residuals.npz", "extended",
+    "residuals.npz", "extended", "as_found",
 }  # fmt: skip
 """What is written, besides pictures."""
 

@@ -1,6 +1,6 @@
-"""What a diagnosis leaves open: limits of detection, what cannot be decided, the extended model, notes."""
+"""What a diagnosis leaves open: limits of detection, what cannot be decided, the extended models, notes."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -17,11 +17,11 @@ from mocobot_report.diagnosis.keys import cause_name
 from mocobot_report.folder import Diagnosed
 
 Values = Mapping[str, Any]
-EXTENDED = "extended"
+EXTENDED, AS_FOUND = "extended", "as_found"
 
 
 def rest_sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
-    """Detection limits, undecidable questions, the extended model's files, notes."""
+    """Detection limits, undecidable questions, the extended models' files, notes."""
     values = diagnosed.values
     limits = _limits(values) if values["detection_limits"] else None
     if limits is not None and values["verdict"] not in NOTHING_WRONG_HERE:
@@ -34,7 +34,7 @@ def rest_sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
     outline = [
         ("What would have been noticed", limits),
         ("What such recordings cannot decide", el("dl", entries, class_="list") if entries else None),
-        ("The extended model", _extended(diagnosed.folder / EXTENDED)),
+        ("The extended model", _models(diagnosed.folder)),
         ("Notes", bullets(notes) if notes else None),
     ]
     return [section(book, name, content) for name, content in outline if content is not None]
@@ -76,23 +76,35 @@ def _limits(values: Values) -> Node:
     )  # fmt: skip
 
 
-def _extended(folder: Path) -> list[Node] | None:
-    try:
-        files = sorted(path for path in folder.rglob("*") if path.is_file())
-    except OSError:
+def _models(folder: Path) -> list[Node] | None:
+    there = {name: files for name in (EXTENDED, AS_FOUND) if (files := _files(folder / name))}
+    if not there:
         return None
-    if not files:
-        return None
+    said = [
+        paragraph(*_told(name, files), " Its own README says what is where.") for name, files in there.items()
+    ]
     rows = [
-        [el("code", path.relative_to(folder.parent).as_posix()), Num(size(path.stat().st_size))]
+        [el("code", path.relative_to(folder).as_posix()), Num(size(path.stat().st_size))]
+        for files in there.values()
         for path in files
     ]
-    team = any(path.name == "team.xml" for path in files)
-    how: list[Child] = [
-        "The estimated team with the named causes in it: ", el("code", "team.xml"), " loads in plain MuJoCo, and ",
-        el("code", "mocobot simulate --model extended"), " takes the folder.",
-    ] if team else ["The model with the named causes in it; it loads in plain MuJoCo."]  # fmt: skip
-    return [
-        paragraph(*how, " Its own README says what is where."),
-        table("Files beside this report", ["file", "size"], rows),
-    ]
+    return [*said, table("Files beside this report", ["file", "size"], rows)]
+
+
+def _told(name: str, files: Sequence[Path]) -> list[Child]:
+    takes = el("code", f"mocobot simulate --model {name}")
+    if name == AS_FOUND:
+        how = "The estimated team with every part as far off as it is found, within its tolerance, too: "
+        return [how, takes, " takes the folder."]
+    if any(path.name == "team.xml" for path in files):
+        loads = el("code", "team.xml")
+        named = "The estimated team with the named causes in it: "
+        return [named, loads, " loads in plain MuJoCo, and ", takes, " takes the folder."]
+    return ["The model with the named causes in it; it loads in plain MuJoCo."]
+
+
+def _files(folder: Path) -> list[Path]:
+    try:
+        return sorted(path for path in folder.rglob("*") if path.is_file())
+    except OSError:
+        return []

@@ -34,7 +34,10 @@ KEYS = (
 )  # fmt: skip
 
 
-def write_extended(scene: TeamScene, effects: Sequence[Effect], folder: Path, extra: dict[str, Any]) -> None:
+def write_extended(
+    scene: TeamScene, effects: Sequence[Effect], folder: Path, extra: dict[str, Any],
+    healthy: Sequence[Effect] = (),
+) -> None:  # fmt: skip
     """Write a scene, effects applied, as an extended model; the folder appears whole or not at all.
 
     Args:
@@ -42,6 +45,7 @@ def write_extended(scene: TeamScene, effects: Sequence[Effect], folder: Path, ex
         effects: what was applied.
         folder: to be created; an extended model that is there already is replaced.
         extra: plain JSON values to keep with it.
+        healthy: what was applied besides, of parts that are off by no more than others; its README tells them apart.
 
     Raises:
         InputError: the folder is something else, or cannot be written, ``extra`` is not plain JSON, or the robots hold
@@ -53,7 +57,7 @@ def write_extended(scene: TeamScene, effects: Sequence[Effect], folder: Path, ex
         "format": FORMAT,
         "version": VERSION,
         "robots": scene.robots,
-        "effects": [effect_to_dict(effect) for effect in effects],
+        "effects": [effect_to_dict(effect) for effect in (*effects, *healthy)],
         "wrist_home_b_m": scene.wrist_home_b.tolist(),
         "theta_home_rad": scene.theta_home.tolist(),
         "grasps": poses_to_list(scene.X_1i),
@@ -74,7 +78,7 @@ def write_extended(scene: TeamScene, effects: Sequence[Effect], folder: Path, ex
     except (TypeError, ValueError, RecursionError) as error:
         raise InputError(f"{folder}: what is to be kept cannot be written as JSON ({error})") from error
     assets = scene.root.get_assets() if scene.xml is None else scene.assets
-    page = readme(values["effects"], scene.robots)
+    page = readme(values["effects"], scene.robots, len(healthy))
     files = {SCENE: scene.to_xml().encode(), NUMBERS: text.encode(), README: page.encode(), **assets}
     folder = Path(folder)
     if folder.exists() and not _is_extended(folder):
