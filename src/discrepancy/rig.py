@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.law_doubt import LawDoubt
 from discrepancy.least_squares.patches import Patches
@@ -197,9 +198,9 @@ class Rig(ABC):
         """Columns of causes where all of them have these values; None of those that are what they always are."""
         return [None] * len(active)
 
-    def inexact(self, candidate: Candidate) -> Array:
-        """Of the numbers that ``steps`` changes, those that the law's own error puts off, as it does sizes; else 0."""
-        return np.zeros(len(self.steps(candidate)))
+    def law_error(self, candidate: Candidate, values: Array) -> Array:
+        """What the law's own error puts values and then the numbers that ``steps`` changes off, standard deviations."""
+        return np.append(rules.LAW_ERROR_SHARE * np.abs(values), np.zeros(len(self.steps(candidate))))
 
     def undecidable(self) -> list[dict[str, Any]]:
         """What recordings of this rig cannot decide, whatever the data: statements with a reason and a remedy."""

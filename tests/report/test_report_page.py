@@ -423,9 +423,7 @@ def test_a_number_of_a_form_that_a_cause_does_not_have_is_left_out(
         assert ("presliding" in Reader(write_report(folder).read_bytes()).rows()) == shown
 
 
-def test_models_to_take_away_are_told_where_they_are(
-    tmp_path: Path, no_pictures: pytest.MonkeyPatch
-) -> None:
+def test_models_to_take_away_are_told_where_they_are(tmp_path: Path, no_pictures: pytest.MonkeyPatch) -> None:
     folder = diagnosis_folder(tmp_path / "one")
     assert "--model as_found" not in write_report(folder).read_text(encoding="utf-8")
     (folder / "as_found").mkdir()

@@ -285,8 +285,9 @@ def test_a_viscoelastic_spring_follows_its_load(relaxation, off):
     np.testing.assert_allclose(way, exact, atol=off * compliance * force)
 
 
-def _modes(scene, names: list[str]) -> np.ndarray:
-    """Frequencies [rad/s] of joints that swing while the rest stands still: MuJoCo's inertia and gravity."""
+def _swinging(scene, names: list[str], axis: str = "x") -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Inertia and stiffness of joints that swing while the rest stands still, and their torques per unit of lateral
+    acceleration across the axis they swing about: MuJoCo's, its gravity."""
     model = scene.compile()
     data = mujoco.MjData(model)
     dofs = [int(model.joint(f"omnid1/payload/{name}").dofadr[0]) for name in names]
@@ -303,7 +304,15 @@ def _modes(scene, names: list[str]) -> np.ndarray:
             sides.append(data.qfrc_bias[dofs].copy())
         data.qpos[where] = 0.0
         stiffness[:, k] = (sides[0] - sides[1]) / 2e-4
-    return np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(full[np.ix_(dofs, dofs)], stiffness)).real))
+    model.opt.gravity[:] = np.array([0.0, 1.0, 0.0]) if axis == "x" else np.array([1.0, 0.0, 0.0])
+    mujoco.mj_forward(model, data)
+    return full[np.ix_(dofs, dofs)], stiffness, data.qfrc_bias[dofs].copy()
+
+
+def _modes(scene, names: list[str]) -> np.ndarray:
+    """Frequencies of such joints [rad/s]."""
+    inertia, stiffness, _ = _swinging(scene, names)
+    return np.sqrt(np.sort(np.linalg.eigvals(np.linalg.solve(inertia, stiffness)).real))
 
 
 def test_a_double_pendulum_has_its_two_modes():
@@ -315,6 +324,22 @@ def test_a_double_pendulum_has_its_two_modes():
     for axis in "xy":
         found = _modes(scene, [f"upper_{axis}", f"lower_{axis}"])
         np.testing.assert_allclose(found, np.sqrt(np.sort(squares)), rtol=1e-3)
+
+
+@pytest.mark.parametrize(("share", "l2"), [(0.25, 0.2), (0.4, 0.36), (0.15, 0.12), (1e-9, 0.2)])
+def test_what_is_known_of_a_double_pendulum_is_the_mass_of_its_slow_mode(share, l2):
+    """That of a mode is what it takes to shake it; what both take is the whole mass."""
+    mass, l1 = 0.02, 0.3
+    form = DoublePendulum(mass, l1, share, l2, 0.05, 0.0, 0.0, 0.1)
+    if share > 1e-6:
+        for axis in "xy":
+            inertia, stiffness, driven = _swinging(team(form), [f"upper_{axis}", f"lower_{axis}"], axis)
+            rates, modes = np.linalg.eig(np.linalg.solve(inertia, stiffness))
+            masses = (driven @ modes) ** 2 / np.einsum("ik,ij,jk->k", modes, inertia, modes)
+            assert masses.sum() == pytest.approx(mass, rel=1e-3)
+            assert form.known()["mass_kg"] == pytest.approx(masses[np.argmin(rates.real)], rel=2e-3)
+    else:
+        assert form.known()["mass_kg"] == pytest.approx(mass, rel=1e-6)
 
 
 def test_an_unequal_pendulum_has_two_frequencies():

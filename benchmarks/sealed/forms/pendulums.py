@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from scipy.linalg import eigh
 
 from estimator.arrays import Array
 from estimator.estimate.principal import inertia_parameters
@@ -19,10 +20,13 @@ from sealed.ground import Ground
 
 @dataclass(frozen=True)
 class DoublePendulum(Form):
-    """A mass on a string, and another on a string below it: two modes in each direction."""
+    """A mass on a string, and another on a string below it: two modes in each direction.
+
+    What a payload feels of a mode is its effective mass. Known is that of the slower one, which a single pendulum is.
+    """
 
     answer = "slosh"
-    size, size_is_known = "mass_kg", True
+    size = "mass_kg"
     on_payload = True
     ranges: ClassVar = {
         "mass_kg": (0.0, 100.0), "length_m": (0.01, 10.0), "lower_share": (0.0, 0.45), "lower_length_m": (0.01, 10.0),
@@ -48,6 +52,18 @@ class DoublePendulum(Form):
             damping_ratio=float(rng.uniform(0.03, 0.08)),
             **vector("point", "m", near(ground.p_1c, REACH_M, rng)),
         )
+
+    def known(self) -> dict[str, float]:
+        upper, lower = self.length_m, self.lower_length_m
+        hanging = self.lower_share * self.mass_kg
+        # Of small angles about the upright, and per acceleration of the pivot.
+        inertia = np.array([[self.mass_kg * upper**2, hanging * upper * lower], [0.0, hanging * lower**2]])
+        inertia[1, 0] = inertia[0, 1]
+        driven = np.array([self.mass_kg * upper, hanging * lower])
+        _, modes = eigh(
+            np.diag(driven), inertia
+        )  # of unit inertia, the slowest first; gravity scales its rates only
+        return {"mass_kg": float((modes[:, 0] @ driven) ** 2)}
 
     def carried(self) -> Array:
         """The mass at its pivot."""

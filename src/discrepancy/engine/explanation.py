@@ -226,8 +226,11 @@ def _values(rig: Rig, best: Hypothesis, index: int) -> dict[str, Array]:
     """Values of a cause, and their covariance with what its law may put them off."""
     candidate = best.problem.candidates[index]
     values = best.fit.part(index)[0] * candidate.units
-    law = np.concatenate([values, rig.inexact(candidate)])
-    covariance = covariance_with_shape(rig, best.fit, index) + rules.LAW_ERROR_SHARE**2 * np.diag(law**2)
+    covariance = covariance_with_shape(rig, best.fit, index)
+    law = np.where(
+        np.diag(covariance) > 0.0, rig.law_error(candidate, values), 0.0
+    )  # of what is in the model
+    covariance = covariance + np.diag(law**2)
     return {"values": values, "covariance": covariance}
 
 

@@ -206,7 +206,8 @@ FORM_SHARE_MOST = 0.3
 LISTED_ODDS = 4.0
 """That a cause is one of the catalogue rather than an unlisted one that looks like it. Chosen."""
 LAW_ERROR_SHARE = 0.02
-"""By which the law of a cause puts its size off; part of every standard error. Chosen."""
+"""By which the law of a cause puts its size off; part of every standard error, and of no probability. Chosen; of those
+of a team in ``TEAM_LAW_ERRORS`` measured."""
 LEAST_PROBABILITY = WRONG_NAME_COST / (1.0 + WRONG_NAME_COST)
 """From which a cause is named, one half; below, it is a suspicion. Derived: named, it costs the share of wrong
 names; not named, that of right ones."""

@@ -85,11 +85,25 @@ def shape_steps(candidate: Candidate) -> list[tuple[Candidate, Candidate, float]
     return steps
 
 
-def inexact_numbers(candidate: Candidate) -> Array:
-    """Numbers of the shape that the data determine, 0 where the law's own error puts none off; shape (s,)."""
-    cause = CAUSES[candidate.cause]
+def law_errors(candidate: Candidate, values: Array) -> Array:
+    """What the law's own error puts a cause's values, then the numbers of its shape that the data determine, off.
+
+    Where numbers of one cause have tolerances, what one of them leaves is taken up by all: each is off by the share
+    of the whole, in tolerances.
+
+    Args:
+        candidate: the cause.
+        values: of its parameters, in their own units, shape (k,).
+
+    Returns:
+        Standard deviations in their own units, shape (k + s,).
+    """
+    cause, units = CAUSES[candidate.cause], candidate.units
+    sizes = np.linalg.norm(values / units) * units if all(candidate.tolerant) else np.abs(values)
     names = (name for name in cause.determined if name in candidate.shape)
-    return np.array([candidate.shape[name] if name in cause.inexact else 0.0 for name in names])
+    numbers = [candidate.shape[name] if name in cause.inexact else 0.0 for name in names]
+    share = rules.TEAM_LAW_ERRORS.get(cause.name, rules.LAW_ERROR_SHARE)
+    return np.asarray(share * np.append(sizes, numbers), dtype=np.float64)
 
 
 def worst_events(

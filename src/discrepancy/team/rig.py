@@ -12,7 +12,7 @@ from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation
 from discrepancy.engine.gain import fit_to_simulate
 from discrepancy.laws.candidate import LawCandidate
-from discrepancy.team.candidates import in_shapes, inexact_numbers
+from discrepancy.team.candidates import in_shapes, law_errors
 from discrepancy.team.causes import CAUSES
 from discrepancy.team.causes.base import Context
 from discrepancy.team.causes.sliding import KEPT
@@ -83,10 +83,10 @@ class TeamRig(LawfulRows):
             return candidate
         return replace(candidate, shape=dict(CAUSES[candidate.cause].recentred(values, candidate.shape)))
 
-    def inexact(self, candidate: Candidate) -> Array:
+    def law_error(self, candidate: Candidate, values: Array) -> Array:
         if isinstance(candidate, LawCandidate):
-            return super().inexact(candidate)
-        return inexact_numbers(candidate)
+            return super().law_error(candidate, values)
+        return law_errors(candidate, values)
 
     def _context(self, candidate: Candidate) -> Context:
         pi, at = self.linear[0].shared.pi, candidate.transient
