@@ -75,9 +75,9 @@ def score(result: Item) -> Scored:
 
 
 def _hidden(item: Item, truth: Item) -> bool:
-    here = item["cause"], item.get("robot"), item.get("joint")
-    answers = (effect["answer"] for effect in truth["effects"])
-    return any(here == (answer["cause"], answer.get("robot"), answer.get("joint")) for answer in answers)
+    """Whether it is the right cause for something hidden, at a place that is right for it."""
+    each = (match([item], {**truth, "effects": [effect]}, [1.0]).scores[0] for effect in truth["effects"])
+    return any(one.member and one.place for one in each)
 
 
 def _factors(request: Item, effects: Sequence[Item]) -> list[float]:

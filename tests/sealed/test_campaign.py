@@ -293,6 +293,12 @@ def test_what_a_wide_background_drew_is_neither_an_alarm_nor_a_miss():
     both = score(_result([_effect()], [named], drawn=drawn))
     assert both.scores[0].right
     assert not both.grounded
+    # So it does about an axis that is the hidden one's, where the background drew some friction as well.
+    rubs = [_effect("gimbal_friction", 3, 1, coulomb_Nm=0.002, viscous_Nms_per_rad=0.02)]
+    found = _named("gimbal_friction", 3, 1, coulomb_Nm=(0.05, 0.001), viscous_Nms_per_rad=(0.03, 0.01))
+    parallel = score(_result([_effect("gimbal_friction", 1, 1)], [found], drawn=rubs))
+    assert parallel.scores[0].right
+    assert not parallel.grounded
 
 
 def test_what_nobody_lists_should_stay_unexplained():
