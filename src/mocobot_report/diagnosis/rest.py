@@ -34,7 +34,7 @@ def rest_sections(book: Book, diagnosed: Diagnosed) -> list[Node]:
     outline = [
         ("What would have been noticed", limits),
         ("What such recordings cannot decide", el("dl", entries, class_="list") if entries else None),
-        ("The extended model", _models(diagnosed.folder)),
+        ("Models to take away", _models(diagnosed.folder)),
         ("Notes", bullets(notes) if notes else None),
     ]
     return [section(book, name, content) for name, content in outline if content is not None]
