@@ -15,6 +15,7 @@ from discrepancy.candidate import Candidate
 from discrepancy.law_doubt import LawDoubt
 from discrepancy.least_squares.patches import Patches
 from estimator.arrays import Array
+from estimator.errors import InputError
 
 Numbers = dict[str, float]
 
@@ -253,5 +254,9 @@ class Rig(ABC):
         """Write the model with the causes in it, for the user to take away."""
 
     def write_as_found(self, explanation: Any, folder: Path) -> None:
-        """Write the same with every healthy part as it is found, too; asked of rigs that are ``whole`` only."""
-        raise NotImplementedError
+        """Write the same with every healthy part as it is found, too.
+
+        Raises:
+            InputError: the rig has no such model (``whole``).
+        """
+        raise InputError("a model with every part as it is found is there of a team only")

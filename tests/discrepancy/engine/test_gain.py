@@ -1,5 +1,7 @@
 """What a cause is worth in closed loop: shares, intervals and bookkeeping by hand."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -7,6 +9,7 @@ from scipy import stats
 from discrepancy.engine.gain import Gain, Response, mean_chi2, responses, with_all_as_found
 from discrepancy.least_squares.fit import Fit
 from discrepancy.least_squares.problem import Problem
+from estimator.errors import InputError
 from fake_rig import FakeRig
 
 
@@ -187,3 +190,18 @@ def test_nothing_is_asked_for_where_only_noise_is_left_or_a_simulation_cannot_ha
         before = (None,) * 4 if rig is failed else before
         gain = Gain(before, before, held_out=True)
         assert with_all_as_found(gain, rig, problem, []) is gain
+
+
+@pytest.mark.parametrize(
+    ("found", "better"), [((2.0, 3.0), True), ((5.0, 6.0), False), ((2.0, None), False), ((), False)]
+)
+def test_a_model_as_found_is_better_if_all_its_trials_are_told_and_together_better(found, better):
+    told = gain([40.0, 50.0], [5.0, 6.0])
+    told = replace(told, as_found=tuple(None if x is None else response(x) for x in found))
+    assert told.is_better_as_found is better
+
+
+def test_rigs_that_have_no_such_model_say_so(tmp_path):
+    with pytest.raises(InputError, match="a team only"):
+        FakeRig({}).write_as_found(None, tmp_path / "as_found")
+    assert not (tmp_path / "as_found").exists()
