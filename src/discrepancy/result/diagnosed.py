@@ -67,16 +67,16 @@ class Diagnosed:
         Raises:
             InputError: something cannot be written.
         """
-        values = self._values
-        if self.diagnosis.causes:
-            try:
-                self.rig.write_extended(self.diagnosis.explanation, folder / EXTENDED)
-            except InputError as error:  # values that no effect can have, such as a negative friction
-                note = f"There is no extended model: {error}."
-                values["notes"] = [*(n for n in values["notes"] if n != note), note]
-        gain = self.diagnosis.gain
+        values, gain = self._values, self.diagnosis.gain
+        models = [(EXTENDED, self.rig.write_extended)] if self.diagnosis.causes else []
         if gain is not None and gain.is_better_as_found:
-            self.rig.write_as_found(self.diagnosis.explanation, folder / AS_FOUND)
+            models.append((AS_FOUND, self.rig.write_as_found))
+        for name, write in models:
+            try:
+                write(self.diagnosis.explanation, folder / name)
+            except InputError as error:  # values that no effect can have, such as a negative friction
+                note = f"There is no {'extended model' if name == EXTENDED else 'model as found'}: {error}."
+                values["notes"] = [*(n for n in values["notes"] if n != note), note]
         residuals = self.traces()
         save_traces(residuals, self.rig.channels, folder / RESIDUALS)
         if draws_plots():

@@ -1,9 +1,12 @@
 """The team that a user takes away answers the recorded commands as the recorded one did, healthy parts included."""
 
+import json
+
 import numpy as np
 import pytest
 
 import mocobot
+from estimator.errors import InputError
 from mocobot_sim.effects import apply_effects, make_effect
 from mocobot_sim.extended.extended import extra_of, load_extended
 from mocobot_sim.scene.scene import build_team
@@ -53,7 +56,7 @@ def _off(recordings, folder):
 
 
 @pytest.mark.slow
-def test_the_team_as_found_answers_as_the_recorded_one_did(recordings, tmp_path):
+def test_the_team_as_found_answers_as_the_recorded_one_did(recordings, tmp_path, monkeypatch):
     diagnosed = mocobot.diagnose(recordings)
     diagnosis = diagnosed.diagnosis
     assert [found.candidate.cause for found in diagnosis.causes] == ["sea_bias"]
@@ -73,3 +76,13 @@ def test_the_team_as_found_answers_as_the_recorded_one_did(recordings, tmp_path)
     assert extra_of(found)["causes"] == extra_of(named)["causes"] == [diagnosis.causes[0].candidate.label]
     off_named, off_found = _off(recordings, named), _off(recordings, found)
     assert np.all(off_found < 0.4 * off_named), (off_found, off_named)
+
+    def none(*_):
+        raise InputError("no effect has such values")
+
+    monkeypatch.setattr(type(diagnosed.rig), "write_as_found", none)
+    diagnosed.write(tmp_path / "other")
+    assert not (tmp_path / "other" / "as_found").exists()
+    assert load_extended(tmp_path / "other" / "extended").robots == 3
+    notes = json.loads((tmp_path / "other" / "diagnosis.json").read_text(encoding="utf-8"))["notes"]
+    assert "There is no model as found: no effect has such values." in notes
