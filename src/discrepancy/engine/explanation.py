@@ -227,9 +227,8 @@ def _values(rig: Rig, best: Hypothesis, index: int) -> dict[str, Array]:
     candidate = best.problem.candidates[index]
     values = best.fit.part(index)[0] * candidate.units
     covariance = covariance_with_shape(rig, best.fit, index)
-    law = np.where(
-        np.diag(covariance) > 0.0, rig.law_error(candidate, values), 0.0
-    )  # of what is in the model
+    told = np.diag(covariance) > 0.0  # what a shape lacks has no error
+    law = np.where(told, rig.law_error(candidate, values), 0.0)
     covariance = covariance + np.diag(law**2)
     return {"values": values, "covariance": covariance}
 

@@ -10,7 +10,7 @@ from typing import Any
 from discrepancy.causes.words import Words
 from discrepancy.engine.diagnose import Diagnosis
 from discrepancy.result.json import diagnosis_to_dict
-from discrepancy.result.read import FORMAT, NAME
+from discrepancy.result.read import AS_FOUND, EXTENDED, FORMAT, NAME
 from discrepancy.result.text import format_diagnosis
 from discrepancy.result.traces import Trace
 from discrepancy.result.traces_file import NAME as RESIDUALS
@@ -21,7 +21,6 @@ from estimator.extras import draws_plots
 from estimator.files import write_json, write_text
 
 REPORT, PAGE = "report.txt", "report.html"
-EXTENDED, AS_FOUND = "extended", "as_found"
 PLOTS = ("residual_*.png", "evidence.png", "closed_loop.png", "law.png")
 
 

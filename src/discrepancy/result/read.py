@@ -10,6 +10,8 @@ from estimator.errors import InputError
 from estimator.strict import read_json
 
 FORMAT, VERSION, NAME = "mocobot-diagnosis", 2, "diagnosis.json"
+EXTENDED, AS_FOUND = "extended", "as_found"
+"""Folders of models beside it: with the named causes, and with every part as far off as it is found."""
 VERDICTS = {
     "consistent": "Consistent",
     "miscalibrated": "Miscalibrated",

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from discrepancy.causes.units import one_each, parameter
-from discrepancy.result.read import kind_of
+from discrepancy.result.read import AS_FOUND, EXTENDED, kind_of
 from discrepancy.result.text import NOTHING_WRONG_HERE
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Child, Node, el
@@ -17,7 +17,6 @@ from mocobot_report.diagnosis.keys import cause_name
 from mocobot_report.folder import Diagnosed
 
 Values = Mapping[str, Any]
-EXTENDED, AS_FOUND = "extended", "as_found"
 
 
 def rest_sections(book: Book, diagnosed: Diagnosed) -> list[Node]:

@@ -15,6 +15,7 @@ def readme(effects: Sequence[Mapping[str, Any]], robots: int, healthy: int = 0) 
     named = len(effects) - healthy
     table = _table(effects[:named])
     if healthy:
+        table = table if named else "No cause was named."
         rest = _table(effects[named:])
         table = f"{table}\n\nEvery other part is as far off as it was found, within its tolerance:\n\n{rest}"
     many = "1 Omnid" if robots == 1 else f"{robots} Omnids"

@@ -12,6 +12,7 @@ from estimator.errors import InputError
 from mocobot.cli import main
 from mocobot_sim.effects import EFFECTS
 from mocobot_sim.extended.extended import extra_of, load_extended, write_extended
+from mocobot_sim.extended.readme import readme
 from mocobot_sim.scene.as_built import CalibrationSpread
 from mocobot_sim.scene.free import build_free_team
 from mocobot_sim.scene.scene import build_team
@@ -227,3 +228,13 @@ def test_robots_that_hold_nothing_are_no_extended_model(tmp_path):
     with pytest.raises(InputError, match="the robots hold nothing; an extended model carries a payload"):
         write_extended(build_free_team(2), [], tmp_path / "model", {})
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("named", [0, 1])
+def test_the_page_tells_what_was_named_from_what_is_as_far_off_as_others(named):
+    effects = [{"cause": f"cause_{k}", "parameters": {"size": 1.0}} for k in range(named + 2)]
+    first, rest = readme(effects, 3, healthy=2).split("Every other part")
+    assert ("No cause was named." in first) == (not named)
+    assert [f"cause_{k}`" in first for k in range(named + 2)] == [k < named for k in range(named + 2)]
+    assert [f"cause_{k}`" in rest for k in range(named + 2)] == [k >= named for k in range(named + 2)]
+    assert "Every other part" not in readme(effects, 3)
