@@ -49,7 +49,7 @@ TEAM_LAW_ERRORS = {
 """``LAW_ERROR_SHARE`` by cause, where it is another. Measured on kept sealed sets (docs/diagnosis/validation.md), forms
 in which sizes compare with the law's among them: with these, errors are 0.7 to 1.25 of their standard errors, rms by
 cause, but for grasps that give way and tethers of the payload, where sets of older rules make it 2.0 and 1.8; with 0.02
-for all encoder zeros, lengths, friction in driven joints, hysteresis, scales had been 0.1 to 0.75 of them."""
+for all, those of zeros, lengths, friction in driven joints, hysteresis and scales had been 0.1 to 0.75 of them."""
 
 # Noise of the sensors.
 
