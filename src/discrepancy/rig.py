@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
@@ -72,6 +72,7 @@ class Rig(ABC):
     reshaped: ClassVar[tuple[str, ...]] = ()  # the same, where what is healthy would have that shape, too
     coarse: ClassVar[tuple[str, ...]] = ()  # causes of which a scan has shapes that are far apart
     plain_first: ClassVar[tuple[str, ...]] = ()  # causes with more to them only where there is any
+    more_share: ClassVar[Mapping[str, float]] = {}  # of what plain ones are worth, that more to them must add
     apart: ClassVar[tuple[str, ...]] = ()  # numbers of shapes that leave something else open than others do
     behind: ClassVar[tuple[str, ...]] = ()  # causes with a shape that shows only beside what they leave open
     curved: ClassVar[bool] = False  # whether exact residuals hold what is within its tolerance, too

@@ -86,9 +86,9 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         except InputError:  # no such machine: the linear answer is the better one
             return linear
         lost = hypothesis.learnt.log_evidence - new.learnt.log_evidence
-        shortens = rig.curved and (anew or at is not None)
         most = rules.BENT_NATS if (bends or anew) and hypothesis is linear else rules.DIVERGED_NATS
         diverges = lost > most
+        shortens = share < 1.0 or (anew or at is not None if rig.curved else diverges)
         way = np.inf if diverges else _way(fit, new.fit)
         if diverges or (way > max(last, 1.0) and not (anew and lost < 0.0)):
             if not anew and near(rig, hypothesis):

@@ -6,8 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
+from discrepancy import rules
 from discrepancy.candidate import Candidate
 from discrepancy.engine.explanation import Explanation
 from discrepancy.engine.gain import fit_to_simulate
@@ -62,6 +63,7 @@ class TeamRig(LawfulRows):
     reshaped = ("sea_hysteresis", "grasp_flex")
     coarse = ("tether", "payload_tether")
     plain_first = ("slosh",)
+    more_share: ClassVar = {"base_creep": rules.CREEP_START_SHARE}
     behind = ("grasp_play",)
     whole = True
     apart = (KEPT,)

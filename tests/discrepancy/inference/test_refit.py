@@ -194,3 +194,41 @@ def test_steps_are_shortened_where_slopes_have_grown():
     assert found.fit.part(4)[0][0] == pytest.approx(expected, abs=0.05)
     for t in linear.problem.trials:
         np.testing.assert_allclose(found.fit.remaining(t), linear.fit.remaining(t), atol=0.3)
+
+
+@dataclass
+class Overshot(FakeRig):
+    """Cause 2 also leaves a trace of its value's square, which looks like more of it in part."""
+
+    by: float = 0.02
+    alike: float = 1.2
+
+    def __post_init__(self):
+        super().__post_init__()
+        rng = np.random.default_rng(7)
+        own = self.columns_of[CATALOGUE[2].key]
+        self.square = [
+            self.by * (self.alike * column + 0.3 * rng.standard_normal(column.shape))[..., 0]
+            for column in own
+        ]
+        value = self.present[2]
+        self.data = [(x + value**2 * s, *rest) for (x, *rest), s in zip(self.data, self.square, strict=True)]
+
+    def residual(self, shared, local, active):
+        (value,) = (v[0] for c, v in active if c.key == CATALOGUE[2].key)
+        out = super().residual(shared, local, active)
+        return [x - value**2 * s for x, s in zip(out, self.square, strict=True)]
+
+
+def test_a_step_that_loses_too_much_is_shortened():
+    """Straight, 40 where 25 is there, which leaves more than nothing of the square; half of the way is near."""
+    rig = Overshot({2: 25.0})
+    linear, nothing = hypotheses(rig, [2])
+    assert linear.fit.part(2)[0][0] == pytest.approx(40.0, abs=1.5)
+    asked = []
+    residual = rig.residual
+    rig.residual = lambda *args: asked.append(args[2][0][1][0]) or residual(*args)
+    found = exact(rig, linear, nothing)
+    assert asked[1] == pytest.approx(0.5 * asked[0])
+    assert found.fit.part(2)[0][0] == pytest.approx(25.0, abs=1.0)
+    assert found.score > linear.score + 100.0

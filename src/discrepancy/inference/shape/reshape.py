@@ -76,6 +76,21 @@ def settled_shape(rig: Rig, new: Hypothesis, index: int) -> Hypothesis:
     return new
 
 
+def as_plain(rig: Rig, new: Hypothesis, index: int) -> Hypothesis:
+    """One of the causes in its plain shape, unless more to it is worth its share of that (``Rig.more_share``).
+
+    Both are held against none at all: where a kind scatters for its sake, it explains little more than that does.
+    """
+    candidate = new.problem.candidates[index]
+    if candidate.cause not in rig.more_share or not candidate.shape:
+        return new
+    others, plain = [i for i in new.free if i != index], candidate.in_shape({})
+    without = Fit.of(new.problem, others, fixed=(index, np.zeros(len(candidate.parameters))))
+    more, less = scores_with(without, [(one, rig.columns(one)) for one in (candidate, plain)])
+    keeps = more > less + rig.more_share[candidate.cause] * max(less, 0.0)
+    return new if keeps else in_shape(rig, new, index, plain)
+
+
 def in_shape(rig: Rig, new: Hypothesis, index: int, shape: Candidate) -> Hypothesis:
     """The hypothesis with one of its causes in another shape."""
     problem = new.problem.with_columns(index, shape, rig.columns(shape))

@@ -9,7 +9,7 @@ from discrepancy.candidate import Candidate
 from discrepancy.inference.hypothesis import Hypothesis
 from discrepancy.inference.scan import Scanned
 from discrepancy.inference.shape.best_shape import best_shape
-from discrepancy.inference.shape.reshape import event_in_shape, in_shape, settled_shape
+from discrepancy.inference.shape.reshape import as_plain, event_in_shape, in_shape, settled_shape
 from discrepancy.least_squares.problem import Problem
 from discrepancy.rig import Rig
 
@@ -43,6 +43,8 @@ def sharpened(
     new = max((_in_shape(rig, base, start, item, shape, near) for shape in tried), key=lambda one: one.score)
     if new.causes[-1].transient:
         return _beyond_tolerance(base, new.problem, new)
+    if near:
+        new = as_plain(rig, new, new.free[-1])
     new = _opened(rig, base, new.problem, new)
     for shape in _apart(rig, new.causes[-1]) if near else ():
         other = _in_shape(rig, base, start, item, shape, near)
