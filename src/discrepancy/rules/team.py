@@ -203,7 +203,7 @@ CREEP_STARTS = 100
 CREEP_START_SHARE = 0.01
 """Of what a creep from the beginning is worth, that one which begins later must add. Measured: while a robot stands its
 friction holds what a creep pulls, so that three of five from the beginning are worth 0.3 % more from 3 to 4 s on, when
-robots begin to move; four that do begin later are worth 70 % and more. Within a second or two after that it is 1 %."""
+robots begin to move; six that do begin later are worth 64 % and more. Within a second or two after that it is 1 %."""
 SLOSH_LENGTHS_M = (0.04, 1.0)
 """Derived: pendulums of 2.5 to 0.5 Hz; slower and faster ones look like drag or play."""
 SLOSH_MOST_DAMPED = 0.3

@@ -256,7 +256,8 @@ def _with_kinds_held(base: Hypothesis) -> list[Scanned]:
 def _chosen(ranked: Sequence[Scanned], leaders: int, opened: Collection[Key]) -> list[Scanned]:
     """The likeliest of all, and of every other cause that may be there its likeliest place.
 
-    Of a cause that leaves something open also the likeliest where it does not yet.
+    Of a cause that leaves something open also the likeliest where it does not yet. What stands out of noise as it should
+    be is among them, however many others go before it in the noise that it makes itself.
     """
 
     def kind(item: Scanned) -> tuple[str, bool]:
@@ -265,7 +266,7 @@ def _chosen(ranked: Sequence[Scanned], leaders: int, opened: Collection[Key]) ->
     likely = [item for item in ranked if item.loud or item.score > rules.LOOKED_AT_NATS]
     chosen, kinds = likely[:leaders], {kind(item) for item in likely[:leaders]}
     for item in likely[leaders:]:
-        if kind(item) not in kinds:
+        if kind(item) not in kinds or item.loud:
             kinds.add(kind(item))
             chosen.append(item)
-    return chosen[: 2 * leaders]
+    return [item for k, item in enumerate(chosen) if k < 2 * leaders or item.loud]
