@@ -256,8 +256,8 @@ def _with_kinds_held(base: Hypothesis) -> list[Scanned]:
 def _chosen(ranked: Sequence[Scanned], leaders: int, opened: Collection[Key]) -> list[Scanned]:
     """The likeliest of all, and of every other cause that may be there its likeliest place.
 
-    Of a cause that leaves something open also the likeliest where it does not yet. What stands out of noise as it should
-    be is among them, however many others go before it in the noise that it makes itself.
+    Of a cause that leaves something open also the likeliest where it does not yet. What stands out of noise as it
+    should be is among them, however many others go before it in the noise that it makes itself.
     """
 
     def kind(item: Scanned) -> tuple[str, bool]:
