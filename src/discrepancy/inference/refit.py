@@ -88,6 +88,7 @@ def exact(rig: Rig, hypothesis: Hypothesis, nothing: Hypothesis) -> Hypothesis:
         lost = hypothesis.learnt.log_evidence - new.learnt.log_evidence
         most = rules.BENT_NATS if (bends or anew) and hypothesis is linear else rules.DIVERGED_NATS
         diverges = lost > most
+        # Where nothing else is moved along, straight columns reach far: only what loses too much is shortened there.
         shortens = share < 1.0 or (anew or at is not None if rig.curved else diverges)
         way = np.inf if diverges else _way(fit, new.fit)
         if diverges or (way > max(last, 1.0) and not (anew and lost < 0.0)):

@@ -201,9 +201,10 @@ CREEP_STEP_S = 0.5
 CREEP_STARTS = 100
 """How many of them there are, each as likely as the others. Derived: three bases, by a minute in steps of 2 s."""
 CREEP_START_SHARE = 0.01
-"""Of what a creep from the beginning is worth, that one which begins later must add. Measured: while a robot stands its
-friction holds what a creep pulls, so that three of five from the beginning are worth 0.3 % more from 3 to 4 s on, when
-robots begin to move; six that do begin later are worth 64 % and more. Within a second or two after that it is 1 %."""
+"""Of what a creep from the beginning is worth, that one which begins later must add. Measured on tuning sets: three of
+five that creep from the beginning are worth 0.3 % more from 3 to 4 s on, when robots begin to move (why is not traced),
+six that begin in mid-trial 64 % and more. Of the five, moved to 6 s one loses 0.5 %, to 5 s another 10 %: a begin soon
+after robots begin to move may not be told."""
 SLOSH_LENGTHS_M = (0.04, 1.0)
 """Derived: pendulums of 2.5 to 0.5 Hz; slower and faster ones look like drag or play."""
 SLOSH_MOST_DAMPED = 0.3
