@@ -48,13 +48,15 @@ def healthy(best: Hypothesis, index: int, less: Hypothesis, judged: Hypothesis) 
 def gained(base: Hypothesis, more: Hypothesis) -> float:
     """By how much a hypothesis with another cause is likelier [nats].
 
-    A kind that scatters explains a fault of its own by straight columns. Where a cause takes the place of such a
-    scatter, both count with the residual at which the cause is exact.
+    A kind that scatters explains a fault of its own by straight columns. Where a cause is of such a kind, or takes the
+    place of its scatter, both count with the residual at which the cause is exact.
     """
     known = {cause.key for cause in base.causes}
     new = [i for i, cause in zip(more.free, more.causes, strict=True) if cause.key not in known]
-    if len(new) == 1 and _wide(base, rules.HELD_FACTOR) - _wide(more, rules.HELD_FACTOR):
-        return more.score - more.without(new[0]).score
+    if len(new) == 1:
+        wide = _wide(base, rules.HELD_FACTOR)
+        if more.problem.candidates[new[0]].cause in wide or wide - _wide(more, rules.HELD_FACTOR):
+            return more.score - more.without(new[0]).score
     return more.score - base.score
 
 

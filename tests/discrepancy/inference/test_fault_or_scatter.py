@@ -132,6 +132,16 @@ def test_a_fault_and_a_scatter_count_at_the_same_residual():
     assert searched.best.score < searched.nothing.score
 
 
+def test_they_do_where_the_others_scatter_a_little_still():
+    """As far as a half beyond their tolerance counts as a scatter; no edge in the comparison may be there."""
+    rig = ShiftedRig({0: 20.0, 1: 3.7, 2: -3.7}, catalogue=SCATTERED, louder=0.15)
+    searched = search(rig)
+    assert [c.cause for c in searched.best.causes] == ["clock"]
+    beside = searched.best.problem.spread[searched.best.problem.columns_of(1)][0]
+    assert rules.HELD_FACTOR < beside < rules.SCATTER_FACTOR
+    assert searched.best.score < searched.nothing.score
+
+
 LAGS = tuple(cause("lag", robot) for robot in (1, 2, 3))
 
 
