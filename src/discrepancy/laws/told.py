@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -26,8 +26,9 @@ class Beside:
 
     def rows(self, trial: int, columns: Array) -> Array:
         """Whitened columns (n, C, k) of one trial in the transform and over the noise, shape (n C, k)."""
-        own = self._fit.problem.spectrum(trial, columns)
-        return own.reshape(-1, columns.shape[2]) * self._roots[trial]
+        own = self._fit.problem.spectrum(trial, columns).reshape(-1, columns.shape[2])
+        own *= self._roots[trial]
+        return own
 
     def edges(self, trial: int, rows: Array) -> tuple[Array, Array]:
         """Products of such rows with the model's columns, (used, k), and their score vector beside the fit, (k,)."""
@@ -46,7 +47,7 @@ class Beside:
             self._models[trial] = every[:, self._columns] * self._roots[trial]
         return self._models[trial]
 
-    def each(self, blocks: Sequence[Array], groups: Sequence[int]) -> list[tuple[Array, Array]]:
+    def each(self, blocks: Iterable[Array], groups: Sequence[int]) -> list[tuple[Array, Array]]:
         """Information and score vector of every group of columns by itself.
 
         Args:

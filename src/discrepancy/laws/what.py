@@ -56,24 +56,34 @@ def _at_place(
     terms: Sequence[Term],
     trials: Sequence[int],
 ) -> list[Judged]:
-    directions = [bench.directions(t, place) for t in trials]
-    out, at = [], 0
+    out, at, first = [], 0, trials[0]
     while at < len(terms):
-        chunk, errors, groups = [], [[] for _ in trials], []
+        chunk, made, groups = list[Term](), list[Array](), list[int]()
         while at < len(terms) and sum(groups) < rules.LAW_CHUNK:
-            term = terms[at]
+            chunk.append(terms[at])
+            made.append(_values(bench, place, first, chunk[-1]))
+            groups.append(made[-1].shape[1] * len(place.axes))
             at += 1
-            values = [bench.with_offset(place, term, bench.of_term(t, term)) for t in trials]
-            groups.append(values[0].shape[1] * len(place.axes))
-            chunk.append(term)
-            for own, value in zip(errors, values, strict=True):
-                own.append(value)
-        blocks = []
-        for t, own in zip(trials, errors, strict=True):
-            blocks.append(bench.white(t, bench.moved(t, directions[t], np.concatenate(own, axis=1))))
+        # A trial at a time, for the sake of memory.
+        blocks = (
+            _columns(
+                bench, place, t, made if t == first else [_values(bench, place, t, term) for term in chunk]
+            )
+            for t in trials
+        )
         for term, (information, score) in zip(chunk, beside.each(blocks, groups), strict=True):
             out.append(Judged(place, term, _nats(information, score)))
     return out
+
+
+def _values(bench: Bench, place: Place, trial: int, term: Term) -> Array:
+    return bench.with_offset(place, term, bench.of_term(trial, term))
+
+
+def _columns(bench: Bench, place: Place, trial: int, values: Sequence[Array]) -> Array:
+    """What formulas of such values add to a trial's whitened residual, shape (n, C, k)."""
+    directions = bench.directions(trial, place)
+    return bench.white(trial, bench.moved(trial, directions, np.concatenate(values, axis=1)))
 
 
 def _nats(information: Array, score: Array) -> float:
