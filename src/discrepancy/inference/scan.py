@@ -25,6 +25,7 @@ class Scanned:
         score: log odds that it is there [nats].
         columns: of an event or a shape that is not the problem's, else None.
         loud: whether it is looked at closely whatever its score.
+        held: whether the score is with its kind within its tolerance, though that scatters.
     """
 
     index: int | None
@@ -32,6 +33,7 @@ class Scanned:
     score: float
     columns: Sequence[Array] | None = None
     loud: bool = False
+    held: bool = False
 
 
 def scan(fit: Fit) -> list[Scanned]:
@@ -85,7 +87,7 @@ def in_best_shape(rig: Rig, fit: Fit, item: Scanned, loud: Collection[int | None
     each = [(shape, rig.columns(shape)) for shape in rig.refinements(item.candidate)]
     for (shape, columns), score in zip(each, scores_with(fit, each), strict=True):
         if score - healthy > best.score:
-            best = Scanned(item.index, shape, score - healthy, columns)
+            best = replace(item, candidate=shape, score=score - healthy, columns=columns)
     return best
 
 

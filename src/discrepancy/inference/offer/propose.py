@@ -249,15 +249,16 @@ def _with_kinds_held(base: Hypothesis) -> list[Scanned]:
             for index in (i for i in members if i in found):
                 score = score_of(fit, index)
                 if score > found[index].score:
-                    found[index] = Scanned(index, problem.candidates[index], score)
+                    found[index] = Scanned(index, problem.candidates[index], score, held=True)
     return list(found.values())
 
 
 def _chosen(ranked: Sequence[Scanned], leaders: int, opened: Collection[Key]) -> list[Scanned]:
     """The likeliest of all, and of every other cause that may be there its likeliest place.
 
-    Of a cause that leaves something open also the likeliest where it does not yet. What stands out of noise as it
-    should be is among them, however many others go before it in the noise that it makes itself.
+    Of a cause that leaves something open also the likeliest where it does not yet. There is room for so many of those
+    whose kind is held within its tolerance: where all is off they go before any other. What is likely as all scatters
+    is among them in any case, and so is what stands out of noise as it should be.
     """
 
     def kind(item: Scanned) -> tuple[str, bool]:
@@ -269,4 +270,4 @@ def _chosen(ranked: Sequence[Scanned], leaders: int, opened: Collection[Key]) ->
         if kind(item) not in kinds or item.loud:
             kinds.add(kind(item))
             chosen.append(item)
-    return [item for k, item in enumerate(chosen) if k < 2 * leaders or item.loud]
+    return [item for k, item in enumerate(chosen) if k < 2 * leaders or item.loud or not item.held]

@@ -1,12 +1,12 @@
-"""Which of a scan are looked at: one that stands out of calm noise is, whatever goes before it in its own."""
+"""Which of a scan are looked at: what stands out of calm noise is, and what is likely as all scatters, in any case."""
 
 import numpy as np
 import pytest
 
 from discrepancy import rules
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.inference.offer.propose import proposals
-from discrepancy.inference.scan import events_of
+from discrepancy.inference.offer.propose import _with_kinds_held, proposals
+from discrepancy.inference.scan import events_of, score_of
 from discrepancy.least_squares.problem import Problem
 from fake_rig import FakeRig, cause
 
@@ -34,3 +34,19 @@ def test_what_stands_out_is_looked_at_however_many_others_go_before_it(others):
     assert event.loud
     offered = {offer.candidate.cause for offer in proposals(rig, base).offers}
     assert "push" in offered
+
+
+def test_where_all_kinds_scatter_what_none_of_them_is_is_looked_at():
+    """With its kind within its tolerance each goes before a cable; more kinds do than there was room for."""
+    kinds = [f"kind {k}" for k in range(3 * rules.LEADERS)]
+    places = [cause(kind, robot) for kind in kinds for robot in (1, 2, 3)]
+    catalogue = (*places, cause("cable", tolerance=0.0))
+    cable = len(catalogue) - 1
+    off = dict(enumerate(10.0 * np.random.default_rng(5).choice([-1.2, -0.8, 0.8, 1.2], cable)))
+    rig = FakeRig({**off, cable: 0.7}, catalogue=catalogue)
+    base = Hypothesis.of(Problem.of(rig.rows(catalogue), catalogue), ())
+    before = [one for one in _with_kinds_held(base) if one.score > score_of(base.fit, cable)]
+    assert len({one.candidate.cause for one in before}) > 2 * rules.LEADERS
+    best = proposals(rig, base).best
+    assert best.causes[-1].cause == "cable"
+    assert best.score > base.score + rules.NAMED_NATS
