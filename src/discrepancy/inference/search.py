@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -20,6 +21,8 @@ from discrepancy.inference.remainder import is_noise, nats_left, share_left, tra
 from discrepancy.inference.straightened import Beside, straightened
 from discrepancy.least_squares.problem import Key
 from discrepancy.rig import Rig
+
+_LOG = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +103,7 @@ def continued(
     doubtful, refused, but, all_exchanged = 0, 0, set[Key](), True
     while len(best.free) < most and doubtful < rules.DOUBTFUL and refused < rules.REFUSED:
         proposed = proposals(rig, best, nothing=nothing, but=but)
+        _log_offers(best, proposed)
         added, shapes, reach = _added(best, proposed), proposed.shapes, proposed.within_reach(best)
         del proposed  # for the sake of memory
         if added is None:
@@ -113,6 +117,7 @@ def continued(
         added = exact(rig, added, nothing)
         if scattered := tolerated(best, added):
             if _form_of_a_fault(rig, best, last, scattered):
+                _log_taken("the form of a fault of its kind, not taken", best, scattered)
                 alike = {c.key for c in best.problem.candidates if c.cause == last.cause}
                 refused, but = refused + 1, but | alike
                 continue
@@ -125,6 +130,8 @@ def continued(
                 rivals = dict(zip(best.free, told, strict=True))
             found, beside = settled(rig, added, nothing, shapes, reach)
             pays = gained(best, found) >= needed(best, found)
+        outcome = "as far off as its kind scatters" if scattered else "there"
+        _log_taken(outcome if pays else f"{outcome}, not taken", best, found)
         if not pays:  # where all is linear it did, which need not be so where it is exact
             if last.transient:  # its key is that of every other
                 break
@@ -198,3 +205,23 @@ def _form_of_a_fault(rig: Rig, base: Hypothesis, cause: Candidate, scattered: Hy
         if other.cause == cause.cause
     ]
     return bool(worth) and scattered.score - base.score < max(worth)
+
+
+def _log_offers(base: Hypothesis, proposed: Proposed) -> None:
+    """What one cause more would gain, the likeliest first, at level DEBUG: why something is named, or is not."""
+    if not _LOG.isEnabledFor(logging.DEBUG):
+        return
+    there = ", ".join(cause.label for cause in base.causes) or "nothing"
+    _LOG.debug("beside %s, %.1f nats:", there, base.score)
+    for one in proposed.offers[: rules.LEADERS]:
+        numbers = ", ".join(f"{name} {value:.4g}" for name, value in one.candidate.shape.items())
+        _LOG.debug(
+            "  %s%s: %+.1f", one.candidate.label, f" ({numbers})" if numbers else "", one.score - base.score
+        )
+    if proposed.best is not None:
+        _LOG.debug("  needed: %.1f", needed(base, proposed.best))
+
+
+def _log_taken(outcome: str, base: Hypothesis, now: Hypothesis) -> None:
+    """What became of the likeliest, and what that gained where residuals are exact."""
+    _LOG.debug("  %s: %+.1f", outcome, now.score - base.score)

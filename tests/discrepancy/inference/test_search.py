@@ -1,5 +1,6 @@
 """Search and diagnosis on a rig of pure numbers, where the truth is known."""
 
+import logging
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,24 @@ def test_clean_data_have_no_cause(seed):
     assert diagnosis.verdict == "consistent"
     assert diagnosis.not_simulated
     assert diagnosis.notes == ()
+
+
+def test_why_something_is_named_is_in_the_log(caplog):
+    """What was offered, how much it had to gain, and what became of it: gains add up to what the search found."""
+    with caplog.at_level(logging.DEBUG, logger="discrepancy.inference.search"):
+        searched = search(FakeRig({2: 25.0}))
+    said = [record.getMessage() for record in caplog.records]
+    gains = [float(line.split(": ")[1]) for line in said if line.strip().startswith("there:")]
+    assert len(gains) == 1
+    assert gains[0] == pytest.approx(searched.best.score - searched.nothing.score, abs=0.1)
+    assert said[0].startswith("beside nothing")
+    assert said[1].strip().startswith("cause 2")
+    assert any(line.startswith("beside cause 2") for line in said)
+
+
+def test_nothing_is_said_unless_asked_for(caplog):
+    search(FakeRig({2: 25.0}))
+    assert caplog.records == []
 
 
 @pytest.mark.parametrize("seed", [1, 2])
