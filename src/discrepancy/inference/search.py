@@ -117,7 +117,7 @@ def continued(
         added = exact(rig, added, nothing)
         if scattered := tolerated(best, added):
             if _form_of_a_fault(rig, best, last, scattered):
-                _log_taken("the form of a fault of its kind, not taken", best, scattered)
+                _log_taken(f"{last.label}, the form of a fault of its kind, not taken", best, scattered)
                 alike = {c.key for c in best.problem.candidates if c.cause == last.cause}
                 refused, but = refused + 1, but | alike
                 continue
@@ -130,7 +130,7 @@ def continued(
                 rivals = dict(zip(best.free, told, strict=True))
             found, beside = settled(rig, added, nothing, shapes, reach)
             pays = gained(best, found) >= needed(best, found)
-        outcome = "as far off as its kind scatters" if scattered else "there"
+        outcome = f"{last.label}, {'as far off as its kind scatters' if scattered else 'there'}"
         _log_taken(outcome if pays else f"{outcome}, not taken", best, found)
         if not pays:  # where all is linear it did, which need not be so where it is exact
             if last.transient:  # its key is that of every other
