@@ -257,8 +257,9 @@ def _chosen(ranked: Sequence[Scanned], leaders: int, opened: Collection[Key]) ->
     """The likeliest of all, and of every other cause that may be there its likeliest place.
 
     Of a cause that leaves something open also the likeliest where it does not yet. There is room for so many of those
-    whose kind is held within its tolerance: where all is off they go before any other. What is likely as all scatters
-    is among them in any case, and so is what stands out of noise as it should be.
+    whose kind is held within its tolerance: where all is off they go before any other. What lasts and is likely as all
+    scatters is among them in any case, and so is an event that stands out of noise as it should be; of others, what
+    frictions far off leave where a motion begins would be a push.
     """
 
     def kind(item: Scanned) -> tuple[str, bool]:
@@ -270,4 +271,5 @@ def _chosen(ranked: Sequence[Scanned], leaders: int, opened: Collection[Key]) ->
         if kind(item) not in kinds or item.loud:
             kinds.add(kind(item))
             chosen.append(item)
-    return [item for k, item in enumerate(chosen) if k < 2 * leaders or item.loud or not item.held]
+    always = [item.loud or not (item.held or item.candidate.transient) for item in chosen]
+    return [item for k, item in enumerate(chosen) if k < 2 * leaders or always[k]]
