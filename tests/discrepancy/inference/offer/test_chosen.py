@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from discrepancy import rules
+from discrepancy.candidate import Transient
 from discrepancy.inference.hypothesis import Hypothesis
-from discrepancy.inference.offer.propose import _with_kinds_held, proposals
-from discrepancy.inference.scan import events_of, score_of
+from discrepancy.inference.offer.propose import _chosen, _with_kinds_held, proposals
+from discrepancy.inference.scan import Scanned, events_of, score_of
 from discrepancy.least_squares.problem import Problem
 from fake_rig import FakeRig, cause
 
@@ -50,3 +51,15 @@ def test_where_all_kinds_scatter_what_none_of_them_is_is_looked_at():
     best = proposals(rig, base).best
     assert best.causes[-1].cause == "cable"
     assert best.score > base.score + rules.NAMED_NATS
+
+
+@pytest.mark.parametrize("loud", [False, True])
+def test_of_events_only_what_stands_out_is_looked_at_in_any_case(loud):
+    """What frictions far off leave where a motion begins would be a push in the noise that is learnt beside them."""
+    held = [Scanned(k, candidate, 50.0, held=True) for k, candidate in enumerate(MANY)]
+    cable = Scanned(len(held), cause("cable", tolerance=0.0), 10.0)
+    push = Scanned(None, cause("push", None, 0.0, 6, transient=Transient(0, 2.0, 0.5)), 20.0, loud=loud)
+    chosen = _chosen([*held, push, cable], rules.LEADERS, ())
+    assert cable in chosen
+    assert (push in chosen) == loud
+    assert sum(item.held for item in chosen) <= 2 * rules.LEADERS
