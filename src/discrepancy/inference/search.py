@@ -130,7 +130,8 @@ def continued(
                 rivals = dict(zip(best.free, told, strict=True))
             found, beside = settled(rig, added, nothing, shapes, reach)
             pays = gained(best, found) >= needed(best, found)
-        outcome = f"{last.label}, {'as far off as its kind scatters' if scattered else 'there'}"
+        there = "there" if any(cause.key == last.key for cause in found.causes) else "another in its place"
+        outcome = f"{last.label}, {'as far off as its kind scatters' if scattered else there}"
         _log_taken(outcome if pays else f"{outcome}, not taken", best, found)
         if not pays:  # where all is linear it did, which need not be so where it is exact
             if last.transient:  # its key is that of every other

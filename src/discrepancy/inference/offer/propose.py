@@ -258,8 +258,8 @@ def _chosen(ranked: Sequence[Scanned], leaders: int, opened: Collection[Key]) ->
 
     Of a cause that leaves something open also the likeliest where it does not yet. There is room for so many of those
     whose kind is held within its tolerance: where all is off they go before any other. What lasts and is likely as all
-    scatters is among them in any case, and so is an event that stands out of noise as it should be; of others, what
-    frictions far off leave where a motion begins would be a push.
+    scatters is among them in any case, and of events what stands out of noise as it should be: with room for others a
+    healthy team had pushes.
     """
 
     def kind(item: Scanned) -> tuple[str, bool]:
@@ -271,5 +271,7 @@ def _chosen(ranked: Sequence[Scanned], leaders: int, opened: Collection[Key]) ->
         if kind(item) not in kinds or item.loud:
             kinds.add(kind(item))
             chosen.append(item)
-    always = [item.loud or not (item.held or item.candidate.transient) for item in chosen]
-    return [item for k, item in enumerate(chosen) if k < 2 * leaders or always[k]]
+    roomless = [
+        item for item in chosen[2 * leaders :] if item.loud or not (item.held or item.candidate.transient)
+    ]
+    return chosen[: 2 * leaders] + roomless

@@ -55,7 +55,7 @@ def test_where_all_kinds_scatter_what_none_of_them_is_is_looked_at():
 
 @pytest.mark.parametrize("loud", [False, True])
 def test_of_events_only_what_stands_out_is_looked_at_in_any_case(loud):
-    """What frictions far off leave where a motion begins would be a push in the noise that is learnt beside them."""
+    """With room for others a healthy team whose kinds all scatter had pushes."""
     held = [Scanned(k, candidate, 50.0, held=True) for k, candidate in enumerate(MANY)]
     cable = Scanned(len(held), cause("cable", tolerance=0.0), 10.0)
     push = Scanned(None, cause("push", None, 0.0, 6, transient=Transient(0, 2.0, 0.5)), 20.0, loud=loud)
