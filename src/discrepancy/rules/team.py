@@ -65,7 +65,15 @@ NOISE_ABOVE_HZ = 25.0
 """Where nothing moves, so that what is there is noise. Chosen."""
 NOISE_LINES, CHATTER_STEPS = 0.5, 10.0
 """Share of the amplitude there that is between the lines, below which the lines are no noise: a joint that chatters.
-And over the torque's step, from which on that is worth a note. Chosen: healthy joints have no lines."""
+And over the torque's step, from which on that is worth a note and, where it is over the noise as well, wider filters.
+Chosen: healthy joints have no lines, and the mean of what a tenth of a newton metre does is below 0.1 mN."""
+CHATTER_OVER, CHATTER_RATE_SHARE = 2.0, 0.45
+"""Cut-off of signals in which something chatters, over its frequency, and at most over the sampling rate. Derived: the
+mean of a torque times the angle at which it acts is that of both oscillating together, 40 mN of 4.5 N m; with the usual
+cut-off 2 % of that are left at 27 Hz, so 90 % at 45 Hz of 100 Hz, and 97 % where sampling lets it be twice."""
+CHATTER_JACOBIAN_HZ = 10.0
+"""Cut-off of signals at which slopes are taken where something chatters. Derived: below half of
+``TEAM_JACOBIAN_HZ``."""
 TEAM_SMOOTH_HZ = 12.0
 """Cut-off of signals when their rounding is drawn anew, and of rates that say where friction slides. Chosen."""
 SLOW_HZ, SMOOTHER_OCTAVES = 1.0, 3

@@ -27,6 +27,6 @@ def chattering(trials: Sequence[Signals], steps: Array) -> tuple[str, ...]:
     return (
         f"The torque of driven joint {joint + 1} of robot {robot + 1} oscillates faster than "
         f"{rules.NOISE_ABOVE_HZ:g} Hz, with {lines[robot, joint]:.2g} N m rms, as if its loop were unstable "
-        "(mocobot inspect says at what frequency). What that does to friction, and to readings that are not linear, is "
-        "in no cause.",
+        "(mocobot inspect says at what frequency). The mean of what that does to torques and friction is in the model, "
+        "as far as the samples tell it; what it does to readings that are not linear is in no cause.",
     )

@@ -10,8 +10,8 @@ from discrepancy.team.causes import CAUSES
 from discrepancy.team.linear.adjust import SignalNoise, with_adjusted_signals
 from discrepancy.team.linear.by_unknowns import by_bases, by_shared
 from discrepancy.team.linear.noise import Noise
-from discrepancy.team.linear.signals import with_rates
 from discrepancy.team.linear.start import Sensed, noise_rows
+from discrepancy.team.linear.trial_linear import filtered
 from discrepancy.team.rig import TeamRig
 from discrepancy.team.tolerances import default_tolerances
 from estimator.rigid_team.residual import balance, grasp_data
@@ -38,9 +38,7 @@ def measured(case, noise, rng):
     """The trial as noisy sensors see it, linearised where the exact one is."""
     errors = next(noise.draws(case.signals, rng, 1))
     signals = case.signals.minus(-errors.phi, -errors.theta, -errors.tau)
-    rate = signals.rate_hz
-    parts = with_rates(signals.phi, rate), with_rates(signals.theta, rate), with_rates(signals.tau, rate)[:1]
-    s = np.concatenate(parts).transpose(1, 2, 0, 3).reshape(len(signals.time), 3, 21)
+    s, rate = filtered(signals), signals.rate_hz
     # What the filters bend is no noise.
     residual = residual_of(case, signals) - case.linear.residual
     data = grasp_data(s, DESIGN, rate)

@@ -7,7 +7,6 @@ import pytest
 from scipy.interpolate import make_interp_spline
 from scipy.spatial.transform import Rotation
 
-from discrepancy.team.linear.signals import with_rates
 from estimator.arm.delta import forward_kinematics
 from estimator.rigid_team.residual import balance, grasp_data, pose_error, pose_residual, poses
 from estimator.rigid_team.slots import PHI
@@ -139,9 +138,9 @@ def test_jacobian_is_one_of_filtered_signals(case, linear):
 
 
 def test_signals_are_value_rate_and_acceleration(case, linear):
-    np.testing.assert_array_equal(linear.s[:, 1, 0:3], with_rates(case.signals.phi, 100.0)[0][:, 1])
-    np.testing.assert_array_equal(linear.s[:, 2, 15:18], with_rates(case.signals.theta, 100.0)[2][:, 2])
-    np.testing.assert_array_equal(linear.s[:, 0, 18:21], with_rates(case.signals.tau, 100.0)[0][:, 0])
+    np.testing.assert_array_equal(linear.s[:, 1, 0:3], case.signals.with_rates(case.signals.phi)[0][:, 1])
+    np.testing.assert_array_equal(linear.s[:, 2, 15:18], case.signals.with_rates(case.signals.theta)[2][:, 2])
+    np.testing.assert_array_equal(linear.s[:, 0, 18:21], case.signals.with_rates(case.signals.tau)[0][:, 0])
 
 
 def test_outside_wrench_takes_from_what_robots_exert(case, linear):

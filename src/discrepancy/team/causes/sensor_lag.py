@@ -1,7 +1,6 @@
 """A first-order lag inside a single torque sensor."""
 
 from discrepancy.team.causes.base import ReadingError, one_joint
-from discrepancy.team.linear.signals import with_rates
 
 
 class SensorLag(ReadingError):
@@ -19,4 +18,4 @@ class SensorLag(ReadingError):
 
     def errors(self, signals, robot, joint, shape, design):
         # truth = reading + T d(reading)/dt
-        return [{"tau": -one_joint(with_rates(signals.tau[:, robot, joint], signals.rate_hz)[1], joint)}]
+        return [{"tau": -one_joint(signals.with_rates(signals.tau[:, robot, joint])[1], joint)}]

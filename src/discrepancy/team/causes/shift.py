@@ -4,7 +4,6 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from discrepancy.team.causes.base import ReadingError, one_robot
-from discrepancy.team.linear.signals import with_rates
 
 
 class Late(ReadingError):
@@ -19,7 +18,7 @@ class Late(ReadingError):
     readings = ("tau",)
 
     def errors(self, signals, robot, joint, shape, design):
-        rates = {x: with_rates(getattr(signals, x)[:, robot], signals.rate_hz)[1] for x in self.readings}
+        rates = {x: signals.with_rates(getattr(signals, x)[:, robot])[1] for x in self.readings}
         return [{x: -rate for x, rate in rates.items()}]
 
     def undo(self, signals, trial, robot, joint, values, shape):

@@ -1,7 +1,6 @@
 """A first-order lag inside the torque sensors."""
 
 from discrepancy.team.causes.base import ReadingError
-from discrepancy.team.linear.signals import with_rates
 
 
 class TorqueLag(ReadingError):
@@ -20,4 +19,4 @@ class TorqueLag(ReadingError):
 
     def errors(self, signals, robot, joint, shape, design):
         # truth = reading + T d(reading)/dt
-        return [{"tau": -with_rates(signals.tau[:, robot], signals.rate_hz)[1]}]
+        return [{"tau": -signals.with_rates(signals.tau[:, robot])[1]}]

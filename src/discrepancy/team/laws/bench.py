@@ -17,7 +17,7 @@ from discrepancy.team.laws.directions import directions_at
 from discrepancy.team.laws.misreading import Misreading
 from discrepancy.team.laws.places import READINGS, indices_of, is_reading, own_reading, places_of, twin_of
 from discrepancy.team.laws.variables import signals_of, variables_of
-from discrepancy.team.linear.signals import Signals, with_rates
+from discrepancy.team.linear.signals import Signals
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 
@@ -66,7 +66,7 @@ class TeamBench(Bench):
         linear = self._linear[trial]
         if not rates:
             return linear.reduction(errors)[:, None]
-        parts = with_rates(errors, linear.signals.rate_hz)
+        parts = linear.signals.with_rates(errors)
         return np.stack([linear.reduction(part) for part in parts], axis=1)
 
     def columns(self, trial: int, candidate: LawCandidate) -> Array:
@@ -83,7 +83,7 @@ class TeamBench(Bench):
     def misreading(self, trial: int, candidate: LawCandidate, signals: Signals) -> Misreading:
         """A law of what is read in a trial, out of such readings."""
         place, (robot, joint) = candidate.at, indices_of(candidate.at)
-        read = with_rates(getattr(signals, READINGS[place.name])[:, robot, joint], signals.rate_hz)[0]
+        read = signals.with_rates(getattr(signals, READINGS[place.name])[:, robot, joint])[0]
 
         def values(true: Array) -> Array:
             seen = {own_reading(place): true}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from discrepancy.laws.variable import TIME, Kind, Variable
-from discrepancy.team.linear.signals import with_rates
 from discrepancy.team.linear.trial_linear import TrialLinear
 from estimator.arrays import Array
 from estimator.rigid_team.slots import PHI, PHI_DDOT, PHI_DOT, TAU, THETA, THETA_DDOT, THETA_DOT
@@ -73,7 +72,7 @@ def signals_of(linear: TrialLinear) -> dict[str, Array]:
     position = linear.data.p_bi[:, 0]
     vectors = {
         "payload_position": position,
-        "payload_velocity": with_rates(position, signals.rate_hz)[1],
+        "payload_velocity": signals.with_rates(position)[1],
         "payload_acceleration": motion.acceleration,
         "payload_felt": motion.acceleration + linear.data.gravity_mps2 * motion.up,
         "payload_rate": motion.omega,

@@ -26,28 +26,42 @@ class Noise:
     Attributes:
         step: rounding step, 0 for a continuous channel [rad, rad, N m].
         sigma: standard deviation of white noise of a reading before rounding [rad, rad, N m].
+        chatters: whether a torque oscillates above 25 Hz.
     """
 
     step: Array
     sigma: Array
+    chatters: bool = False
 
     @classmethod
     def of(cls, trials: list[Signals]) -> Noise:
         """Resolution of the sensors behind some trials."""
         # Trial by trial: the grid may lie differently in each.
         step = np.median([_steps(trial) for trial in trials], axis=0)
-        white = np.sqrt(np.mean([_white(trial) ** 2 for trial in trials], axis=0))
-        return cls(step, np.sqrt(np.maximum(white**2 - step**2 / 12.0, 0.0)))
+        fast = [_Fast.of(trial) for trial in trials]
+        white = np.sqrt(np.mean([one.white**2 for one in fast], axis=0))
+        sigma = np.sqrt(np.maximum(white**2 - step**2 / 12.0, 0.0))
+        return cls(step, sigma, any(one.is_loud(step) for one in fast))
 
     def known_to(self, signals: Signals) -> Signals:
-        """The signals with what they have to be smoothed at for the sake of their rates (``Signals.smooth_hz``)."""
+        """The signals with what they have to be smoothed at for the sake of their rates (``Signals.smooth_hz``).
+
+        What chatters is let through: dry friction turns with it, and hardly holds up what is slower.
+        """
         noisy = self.sigma > rules.NOISY_STEPS * self.step
         white = np.where(noisy, np.hypot(self.sigma, self.step / np.sqrt(12.0)), 0.0)
         rates = white * np.sqrt(signals.rate_hz / _native_hz(signals))[:, None] * _rate_gain(signals.rate_hz)
         quiet = np.array([rules.QUIET_RAD_PER_S, rules.QUIET_RAD_PER_S, rules.QUIET_NM_PER_S])
         # Noise of a rate grows with the cut-off to the power 3/2.
         less = (quiet[:, None, None] / np.maximum(rates, 1e-300)).clip(max=1.0) ** (2.0 / 3.0)
-        return replace(signals, smooth_hz=np.maximum(rules.TEAM_SMOOTH_HZ * less, rules.QUIET_HZ))
+        smooth_hz = np.maximum(rules.TEAM_SMOOTH_HZ * less, rules.QUIET_HZ)
+        fast = _Fast.of(signals) if self.chatters else None
+        if fast is None or not fast.is_loud(self.step):
+            return replace(signals, smooth_hz=smooth_hz)
+        most = rules.CHATTER_RATE_SHARE * signals.rate_hz
+        let_through = np.where(fast.lines > 0.0, np.minimum(rules.CHATTER_OVER * fast.at_hz, most), 0.0)
+        pre_hz = max(float(let_through.max()), rules.TEAM_PRE_HZ)
+        return replace(signals, smooth_hz=np.maximum(smooth_hz, let_through), pre_hz=pre_hz)
 
     def draws(self, signals: Signals, rng: np.random.Generator, count: int) -> Iterator[Signals]:
         """Realisations of the sensors' errors on a trial: what they add to its smooth signals.
@@ -191,22 +205,41 @@ def _steps(signals: Signals) -> Array:
 
 def chatter(signals: Signals) -> Array:
     """Root mean square above 25 Hz where it is lines and no noise, otherwise 0, shape (3, N, 3): phi, theta, tau."""
-    high, x = _high(signals), _columns(signals)
-    frequency, density = periodogram(x, signals.rate_hz, window="hann", detrend="linear", axis=0)
-    lines = np.sqrt(density[frequency > high].sum(axis=0) * frequency[1])
-    over_time, between_lines = _levels(signals)
-    lines[between_lines >= rules.NOISE_LINES * over_time] = 0.0
-    return np.moveaxis(lines.reshape(len(lines), 3, 3), 1, 0)
+    return _Fast.of(signals).lines
 
 
-def _white(signals: Signals) -> Array:
-    """Standard deviation of white noise of a reading, from what lies above 25 Hz, shape (3, N, 3).
+@dataclass(frozen=True, eq=False)
+class _Fast:
+    """What every channel has above 25 Hz, shape (3, N, 3) each: phi, theta, tau.
 
-    Robust against moments, and against lines where these are most of it: a joint that chatters.
+    Attributes:
+        white: standard deviation of white noise of a reading. Robust against moments, and against lines where these are
+            most of it: a joint that chatters.
+        lines: root mean square where it is lines and no noise, otherwise 0.
+        at_hz: of the strongest line.
     """
-    over_time, between_lines = _levels(signals)
-    white = np.where(between_lines < rules.NOISE_LINES * over_time, between_lines, over_time)
-    return np.moveaxis(white.reshape(len(white), 3, 3), 1, 0)
+
+    white: Array
+    lines: Array
+    at_hz: Array
+
+    @classmethod
+    def of(cls, signals: Signals) -> _Fast:
+        """Of one trial."""
+        high, x = _high(signals), _columns(signals)
+        frequency, density = periodogram(x, signals.rate_hz, window="hann", detrend="linear", axis=0)
+        fast = density[frequency > high]
+        lines = np.sqrt(fast.sum(axis=0) * frequency[1])
+        at_hz = frequency[frequency > high][fast.argmax(axis=0)]
+        over_time, between_lines = _levels(signals)
+        noise = between_lines >= rules.NOISE_LINES * over_time
+        white = np.where(noise, over_time, between_lines)
+        each = (white, np.where(noise, 0.0, lines), at_hz)
+        return cls(*(np.moveaxis(one.reshape(len(one), 3, 3), 1, 0) for one in each))
+
+    def is_loud(self, step: Array) -> bool:
+        """Whether a torque oscillates by much more than its noise and its step, of steps of shape (3, N, 3)."""
+        return bool(np.any(self.lines[2] > rules.CHATTER_STEPS * np.maximum(step[2], self.white[2])))
 
 
 def _high(signals: Signals) -> float:

@@ -25,6 +25,7 @@ class Signals:
         rate_hz: sampling rate [Hz].
         sampling: how each robot's sensors were read, where the samples are not as they were read.
         smooth_hz: cut-off at which rates tell rest from sliding, shape (3, N, 3): phi, theta, tau; None: as usual.
+        pre_hz: cut-off before the nonlinear formulas, above what chatters: the mean of a product is not that of means.
     """
 
     time: Array
@@ -34,6 +35,7 @@ class Signals:
     rate_hz: float
     sampling: tuple[Sampling, ...] | None = None
     smooth_hz: Array | None = None
+    pre_hz: float = rules.TEAM_PRE_HZ
     _last: dict[tuple[str, int, int], Array] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
@@ -59,14 +61,18 @@ class Signals:
             self._last[which] = low_pass(getattr(self, moves)[:, robot, joint], self.rate_hz, cutoff_hz)
         return self._last[which]
 
+    def with_rates(self, x: Array) -> Array:
+        """Filtered value, rate and acceleration of what goes with the samples, shape (Q, ...) -> (3, Q, ...)."""
+        value = low_pass(x, self.rate_hz, self.pre_hz)
+        rate = differentiate(value, self.rate_hz)
+        return np.stack([value, rate, differentiate(rate, self.rate_hz)])
+
+    @property
+    def chatters(self) -> bool:
+        """Whether something oscillates above what is usually let through to the nonlinear formulas."""
+        return self.pre_hz > rules.TEAM_PRE_HZ
+
     @property
     def keep(self) -> slice:
         """Rows left once the filters' transients at both ends are dropped."""
         return trim_slice(len(self.time), self.rate_hz, rules.TEAM_TRIM_S)
-
-
-def with_rates(x: Array, rate_hz: float) -> Array:
-    """Filtered value, rate and acceleration of joint angles, shape (Q, ...) -> (3, Q, ...)."""
-    value = low_pass(x, rate_hz, rules.TEAM_PRE_HZ)
-    rate = differentiate(value, rate_hz)
-    return np.stack([value, rate, differentiate(rate, rate_hz)])

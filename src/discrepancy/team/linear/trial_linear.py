@@ -14,7 +14,7 @@ from discrepancy.least_squares.stored import is_stored, stored
 from discrepancy.team.linear.by_unknowns import by_bases, by_shared
 from discrepancy.team.linear.jacobian import BySignals, by_signals
 from discrepancy.team.linear.reduction import Reduction
-from discrepancy.team.linear.signals import Signals, with_rates
+from discrepancy.team.linear.signals import Signals
 from estimator.arm.arms import Arms, arm_of, design_of
 from estimator.arm.delta import leg_geometry, wrist_motion
 from estimator.arm.design import OmnidDesign
@@ -112,7 +112,7 @@ class TrialLinear:
             phi, theta: reading minus truth [rad], shape (Q, 3) or (3,).
             tau: the same [N m].
         """
-        rate, samples = self.signals.rate_hz, len(self.signals.time)
+        samples = len(self.signals.time)
         total = np.zeros((samples, self.channels))
         for angle, error in ((PHI, phi), (THETA, theta)):
             if error is None:
@@ -120,7 +120,7 @@ class TrialLinear:
             if error.ndim == 1:
                 total += self.J(robot, angle, error)
             else:
-                parts = with_rates(error, rate).transpose(1, 0, 2).reshape(samples, 9)
+                parts = self.signals.with_rates(error).transpose(1, 0, 2).reshape(samples, 9)
                 total += self.J(robot, with_its_rates(angle), parts)
         if tau is not None:
             total += self.J(robot, TAU, tau)
@@ -132,7 +132,7 @@ class TrialLinear:
         To the residual, shape (D, n, C), and to the reduced signals, (D, n, N, 21).
         """
         D, samples, N = phi.shape[:3]
-        angles = with_rates(np.stack([phi, theta], axis=3).transpose(1, 2, 3, 4, 0), self.signals.rate_hz)
+        angles = self.signals.with_rates(np.stack([phi, theta], axis=3).transpose(1, 2, 3, 4, 0))
         # (3, Q, N, 2, 3, D) to slots, which are value, rate and acceleration of phi, then of theta, then tau
         parts = np.concatenate(
             [
@@ -215,7 +215,7 @@ class TrialLinear:
     def _of_wrong_motion(self, robot: int, moved: Array, at: slice) -> Array:
         """Wrench balance (s, 6, k) of a wrist that moves apart from the payload, by (s, 3, k) [m] in {b1}."""
         wrist = self.bases.R[robot].T @ moved
-        rates = np.concatenate(with_rates(wrist, self.signals.rate_hz)[1:], axis=1)
+        rates = np.concatenate(self.signals.with_rates(wrist)[1:], axis=1)
         return np.asarray(self.by_wrist[robot, at] @ rates)
 
     @cached_property
@@ -229,10 +229,7 @@ class TrialLinear:
         middle = signals.time - signals.time.mean()
         for i, sampling in enumerate(signals.sampling or ()):
             if sampling.aligned:
-                rates = [
-                    -with_rates(x[:, i], signals.rate_hz)[1]
-                    for x in (signals.phi, signals.theta, signals.tau)
-                ]
+                rates = [-signals.with_rates(x[:, i])[1] for x in (signals.phi, signals.theta, signals.tau)]
                 columns.append(self.of_signals(i, *rates))
                 columns.append(self.of_signals(i, *(rate * middle[:, None] for rate in rates)))
         return np.stack(columns, axis=2) if columns else np.zeros((*self.residual.shape, 0))
@@ -284,13 +281,17 @@ def linearise(
     residual = reduction(np.concatenate([pose, balance(data, shared)[0]], axis=1))
     moved = np.zeros((*residual.shape, 0)) if known else reduction(by_shared(data, shared, bases))
     columns = moved, reduction(by_bases(data, shared, bases))
-    J = by_signals(s, data, shared, bases, arms) if full else BySignals.none(s.shape[1], 6 * s.shape[1])
+    at = s, data
+    if full and signals.chatters:  # between its knots J would fold that into slow motion
+        calm = filtered(replace(signals, pre_hz=rules.CHATTER_JACOBIAN_HZ))
+        at = calm, grasp_data(calm, arms, signals.rate_hz)
+    J = by_signals(*at, shared, bases, arms) if full else BySignals.none(s.shape[1], 6 * s.shape[1])
     return TrialLinear(signals, s, data, shared, bases, arms, reduction, residual, J, *columns)
 
 
 def filtered(signals: Signals) -> Array:
     """Signals as ``slots`` has them, shape (Q, N, 21)."""
-    rate, (Q, N) = signals.rate_hz, signals.phi.shape[:2]
-    angles = with_rates(signals.phi, rate), with_rates(signals.theta, rate)
-    parts = np.concatenate([*angles, with_rates(signals.tau, rate)[:1]])
+    Q, N = signals.phi.shape[:2]
+    angles = signals.with_rates(signals.phi), signals.with_rates(signals.theta)
+    parts = np.concatenate([*angles, signals.with_rates(signals.tau)[:1]])
     return parts.transpose(1, 2, 0, 3).reshape(Q, N, COUNT)
