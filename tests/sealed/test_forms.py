@@ -145,7 +145,7 @@ def test_a_torque_acts_in_its_joint_alone(kind, angle):
 
 
 def test_a_wrench_gets_the_payloads_velocity():
-    """Of its centre of mass, against the difference of its places; and omega against that of its axes."""
+    """Of its centre of mass, against the difference of its places."""
     scene, seen = team(), []
 
     class Watched:
@@ -161,9 +161,9 @@ def test_a_wrench_gets_the_payloads_velocity():
     run_trial(replace(scene, effects=(Watched(),)), trajectory)  # pyright: ignore[reportArgumentType]
     place, velocity = (np.array([row[k] for row in seen]) for k in (1, 2))
     assert np.abs(velocity).max() > 0.05
-    np.testing.assert_allclose(
-        velocity[1:-1], (place[2:] - place[:-2]) / 2e-3, atol=5e-3 * np.abs(velocity).max()
-    )
+    # Of this instant, where the place is of the step before: late rates would be an inertia.
+    now = (place[2:] - place[:-2]) / 2e-3
+    np.testing.assert_allclose(velocity[:-2], now, atol=2e-4 * np.abs(velocity).max())
 
 
 def test_a_push_has_its_moment():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Literal
 
+import mujoco
 import numpy as np
 
 from mocobot_sim.trial.actors import Stage
@@ -64,15 +65,18 @@ class PayloadWrench:
         """Find the payload."""
         self._data, self._model = stage.data, stage.model
         self._body, self._dt = stage.index.payload_body, 1.0 / stage.rate_hz
+        self._J = np.zeros((6, stage.model.nv))
 
     def act(self, tick: int) -> None:
-        """Add the wrench; the payload's pose and rate are those of the step before."""
+        """Add the wrench; the payload's pose is that of the step before, its rates are those of this instant.
+
+        A position moves on by the rate that it has after a step, so that of an instant is half a step ahead. Rates of
+        the step before would be 1.5 ms late: of 37 N s/m an inertia of 0.06 kg that has no weight.
+        """
         data, body = self._data, self._body
-        spin = data.cvel[body, :3]
-        # Velocities of MuJoCo's bodies are given at the centre of mass of the whole tree.
-        arm = data.xipos[body] - data.subtree_com[self._model.body_rootid[body]]
-        velocity = data.cvel[body, 3:] + _cross(spin, arm)
-        force, moment = self._wrench(tick * self._dt, data.xipos[body], velocity, spin)
+        mujoco.mj_jacBodyCom(self._model, data, self._J[:3], self._J[3:], body)
+        rates = self._J @ (data.qvel + 0.5 * self._model.opt.timestep * data.qacc)
+        force, moment = self._wrench(tick * self._dt, data.xipos[body], rates[:3], rates[3:])
         data.xfrc_applied[body, :3] += force
         data.xfrc_applied[body, 3:] += moment
 
