@@ -42,6 +42,7 @@ def true_bases() -> Bases:
 @dataclass(frozen=True)
 class Case:
     path: Sines
+    squeeze: Sines
     carried: Carried
     signals: Signals
     shared: Shared
@@ -60,7 +61,7 @@ def exact(duration_s=16.0, seed=4) -> Case:
     signals = Signals.of(carried.recording)
     shared, bases, reduction = true_shared(), true_bases(), Reduction.of(signals)
     return Case(
-        path, carried, signals, shared, bases, reduction,
+        path, squeeze, carried, signals, shared, bases, reduction,
         linearise(signals, shared, bases, DESIGN, reduction, full=True),
     )  # fmt: skip
 

@@ -71,7 +71,7 @@ class PayloadWrench:
         """Add the wrench; the payload's pose is that of the step before, its rates are those of this instant.
 
         A position moves on by the rate that it has after a step, so that of an instant is half a step ahead. Rates of
-        the step before would be 1.5 ms late: of 37 N s/m an inertia of 0.06 kg that has no weight.
+        the step before would be 1.5 ms late: of 37 N s/m an inertia of -0.055 kg that has no weight.
         """
         data, body = self._data, self._body
         mujoco.mj_jacBodyCom(self._model, data, self._J[:3], self._J[3:], body)

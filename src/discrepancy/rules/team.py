@@ -50,10 +50,6 @@ TEAM_LAW_ERRORS = {
 in which sizes compare with the law's among them: with these, errors are 0.7 to 1.25 of their standard errors, rms by
 cause, but for grasps that give way and tethers of the payload, where sets of older rules make it 2.0 and 1.8; with 0.02
 for all, those of zeros, lengths, friction in driven joints, hysteresis and scales had been 0.1 to 0.75 of them."""
-TEAM_LAG_ERRORS = {"grasp_flex": 0.1}
-"""The same of the time in which what gives way follows, where it is another. Measured on four sealed sets at three and
-ten times the tolerances (176743, 176949, 176953, 177129): it is told 2 to 12 % short, up to 5 standard errors, by what
-parts within their tolerances are off; within the tolerances as such, within 1 % (178422, 178423)."""
 
 # Noise of the sensors.
 
@@ -70,11 +66,12 @@ NOISE_ABOVE_HZ = 25.0
 NOISE_LINES, CHATTER_STEPS = 0.5, 10.0
 """Share of the amplitude there that is between the lines, below which the lines are no noise: a joint that chatters.
 And over the torque's step, from which on that is worth a note and, where it is over the noise as well, wider filters.
-Chosen: healthy joints have no lines, and the mean of what a tenth of a newton metre does is below 0.1 mN."""
+Chosen: healthy joints have no lines, and what a tenth of a newton metre does is 0.04 mN, as it goes with the square."""
 CHATTER_OVER, CHATTER_RATE_SHARE = 2.0, 0.45
 """Cut-off of signals in which something chatters, over its frequency, and at most over the sampling rate. Derived: the
-mean of a torque times the angle at which it acts is that of both oscillating together, 40 mN of 4.5 N m; with the usual
-cut-off 2 % of that are left at 27 Hz, so 90 % at 45 Hz of 100 Hz, and 97 % where sampling lets it be twice."""
+mean of a torque times the angle at which it acts is that of both oscillating together, of which the square of the
+filter's gain is left: at 27 Hz and 100 Hz 0.4 % with the usual cut-off and all with 45 Hz, at 1 kHz 97 % with 54 Hz.
+Measured: of torques of +- 7 N m it is up to 49 mN (docs/diagnosis/validation.md, 'Robots that chatter')."""
 CHATTER_JACOBIAN_HZ = 10.0
 """Cut-off of signals at which slopes are taken where something chatters. Derived: below half of
 ``TEAM_JACOBIAN_HZ``."""

@@ -101,10 +101,9 @@ def law_errors(candidate: Candidate, values: Array) -> Array:
     cause, units = CAUSES[candidate.cause], candidate.units
     sizes = np.linalg.norm(values / units) * units if all(candidate.tolerant) else np.abs(values)
     names = (name for name in cause.determined if name in candidate.shape)
-    numbers = np.array([candidate.shape[name] if name in cause.inexact else 0.0 for name in names])
+    numbers = [candidate.shape[name] if name in cause.inexact else 0.0 for name in names]
     share = rules.TEAM_LAW_ERRORS.get(cause.name, rules.LAW_ERROR_SHARE)
-    of_numbers = rules.TEAM_LAG_ERRORS.get(cause.name, share)
-    return np.asarray(np.append(share * sizes, of_numbers * numbers), dtype=np.float64)
+    return np.asarray(share * np.append(sizes, numbers), dtype=np.float64)
 
 
 def worst_events(

@@ -7,22 +7,20 @@ from collections.abc import Sequence
 import numpy as np
 
 from discrepancy import rules
-from discrepancy.team.linear.noise import chatter
+from discrepancy.team.linear.chatter import Fast
 from discrepancy.team.linear.signals import Signals
-from estimator.arrays import Array
 
 
-def chattering(trials: Sequence[Signals], steps: Array) -> tuple[str, ...]:
-    """A sentence where a torque oscillates faster than a team moves, by more than ten of its steps; for the notes.
+def chattering(trials: Sequence[Signals]) -> tuple[str, ...]:
+    """A sentence where a torque oscillates faster than a team moves, by so much that it is let through; for the notes.
 
     Args:
-        trials: signals of every trial.
-        steps: rounding steps, shape (3, N, 3): phi, theta, tau.
+        trials: signals of every trial, with their cut-offs (``Noise.known_to``).
     """
-    lines = np.max([chatter(trial)[2] for trial in trials], axis=0)
-    lines = np.where(lines > rules.CHATTER_STEPS * steps[2], lines, 0.0)
-    if not lines.any():
+    loud = [Fast.of(trial).lines[2] for trial in trials if trial.chatters]
+    if not loud:
         return ()
+    lines = np.max(loud, axis=0)
     robot, joint = np.unravel_index(int(np.argmax(lines)), lines.shape)
     return (
         f"The torque of driven joint {joint + 1} of robot {robot + 1} oscillates faster than "

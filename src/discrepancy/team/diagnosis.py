@@ -80,7 +80,7 @@ def diagnose_team(
     )  # fmt: skip
     assert isinstance(found.rig, TeamRig)
     payload, own = estimates(found.rig, found.explanation), partial(traces, found.rig, found.explanation)
-    loops = chattering([linear.signals for linear in found.rig.linear], found.rig.sensed.noise.step)
+    loops = chattering([linear.signals for linear in found.rig.linear])
     found = replace(found, notes=(*found.notes, *choice.notes, *notes, *loops))
     return Diagnosed(found.rig, found, TeamWords(), own, payload)
 

@@ -7,8 +7,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from discrepancy.least_squares.whitening import Whitening
+from discrepancy.team.linear.chatter import Fast
 from discrepancy.team.linear.inertia import held_inertia
-from discrepancy.team.linear.noise import chatter
 from discrepancy.team.linear.start import linearised_trials, start_shared
 from discrepancy.team.linear.trial_linear import TrialLinear
 from discrepancy.team.rig import TeamRig
@@ -40,7 +40,7 @@ def test_a_healthy_log_leaves_noise_alone(random_a, name):
     sigma = np.median(noise.sigma[2])
     assert sigma == pytest.approx(LOGGERS[name].tau_noise_Nm, rel=0.15)
     assert left_over(trial, white) == pytest.approx(1.0, abs=0.13)
-    assert not chatter(trial.signals).any()
+    assert not Fast.of(trial.signals).lines.any()
 
 
 @pytest.mark.slow
@@ -53,7 +53,7 @@ def test_a_joint_that_chatters_in_a_log_is_no_noisy_sensor(random_a, name):
     (trial,), sensed = linearised_trials(
         [recording], start_shared(estimate_payload([recording], "joint")), {}
     )
-    sigma, lines = sensed.noise.sigma[2], chatter(trial.signals)[2]
+    sigma, lines = sensed.noise.sigma[2], Fast.of(trial.signals).lines[2]
     np.testing.assert_allclose(sigma, LOGGERS[name].tau_noise_Nm, rtol=0.5)
     assert lines[1, 0] > 1.0
     lines[1, 0] = 0.0

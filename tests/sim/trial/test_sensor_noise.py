@@ -8,7 +8,8 @@ from scipy.signal import butter, sosfiltfilt
 
 from discrepancy.rules import MODEL_ABOVE, MODEL_BELOW_HZ, MODEL_PHI_RAD, MODEL_TAU_NM, MODEL_THETA_RAD
 from discrepancy.team.chattering import chattering
-from discrepancy.team.linear.noise import Noise, chatter
+from discrepancy.team.linear.chatter import Fast
+from discrepancy.team.linear.noise import Noise
 from discrepancy.team.linear.signals import Signals
 
 RATE = 100.0
@@ -185,7 +186,7 @@ def test_a_joint_that_chatters_is_not_taken_for_a_noisy_sensor(rng, hz):
     # A periodic signal meets the grid at the same phases again: some of its rounding is in lines, too.
     total = np.hypot(noise.sigma[2], noise.step[2] / np.sqrt(12))
     np.testing.assert_allclose(total, np.hypot(sigma, step / np.sqrt(12)), rtol=0.15)
-    said = chatter(loud)
+    said = Fast.of(loud).lines
     assert said[2, 1, 2] == pytest.approx(5.0 / np.sqrt(2), rel=0.01)
     said[2, 1, 2] = 0.0
     assert not said[2].any()
@@ -196,12 +197,16 @@ def test_what_is_said_of_a_joint_that_chatters(rng):
     tau = calm.tau.copy()
     tau[:, 0, 1] += 2.0 * np.sin(2 * np.pi * 35.0 * TIME)
     loud = Signals(TIME, calm.phi, calm.theta, tau, RATE)
-    steps = np.full((3, 2, 3), 0.01)
-    assert chattering([calm], steps) == ()
-    (said,) = chattering([calm, loud], steps)
+
+    def said_of(*trials):
+        noise = Noise.of(list(trials))
+        return chattering([noise.known_to(one) for one in trials])
+
+    assert said_of(calm) == ()
+    (said,) = said_of(calm, loud)
     assert "driven joint 2 of robot 1 oscillates faster than 25 Hz, with 1.4 N m rms" in said
     small = replace(loud, tau=calm.tau + 0.04 * (tau - calm.tau))
-    assert chattering([small], steps) == ()
+    assert said_of(small) == ()
 
 
 def test_channels_have_resolutions_of_their_own(rng):

@@ -8,9 +8,9 @@ from functools import cache
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.signal import butter, periodogram, sosfiltfilt
 
 from discrepancy import rules
+from discrepancy.team.linear.chatter import Fast, columns_of, native_hz
 from discrepancy.team.linear.signals import Signals
 from estimator.arrays import Array
 from estimator.filtering import differentiate, low_pass
@@ -38,7 +38,7 @@ class Noise:
         """Resolution of the sensors behind some trials."""
         # Trial by trial: the grid may lie differently in each.
         step = np.median([_steps(trial) for trial in trials], axis=0)
-        fast = [_Fast.of(trial) for trial in trials]
+        fast = [Fast.of(trial) for trial in trials]
         white = np.sqrt(np.mean([one.white**2 for one in fast], axis=0))
         sigma = np.sqrt(np.maximum(white**2 - step**2 / 12.0, 0.0))
         return cls(step, sigma, any(one.is_loud(step) for one in fast))
@@ -50,12 +50,12 @@ class Noise:
         """
         noisy = self.sigma > rules.NOISY_STEPS * self.step
         white = np.where(noisy, np.hypot(self.sigma, self.step / np.sqrt(12.0)), 0.0)
-        rates = white * np.sqrt(signals.rate_hz / _native_hz(signals))[:, None] * _rate_gain(signals.rate_hz)
+        rates = white * np.sqrt(signals.rate_hz / native_hz(signals))[:, None] * _rate_gain(signals.rate_hz)
         quiet = np.array([rules.QUIET_RAD_PER_S, rules.QUIET_RAD_PER_S, rules.QUIET_NM_PER_S])
         # Noise of a rate grows with the cut-off to the power 3/2.
         less = (quiet[:, None, None] / np.maximum(rates, 1e-300)).clip(max=1.0) ** (2.0 / 3.0)
         smooth_hz = np.maximum(rules.TEAM_SMOOTH_HZ * less, rules.QUIET_HZ)
-        fast = _Fast.of(signals) if self.chatters else None
+        fast = Fast.of(signals) if self.chatters else None
         if fast is None or not fast.is_loud(self.step):
             return replace(signals, smooth_hz=smooth_hz)
         most = rules.CHATTER_RATE_SHARE * signals.rate_hz
@@ -115,13 +115,6 @@ class _Way:
         return made[1:] + (made[0] - self._smooth)
 
 
-def _native_hz(signals: Signals) -> Array:
-    """Rate of every robot's readings [Hz], shape (N,)."""
-    if signals.sampling is None:
-        return np.full(signals.phi.shape[1], signals.rate_hz)
-    return np.array([sampling.native_hz for sampling in signals.sampling])
-
-
 @cache
 def _rate_gain(rate_hz: float) -> float:
     """Standard deviation of the rates that tell rest from motion, of white noise of 1 at every sample [1/s]."""
@@ -129,11 +122,6 @@ def _rate_gain(rate_hz: float) -> float:
     impulse[len(impulse) // 2] = 1.0
     smooth = low_pass(impulse, rate_hz, rules.TEAM_SMOOTH_HZ)
     return float(np.linalg.norm(differentiate(smooth, rate_hz)))
-
-
-def _columns(signals: Signals) -> Array:
-    """The sensors' channels of all robots, shape (Q, N, 9)."""
-    return np.concatenate([signals.phi, signals.theta, signals.tau], axis=2)
 
 
 def _read(x: Array, step: Array, sigma: Array, rng: np.random.Generator) -> Array:
@@ -179,7 +167,7 @@ def _unrounded(signals: Signals, step: Array) -> Array:
     Readings of a slow joint are stairs, and no filter with one cut-off leaves of them what it did: where fewer than
     three stairs go into a period of ``TEAM_SMOOTH_HZ``, the cut-off falls with their frequency.
     """
-    x, rate_hz = _columns(signals), signals.rate_hz
+    x, rate_hz = columns_of(signals), signals.rate_hz
     slow = differentiate(low_pass(x, rate_hz, rules.SLOW_HZ), rate_hz)
     stairs_hz = low_pass(np.abs(slow), rate_hz, rules.SLOW_HZ) / np.where(step > 0, step, 1e-300)
     cutoffs = rules.TEAM_SMOOTH_HZ * 0.5 ** np.arange(rules.SMOOTHER_OCTAVES + 1)
@@ -199,79 +187,5 @@ def _steps(signals: Signals) -> Array:
     """Rounding step of every channel, shape (3, N, 3)."""
     if signals.sampling is not None:
         return np.array([[sampling.steps_of(kind) for sampling in signals.sampling] for kind in range(3)])
-    steps = np.apply_along_axis(rounding_step, 0, _columns(signals))
+    steps = np.apply_along_axis(rounding_step, 0, columns_of(signals))
     return np.moveaxis(steps.reshape(len(steps), 3, 3), 1, 0)
-
-
-def chatter(signals: Signals) -> Array:
-    """Root mean square above 25 Hz where it is lines and no noise, otherwise 0, shape (3, N, 3): phi, theta, tau."""
-    return _Fast.of(signals).lines
-
-
-@dataclass(frozen=True, eq=False)
-class _Fast:
-    """What every channel has above 25 Hz, shape (3, N, 3) each: phi, theta, tau.
-
-    Attributes:
-        white: standard deviation of white noise of a reading. Robust against moments, and against lines where these are
-            most of it: a joint that chatters.
-        lines: root mean square where it is lines and no noise, otherwise 0.
-        at_hz: of the strongest line.
-    """
-
-    white: Array
-    lines: Array
-    at_hz: Array
-
-    @classmethod
-    def of(cls, signals: Signals) -> _Fast:
-        """Of one trial."""
-        high, x = _high(signals), _columns(signals)
-        frequency, density = periodogram(x, signals.rate_hz, window="hann", detrend="linear", axis=0)
-        fast = density[frequency > high]
-        lines = np.sqrt(fast.sum(axis=0) * frequency[1])
-        at_hz = frequency[frequency > high][fast.argmax(axis=0)]
-        over_time, between_lines = _levels(signals)
-        noise = between_lines >= rules.NOISE_LINES * over_time
-        white = np.where(noise, over_time, between_lines)
-        each = (white, np.where(noise, 0.0, lines), at_hz)
-        return cls(*(np.moveaxis(one.reshape(len(one), 3, 3), 1, 0) for one in each))
-
-    def is_loud(self, step: Array) -> bool:
-        """Whether a torque oscillates by much more than its noise and its step, of steps of shape (3, N, 3)."""
-        return bool(np.any(self.lines[2] > rules.CHATTER_STEPS * np.maximum(step[2], self.white[2])))
-
-
-def _high(signals: Signals) -> float:
-    """From where on there is noise alone [Hz]."""
-    return float(min(rules.NOISE_ABOVE_HZ, 0.4 * min(signals.rate_hz, *_native_hz(signals))))
-
-
-def _levels(signals: Signals) -> tuple[Array, Array]:
-    """White noise of a reading with the lines, and without, shape (N, 9) each.
-
-    A conversion leaves less of it there; how much, it shows on noise of one.
-    """
-    rate_hz, x, high = signals.rate_hz, _columns(signals), _high(signals)
-    over_time, between_lines = _fast(high, x, rate_hz)
-    if signals.sampling is None:
-        share = np.sqrt(1.0 - high / (rate_hz / 2.0))
-        return over_time / share, between_lines / share
-    rng = np.random.default_rng(rules.NOISE_SEED)
-    for i, sampling in enumerate(signals.sampling):
-        way = Resampling.of(sampling.later(float(signals.time[0])), rate_hz, len(x), rng)
-        left = _fast(high, way(rng.standard_normal((len(way.instants), SENSORS))), rate_hz)
-        over_time[i] /= np.median(left[0])
-        between_lines[i] /= np.median(left[1])
-    return over_time, between_lines
-
-
-def _fast(high: float, x: Array, rate_hz: float) -> tuple[Array, Array]:
-    """Root mean squares above a frequency: with the lines there, robust against moments; and between the lines."""
-    band = butter(4, high, btype="high", fs=rate_hz, output="sos")
-    fast = np.asarray(sosfiltfilt(band, x, axis=0), dtype=np.float64)
-    over_time = 1.4826 * np.median(np.abs(fast), axis=0)
-    frequency, density = periodogram(fast, rate_hz, window="hann", axis=0)
-    # Powers of white noise are exponentially distributed: ln 2 of their mean is the median.
-    level = np.median(density[frequency > high], axis=0) / np.log(2.0)
-    return over_time, np.sqrt(level * (rate_hz / 2.0 - high))
