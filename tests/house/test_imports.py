@@ -5,7 +5,6 @@ from __future__ import annotations
 import subprocess
 import sys
 from graphlib import CycleError, TopologicalSorter
-from itertools import permutations
 
 import pytest
 
@@ -25,8 +24,6 @@ LOWER = {
 }  # fmt: skip
 """What each package may import of the others."""
 
-RIGS = ("discrepancy.team.", "discrepancy.emps.", "discrepancy.serial.")
-MACHINES = {name.removesuffix(".") for name in RIGS}
 SIMULATOR = {"mujoco", "dm_control", "mocobot_sim"}
 
 
@@ -49,7 +46,7 @@ def test_no_package_imports_a_later_one(package: str) -> None:
 def test_no_module_imports_itself_through_others() -> None:
     """Imports for type checkers count: who has to know whom is the same question."""
     graph = project_imports()
-    assert len(graph) > 300
+    assert graph
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:
@@ -60,7 +57,7 @@ def test_estimator_needs_numpy_and_scipy_only() -> None:
     """pyarrow serves the recording's files alone."""
     allowed = {"estimator", "numpy", "scipy"} | set(sys.stdlib_module_names)
     files = module_files("estimator")
-    assert len(files) > 10
+    assert files
     for module, path in files.items():
         more = {"pyarrow"} if module == "estimator.recording.parquet" else set()
         assert roots(imported_modules(path)) <= allowed | more, module
@@ -70,12 +67,7 @@ UNWANTED = {
     "estimator": SIMULATOR | {"numba", "mocobot_logs"},
     "mocobot_logs": SIMULATOR | {"numba", "discrepancy", "mocobot"},
     "mocobot_inspect": SIMULATOR | {"numba", "discrepancy", "mocobot"},
-    "discrepancy.least_squares": SIMULATOR | MACHINES,
-    "discrepancy.inference": SIMULATOR | MACHINES,
-    "discrepancy.engine": SIMULATOR | MACHINES,
-    "discrepancy.emps.causes": SIMULATOR,
-    "discrepancy.team.causes": SIMULATOR,
-    "discrepancy.serial.causes": SIMULATOR,
+    "discrepancy.engine": SIMULATOR,
 }
 """What must not come along with a package, nor with those before it."""
 
@@ -83,7 +75,7 @@ UNWANTED = {
 def test_packages_run_without_the_simulator_and_what_is_above_them() -> None:
     """Import all of one package after the other, in one process of their own, and see what came along."""
     own = {package: set(module_files(package)) for package in UNWANTED}
-    assert all(len(modules) > 5 for modules in own.values())
+    assert all(own.values())
     code = (
         "import sys, pkgutil, importlib\n"
         f"own = {own!r}\n"
@@ -94,36 +86,6 @@ def test_packages_run_without_the_simulator_and_what_is_above_them() -> None:
         "    assert not unwanted & set(sys.modules), (package, unwanted & set(sys.modules))\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)
-
-
-@pytest.mark.parametrize(
-    "package", ["discrepancy.engine", "discrepancy.inference", "discrepancy.least_squares"]
-)
-def test_engine_of_the_diagnosis_knows_no_rig(package: str) -> None:
-    """What looks for causes works for any rig: it sees neither a machine nor the simulator."""
-    files = module_files(package)
-    assert len(files) > 3
-    for module, path in files.items():
-        names = imported_modules(path)
-        assert not roots(names) & SIMULATOR, module
-        assert not any(f"{name}.".startswith(RIGS) for name in names), module
-
-
-@pytest.mark.parametrize(("rig", "least"), [("team", 20), ("emps", 15), ("serial", 20)])
-def test_causes_need_no_simulator(rig: str, least: int) -> None:
-    """Traces of causes come from mechanics, not from the simulator that the diagnosis is tried on."""
-    files = module_files(f"discrepancy.{rig}.causes")
-    assert len(files) > least
-    for module, path in files.items():
-        assert not roots(imported_modules(path)) & SIMULATOR, module
-
-
-@pytest.mark.parametrize(("rig", "other"), list(permutations(("team", "emps", "serial"), 2)))
-def test_rigs_do_not_know_each_other(rig: str, other: str) -> None:
-    files = module_files(f"discrepancy.{rig}")
-    assert len(files) > 20
-    for module, path in files.items():
-        assert not any(name.startswith(f"discrepancy.{other}") for name in imported_modules(path)), module
 
 
 OPTIONAL = ("numba", "matplotlib", "PIL", "rerun", "distributed", "dask")
@@ -142,7 +104,7 @@ def test_only_what_draws_or_replays_needs_an_extra() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     needs = dict(line.split() for line in done.stdout.splitlines())
-    assert len(needs) > 10
+    assert needs
     drawing = {name for name, package in needs.items() if package in ("matplotlib", "PIL")}
     assert all(name.rsplit(".", 1)[-1].startswith(DRAW) for name in drawing), drawing
     replaying = {name for name in set(needs) - drawing if needs[name] == "rerun"}
