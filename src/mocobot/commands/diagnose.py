@@ -52,7 +52,7 @@ def run(options: Diagnose) -> None:
     inputs += calibration_file(options.calibration)
     logs, robots = Logs(options.map), Robots(options.calibration)
     tolerances = read_tolerances(options.tolerances, rig.tolerances())
-    with whole_folder(options.out) if options.out else nullcontext() as folder:
+    with whole_folder(options.out, "diagnosis") if options.out else nullcontext() as folder:
         data = rig.read(options.rec, logs, robots)
         made_with = provenance("diagnose", asdict(options), inputs) if folder else {}
         with workers_of(options.scheduler), stages() as (say, simulated):

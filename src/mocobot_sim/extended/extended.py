@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from estimator.errors import InputError
 from estimator.files import whole_folder
 from estimator.strict import Fields, parse_json
+from estimator.written import LIST, holds
 from mocobot_sim.effects import Effect, effect_from_dict, effect_to_dict
 from mocobot_sim.extended.poses import poses_to_list, read_poses
 from mocobot_sim.extended.readme import readme
@@ -81,21 +82,14 @@ def write_extended(
     page = readme(values["effects"], scene.robots, len(healthy))
     files = {SCENE: scene.to_xml().encode(), NUMBERS: text.encode(), README: page.encode(), **assets}
     folder = Path(folder)
-    if folder.exists() and not _is_extended(folder):
+    if folder.is_file() or (folder.is_dir() and any(folder.iterdir()) and not holds("extended")(folder)):
         raise InputError(f"{folder}: exists and is not an extended model; name a new folder")
     try:
-        with whole_folder(folder) as temporary:
+        with whole_folder(folder, "extended") as temporary:
             for name, content in files.items():
                 (temporary / name).write_bytes(content)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
-
-
-def _is_extended(folder: Path) -> bool:
-    try:
-        return json.loads((folder / NUMBERS).read_text(encoding="utf-8"))["format"] == FORMAT
-    except (OSError, ValueError, TypeError, KeyError):
-        return False
 
 
 def load_extended(folder: Path) -> TeamScene:
@@ -119,7 +113,7 @@ def load_extended(folder: Path) -> TeamScene:
     assets = {
         path.name: path.read_bytes()
         for path in sorted(folder.iterdir())
-        if path.is_file() and path.name not in (SCENE, NUMBERS, README)
+        if path.is_file() and path.name not in (SCENE, NUMBERS, README, LIST)
     }
     scene = TeamScene(
         root=None,

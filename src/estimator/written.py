@@ -1,0 +1,112 @@
+"""What this program wrote into a result folder: a list of files and digests in it, so that nothing else is removed."""
+
+import hashlib
+import json
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from estimator.errors import InputError
+
+LIST = ".mocobot-files"
+"""The list's name: {format, version, kind: of the result, files: {path in the folder: SHA-256}}."""
+FORMAT, VERSION = "mocobot-files", 1
+_LARGEST_BYTES = 16 << 20
+
+
+def list_written(folder: Path, kind: str) -> None:
+    """Write the list of all that a new folder holds.
+
+    Args:
+        folder: which nobody else has written into yet.
+        kind: of the result, such as ``diagnosis``.
+    """
+    files = {str(path.relative_to(folder)): _digest(path) for path in _entries(folder)}
+    values = {"format": FORMAT, "version": VERSION, "kind": kind, "files": files}
+    (folder / LIST).write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+
+
+def add_written(path: Path) -> None:
+    """Add a file that was written into a folder later to the folder's list, if there is one."""
+    values = _read(path.parent)
+    if values:
+        values["files"][path.name] = _digest(path)
+        (path.parent / LIST).write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+
+
+def holds(kind: str) -> Callable[[Path], bool]:
+    """What says whether a folder is a result of some kind, and raises an InputError if it holds anything else."""
+
+    def is_ours(folder: Path) -> bool:
+        values = _read(folder)
+        if values.get("kind") != kind:
+            return False
+        for path in _entries(folder):
+            if not _is_written(path, folder, values):
+                raise InputError(
+                    f"{path}: was not written by mocobot, or changed since; move it elsewhere first"
+                )
+        return True
+
+    return is_ours
+
+
+def leave_others(folder: Path, new: Path) -> None:
+    """Remove from a replaced folder what its list has, and move all else to the new one, under a free name."""
+    values = _read(folder)
+    for path in _entries(folder):
+        if _is_written(path, folder, values):
+            path.rmdir() if path.is_dir() and not path.is_symlink() else path.unlink()
+        else:
+            target = new / path.relative_to(folder)
+            target.parent.mkdir(parents=True, exist_ok=True)
+            path.rename(free_name(target))
+    if values:
+        (folder / LIST).unlink()
+    for path in sorted(folder.rglob("*"), reverse=True):
+        with suppress(OSError):
+            path.rmdir()
+    folder.rmdir()
+
+
+def free_name(path: Path) -> Path:
+    """The path, or with ``.kept`` behind it where it is taken."""
+    while os.path.lexists(path):
+        path = path.with_name(f"{path.name}.kept")
+    return path
+
+
+def _entries(folder: Path) -> list[Path]:
+    """Files, links and empty folders below a folder, but the list."""
+    found = [path for path in folder.rglob("*") if path != folder / LIST]
+    return sorted(p for p in found if p.is_symlink() or not p.is_dir() or not any(p.iterdir()))
+
+
+def _is_written(path: Path, folder: Path, values: dict[str, Any]) -> bool:
+    digest = values.get("files", {}).get(str(path.relative_to(folder)))
+    return digest is not None and digest == _digest(path)
+
+
+def _digest(path: Path) -> str:
+    if path.is_symlink() or not path.is_file():
+        return "folder" if path.is_dir() and not path.is_symlink() else ""
+    try:
+        with path.open("rb") as file:
+            return hashlib.file_digest(file, "sha256").hexdigest()
+    except OSError:
+        return ""
+
+
+def _read(folder: Path) -> dict[str, Any]:
+    """The list; empty if there is none that can be used."""
+    path = folder / LIST
+    try:
+        if not path.is_file() or path.stat().st_size > _LARGEST_BYTES:
+            return {}
+        values = json.loads(path.read_bytes())
+        usable = values["format"] == FORMAT and values["version"] == VERSION and "kind" in values
+        return values if usable and isinstance(values["files"], dict) else {}
+    except (OSError, ValueError, TypeError, KeyError, RecursionError):
+        return {}
