@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from estimator.errors import InputError
+from estimator.inputs import open_input, printable
 from estimator.scratch import scratch_name
 from estimator.written import free_name, leave_others, list_written
 
@@ -171,20 +172,20 @@ def file_facts(path: Path) -> dict[str, Any]:
     Raises:
         InputError: it cannot be read.
     """
-    with system_errors(path, "read"), path.open("rb") as file:
+    with system_errors(path, "read"), open_input(path) as file:
         digest = hashlib.file_digest(file, "sha256").hexdigest()
         size = os.fstat(file.fileno()).st_size
     return {"name": path.name, "path": str(path), "bytes": size, "sha256": digest}
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write UTF-8 text.
+    """Write UTF-8 text; in a ``.txt`` file, which terminals show, control characters are escaped.
 
     Raises:
         InputError: the target cannot be written.
     """
     with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(printable(text) if path.suffix == ".txt" else text, encoding="utf-8")
 
 
 def write_json(path: Path, values: Mapping[str, Any]) -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from estimator.errors import InputError
+from estimator.inputs import open_input
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording
 
@@ -57,7 +58,7 @@ def _found(entry: dict[str, Any], folder: Path) -> Source:
     given = entry["path"]
     for path in (Path(given), folder / given, folder / name, folder.parent / name):
         try:
-            with path.open("rb") as file:
+            with open_input(path) as file:
                 same = hashlib.file_digest(file, "sha256").hexdigest() == entry.get("sha256")
         except (OSError, ValueError):  # a name with a NUL
             continue

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_logs.faults import shown
+from mocobot_sim.model_check import check_model
 
 _OTHER = {int(mujoco.mjtJoint.mjJNT_FREE): "free", int(mujoco.mjtJoint.mjJNT_BALL): "ball"}
 _AT_JOINT = (int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT))
@@ -55,6 +56,7 @@ def load_spec(path: Path | str) -> mujoco.MjSpec:
     path = Path(path)
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; a model is an MJCF or URDF file")
+    check_model(path)
     try:
         spec = mujoco.MjSpec.from_file(str(path))
     except (ValueError, RuntimeError, OSError) as error:

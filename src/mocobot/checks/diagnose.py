@@ -7,6 +7,7 @@ from discrepancy.cause_names import emps, serial, team
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.inference.odds import check_odds
 from estimator.errors import InputError
+from estimator.strict import read_json
 from estimator.written import holds
 from mocobot.files.targets import (
     calibration_file,
@@ -18,9 +19,11 @@ from mocobot.files.targets import (
     map_file,
 )
 from mocobot.options import Diagnose
+from mocobot_sim.trial.sidecar import truth_path
 
 CAUSES = {"team": team.NAMES, "emps": emps.NAMES}
 """Names of causes by rig."""
+TRUTH = "the truth beside a simulated recording"
 
 
 def check(options: Diagnose) -> None:
@@ -49,6 +52,8 @@ def check(options: Diagnose) -> None:
     check_there(options.rec)
     if options.rig == "team":
         check_formats(options.rec)
+        for path in filter(Path.exists, map(truth_path, options.rec)):
+            read_json(path, TRUTH)  # what it says, nobody asks before the verdict
 
 
 def _check_joints(options: Diagnose, model: Path) -> None:

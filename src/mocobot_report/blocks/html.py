@@ -85,7 +85,7 @@ def variables(values: Mapping[str, str]) -> str:
 
 
 def _clean(text: str) -> str:
-    return NOT_HTML.sub("\ufffd", text)
+    return NOT_HTML.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 def _text(node: Node, text: str) -> None:

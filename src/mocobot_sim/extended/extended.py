@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from estimator.errors import InputError
 from estimator.files import whole_folder
+from estimator.inputs import JSON_BYTES, read_input
 from estimator.strict import Fields, parse_json
 from estimator.written import LIST, holds
 from mocobot_sim.effects import Effect, effect_from_dict, effect_to_dict
 from mocobot_sim.extended.poses import poses_to_list, read_poses
 from mocobot_sim.extended.readme import readme
+from mocobot_sim.model_check import check_model
 from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.as_built_file import unit_in
 from mocobot_sim.scene.scene import TeamScene
@@ -132,6 +134,7 @@ def load_extended(folder: Path) -> TeamScene:
         assets=assets,
     )
     read.object("extra")
+    check_model(folder / SCENE)
     _check_model(scene, folder / SCENE)
     return scene
 
@@ -156,7 +159,7 @@ def _fields(values: dict[str, Any], where: str) -> Fields:
 
 def _read(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return read_input(path, JSON_BYTES).decode("utf-8")
     except (OSError, ValueError) as error:
         detail = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read ({detail}); an extended model has this file") from error
