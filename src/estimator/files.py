@@ -2,7 +2,6 @@
 
 import contextlib
 import errno
-import hashlib
 import json
 import os
 import shutil
@@ -13,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from estimator.errors import InputError
-from estimator.inputs import open_input, printable
+from estimator.inputs import file_sha256, printable
 from estimator.scratch import scratch_name
 from estimator.written import free_name, leave_others, list_written
 
@@ -172,10 +171,10 @@ def file_facts(path: Path) -> dict[str, Any]:
     Raises:
         InputError: it cannot be read.
     """
-    with system_errors(path, "read"), open_input(path) as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-        size = os.fstat(file.fileno()).st_size
-    return {"name": path.name, "path": str(path), "bytes": size, "sha256": digest}
+    with system_errors(path, "read"):
+        return {
+            "name": path.name, "path": str(path), "bytes": path.stat().st_size, "sha256": file_sha256(path)
+        }  # fmt: skip
 
 
 def write_text(path: Path, text: str) -> None:

@@ -1,6 +1,7 @@
 """Files that users name, and texts in them: no pipes or devices, nothing boundless, nothing that a terminal obeys."""
 
 import errno
+import hashlib
 import os
 import re
 import stat
@@ -40,6 +41,16 @@ def read_input(path: Path, most_bytes: int) -> bytes:
     if len(content) > most_bytes:
         raise OSError(errno.EFBIG, f"larger than {most_bytes >> 20} MiB")
     return content
+
+
+def file_sha256(path: Path) -> str:
+    """SHA-256 of a file, which is read piece by piece.
+
+    Raises:
+        OSError: see ``open_input``.
+    """
+    with open_input(path) as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def parse_toml(text: str) -> dict[str, Any]:

@@ -1,5 +1,6 @@
 """Names of what is written before it is whole; what a dead process left under such a name goes with the next run."""
 
+import errno
 import os
 import re
 import shutil
@@ -11,7 +12,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 _HOST = re.sub(r"\W", "", socket.gethostname())[:40]
-_NAME = re.compile(rf"\.mocobot-{_HOST}-(\d+)-[0-9a-f]{{8}}\.tmp")
+_NAME = re.compile(rf"\.mocobot-{_HOST}-(\d{{1,9}})-[0-9a-f]{{8}}\.tmp")
 _swept: set[Path] = set()
 
 
@@ -43,18 +44,14 @@ def scratch_folder(where: Path | None = None) -> Iterator[Path]:
 
 
 def _remove(path: Path) -> None:
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path, ignore_errors=True)
-    else:
-        with suppress(OSError):
-            path.unlink()
+    shutil.rmtree(path, ignore_errors=True)  # neither files nor links
+    with suppress(OSError):
+        path.unlink()
 
 
 def _is_alive(pid: int) -> bool:
     try:
         os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except (OSError, OverflowError):  # another user's
-        return True
+    except OSError as error:
+        return error.errno != errno.ESRCH  # another user's
     return True

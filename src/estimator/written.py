@@ -1,6 +1,5 @@
 """What this program wrote into a result folder: a list of files and digests in it, so that nothing else is removed."""
 
-import hashlib
 import json
 import os
 from collections.abc import Callable
@@ -9,11 +8,11 @@ from pathlib import Path
 from typing import Any
 
 from estimator.errors import InputError
+from estimator.inputs import file_sha256
+from estimator.strict import read_json
 
-LIST = ".mocobot-files"
-"""The list's name: {format, version, kind: of the result, files: {path in the folder: SHA-256}}."""
-FORMAT, VERSION = "mocobot-files", 1
-_LARGEST_BYTES = 16 << 20
+LIST, FORMAT = ".mocobot-files", "mocobot-files"
+"""The list: {format, kind: of the result, files: {path in the folder: SHA-256}}."""
 
 
 def list_written(folder: Path, kind: str) -> None:
@@ -24,16 +23,14 @@ def list_written(folder: Path, kind: str) -> None:
         kind: of the result, such as ``diagnosis``.
     """
     files = {str(path.relative_to(folder)): _digest(path) for path in _entries(folder)}
-    values = {"format": FORMAT, "version": VERSION, "kind": kind, "files": files}
-    (folder / LIST).write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+    _write(folder, {"format": FORMAT, "kind": kind, "files": files})
 
 
 def add_written(path: Path) -> None:
     """Add a file that was written into a folder later to the folder's list, if there is one."""
-    values = _read(path.parent)
-    if values:
+    if values := _read(path.parent):
         values["files"][path.name] = _digest(path)
-        (path.parent / LIST).write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
+        _write(path.parent, values)
 
 
 def holds(kind: str) -> Callable[[Path], bool]:
@@ -86,27 +83,25 @@ def _entries(folder: Path) -> list[Path]:
 
 def _is_written(path: Path, folder: Path, values: dict[str, Any]) -> bool:
     digest = values.get("files", {}).get(str(path.relative_to(folder)))
-    return digest is not None and digest == _digest(path)
+    return bool(digest) and digest == _digest(path)
 
 
 def _digest(path: Path) -> str:
-    if path.is_symlink() or not path.is_file():
-        return "folder" if path.is_dir() and not path.is_symlink() else ""
-    try:
-        with path.open("rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
-    except OSError:
-        return ""
+    """SHA-256 of a file; a word that is none for anything else."""
+    with suppress(OSError):
+        if not path.is_symlink():
+            return "folder" if path.is_dir() else file_sha256(path)
+    return ""
+
+
+def _write(folder: Path, values: dict[str, Any]) -> None:
+    (folder / LIST).write_text(json.dumps(values, indent=1) + "\n", encoding="utf-8")
 
 
 def _read(folder: Path) -> dict[str, Any]:
     """The list; empty if there is none that can be used."""
-    path = folder / LIST
-    try:
-        if not path.is_file() or path.stat().st_size > _LARGEST_BYTES:
-            return {}
-        values = json.loads(path.read_bytes())
-        usable = values["format"] == FORMAT and values["version"] == VERSION and "kind" in values
-        return values if usable and isinstance(values["files"], dict) else {}
-    except (OSError, ValueError, TypeError, KeyError, RecursionError):
-        return {}
+    with suppress(InputError):
+        values = read_json(folder / LIST, "a list of what was written")
+        if values.get("format") == FORMAT and isinstance(values.get("files"), dict):
+            return values
+    return {}

@@ -61,7 +61,7 @@ class _Check:
         count = attributes.get("count", "") if tag in ("replicate", "composite", "flexcomp") else ""
         self._copies.append(self._copies[-1] * prod(map(_whole, count.split())))
         self._elements += self._copies[-1]
-        what = f"{self._path}: <{tag}> {attributes.get('name', '')!r:.60}"
+        what = f"{self._path}: <{tag} {attributes.get('name', ''):.60}>".replace(" >", ">")
         self._limit(self._elements, MOST_ELEMENTS, f"{what} makes", "elements of the model")
         for rows, columns in (("nrow", "ncol"), ("width", "height")):
             if rows in attributes and columns in attributes:

@@ -27,8 +27,3 @@ def plain_numbers(axis: Axis) -> None:
     """Label a logarithmic axis with numbers in place of formulas."""
     axis.set_major_formatter(_Plain())
     axis.set_minor_formatter(_Plain())
-
-
-def legible(name: str) -> str:
-    """A name as a legend shows it: those that begin with an underscore it leaves out."""
-    return f" {name}" if name.startswith("_") else name

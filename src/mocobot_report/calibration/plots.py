@@ -15,7 +15,7 @@ from estimator.calibrate.outcome.text import SHOWN, shown_groups
 from mocobot_report.blocks.palette import LIGHT
 from mocobot_report.blocks.units import short_names
 from mocobot_report.calibration.charts import COLOURS, FITS, hidden_kinds, kind_names
-from mocobot_sim.plain_plots import legible, plain_numbers, plain_words
+from mocobot_sim.plain_plots import plain_numbers, plain_words
 
 MARKERS = {"circle": "o", "square": "s", "diamond": "D"}
 
@@ -115,7 +115,12 @@ def _shares(calibration: Calibration) -> Figure:
     for k, (name, trial) in enumerate(zip(short_names([t.name for t in trials]), trials, strict=True)):
         share = 100.0 * np.array([trial.shares.get(kind, 0.0) for kind in kinds])
         axis.barh(
-            range(len(kinds)), share, 0.66, left, color=LIGHT[COLOURS[k % len(COLOURS)]], label=legible(name)
+            range(len(kinds)),
+            share,
+            0.66,
+            left,
+            color=LIGHT[COLOURS[k % len(COLOURS)]],
+            label=name if name[0] != "_" else f" {name}",
         )
         left += share
     axis.barh(
