@@ -6,8 +6,9 @@ import os
 import re
 import stat
 import tomllib
+from io import BufferedReader
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 DEEPEST = 64
 """Most levels of a file's values, and parts of a key in TOML: beyond, parsers take minutes or fail."""
@@ -17,7 +18,7 @@ TOML_BYTES, JSON_BYTES = 1 << 20, 64 << 20
 _DOTTED = re.compile(rf"""(?:(?:(?<![\w-])[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST}}}""")
 
 
-def open_input(path: Path) -> BinaryIO:
+def open_input(path: Path) -> BufferedReader:
     """Open a file to read.
 
     Raises:

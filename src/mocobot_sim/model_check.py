@@ -45,7 +45,7 @@ class _Check:
                 raise InputError(f"{file}: cannot be read ({error.strerror})") from error
             except expat.ExpatError as error:
                 raise InputError(
-                    f"{file}: MuJoCo cannot read it, it is not well-formed XML ({error})"
+                    f"{file}: not a readable MJCF or URDF, it is not well-formed XML ({error})"
                 ) from error
         for file in sorted(self._places()):
             try:

@@ -25,7 +25,7 @@ from mocobot_logs.map.files import read_map
 from mocobot_logs.open_log import open_log
 from mocobot_report.blocks.html import el, to_bytes
 from mocobot_report.calibration.plots import save_plots
-from mocobot_sim.plain_plots import plain_numbers, plain_words
+from mocobot_sim.plots_plain import plain_numbers, plain_words
 from mocobot_sim.scene.payload import load_payload
 from recordings import small_recording
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from estimator.files import whole_file
 from mocobot_report.blocks.palette import LIGHT
 from mocobot_report.campaign.words import background_words
-from mocobot_sim.plain_plots import plain_numbers, plain_words
+from mocobot_sim.plots_plain import plain_numbers, plain_words
 
 COLOURS = {"calibrated": LIGHT["after"], "uncalibrated": LIGHT["before"], "units": LIGHT["after"]}
 APART = 1.03

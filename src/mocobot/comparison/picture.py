@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from mocobot.comparison.comparison import Comparison
 from mocobot_report.blocks.palette import LIGHT
-from mocobot_sim.plain_plots import plain_words
+from mocobot_sim.plots_plain import plain_words
 
 FARTHEST = 30.0
 """Standard errors at which the picture ends; what is farther off is drawn there as an arrow. Chosen."""

@@ -15,7 +15,7 @@ from estimator.calibrate.outcome.text import SHOWN, shown_groups
 from mocobot_report.blocks.palette import LIGHT
 from mocobot_report.blocks.units import short_names
 from mocobot_report.calibration.charts import COLOURS, FITS, hidden_kinds, kind_names
-from mocobot_sim.plain_plots import plain_numbers, plain_words
+from mocobot_sim.plots_plain import plain_numbers, plain_words
 
 MARKERS = {"circle": "o", "square": "s", "diamond": "D"}
 

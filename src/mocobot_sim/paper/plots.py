@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from estimator.files import whole_file
 from mocobot_sim.paper.fits import ONE_FIT, SELF_CALIBRATED, TRANSFER
 from mocobot_sim.paper.tables import BY_ENCODERS, MOMENTS, AllScores, Row, paper_tables, spring_share
-from mocobot_sim.plain_plots import plain_numbers, plain_words
+from mocobot_sim.plots_plain import plain_numbers, plain_words
 
 COLOURS = {
     "paper": "#6b7280", "ideal": "#2a9d8f", "nominal": "#2f6fd0", ONE_FIT: "#2f6fd0", "uncalibrated": "#e07b39",

@@ -18,7 +18,7 @@ from discrepancy.result.pictures.plots_law import law_figure
 from discrepancy.result.pictures.residual_statistics import multiples
 from discrepancy.result.traces import Group, Trace, group_units, groups
 from estimator.arrays import Array
-from mocobot_sim.plain_plots import plain_words
+from mocobot_sim.plots_plain import plain_words
 
 CLEAN_BAND = "#d9dde3"
 COMPONENTS = ("#7a5195", "#d99a2b", "#2a9d8f")

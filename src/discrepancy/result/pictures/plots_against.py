@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from discrepancy.causes.words import Words
 from discrepancy.result.pictures.residual_statistics import binned, spectrum
 from discrepancy.result.traces import Group, Trace
-from mocobot_sim.plain_plots import plain_numbers
+from mocobot_sim.plots_plain import plain_numbers
 
 BEFORE, AFTER = "#c8553d", "#2f6fd0"
 SERIES = (("as simulated", "white_before", BEFORE), ("with causes and tolerances", "white_after", AFTER))

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from discrepancy.result.evidence_list import drawn, label, relation
 from discrepancy.result.pictures.plots_against import AFTER, BEFORE, log_scale, titled
 from discrepancy.result.text_gain import foretold_torques, response_units
-from mocobot_sim.plain_plots import plain_numbers
+from mocobot_sim.plots_plain import plain_numbers
 
 RELATIONS = {
     "named": ("named", "#2f6fd0", "s"),
