@@ -90,4 +90,10 @@ def printable(text: str, keep: str = "\n\t") -> str:
     """Text as a terminal may show it: control characters are escaped, but for a few."""
     if text.isprintable():
         return text
-    return "".join(c if c.isprintable() or c in keep else ascii(c)[1:-1] for c in text)
+    return "".join(c if c.isprintable() or c in keep else _escaped(c) for c in text)
+
+
+def _escaped(character: str) -> str:
+    """As Python has it, and beyond ASCII TOML and JSON, too: drafts of maps are printed."""
+    escaped = ascii(character)[1:-1]
+    return escaped if character < "\x80" else escaped.replace("\\x", "\\u00")

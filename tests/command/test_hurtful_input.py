@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -157,6 +158,9 @@ def test_boundless_models(pipe: Path, tmp_path: Path, before: str, inside: str, 
     for read in (load_model, load_payload):
         with pytest.raises(InputError, match=said):
             read(file)
+    file.write_text(f"<mujoco><worldbody>{BODY}</worldbody></mujoco>".replace('"j"', '"j&#10;OK"'))
+    with pytest.raises(InputError, match="must have a printable name"):
+        load_model(file)
     file.write_text(f"<mujoco><!-- a -- b --><worldbody>{BODY}</worldbody></mujoco>")
     assert load_model(file).joints == ("j",)
 
@@ -200,6 +204,10 @@ def test_control_characters_are_shown_escaped(
     assert shown in refused(capsys, "inspect", tmp_path / f"{ESCAPE}.csv")
     monkeypatch.setattr("mocobot.commands.effects.run", lambda _: print(f"é {ESCAPE}\n\tx"))
     assert run(capsys, "effects") == (0, f"é {shown}\n\tx\n", "")
+    file = tmp_path / "log.csv"
+    file.write_text("time\u00a0[s],x\n" + "".join(f"{k / 100},{k}\n" for k in range(300)), encoding="utf-8")
+    code, draft, _ = run(capsys, "map", file)
+    assert (code, tomllib.loads(draft)["time"]["column"]) == (0, "time\u00a0[s]")
     assert shown.encode() in to_bytes(el("p", ESCAPE, title=ESCAPE))
 
 

@@ -154,6 +154,8 @@ def _check(path: Path, model: mujoco.MjModel) -> None:
         name, word = model.joint(j).name, _OTHER.get(int(model.jnt_type[j]))
         if word is not None:
             raise InputError(f"{path}: joint {name or j + 1!r} is a {word} joint; {allowed}")
+        if not name.isprintable():
+            raise InputError(f"{path}: joint {name!r:.80} must have a printable name")
         if not name:
             body = model.body(model.jnt_bodyid[j]).name
             raise InputError(
