@@ -70,7 +70,7 @@ def test_hidden_bias_is_named_extended_and_written(
 
     # Its own result may be replaced, but nothing that someone put there is lost.
     (out / "notes.txt").write_text("mine")
-    assert "not an earlier diagnosis" in refused(capsys, *biased_trials, "--out", out)
+    assert "notes.txt: was not written by mocobot" in refused(capsys, *biased_trials, "--out", out)
     assert (out / "notes.txt").read_text() == "mine"
 
 
