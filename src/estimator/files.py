@@ -2,64 +2,88 @@
 
 import contextlib
 import errno
-import hashlib
 import json
 import os
 import shutil
 import tempfile
-import uuid
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
 from estimator.errors import InputError
+from estimator.inputs import file_sha256, printable
+from estimator.scratch import scratch_name
+from estimator.written import free_name, leave_others, list_written
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)
 """What a disk says that takes no more."""
+_State = tuple[int, int, int] | None
+_checked: dict[Path, _State] = {}
+"""What was at the place of a file when it was checked, before the work; None for nothing."""
 
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """A temporary name beside ``path`` for a file that takes its place when the block ends without an error.
 
-    Missing folders above it are made.
+    Missing folders above it are made. A file that somebody else has put there since the place was checked
+    (``check_target``) is kept, with ``.kept`` behind its name.
 
     Raises:
         InputError: the operating system refuses.
     """
     real = Path(os.path.realpath(path))
-    temporary = real.parent / f".{uuid.uuid4().hex}.tmp"
     with system_errors(path), _folders_above(path):
+        temporary, before = scratch_name(real.parent), _checked.pop(real, _state(real))
         try:
             yield temporary
+            if _state(real) not in (None, before):
+                real.rename(free_name(real))
             temporary.replace(real)
         finally:
             with contextlib.suppress(OSError):
                 temporary.unlink(missing_ok=True)
 
 
-@contextmanager
-def whole_folder(path: Path) -> Iterator[Path]:
-    """A temporary folder that takes the place of ``path`` (with all it held) when the block ends without an error.
+def _state(path: Path) -> _State:
+    try:
+        found = path.lstat()
+    except OSError:
+        return None
+    return found.st_ino, found.st_size, found.st_mtime_ns
 
-    Missing folders above it are made. What cannot be written inside is told by its place in ``path``.
+
+@contextmanager
+def whole_folder(path: Path, kind: str) -> Iterator[Path]:
+    """A temporary folder that takes the place of ``path`` when the block ends without an error.
+
+    Missing folders above it are made. What cannot be written inside is told by its place in ``path``. The folder gets
+    a list of what is in it. Of one that it replaces, what its list has is removed; everything else is kept, and has
+    ``.kept`` behind its name where the new folder has the same one.
+
+    Args:
+        path: the folder.
+        kind: of result, for the list (``estimator.written``).
 
     Raises:
         InputError: it cannot be created or put in place.
     """
     real = Path(os.path.realpath(path))
-    mark = uuid.uuid4().hex
-    temporary, old = real.parent / f".{mark}.tmp", real.parent / f".{mark}.old"
     with _folders_above(path):
+        temporary = scratch_name(real.parent)
+        old = temporary.with_suffix(".old")
         try:
             with system_errors(path):
                 temporary.mkdir()
             yield temporary
             with system_errors(path):
+                list_written(temporary, kind)
                 if real.exists():
                     real.rename(old)
                 temporary.rename(real)
+                if old.exists():
+                    leave_others(old, real)
         except InputError as error:
             if str(temporary) not in str(error):
                 raise
@@ -73,8 +97,6 @@ def whole_folder(path: Path) -> Iterator[Path]:
                 with contextlib.suppress(OSError):
                     old.rename(real)
             shutil.rmtree(temporary, ignore_errors=True)
-            if real.exists():
-                shutil.rmtree(old, ignore_errors=True)
 
 
 @contextmanager
@@ -126,6 +148,8 @@ def check_target(path: Path, suffix: str = "") -> None:
             raise InputError(f"{path}: the file's name must end in {suffix}")
         if path.exists() and not path.is_file():
             raise InputError(f"{path}: is not a regular file; name another one to write")
+        real = Path(os.path.realpath(path))
+        _checked[real] = _state(real)
     check_place(path)
 
 
@@ -147,20 +171,20 @@ def file_facts(path: Path) -> dict[str, Any]:
     Raises:
         InputError: it cannot be read.
     """
-    with system_errors(path, "read"), path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-        size = os.fstat(file.fileno()).st_size
-    return {"name": path.name, "path": str(path), "bytes": size, "sha256": digest}
+    with system_errors(path, "read"):
+        return {
+            "name": path.name, "path": str(path), "bytes": path.stat().st_size, "sha256": file_sha256(path)
+        }  # fmt: skip
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write UTF-8 text.
+    """Write UTF-8 text; in a ``.txt`` file, which terminals show, control characters are escaped.
 
     Raises:
         InputError: the target cannot be written.
     """
     with whole_file(path) as temporary:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_text(printable(text) if path.suffix == ".txt" else text, encoding="utf-8")
 
 
 def write_json(path: Path, values: Mapping[str, Any]) -> None:

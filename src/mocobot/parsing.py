@@ -2,6 +2,8 @@
 
 import difflib
 import math
+import os
+import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -17,6 +19,8 @@ from tyro.constructors import ConstructorRegistry, PrimitiveConstructorSpec, Pri
 from estimator.errors import InputError
 
 PROG = "mocobot"
+NARROWEST = 40
+"""Columns that the help takes at least: what lays it out does not end in fewer than about ten."""
 DESCRIPTION = (
     "Simulate mobile cobots that carry an unknown payload together, estimate it, and find out what the simulation "
     "gets wrong. Exit codes: 0 done; 1 done, and with --strict the answer is not good; 2 refused, with one sentence "
@@ -43,6 +47,8 @@ def parse(commands: Mapping[str, type], arguments: Sequence[str]) -> Any:
         command = next((argument for argument in arguments if argument in commands), None)
         raise InputError(_sentence(event, commands, command))
 
+    if shutil.get_terminal_size().columns < NARROWEST:
+        os.environ["COLUMNS"] = str(NARROWEST)
     with failures.on_parse_error(refuse):
         return tyro.cli(
             kinds,

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from estimator.errors import InputError
+from estimator.inputs import open_input
 from mocobot_logs.faults import readable
 
 FREE_BYTES = 256 << 20
@@ -41,7 +42,7 @@ def read_small(path: Path, most_bytes: int, where: str, kind: str) -> bytes:
     Raises:
         InputError: it is larger, or cannot be read.
     """
-    with readable(where), path.open("rb") as file:
+    with readable(where), open_input(path) as file:
         content = file.read(most_bytes + 1)
     if len(content) > most_bytes:
         raise InputError(f"{where}: is larger than {most_bytes >> 20} MiB, which no {kind} is")

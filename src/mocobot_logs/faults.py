@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from estimator.errors import InputError
+from estimator.inputs import printable
 
 LONGEST = 200
 
@@ -16,7 +17,7 @@ def detail_of(error: BaseException) -> str:
 
 def shown(text: str, longest: int = 60) -> str:
     """Text of a file as a terminal may show it."""
-    return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in text[:longest])[:longest]
+    return printable(text[:longest], keep="")[:longest]
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from pathlib import Path
 from types import ModuleType
 
 from estimator.files import check_target, whole_file
+from estimator.written import add_written
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import el, to_bytes
 from mocobot_report.calibration import part as calibration_part
@@ -50,6 +51,8 @@ def write_report(folder: Path, out: Path | None = None, say: Say = lambda _: Non
     check_target(out, SUFFIX)
     with whole_file(out) as temporary:
         temporary.write_bytes(make_page(contents, say))
+    if out.parent == folder:
+        add_written(out)
     return out
 
 

@@ -24,6 +24,7 @@ from discrepancy.result.traces import Trace
 from discrepancy.rig import Channel
 from estimator.arrays import Array
 from estimator.errors import InputError
+from estimator.inputs import open_input, plain
 
 NAME = "residuals.npz"
 FORMAT, VERSION = "mocobot-residuals", 1
@@ -73,7 +74,7 @@ def load_traces(path: Path) -> tuple[list[Trace], list[Channel]]:
         InputError: there is no such file, or it is not whole.
     """
     try:
-        with path.open("rb") as file:
+        with open_input(path) as file:
             archive = np.load(file, allow_pickle=False)
             if not isinstance(archive, np.lib.npyio.NpzFile):
                 raise ValueError("it holds one array")
@@ -86,7 +87,7 @@ def load_traces(path: Path) -> tuple[list[Trace], list[Channel]]:
     except BROKEN as error:
         raise InputError(f"{path}: not the residuals of a diagnosis, or damaged ({_words(error)})") from error
     try:
-        facts = json.loads(arrays["facts"].tobytes())
+        facts = plain(json.loads(arrays["facts"].tobytes()))
         if facts["format"] != FORMAT or facts["version"] != VERSION:
             raise ValueError(f"it must have format {FORMAT!r} and version {VERSION}")
         channels = [_channel(entry) for entry in facts["channels"]]

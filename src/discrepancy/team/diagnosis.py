@@ -95,6 +95,6 @@ def against_truth(found: Diagnosed, truth: Mapping[str, Any]) -> Diagnosed:
     known = dict(found.estimates or {})
     try:
         known["errors"] = {name: errors(known[name], truth) for name in ("before", "after")}
-    except (KeyError, TypeError, ValueError, IndexError):
+    except (KeyError, TypeError, ValueError, IndexError, OverflowError):
         return found
     return replace(found, estimates=known)

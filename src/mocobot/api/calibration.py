@@ -19,6 +19,7 @@ from estimator.calibrate.prior import Prior
 from estimator.errors import InputError
 from estimator.files import whole_folder
 from estimator.recording.model import Recording
+from estimator.written import holds
 from mocobot.api.given import Given, recordings_of
 from mocobot.api.public import public
 from mocobot.files import calibrations
@@ -63,8 +64,8 @@ class Calibration(Below):
         Raises:
             InputError: the folder holds something else, or cannot be written.
         """
-        check_folder(Path(folder), [], calibrations.is_calibration, "an earlier calibration", force=True)
-        with whole_folder(Path(folder)) as whole:
+        check_folder(Path(folder), [], holds("calibration"), "an earlier calibration", force=True)
+        with whole_folder(Path(folder), "calibration") as whole:
             calibrations.write_into(whole, self)
 
 

@@ -16,6 +16,7 @@ from discrepancy.result.sensitivity import detection_limits
 from discrepancy.team.diagnosis import diagnose_team
 from discrepancy.team.rig import TeamRig
 from estimator.errors import InputError
+from estimator.processes import ends_with_this
 from estimator.recording.model import Recording
 from mocobot.api.given import Robots
 from mocobot.campaign.limits import MeasuredLimits, push_limits
@@ -73,7 +74,10 @@ def _run(
     todo = [task for task in tasks if not store.has(task[1])]
     done(len(tasks) - len(todo))
     pool = Parallel(
-        n_jobs=jobs, return_as="generator_unordered", pre_dispatch="all" if remote else "2 * n_jobs"
+        n_jobs=jobs,
+        return_as="generator_unordered",
+        pre_dispatch="all" if remote else "2 * n_jobs",
+        **ends_with_this(),
     )
     results: Any = pool(delayed(work)(task) for task in todo)
     for result in results:

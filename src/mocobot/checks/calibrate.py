@@ -1,8 +1,7 @@
 """What ``mocobot calibrate`` refuses at once."""
 
-from pathlib import Path
-
 from estimator.errors import InputError
+from estimator.written import holds
 from mocobot.files.targets import check_folder, check_formats, check_recordings, check_there, map_file
 from mocobot.options import Calibrate
 
@@ -19,14 +18,6 @@ def check(options: Calibrate) -> None:
     check_recordings(files)
     if options.out is not None:
         inputs = [*files, *([options.prior] if options.prior else []), *map_file(options.map)]
-        check_folder(options.out, inputs, _is_calibration, "an earlier calibration", force=options.force)
+        check_folder(options.out, inputs, holds("calibration"), "an earlier calibration", force=options.force)
     check_there(files)
     check_formats(files)
-
-
-def _is_calibration(folder: Path) -> bool:
-    from mocobot.files.calibrations import (
-        is_calibration,  # numpy, which is of no use where there is no folder
-    )
-
-    return is_calibration(folder)

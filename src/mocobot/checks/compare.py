@@ -1,7 +1,6 @@
 """What ``mocobot compare`` refuses at once."""
 
-from pathlib import Path
-
+from estimator.written import holds
 from mocobot.files.targets import check_folder, check_there
 from mocobot.options import Compare
 
@@ -14,11 +13,5 @@ def check(options: Compare) -> None:
     """
     if options.out is not None:
         inputs = [options.a, options.b]
-        check_folder(options.out, inputs, _is_comparison, "an earlier comparison", force=options.force)
+        check_folder(options.out, inputs, holds("comparison"), "an earlier comparison", force=options.force)
     check_there([options.a, options.b])
-
-
-def _is_comparison(folder: Path) -> bool:
-    from mocobot.comparison.files import is_comparison  # numpy, of no use where there is no folder
-
-    return is_comparison(folder)

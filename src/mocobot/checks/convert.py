@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from estimator.errors import InputError
+from estimator.written import holds
 from mocobot.files.targets import (
     check_folder,
     check_formats,
@@ -54,13 +55,7 @@ def check_target(options: Convert, out: Path) -> None:
         check_output(out, _inputs(options), force=options.force)
         return
     check_no_input(out, _inputs(options))
-    check_folder(out, _inputs(options), _is_bag, "a bag of an earlier conversion", force=options.force)
-
-
-def _is_bag(folder: Path) -> bool:
-    from mocobot_logs.bag.write import is_written_bag  # numpy, which is of no use where there is no folder
-
-    return is_written_bag(folder)
+    check_folder(out, _inputs(options), holds("bag"), "a bag of an earlier conversion", force=options.force)
 
 
 def _inputs(options: Convert) -> list[Path]:

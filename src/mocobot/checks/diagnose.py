@@ -7,6 +7,8 @@ from discrepancy.cause_names import emps, serial, team
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.inference.odds import check_odds
 from estimator.errors import InputError
+from estimator.strict import read_json
+from estimator.written import holds
 from mocobot.files.targets import (
     calibration_file,
     check_folder,
@@ -17,9 +19,11 @@ from mocobot.files.targets import (
     map_file,
 )
 from mocobot.options import Diagnose
+from mocobot_sim.trial.sidecar import truth_path
 
 CAUSES = {"team": team.NAMES, "emps": emps.NAMES}
 """Names of causes by rig."""
+TRUTH = "the truth beside a simulated recording"
 
 
 def check(options: Diagnose) -> None:
@@ -42,12 +46,14 @@ def check(options: Diagnose) -> None:
     if options.out is not None:
         inputs = [*options.rec, *([options.tolerances] if options.tolerances else []), *map_file(options.map)]
         inputs += calibration_file(options.calibration)
-        check_folder(options.out, inputs, _is_diagnosis, "an earlier diagnosis", force=options.force)
+        check_folder(options.out, inputs, holds("diagnosis"), "an earlier diagnosis", force=options.force)
     _check_rig(options)
     _check_excluded(options.exclude, CAUSES[options.rig])
     check_there(options.rec)
     if options.rig == "team":
         check_formats(options.rec)
+        for path in filter(Path.exists, map(truth_path, options.rec)):
+            read_json(path, TRUTH)  # what it says, nobody asks before the verdict
 
 
 def _check_joints(options: Diagnose, model: Path) -> None:
@@ -60,7 +66,7 @@ def _check_joints(options: Diagnose, model: Path) -> None:
     if options.out is not None:
         inputs = [*logs, model, *([options.tolerances] if options.tolerances else [])]
         inputs += [Path(options.map)] if options.map is not None else []
-        check_folder(options.out, inputs, _is_diagnosis, "an earlier diagnosis", force=options.force)
+        check_folder(options.out, inputs, holds("diagnosis"), "an earlier diagnosis", force=options.force)
     _check_excluded(options.exclude, serial.NAMES)
     check_there([*logs, model])
     check_formats(logs)
@@ -86,11 +92,3 @@ def _check_excluded(excluded: Sequence[str], causes: Sequence[str]) -> None:
     excluded_from(causes, excluded)
     if set(causes) <= set(excluded):
         raise InputError("every cause is excluded; nothing is left to look for")
-
-
-def _is_diagnosis(folder: Path) -> bool:
-    from discrepancy.result.diagnosed import (
-        is_diagnosis,  # all of it, which is of no use where there is no folder
-    )
-
-    return is_diagnosis(folder)

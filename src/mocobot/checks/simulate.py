@@ -1,10 +1,10 @@
 """What ``mocobot simulate`` refuses at once."""
 
-import re
 from pathlib import Path
 from typing import get_args
 
 from estimator.errors import InputError
+from estimator.written import holds
 from mocobot.api.fits import check_fits
 from mocobot.files.targets import check_folder, check_output
 from mocobot.options import Simulate
@@ -14,8 +14,6 @@ from mocobot_sim.scene.model_files import payload_path
 from mocobot_sim.trial.sidecar import truth_path
 
 KINDS = get_args(Kind)
-OURS = re.compile(rf"trial\d+_({'|'.join(KINDS)})\.(parquet|truth\.json)")
-"""Files in the folder of several trials."""
 
 
 def check(options: Simulate) -> None:
@@ -31,7 +29,9 @@ def check(options: Simulate) -> None:
         check_output(options.out, inputs, force=options.force, suffix=".parquet")
         check_output(truth_path(options.out), inputs, force=options.force)
     elif options.out_dir is not None:
-        check_folder(options.out_dir, inputs, _is_ours, "an earlier simulation", force=options.force)
+        check_folder(
+            options.out_dir, inputs, holds("simulation"), "an earlier simulation", force=options.force
+        )
     check_fits("--vias", options.vias, ("random", "free"), kinds)
     check_fits("--duration", options.duration, ("periodic",), kinds)
     check_fits("--robots", options.robots, ("free",), kinds)
@@ -79,7 +79,3 @@ def kinds_of(options: Simulate) -> list[str]:
                 f"{', '.join(KINDS)}"
             )
     return kinds
-
-
-def _is_ours(folder: Path) -> bool:
-    return all(path.is_file() and OURS.fullmatch(path.name) for path in folder.iterdir())

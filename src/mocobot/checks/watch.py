@@ -1,17 +1,11 @@
 """What ``mocobot watch`` refuses at once."""
 
-from pathlib import Path
-
 from estimator.errors import InputError
+from estimator.written import holds
 from mocobot.files.targets import check_folder, check_formats, check_recordings, check_there, map_file
 from mocobot.options import Watch
 
 VERDICT, PAGE = "verdict.txt", "report.html"
-OURS = {
-    VERDICT, PAGE, "estimate.json", "calibration.json", "calibration", "recordings", "diagnosis.json", "report.txt",
-    "residuals.npz", "extended", "as_found",
-}  # fmt: skip
-"""What is written, besides pictures."""
 
 
 def check(options: Watch) -> None:
@@ -29,11 +23,6 @@ def check(options: Watch) -> None:
             raise InputError(f"{stem} is the name of two recordings; give each a name of its own")
     if options.out is not None:
         inputs = [*options.rec, *map_file(options.map)]
-        check_folder(options.out, inputs, _is_ours, "an earlier result of watch", force=options.force)
+        check_folder(options.out, inputs, holds("watch"), "an earlier result of watch", force=options.force)
     check_there(options.rec)
     check_formats(options.rec)
-
-
-def _is_ours(folder: Path) -> bool:
-    names = {path.name for path in folder.iterdir() if path.suffix != ".png"}
-    return VERDICT in names and names <= OURS

@@ -20,7 +20,7 @@ def run(options: Compare) -> None:
         NotGood: with ``strict``, something changed.
     """
     found = compare(options.a, options.b)
-    with whole_folder(options.out) if options.out else nullcontext() as folder:
+    with whole_folder(options.out, "comparison") if options.out else nullcontext() as folder:
         if folder is not None:
             inputs = [path for path in (options.a, options.b) if path.is_file()]
             write_into(folder, found, provenance("compare", asdict(options), inputs))

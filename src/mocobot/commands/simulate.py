@@ -34,7 +34,7 @@ def run(options: Simulate) -> None:
         print(_line(options.out, done[0], options))
     elif options.out_dir is not None:
         names = _names(kinds)
-        with whole_folder(options.out_dir) as folder:
+        with whole_folder(options.out_dir, "simulation") as folder:
             for recording, name in zip(done, names, strict=True):
                 recording.write(folder / name)
         for recording, name in zip(done, names, strict=True):

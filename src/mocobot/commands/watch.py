@@ -88,7 +88,7 @@ def run(options: Watch) -> None:
         _conclude(seen, options.jobs, say, simulated)
         if out is not None:
             say("write")
-            with whole_folder(out) as folder:
+            with whole_folder(out, "watch") as folder:
                 _write(seen, folder, made_with)
             if seen.estimate or seen.diagnosis:
                 write_report(out, out / PAGE, say)

@@ -30,9 +30,3 @@ def write_into(folder: Path, found: Comparison, made_with: Mapping[str, Any] | N
         from mocobot.comparison.picture import save_picture  # matplotlib
 
         save_picture(found, folder / PICTURE)
-
-
-def is_comparison(folder: Path) -> bool:
-    """Whether a folder holds a comparison and nothing that someone else put there."""
-    names = {path.name for path in folder.iterdir()}
-    return NAME in names and names <= {NAME, REPORT, PICTURE}

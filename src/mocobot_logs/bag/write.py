@@ -15,7 +15,6 @@ import sqlite3
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -39,6 +38,8 @@ from estimator.arm.wrist_level import wrist_of
 from estimator.errors import InputError
 from estimator.files import check_place, whole_file, whole_folder
 from estimator.recording.model import Recording
+from estimator.scratch import scratch_folder
+from estimator.written import holds
 from mocobot_logs.bag.mcap_writer import ChecksummedMcap
 from mocobot_logs.bag.messages import Topic
 from mocobot_logs.bag.read import METADATA_TOPIC
@@ -90,7 +91,7 @@ def write_bag(
         level: "joint" (phi, theta, tau) or "wrist" (h, theta, force).
         storage: "mcap" or "sqlite3".
         advance: takes the number of samples written since the last call.
-        replace_bag: whether a folder that ``is_written_bag`` may be replaced, once the new one is complete.
+        replace_bag: whether a bag in a folder that this program wrote may be replaced, once the new one is complete.
 
     Raises:
         InputError: the target exists or cannot be written, times are not within [0, 2^31) s, or level or storage is
@@ -106,10 +107,10 @@ def write_bag(
     plugin = StoragePlugin[storage.upper()]
     try:
         with (
-            whole_file(path) if single else whole_folder(path) as target,
-            TemporaryDirectory(dir=path.parent, prefix=".", suffix=".tmp") as scratch,
+            whole_file(path) if single else whole_folder(path, "bag") as target,
+            scratch_folder(path.parent) as scratch,
         ):
-            folder = Path(scratch) / name  # a bag's files are named like its folder
+            folder = scratch / name  # a bag's files are named like its folder
             with _Writer(folder, version=_VERSION, storage_plugin=plugin) as bag:
                 _write(recording, stamps, level, bag, advance)
             for file in folder.iterdir():
@@ -122,17 +123,6 @@ def write_bag(
     except (OSError, ValueError, sqlite3.Error, WriterError) as error:
         detail = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be written ({detail})") from error
-
-
-def is_written_bag(folder: Path) -> bool:
-    """Whether a folder holds a bag that ``write_bag`` wrote, and nothing else."""
-    names = {path.name for path in folder.iterdir()}
-    stored = sum(Path(name).suffix in SUFFIXES.values() for name in names)
-    try:
-        told = (folder / "metadata.yaml").read_text(encoding="utf-8")
-    except (OSError, ValueError):
-        return False
-    return len(names) == 2 and stored == 1 and METADATA_TOPIC in told
 
 
 def _check_target(path: Path, storage: Storage, replace_bag: bool) -> bool:
@@ -149,7 +139,7 @@ def _check_target(path: Path, storage: Storage, replace_bag: bool) -> bool:
         if (
             not single
             and path.exists()
-            and not (path.is_dir() and (not any(path.iterdir()) or (replace_bag and is_written_bag(path))))
+            and not (path.is_dir() and (not any(path.iterdir()) or (replace_bag and holds("bag")(path))))
         ):
             what = "is a folder that holds something" if path.is_dir() else "is a file"
             raise InputError(f"{path}: {what}; name a new folder for the bag, or a {SUFFIXES[storage]} file")

@@ -18,6 +18,7 @@ import pyarrow.compute as pc
 import pyarrow.dataset as ds
 
 from estimator.errors import InputError
+from estimator.inputs import plain
 from mocobot_logs.claims import check_claim, read_small
 from mocobot_logs.faults import detail_of, told_in_one_sentence
 from mocobot_logs.formats import DATASET_INFO, dataset_root
@@ -104,7 +105,7 @@ def _read_info(root: Path, name: str) -> dict[str, Any]:
     where = f"{name}: {DATASET_INFO}"
     content = read_small(root / DATASET_INFO, MAX_INFO_BYTES, where, "dataset's description")
     try:
-        info = json.loads(content)
+        info = plain(json.loads(content))
     except (ValueError, RecursionError) as error:
         raise InputError(f"{where} cannot be read ({detail_of(error)})") from error
     if not isinstance(info, dict):

@@ -7,6 +7,7 @@ from typing import Any
 from discrepancy.causes.units import one_each, parameter
 from discrepancy.result.read import AS_FOUND, EXTENDED, kind_of
 from discrepancy.result.text import NOTHING_WRONG_HERE
+from estimator.written import LIST
 from mocobot_report.blocks.book import Book
 from mocobot_report.blocks.html import Child, Node, el
 from mocobot_report.blocks.numbers import plain, size, spelled
@@ -104,6 +105,6 @@ def _told(name: str, files: Sequence[Path]) -> list[Child]:
 
 def _files(folder: Path) -> list[Path]:
     try:
-        return sorted(path for path in folder.rglob("*") if path.is_file())
+        return sorted(path for path in folder.rglob("*") if path.is_file() and path.name != LIST)
     except OSError:
         return []

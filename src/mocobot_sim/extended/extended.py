@@ -11,10 +11,13 @@ from numpy.typing import NDArray
 
 from estimator.errors import InputError
 from estimator.files import whole_folder
+from estimator.inputs import JSON_BYTES, read_input
 from estimator.strict import Fields, parse_json
+from estimator.written import LIST, holds
 from mocobot_sim.effects import Effect, effect_from_dict, effect_to_dict
 from mocobot_sim.extended.poses import poses_to_list, read_poses
 from mocobot_sim.extended.readme import readme
+from mocobot_sim.model_check import check_model
 from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.as_built_file import unit_in
 from mocobot_sim.scene.scene import TeamScene
@@ -81,21 +84,14 @@ def write_extended(
     page = readme(values["effects"], scene.robots, len(healthy))
     files = {SCENE: scene.to_xml().encode(), NUMBERS: text.encode(), README: page.encode(), **assets}
     folder = Path(folder)
-    if folder.exists() and not _is_extended(folder):
+    if folder.is_file() or (folder.is_dir() and any(folder.iterdir()) and not holds("extended")(folder)):
         raise InputError(f"{folder}: exists and is not an extended model; name a new folder")
     try:
-        with whole_folder(folder) as temporary:
+        with whole_folder(folder, "extended") as temporary:
             for name, content in files.items():
                 (temporary / name).write_bytes(content)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
-
-
-def _is_extended(folder: Path) -> bool:
-    try:
-        return json.loads((folder / NUMBERS).read_text(encoding="utf-8"))["format"] == FORMAT
-    except (OSError, ValueError, TypeError, KeyError):
-        return False
 
 
 def load_extended(folder: Path) -> TeamScene:
@@ -119,7 +115,7 @@ def load_extended(folder: Path) -> TeamScene:
     assets = {
         path.name: path.read_bytes()
         for path in sorted(folder.iterdir())
-        if path.is_file() and path.name not in (SCENE, NUMBERS, README)
+        if path.is_file() and path.name not in (SCENE, NUMBERS, README, LIST)
     }
     scene = TeamScene(
         root=None,
@@ -138,6 +134,7 @@ def load_extended(folder: Path) -> TeamScene:
         assets=assets,
     )
     read.object("extra")
+    check_model(folder / SCENE)
     _check_model(scene, folder / SCENE)
     return scene
 
@@ -162,7 +159,7 @@ def _fields(values: dict[str, Any], where: str) -> Fields:
 
 def _read(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8")
+        return read_input(path, JSON_BYTES).decode("utf-8")
     except (OSError, ValueError) as error:
         detail = getattr(error, "strerror", None) or error
         raise InputError(f"{path}: cannot be read ({detail}); an extended model has this file") from error

@@ -18,6 +18,7 @@ from estimator.calibrate.calibration import Calibration
 from estimator.errors import InputError
 from estimator.estimate.grasps import estimate_grasps
 from estimator.estimate.result import PayloadEstimate
+from estimator.processes import ends_with_this
 from estimator.recording.model import Recording
 from estimator.signals.process import process_recording
 from mocobot_sim.paper.fits import COLUMNS, SELF_CALIBRATED, TRANSFER, estimate_both, fit_trials, three_trials
@@ -169,7 +170,9 @@ def run_paper(
     # Far away all is sent at once: workers may come while it runs. A task's arguments are one tuple (``work``), which
     # joblib does not put on a worker beforehand, where they would be lost with it.
     ahead = "all" if remote else "2 * n_jobs"
-    with Parallel(n_jobs=jobs, return_as="generator_unordered", pre_dispatch=ahead) as pool:
+    with Parallel(
+        n_jobs=jobs, return_as="generator_unordered", pre_dispatch=ahead, **ends_with_this()
+    ) as pool:
         each = Work(pool, plan.steps, progress or _untold, store, remote=remote).each
         first = [
             (_request(plan, payload, "random", k), team, None)

@@ -2,13 +2,12 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from threading import Event, Thread
 
 import numpy as np
 
 from estimator.arrays import Array
+from estimator.scratch import scratch_folder
 
 EVERY_S = 0.2
 """Time between two looks at the shares."""
@@ -25,8 +24,8 @@ def shares(tasks: int, told: Callable[[float], object]) -> Iterator[Array]:
     Yields:
         The share of each task that is done, shape (tasks,), for the tasks to write to, in any process.
     """
-    with TemporaryDirectory(prefix="mocobot", ignore_cleanup_errors=True) as folder:
-        done = np.memmap(Path(folder) / "shares", dtype=float, mode="w+", shape=(tasks,))
+    with scratch_folder() as folder:
+        done = np.memmap(folder / "shares", dtype=float, mode="w+", shape=(tasks,))
         over = Event()
 
         def tell() -> None:

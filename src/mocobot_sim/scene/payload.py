@@ -9,6 +9,8 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.errors import InputError
+from estimator.inputs import printable
+from mocobot_sim.model_check import check_model
 from mocobot_sim.scene.models import payload_path, posed
 from mocobot_sim.scene.pymjcf import compiled, mjcf
 
@@ -28,12 +30,13 @@ def load_payload(payload: str | Path) -> mjcf.RootElement:
         InputError: it cannot be read, or something in it would act on the robots, too.
     """
     path = Path(payload) if Path(payload).suffix == ".xml" else payload_path(str(payload))
+    if path.exists():
+        check_model(path)
     try:
         root = mjcf.from_path(str(path))
     except (OSError, ValueError, AttributeError, KeyError, SyntaxError) as error:
         said = " ".join(str(getattr(error, "strerror", None) or error).split())
-        quoted = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in said)  # of a damaged file
-        raise InputError(f"{path}: not a readable MJCF ({quoted})") from error
+        raise InputError(f"{path}: not a readable MJCF ({printable(said)})") from error
     if root.compiler.angle != "radian":
         # The composed scene has one compiler setting for all parts; degrees here would be read as radians.
         raise InputError(f'{path}: compiler angle is {root.compiler.angle or "degree"}; it must be "radian"')

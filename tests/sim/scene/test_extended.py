@@ -9,6 +9,7 @@ import pytest
 
 from effect_cases import example, one_robot, team_with
 from estimator.errors import InputError
+from estimator.written import LIST
 from mocobot.cli import main
 from mocobot_sim.effects import EFFECTS
 from mocobot_sim.extended.extended import extra_of, load_extended, write_extended
@@ -83,7 +84,7 @@ def test_plain_mujoco_loads_it(folder):
     assert np.isfinite(data.qpos).all()
     text = (folder / "README.md").read_text(encoding="utf-8")
     assert all(f"`{cause}`" in text for cause in HIDDEN)
-    assert sorted(path.name for path in folder.iterdir()) == ["README.md", "effects.json", "team.xml"]
+    assert sorted(path.name for path in folder.iterdir()) == [LIST, "README.md", "effects.json", "team.xml"]
 
 
 @pytest.mark.parametrize("cause", list(EFFECTS))

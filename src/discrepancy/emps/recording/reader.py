@@ -11,6 +11,7 @@ from discrepancy.emps.recording.sampling import on_grid
 from discrepancy.emps.recording.whole import is_whole
 from estimator.arrays import Array
 from estimator.errors import InputError
+from estimator.inputs import open_input
 
 SERIES = {
     "t": "time [s]",
@@ -35,7 +36,7 @@ def read_emps(path: Path) -> AxisLog:
             raise InputError(
                 f"{path}: is cut off: what its last variable should have goes beyond the end of the file"
             )
-        with path.open("rb") as file:
+        with open_input(path) as file:
             found = loadmat(file, variable_names=[*SERIES, *NUMBERS])
     except InputError:
         raise

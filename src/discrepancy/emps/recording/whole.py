@@ -5,6 +5,8 @@ from __future__ import annotations
 import struct
 from pathlib import Path
 
+from estimator.inputs import open_input
+
 HEADER_BYTES, TAG_BYTES = 128, 8
 
 
@@ -19,7 +21,7 @@ def is_whole(path: Path) -> bool:
         OSError: it cannot be read.
     """
     size = path.stat().st_size
-    with path.open("rb") as file:
+    with open_input(path) as file:
         header = file.read(HEADER_BYTES)
         order = {b"IM": "<", b"MI": ">"}.get(header[126:])
         if order is None or struct.unpack(f"{order}H", header[124:126]) != (0x0100,):

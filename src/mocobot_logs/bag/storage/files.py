@@ -14,8 +14,10 @@ from tempfile import mkdtemp
 from typing import Any
 
 from ruamel.yaml import YAML
+from ruamel.yaml.tokens import AnchorToken
 
 from estimator.errors import InputError
+from estimator.inputs import plain
 from mocobot_logs.bag.messages import BLOCK_BYTES, MESSAGE_BYTES, Messages, Storage, joined, merged
 from mocobot_logs.bag.storage.mcap import McapBag
 from mocobot_logs.bag.storage.sqlite import SqliteBag
@@ -193,7 +195,9 @@ def _load(content: bytes, path: Path) -> dict[str, Any]:
         # Merged keys grow without bound, tags make objects, deep nesting takes minutes: no recorder writes them.
         raise InputError(f"{path}: holds YAML beyond plain values, which no bag's metadata does")
     try:
-        values = YAML(typ="safe", pure=True).load(text)
+        if "&" in text and any(isinstance(t, AnchorToken) for t in YAML(typ="safe", pure=True).scan(text)):
+            raise ValueError("it has anchors, which no bag's metadata has")
+        values = plain(YAML(typ="safe", pure=True).load(text))
     except Exception as error:  # on damaged text the parser raises many types, not all of them its own
         raise InputError(f"{path}: not readable YAML ({detail_of(error)})") from error
     if not isinstance(values, dict):
