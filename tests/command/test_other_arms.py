@@ -12,6 +12,7 @@ from discrepancy.serial.causes import CAUSES
 from made_arm import write_chain_log
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("joints", [1, 7])
 def test_every_command_takes_a_cause_at_the_last_joint(tmp_path, capsys, joints) -> None:
     log, model, found = write_chain_log(tmp_path, joints, joints), tmp_path / "arm.xml", tmp_path / "found"

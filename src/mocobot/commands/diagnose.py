@@ -96,7 +96,7 @@ def _truth(paths: Sequence[Path]) -> dict[str, Any] | None:
     for path in paths:
         try:
             values = json.loads(truth_path(path).read_text(encoding="utf-8"))
-            found.append({key: values[key] for key in keys})
+            found.append({key: values[key] for key in keys} | {"as_built": values.get("as_built")})
         except (OSError, ValueError, KeyError, TypeError):
             return None
     return found[0] if all(values == found[0] for values in found) else None
