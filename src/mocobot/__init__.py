@@ -6,12 +6,14 @@ The names in ``__all__`` are the public ones (docs/api.md); each is imported whe
 
 from __future__ import annotations
 
-import os
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-# The matrices are small: threads that fight over them make a diagnosis several times slower on a busy machine.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+from mocobot.blas import one_thread
+
+# Results must not depend on how many there are. The matrices are small, too: threads that fight over them make a
+# diagnosis several times slower on a busy machine.
+one_thread()
 
 if TYPE_CHECKING:
     from estimator.errors import InputError as InputError

@@ -37,8 +37,10 @@ steps                      Gauss-Newton steps
 findings                   sentences: what to know before trusting the numbers
 open                       sentences: what these recordings do not decide, and what would
 
-All is in the frames that the encoders define: {i} turned about its x axis by the zero of that theta_x. Files add
-``provenance`` (``mocobot.files.provenance``); readers ignore it and any other key at the top.
+frames                     {defined_by, theta_x_zero_sd_deg}: "encoders", each {i} turned about its x axis by the zero
+                           of that theta_x, of which a standard deviation is assumed; or "drawing", and 0
+
+Files add ``provenance`` (``mocobot.files.provenance``); readers ignore it, ``frames`` and any other key at the top.
 """
 
 from __future__ import annotations
@@ -99,6 +101,10 @@ def calibration_to_dict(calibration: Calibration) -> dict[str, Any]:
         "steps": int(calibration.steps),
         "findings": list(calibration.findings),
         "open": list(calibration.open),
+        "frames": {
+            "defined_by": "encoders" if calibration.zero_sd_rad else "drawing",
+            "theta_x_zero_sd_deg": float(np.rad2deg(calibration.zero_sd_rad)),
+        },
     }
 
 

@@ -5,6 +5,7 @@ from itertools import combinations
 
 import numpy as np
 
+from estimator.estimate.frames import frames_said
 from estimator.estimate.inertia import PARAMETERS
 from estimator.estimate.principal import ORDER
 from estimator.estimate.result import PayloadEstimate
@@ -26,6 +27,7 @@ def format_estimate(estimate: PayloadEstimate) -> str:
         f"{len(estimate.recordings)} recording{'s' * (len(estimate.recordings) > 1)}"
     ]
     lines += [f"    {estimate.why_not_fit}"] if estimate.why_not_fit else []
+    lines += [f"    {frames_said(estimate.zero_sd_rad)}"] if estimate.zero_sd_rad else []
     lines += _grasps(estimate)
     lines += ["[[Mass and centre of mass in {1}]]"]
     mass = estimate.mass

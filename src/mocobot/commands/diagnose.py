@@ -98,7 +98,7 @@ def _truth(paths: Sequence[Path]) -> dict[str, Any] | None:
     for path in paths:
         try:
             values = read_json(truth_path(path), TRUTH)
-            found.append({key: values[key] for key in keys})
+            found.append({key: values[key] for key in keys} | {"as_built": values.get("as_built")})
         except (InputError, KeyError):
             return None
     return found[0] if all(values == found[0] for values in found) else None

@@ -11,6 +11,7 @@ from typing import Any
 from estimator.arm.unit import AT
 from estimator.calibrate.outcome.text import SHOWN, shown_groups
 from estimator.errors import InputError
+from estimator.estimate.frames import frames_said
 from estimator.files import whole_folder, write_json, write_text
 from estimator.numbers import measured
 from estimator.recording.metadata import FREE
@@ -187,7 +188,8 @@ def _payload(found: Estimate) -> str:
     if found.p_1c is not None and found.p_1c_se_m is not None:
         each = (measured(float(x), float(se)) for x, se in zip(found.p_1c, found.p_1c_se_m, strict=True))
         com = f"centre of mass ({', '.join(f'{x} +- {se}' for x, se in each)}) m in {{1}}"
-    return f"Payload: {mass}, {com}."
+    frames = f", in {frames_said(found.zero_sd_rad)}" if found.zero_sd_rad else ""
+    return f"Payload: {mass}, {com}{frames}."
 
 
 def _robots(found: Calibration | None) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from estimator.errors import InputError
+from estimator.estimate.frames import frames_said
 from estimator.estimate.result import PayloadEstimate
 from estimator.leftover.contradiction import CONTRADICTS
 from mocobot_report.blocks.book import Book
@@ -54,7 +55,8 @@ def answer(estimated: Estimated) -> list[Node]:
     said = (
         f"Estimated from {len(trials)} recording{'s' * (len(trials) != 1)} ({kinds}; "
         f"{sum(r.duration_s for r in e.recordings):.0f} s in all) of {e.robots} robot{'s' * (e.robots != 1)} that "
-        f"hold{'s' * (e.robots == 1)} the payload together, {how}. Values are given with their standard errors."
+        f"hold{'s' * (e.robots == 1)} the payload together, {how}. Values are given with their standard errors"
+        f"{f', in {tidy(frames_said(e.zero_sd_rad), inside=True)}' if e.zero_sd_rad else ''}."
     )
     return [paragraph(said, kind="lede"), tiles(_tiles(e)), *why, _doubts(e)]
 
@@ -116,7 +118,7 @@ def sections(book: Book, estimated: Estimated) -> list[Node]:
     e = estimated.estimate
     book.say(f"estimate {estimated.path.name}")
     found = sources(estimated.provenance, estimated.path.parent)
-    truth, said = _truth(found, e.robots)
+    truth, said = _truth(found, e)
     alone = any(r.inertia is not None for r in e.recordings)
     outline = [
         ("Payload", [_picture(book, found, e, truth), _payload(e)]),
@@ -138,15 +140,16 @@ def _picture(book: Book, found: list[Source], e: PayloadEstimate, truth: BodyFac
     return None
 
 
-def _truth(found: list[Source], robots: int) -> tuple[BodyFacts | None, str]:
+def _truth(found: list[Source], e: PayloadEstimate) -> tuple[BodyFacts | None, str]:
     for source in found:
         if source.path is None:
             continue
         with contextlib.suppress(InputError):
-            return read_truth(source.path, robots), (
-                f"The truth is that beside {source.name}: these recordings are simulated. Error is estimate minus "
-                "truth; errors beyond two or three standard errors come from what standard errors do not cover, such "
-                "as calibration."
+            frames = ", in the frames that the encoders define" if e.zero_sd_rad else ""
+            return read_truth(source.path, e.robots, e), (
+                f"The truth is that beside {source.name}{frames}: these recordings are simulated. Error is estimate "
+                "minus truth; errors beyond two or three standard errors come from what standard errors do not cover, "
+                "such as calibration."
             )
     return None, ""
 

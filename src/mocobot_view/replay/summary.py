@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from discrepancy.result.read import VERDICTS, WrittenDiagnosis
 from estimator.arrays import Array
+from estimator.estimate.frames import frames_said
 from estimator.statistics import rms, rms_length
 from mocobot_view.facts.placement import Grasps
 from mocobot_view.replay.replay_trial import ReplayTrial
@@ -69,6 +70,7 @@ def _estimate(trial: ReplayTrial) -> str:
     head, *lines = ["| " + " | ".join(row[:columns]) + " |" for row in [("", "estimate", "truth"), *rows]]
     table = [head, "|" + "---|" * columns, *lines]
     title = "**Payload: estimate ± standard error" + (", and truth**" if truth else "**")
+    title += f"\n\nIn {frames_said(estimate.zero_sd_rad)}." if estimate and estimate.zero_sd_rad else ""
     flags = [f"- {_plain(flag)}" for flag in estimate.flags] if estimate else []
     return title + "\n\n" + "\n".join(table) + ("\n\n" + "\n".join(flags) if flags else "")
 
