@@ -184,19 +184,21 @@ class _Block:
     Attributes:
         equations: the rows.
         averaged: whether derivatives of the balance are averaged over each row.
+        by_masses: whether those by the robots are, too.
         adjustment: of the signals; None before the first step.
         curvature: of those derivatives; None before it is needed.
     """
 
     equations: TrialEquations
     averaged: bool
+    by_masses: bool
     adjustment: Array | None = None
     curvature: Curvature | None = None
 
     def at(self, units: ArmUnit, shared: Shared, bases: Bases) -> Rowed:
         """The rows at some unknowns; what is found of them is kept."""
         if self.averaged and self.curvature is None:
-            self.curvature = self.equations.curvature(units, shared, bases)
+            self.curvature = self.equations.curvature(units, shared, bases, by_masses=self.by_masses)
         rowed = self.equations.at(units, shared, bases, self.adjustment, self.curvature)
         self.adjustment = rowed.adjustment
         return rowed
@@ -208,8 +210,8 @@ def _blocks(trials: Sequence[Trial], prior: Prior, every: int, *, held: bool) ->
     A common scale of springs and arm masses that are each free are told apart by what lies within the errors of
     derivatives at a row's mean signals (2 % at most): a step of Gauss-Newton then covers a fifth of the way.
     """
-    averaged = every == 1 and prior.arm_mass_ratio > 0.0
-    return [[_Block(equations, averaged) for equations in trial.blocks(every, held=held)] for trial in trials]
+    averaged, by_masses = every == 1, prior.arm_mass_ratio > 0.0
+    return [[_Block(equations, averaged, by_masses) for equations in trial.blocks(every, held=held)] for trial in trials]
 
 
 def _trial_fit(

@@ -92,7 +92,7 @@ def estimate_joint(
     alpha_noise = rms([acceleration_noise(trial, grasps) for trial in trials])
     inertia_report = rotational_excitation(Y[:, 3:, 4:], alpha_noise, step)
     # Directions without excitation leave the fit, the others of an open inertia stay: they explain moments.
-    turning = _excited(inertia_report)
+    turning = np.eye(6)
     basis = _blocks(np.eye(4), turning)
     theta, weights = _weighted_solve(_spanned(Y, basis), w)
     check_lifted(theta[0])

@@ -127,14 +127,14 @@ def _fitted(staged: PayloadEstimate, trials: Sequence[consistency.Trial], read: 
     if staged.robots < 2:
         raise _CannotBe("one robot closes no loop")
     grasps, mass, c, inertia = staged.grasps, staged.mass, staged.p_1c, staged.inertia
-    if grasps is None or mass is None or c is None or inertia is None:
-        parts = {"grasps": grasps, "mass": mass, "centre of mass": c, "inertia": inertia}
+    if grasps is None or mass is None or c is None:
+        parts = {"grasps": grasps, "mass": mass, "centre of mass": c}
         missing = next(name for name, part in parts.items() if part is None)
         raise _CannotBe(f"these recordings do not determine the {missing}")
     if staged.units is None and any(trial.units is not None for trial in trials):
         raise _CannotBe("the recordings say different things of their robots")
     units = staged.units or ArmUnit(read[0].design, np.zeros((staged.robots, COUNT)))
-    about_1 = inertia.inertia + mass.mass * (c @ c * np.eye(3) - np.outer(c, c))
+    about_1 = (inertia.inertia if inertia else 0.01 * mass.mass * np.eye(3)) + mass.mass * (c @ c * np.eye(3) - np.outer(c, c))
     shared = Shared(grasps, np.concatenate([[mass.mass], mass.mass * c, inertia_parameters(about_1)]))
     parts, bases = [], []
     for one, sensing in zip(read, Sensing.of_each([one.resolution for one in read]), strict=True):
