@@ -197,7 +197,7 @@ class _Block:
 
     def at(self, units: ArmUnit, shared: Shared, bases: Bases) -> Rowed:
         """The rows at some unknowns; what is found of them is kept."""
-        if self.averaged and self.curvature is None:
+        if self.averaged and (self.curvature is None or not self.by_masses):
             self.curvature = self.equations.curvature(units, shared, bases, by_masses=self.by_masses)
         rowed = self.equations.at(units, shared, bases, self.adjustment, self.curvature)
         self.adjustment = rowed.adjustment
