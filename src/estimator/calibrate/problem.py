@@ -211,7 +211,10 @@ def _blocks(trials: Sequence[Trial], prior: Prior, every: int, *, held: bool) ->
     derivatives at a row's mean signals (2 % at most): a step of Gauss-Newton then covers a fifth of the way.
     """
     averaged, by_masses = every == 1, prior.arm_mass_ratio > 0.0
-    return [[_Block(equations, averaged, by_masses) for equations in trial.blocks(every, held=held)] for trial in trials]
+    return [
+        [_Block(equations, averaged, by_masses) for equations in trial.blocks(every, held=held)]
+        for trial in trials
+    ]
 
 
 def _trial_fit(

@@ -36,7 +36,9 @@ class Resolution(NamedTuple):
         if recording.metadata.sampling is None:
             # The ripple of a slow joint's rounding is no noise: without noise, no reading goes to and fro.
             to_and_fro = _to_and_fro(recording, step)
-            noise = np.where(to_and_fro < rules.TO_AND_FRO, rules.NOISE_TO_AND_FRO * to_and_fro * step, np.inf)
+            noise = np.where(
+                to_and_fro < rules.TO_AND_FRO, rules.NOISE_TO_AND_FRO * to_and_fro * step, np.inf
+            )
             white = np.minimum(white, np.sqrt(noise**2 + step**2 / 12.0))
         return cls(step, white, _share(recording))
 

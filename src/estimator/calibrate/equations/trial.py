@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.arrays import Array
@@ -101,11 +100,12 @@ class TrialEquations:
     def curvature(self, units: ArmUnit, shared: Shared, bases: Bases, *, by_masses: bool) -> Curvature:
         """What the balance's derivatives, averaged over each row, have beyond those at its mean signals.
 
-        Those by the payload are averaged over all instants: motion about one axis alone moves the moments of inertia
-        about the others by products of rates, which a mean rate hardly shows. At rest there is none, but noise of rates.
+        Those by the payload are averaged over all instants: one that turns about one axis shows moments of inertia
+        about the others by products of rates, which mean rates do not tell. At rest there is none, but noise of rates.
         """
         payload = [
-            _by_carried(robot_data(corrected(s, units), units), units, shared)[:, -6:] for s in (self.rows.s, self.mean)
+            _by_carried(robot_data(corrected(s, units), units), units, shared)[:, -6:]
+            for s in (self.rows.s, self.mean)
         ]
         by_carried = self.rows(payload[0]) - payload[1]
         by_units = np.zeros((len(self.mean), 6, *units.x.shape))

@@ -95,6 +95,7 @@ def with_payload(
         inertia.judged(replace(step, weak=())) if step.step == "inertia" else step for step in staged.steps
     ]
     told = all(step.determined for step in steps if step.step == "inertia")
+    after = inertia_flags(inertia) if told else []
     return replace(
         staged,
         grasps=grasps,
@@ -104,10 +105,7 @@ def with_payload(
         inertia=inertia if told else None,
         steps=tuple(steps),
         recordings=tuple(records),
-        flags=(
-            *(flag for flag in staged.flags if flag not in before),
-            *(inertia_flags(inertia) if told else ()),
-        ),
+        flags=(*(flag for flag in staged.flags if flag not in before), *after),
     )
 
 

@@ -79,8 +79,9 @@ def estimate(
     Args:
         recordings: one or several trials with the same robots and grasps, taken one after the other.
         method: ``"fit"``, one least squares of closed loops and balance of wrenches, the robots held; ``"staged"`` and
-            ``"joint"`` as in ``estimate_payload``; ``"auto"``, the fit where the recordings determine the centre of mass
-            and nothing but noise is left, else as ``estimate_payload`` has it, for what is no noise moves the fit further.
+            ``"joint"`` as in ``estimate_payload``; ``"auto"``, the fit where the recordings determine the centre of
+            mass and nothing but noise is left, else as ``estimate_payload`` has it, for what is no noise moves the fit
+            further.
         cutoff_hz: cut-off of the low-pass filter for what the fit does not do [Hz].
         say: takes the name of the stage that begins.
 
