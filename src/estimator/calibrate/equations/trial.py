@@ -97,26 +97,32 @@ class TrialEquations:
         """Rows of the residual, shape (n, C)."""
         return self.rows(_residual(robot_data(corrected(self.rows.s, units), units), units, shared, bases))
 
-    def curvature(self, units: ArmUnit, shared: Shared, bases: Bases, *, by_masses: bool) -> Curvature:
+    def curvature(
+        self, units: ArmUnit, shared: Shared, bases: Bases, before: Curvature | None = None
+    ) -> Curvature:
         """What the balance's derivatives, averaged over each row, have beyond those at its mean signals.
 
         Those by the payload are averaged over all instants: one that turns about one axis shows moments of inertia
         about the others by products of rates, which mean rates do not tell. At rest there is none, but noise of rates.
+        Those by the robots take longer and vary less: they are as found ``before``.
         """
         payload = [
             _by_carried(robot_data(corrected(s, units), units), units, shared)[:, -6:]
             for s in (self.rows.s, self.mean)
         ]
         by_carried = self.rows(payload[0]) - payload[1]
+        by_carried[self.rows.moving :] = 0.0
+        if before is not None:
+            return Curvature(before.by_units, by_carried)
         by_units = np.zeros((len(self.mean), 6, *units.x.shape))
-        if by_masses:
+        if not self.held:
             every = rules.CURVATURE_EVERY
             fine = _derivatives(corrected(self.rows.s[::every], units), units, shared, bases)[1][:, -6:]
             coarse = _derivatives(corrected(self.mean, units), units, shared, bases)[1][:, -6:]
             # Each instant stands for those around it.
             near = np.minimum((np.arange(len(self.rows.s)) + every // 2) // every, len(fine) - 1)
             by_units = self.rows(fine[near]) - coarse
-        by_units[self.rows.moving :] = by_carried[self.rows.moving :] = 0.0
+            by_units[self.rows.moving :] = 0.0
         return Curvature(by_units, by_carried)
 
     def at(
