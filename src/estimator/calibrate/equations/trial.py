@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.arrays import Array
@@ -98,28 +97,33 @@ class TrialEquations:
         """Rows of the residual, shape (n, C)."""
         return self.rows(_residual(robot_data(corrected(self.rows.s, units), units), units, shared, bases))
 
-    def curvature(self, units: ArmUnit, shared: Shared, bases: Bases) -> Curvature:
-        """What the balance's derivatives, averaged over each row, have beyond those at its mean signals."""
-        coarse = _derivatives(corrected(self.mean, units), units, shared, bases)
-        every = rules.CURVATURE_EVERY
-        fine = _derivatives(corrected(self.rows.s[::every], units), units, shared, bases)
-        # Each instant stands for those around it.
-        near = np.minimum((np.arange(len(self.rows.s)) + every // 2) // every, len(self.rows.s[::every]) - 1)
-        gather = csr_array(
-            (np.ones(len(near)), (np.arange(len(near)), near)), shape=(len(near), len(self.rows.s[::every]))
-        )
-        operator = csr_array(self.rows.operator @ gather)
-        parts = []
-        for mean, samples in zip(coarse[1:3], fine[1:3], strict=True):
-            balance = samples[:, -6:]
-            averaged = np.asarray(operator @ balance.reshape(len(balance), -1)).reshape(
-                -1, *balance.shape[1:]
-            )
-            parts.append(averaged - mean[:, -6:])
-        # At rest there is no curvature, but noise of rates.
-        for part in parts:
-            part[self.rows.moving :] = 0.0
-        return Curvature(*parts)
+    def curvature(
+        self, units: ArmUnit, shared: Shared, bases: Bases, before: Curvature | None = None
+    ) -> Curvature:
+        """What the balance's derivatives, averaged over each row, have beyond those at its mean signals.
+
+        Those by the payload are averaged over all instants: one that turns about one axis shows moments of inertia
+        about the others by products of rates, which mean rates do not tell. At rest there is none, but noise of rates.
+        Those by the robots take longer and vary less: they are as found ``before``.
+        """
+        payload = [
+            _by_carried(robot_data(corrected(s, units), units), units, shared)[:, -6:]
+            for s in (self.rows.s, self.mean)
+        ]
+        by_carried = self.rows(payload[0]) - payload[1]
+        by_carried[self.rows.moving :] = 0.0
+        if before is not None:
+            return Curvature(before.by_units, by_carried)
+        by_units = np.zeros((len(self.mean), 6, *units.x.shape))
+        if not self.held:
+            every = rules.CURVATURE_EVERY
+            fine = _derivatives(corrected(self.rows.s[::every], units), units, shared, bases)[1][:, -6:]
+            coarse = _derivatives(corrected(self.mean, units), units, shared, bases)[1][:, -6:]
+            # Each instant stands for those around it.
+            near = np.minimum((np.arange(len(self.rows.s)) + every // 2) // every, len(fine) - 1)
+            by_units = self.rows(fine[near]) - coarse
+            by_units[self.rows.moving :] = 0.0
+        return Curvature(by_units, by_carried)
 
     def at(
         self,
@@ -151,7 +155,7 @@ class TrialEquations:
             by_carried[:, -6:] += curvature.by_carried
         noise = noise_of(self.rows, self.variances)
         covariance = covariance_of(by_signals, noise)
-        again = self.rows.repeats > 1.0
+        again = bool(np.any(np.asarray(self.rows.repeats) > 1.0))
         return Rowed(
             residual,
             by_units,
@@ -186,14 +190,18 @@ def _regressor(motion: Array, motion_dot: Array, up: Array, gravity_mps2: float)
     return newton_euler_regressor(motion[:, :3], motion_dot[:, :3], specific)
 
 
+def _motion(data: ArmData, units: ArmUnit, shared: Shared) -> tuple[Array, Array, Array]:
+    """The payload's twist in {1}, its derivative, and the direction against gravity; shapes (Q, 6) twice and (Q, 3)."""
+    G, Q = _fusion(units, shared), len(data.h)
+    up = np.einsum("iab,qib->qa", shared.grasps.R_1i, data.R_bi[..., 2, :])
+    up /= np.linalg.norm(up, axis=1, keepdims=True)
+    return data.twist.reshape(Q, -1) @ G.T, data.twist_dot.reshape(Q, -1) @ G.T, up
+
+
 def _balance(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
     """(f, M) of the robots at the origin of {1}, in {1}, minus what moves the payload, shape (Q, 6)."""
-    grasps, Q = shared.grasps, len(data.h)
-    G = _fusion(units, shared)
-    motion, motion_dot = data.twist.reshape(Q, -1) @ G.T, data.twist_dot.reshape(Q, -1) @ G.T
-    up = np.einsum("iab,qib->qa", grasps.R_1i, data.R_bi[..., 2, :])
-    up /= np.linalg.norm(up, axis=1, keepdims=True)
-    force, moment = total_wrench(data.wrench, grasps)
+    motion, motion_dot, up = _motion(data, units, shared)
+    force, moment = total_wrench(data.wrench, shared.grasps)
     needed = _regressor(motion, motion_dot, up, units.gravity_mps2) @ shared.pi
     return np.concatenate([force, moment], axis=1) - needed
 
@@ -227,7 +235,7 @@ def _derivatives(
         by_units[:, :, i, AT["tau_zero"]] = -of_tau * (1.0 + unit.of("stiffness_ratio"))
         tau = s[:, i, TAU] / (1.0 + unit.of("stiffness_ratio"))
         by_units[:, :, i, AT["stiffness_ratio"]] = of_tau * tau[:, None]
-    by_carried = _by_carried(data, motion, motion_dot, up, units, shared)
+    by_carried = _by_carried(data, units, shared)
     return by_signals, by_units, by_carried, np.zeros((n, C, 4 * (N - 1)))
 
 
@@ -258,9 +266,8 @@ def _chain(
     return out
 
 
-def _by_carried(
-    data: ArmData, motion: Array, motion_dot: Array, up: Array, units: ArmUnit, shared: Shared
-) -> Array:
+def _by_carried(data: ArmData, units: ArmUnit, shared: Shared) -> Array:
+    motion, motion_dot, up = _motion(data, units, shared)
     n, N = data.h.shape[:2]
     grasped, gravity = 6 * (N - 1), units.gravity_mps2
     out = np.zeros((n, 6 * N, grasped + 10))

@@ -91,15 +91,22 @@ def with_payload(
         force, moment = wrench_balance(trial.data, grasps, numbers.mass_kg, numbers.p_1c, inertia)
         records[k] = replace(records[k], force_residual=force, moment_residual_m=moment)
     before = inertia_flags(staged.inertia) if staged.inertia else []
+    # What a least squares of twists would not tell apart from noise says nothing of the fit: its errors do.
+    steps = [
+        inertia.judged(replace(step, weak=())) if step.step == "inertia" else step for step in staged.steps
+    ]
+    told = all(step.determined for step in steps if step.step == "inertia")
+    after = inertia_flags(inertia) if told else []
     return replace(
         staged,
         grasps=grasps,
         mass=MassEstimate(numbers.mass_kg, numbers.mass_se_kg, _force_residual(records, numbers, trials)),
         p_1c=numbers.p_1c,
         p_1c_covariance=numbers.covariance[1:4, 1:4],
-        inertia=inertia,
+        inertia=inertia if told else None,
+        steps=tuple(steps),
         recordings=tuple(records),
-        flags=(*(flag for flag in staged.flags if flag not in before), *inertia_flags(inertia)),
+        flags=(*(flag for flag in staged.flags if flag not in before), *after),
     )
 
 
