@@ -125,6 +125,10 @@ def test_what_stays_open_is_said(team: Team) -> None:
     assert "--parallel-flanges" in theta_x
     assert "--free" in masses
     assert single.startswith("first: with one recording none can be left out")
+    farthest_mm = 1e3 * np.linalg.norm(alone.payloads[0].grasps.p_1i, axis=1).max()
+    assert f"up to {farthest_mm * np.deg2rad(1.0):.2g} mm" in theta_x
+    held = alone.payloads[0]
+    assert f"brings that to {100 * np.sqrt(held.covariance[12, 12]) / held.parameters[0]:.1g} %" in scale
     weighed = calibrate(team[2][:2], known_mass={"": (alone.payloads[0].parameters[0], 0.001)})
     assert not any("--known-mass" in sentence for sentence in weighed.open)
     assert len(weighed.open) == 2
