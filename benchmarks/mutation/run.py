@@ -11,11 +11,16 @@ that cover it run, the fastest first. What was found is added to ``found.jsonl``
 from __future__ import annotations
 
 import json
+import os
 import random
+import sys
 import time
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import tyro
 
@@ -53,6 +58,9 @@ def main(options: Options) -> None:
         one = json.loads(line)
         found[one["place"]] = one
     order = all_mutants(tests.copy, PACKAGES, random.Random(options.seed))
+    code, printed = tests.run(tests.covering(order[options.skip]))
+    if code:  # or every change would be told
+        sys.exit(f"tests fail without any change: {printed}")
     print(f"{len(order)} changes")
     counts: Counter[str] = Counter()
     survivors = []

@@ -123,6 +123,7 @@ def test_what_stays_open_is_said(team: Team) -> None:
     assert "--known-mass" in scale
     assert "1 deg" in theta_x
     assert "--parallel-flanges" in theta_x
+    assert "Where each is known to 5 % only" in masses
     assert "--free" in masses
     assert single.startswith("first: with one recording none can be left out")
     farthest_mm = 1e3 * np.linalg.norm(alone.payloads[0].grasps.p_1i, axis=1).max()
@@ -132,6 +133,17 @@ def test_what_stays_open_is_said(team: Team) -> None:
     weighed = calibrate(team[2][:2], known_mass={"": (alone.payloads[0].parameters[0], 0.001)})
     assert not any("--known-mass" in sentence for sentence in weighed.open)
     assert len(weighed.open) == 2
+
+
+def test_what_is_assumed_to_be_known_does_not_stay_open(team: Team) -> None:
+    two = team[2][:2]
+    assert len(calibrate(two).open) == 3
+    zeros = calibrate(two, prior=Prior(encoder_zero_rad=0.0)).open
+    assert not any("theta_x" in sentence for sentence in zeros)
+    assert len(zeros) == 2
+    masses = calibrate(two, prior=Prior(arm_mass_ratio=0.05)).open
+    assert not any("--arm-masses" in sentence for sentence in masses)
+    assert len(masses) == 2
 
 
 def test_a_sensitivity_to_arm_masses_is_that_of_heavier_arms(team: Team) -> None:
