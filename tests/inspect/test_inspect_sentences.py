@@ -237,7 +237,7 @@ def test_the_largest_oscillation_of_an_effort_is_named(plain: Inspection) -> Non
     [
         ("phi2", DESIGN.phi_min_rad, DESIGN.phi_max_rad),
         ("theta_y", -DESIGN.gimbal_limit_rad, DESIGN.gimbal_limit_rad),
-        ("tau3", -2.0  # of torque_limit_Nm: no spring reads beyond, so it is another unit or a spike * DESIGN.torque_limit_Nm, 2.0  # of torque_limit_Nm: no spring reads beyond, so it is another unit or a spike * DESIGN.torque_limit_Nm),
+        ("tau3", -2.0 * DESIGN.torque_limit_Nm, 2.0 * DESIGN.torque_limit_Nm),
     ],
 )
 def test_limits(plain: Inspection, name: str, low: float, high: float) -> None:
