@@ -14,6 +14,7 @@ import shutil
 import signal
 import sys
 from collections import defaultdict
+from itertools import accumulate
 from pathlib import Path
 
 import coverage
@@ -43,8 +44,8 @@ def pytest_collection_modifyitems(items):
 class Tests:
     """Which tests cover a line, and how long each takes."""
 
-    def __init__(self, work: Path, fresh: bool) -> None:
-        self.work, self.copy, log = work, work / "tree", work / "tests.log"
+    def __init__(self, work: Path, most_s: float, fresh: bool) -> None:
+        self.work, self.copy, self.most_s, log = work, work / "tree", most_s, work / "tests.log"
         shutil.rmtree(self.copy, ignore_errors=True)
         self.copy.mkdir(parents=True)
         for name in TREE:
@@ -121,9 +122,13 @@ class Tests:
         of_file: dict[str, float] = defaultdict(float)
         for name in found:
             of_file[name.split("::")[0]] += self.seconds[name]
-        return sorted(
-            found, key=lambda name: (of_file[name.split("::")[0]], name.split("::")[0], self.seconds[name])
+        order = sorted(
+            found, key=lambda test: (of_file[file := test.split("::")[0]], file, self.seconds[test])
         )
+        until = accumulate(self.seconds[name] for name in order)
+        return [
+            name for k, (name, s) in enumerate(zip(order, until, strict=True)) if s <= self.most_s or not k
+        ]
 
     def verdict(self, mutant: Mutant) -> tuple[str, str, str]:
         """Killed, survived, timed out or not covered; the last words of the tests; the change."""

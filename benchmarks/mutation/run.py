@@ -39,6 +39,7 @@ class Options:
         skip: changes of the order to leave out before them.
         seed: of the order.
         work: folder of the copy, of what covers what, and of what was found.
+        most_s: seconds that the tests of one change may need, as they needed under coverage.
         again: run those of the same changes that survived again.
         fresh: look again which tests cover what.
     """
@@ -47,12 +48,13 @@ class Options:
     skip: int = 0
     seed: int = 0
     work: Path = Path("/tmp/mutation")
+    most_s: float = 600.0
     again: bool = False
     fresh: bool = False
 
 
 def main(options: Options) -> None:
-    tests, store = Tests(options.work, options.fresh), options.work / "found.jsonl"
+    tests, store = Tests(options.work, options.most_s, options.fresh), options.work / "found.jsonl"
     found = {}
     for line in store.read_text().splitlines() if store.exists() else ():
         one = json.loads(line)

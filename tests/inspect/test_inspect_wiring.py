@@ -89,6 +89,26 @@ def test_how_much_better_undoing_has_to_be(wrong: float, right: float, found: bo
     assert shows(wrong, right) is found
 
 
+def test_disagreements_are_in_units_of_what_poorly_calibrated_robots_show(
+    trials: dict[str, Recording],
+) -> None:
+    """Robot 2's encoders and torques are off by much more than noise."""
+
+    def edit(phi: np.ndarray, theta: np.ndarray, tau: np.ndarray) -> None:
+        theta[:, 1] *= 1.2
+        theta[:, 1, 1] += 0.05
+        phi[:, 1] *= 1.05
+        tau[:, 1] *= 1.2
+
+    found = look(signals(miswire(trials["a"], edit))).as_is
+    tolerances = {"rotation": 0.01, "velocity": 0.03, "tilt": 0.02, "force": 0.03, "moment": 0.025}
+    assert set(found.scaled) == set(tolerances)
+    for name, tolerance in tolerances.items():
+        assert found.relative[name] > tolerance
+        assert found.scaled[name] == pytest.approx(found.relative[name] / tolerance, rel=0.05)
+    assert found.total == pytest.approx(np.mean(np.square(list(found.scaled.values()))))
+
+
 def test_two_mistakes_are_both_named(trials: dict[str, Recording]) -> None:
     def edit(phi: np.ndarray, theta: np.ndarray, tau: np.ndarray) -> None:
         theta *= 180 / np.pi
