@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
 
 from array_log import ArrayLog, stream
 from estimator.clocks.offsets import ClockEstimate
+from estimator.estimate.identifiability import StepReport, WeakDirection
 from mocobot_inspect.findings import evidence, findings, of_stream, stands
 from mocobot_inspect.inspection import Inspection, inspect_log
 from mocobot_inspect.readiness import Readiness, idle_axes
@@ -19,7 +20,9 @@ from mocobot_inspect.stream.channels import Channel, Stretch
 from mocobot_inspect.stream.oscillation import Oscillation, joined, oscillation
 from mocobot_inspect.stream.timing import Timing
 from mocobot_inspect.text import format_inspection, verdict
+from mocobot_inspect.wiring.check import Wiring
 from mocobot_inspect.wiring.misfit import Misfit
+from mocobot_inspect.wiring.motion import Fault
 from omnid_design import DESIGN
 
 S = 1_000_000_000
@@ -450,3 +453,71 @@ def test_oscillations_of_parts_are_one() -> None:
     assert joined([]) is None
     parts = [Oscillation(20.0, 0.1, 2.5), Oscillation(21.0, 0.3, 5.0), Oscillation(22.0, 0.2, 2.5)]
     assert joined(parts) == Oscillation(21.0, 0.3, 10.0)
+
+
+def test_a_missing_robot_is_suspected_where_only_forces_do_not_fit(plain: Inspection) -> None:
+    hint = ": they move together, so does the log lack a robot, or does something else carry or push?"
+    said = {}
+    for name, scaled, determined in (
+        ("forces", {"rotation": 1.0, "velocity": 1.4, "force": 9.0}, True),
+        ("motion", {"rotation": 1.0, "velocity": 1.42, "force": 9.0}, True),
+        ("open", {"rotation": 1.0, "force": 9.0}, False),
+    ):
+        misfit = Misfit(scaled, scaled, () if determined else (Fault(1.0, "why"),), determined)
+        wiring = Wiring(misfit, (), misfit, (), 10)
+        (sentence,) = told(replace(plain, wiring=wiring), "wiring")
+        assert sentence.startswith("the channels do not fit robots that carry one rigid payload (")
+        assert "no mistake that is looked for explains it" in sentence
+        said[name] = sentence.endswith(hint)
+    assert said == {"forces": True, "motion": False, "open": False}
+
+
+def test_excitation_is_shown(plain: Inspection) -> None:
+    weak = WeakDirection("rotation R_12", "about x of {1}", (1.0, 0.0, 0.0), "why not")
+    step = StepReport("rotation R_12", ("a", "b"), "rad/s", (0.5, 0.01), 0.02, (weak,))
+    ready = Readiness((step,), 3, (0.1, 0.2, 0.3), dict.fromkeys(("grasps", "mass"), "why"), ())
+    lines = format_inspection(replace(plain, ready=ready)).splitlines()
+    at = lines.index("[[Excitation]]  3 static holds")
+    assert [line.strip() for line in lines[at + 1 : at + 4]] == [
+        "turning [rad/s rms]: 0.1 roll; 0.2 pitch; 0.3 yaw",
+        "rotation R_12: rank 1 of 2, condition 50, weakest signal 0.01 rad/s, noise 0.02",
+        "weak about x of {1}: why not",
+    ]
+    undone = format_inspection(replace(plain, ready=ready, ready_undone=replace(ready, axes=None)))
+    assert "[[Excitation, with all mistakes found undone]]  3 static holds" in undone
+    assert "turning" not in undone
+    assert "[[Excitation" not in format_inspection(replace(plain, ready=replace(ready, steps=())))
+
+
+class Hidden(NamedTuple):
+    """As much of a mistake as its words need."""
+
+    what: str
+    robots: str
+
+    def subject(self) -> str:
+        return self.what
+
+    def who(self) -> str:
+        return self.robots
+
+
+def test_mistakes_that_would_not_show(plain: Inspection) -> None:
+    def shown(*mistakes: Hidden) -> str:
+        well = Misfit({"rotation": 0.01}, {"rotation": 1.0}, (), True)
+        text = format_inspection(replace(plain, wiring=Wiring(well, (), well, mistakes, 30)))
+        (line,) = [line.strip() for line in text.splitlines() if "looked for" in line]
+        return line.removeprefix("30 wiring mistakes were looked for")
+
+    assert shown() == ""
+    same = [
+        Hidden("order of tau", "robot 1"),
+        Hidden("order of tau", "robot 2"),
+        Hidden("order of tau", "robot 1"),
+    ]
+    assert shown(*same) == "; 3 of them would not show here: order of tau (robot 1, robot 2)"
+    every = [Hidden(f"kind {k}", "all robots") for k in range(8)]
+    six = "; ".join(f"kind {k} (all robots)" for k in range(6))
+    assert shown(*every[:6]) == f"; 6 of them would not show here: {six}"
+    assert shown(*every[:7]) == f"; 7 of them would not show here: {six}; and 1 more"
+    assert shown(*every) == f"; 8 of them would not show here: {six}; and 2 more"

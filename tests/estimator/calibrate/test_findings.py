@@ -161,3 +161,16 @@ def test_a_sensitivity_to_arm_masses_is_that_of_heavier_arms(team: Team) -> None
                       for _ in range(2)]  # fmt: skip
         off.append(100.0 * (calibrate(recordings).payloads[0].parameters[0] / held.mass - 1.0))
     assert 0.5 * share < np.sqrt(np.mean(np.square(off))) < 1.7 * share
+
+
+def test_the_recording_that_fits_worst_is_named(team: Team) -> None:
+    """All robots rub in both, and in one of them more."""
+    rubbing = []
+    for recording, size in zip(team[2][:2], (0.1, 0.3), strict=True):
+        tau = recording.tau.copy()
+        tau[:, 0, 1] += size * np.sign(np.gradient(low_pass(recording.phi[:, 0, 1], 100.0, 5.0)))
+        rubbing.append(replace(recording, tau=tau))
+    (found,) = calibrate(rubbing).findings
+    assert found.startswith("No calibration explains first (")
+    assert "; second (" in found
+    assert "most in second" in found
