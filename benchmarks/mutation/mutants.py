@@ -33,6 +33,7 @@ class Mutant:
         kind: of the change.
         text: what stands there then.
         names: that the statement gives a value where it runs when the module is imported; () in a function.
+        statement: lines of the statement that it is in, without those inside.
     """
 
     path: str
@@ -40,6 +41,7 @@ class Mutant:
     kind: str
     text: str
     names: tuple[str, ...]
+    statement: range
 
     def lines(self) -> range:
         return range(self.node.lineno, self.node.end_lineno + 1)  # type: ignore[attr-defined]
@@ -58,16 +60,22 @@ class Mutant:
 def all_mutants(top: Path, packages: Sequence[str], rng: random.Random) -> list[Mutant]:
     """Every change, in random order."""
     files = sorted(path for name in packages for path in (top / "src" / name).rglob("*.py"))
-    found = [
-        m for file in files for m in _walk(str(file.relative_to(top)), ast.parse(file.read_text()), (), rng)
-    ]
+    found: list[Mutant] = []
+    for file in files:
+        found += _walk(str(file.relative_to(top)), ast.parse(file.read_text()), (), range(0), rng)
     rng.shuffle(found)
     return found
 
 
-def _walk(path: str, node: ast.AST, names: tuple[str, ...], rng: random.Random) -> Iterator[Mutant]:
+def _walk(
+    path: str, node: ast.AST, names: tuple[str, ...], statement: range, rng: random.Random
+) -> Iterator[Mutant]:
+    if isinstance(node, ast.stmt):
+        body = getattr(node, "body", None)
+        end = max(body[0].lineno - 1, node.lineno) if body else node.end_lineno or node.lineno
+        statement = range(node.lineno, end + 1)
     for kind, text, gone in _changes(node, rng):
-        yield Mutant(path, gone, kind, text, names)
+        yield Mutant(path, gone, kind, text, names, statement)
     if isinstance(node, ast.Raise | ast.JoinedStr):
         return
     for field, value in ast.iter_fields(node):
@@ -79,7 +87,7 @@ def _walk(path: str, node: ast.AST, names: tuple[str, ...], rng: random.Random) 
                 inside = ()
             elif field == "body" and isinstance(node, ast.Module | ast.ClassDef):
                 inside = tuple(sorted(_named(child)))
-            yield from _walk(path, child, inside, rng)
+            yield from _walk(path, child, inside, statement, rng)
 
 
 def _named(statement: ast.AST) -> set[str]:
