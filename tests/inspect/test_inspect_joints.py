@@ -100,6 +100,22 @@ def test_mistakes_against_the_model(tmp_path, healthy, case) -> None:
     )
 
 
+@pytest.mark.parametrize(("times", "named"), [(2.8, False), (3.2, True)])
+def test_how_much_better_undoing_has_to_be(tmp_path, healthy, times, named) -> None:
+    """A sign is wrong beside a torque that no model explains, which leaves so many times less without the mistake."""
+
+    def change(values):
+        torque, share = values["shoulder torque"], 1.0 / times
+        size = np.std(torque) * np.sqrt(2.0 * share / (1.0 - share))
+        values["shoulder torque"] = -torque - size * np.sin(2.0 * np.pi * 4.3 * values["time"])
+
+    wiring = inspected(tmp_path, changed(healthy, change)).wiring
+    assert wiring is not None
+    assert [(one.mistake.kind, one.mistake.joints) for one in wiring.found] == [("torque_sign", (1,))] * named
+    for one in wiring.found:
+        assert one.before / one.after == pytest.approx(times, rel=0.02)
+
+
 COLUMNS = {
     "velocity in degrees": (
         scale("elbow dq", np.degrees(1.0)),

@@ -11,7 +11,7 @@ from estimator.arm.wrist_level import wrist_of
 from estimator.recording.model import Recording
 from miswired import MISTAKES, Miswired, miswire
 from mocobot_inspect.signals import Signals, signals_of
-from mocobot_inspect.wiring.check import Wiring, check_wiring
+from mocobot_inspect.wiring.check import Wiring, check_wiring, shows
 from mocobot_inspect.wiring.misfit import SUSPICIOUS
 from mocobot_logs.log import Level
 from mocobot_sim.scene.scene import build_team
@@ -70,6 +70,42 @@ def test_true_recordings_are_left_alone(trials: dict[str, Recording], payload: s
     assert wiring.as_is.total < 0.05
     assert wiring.as_is.determined
     assert wiring.as_is.faults == ()
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right", "found"),
+    [
+        (1.9, 0.2, False),  # not suspicious: 15 times less
+        (1.9, 0.12, True),
+        (2.1, 0.5, True),  # suspicious: 4 times less
+        (40.0, 9.0, True),
+        (40.0, 11.0, False),
+        (0.29, 0.001, False),  # too little to be explained
+        (0.31, 0.001, True),
+    ],
+)
+def test_how_much_better_undoing_has_to_be(wrong: float, right: float, found: bool) -> None:
+    """As the pages state: 4 times where the misfit was suspicious, that is above 2, and 15 times where it was not."""
+    assert shows(wrong, right) is found
+
+
+def test_disagreements_are_in_units_of_what_poorly_calibrated_robots_show(
+    trials: dict[str, Recording],
+) -> None:
+    """Robot 2's encoders and torques are off by much more than noise."""
+
+    def edit(phi: np.ndarray, theta: np.ndarray, tau: np.ndarray) -> None:
+        theta[:, 1] *= 1.2
+        theta[:, 1, 1] += 0.05
+        phi[:, 1] *= 1.05
+        tau[:, 1] *= 1.2
+
+    found = look(signals(miswire(trials["a"], edit))).as_is
+    tolerances = {"rotation": 0.01, "velocity": 0.03, "tilt": 0.02, "force": 0.03, "moment": 0.025}
+    assert set(found.scaled) == set(tolerances)
+    for name, tolerance in tolerances.items():
+        assert found.scaled[name] == pytest.approx(found.relative[name] / tolerance, rel=0.05)
+    assert found.total == pytest.approx(np.mean(np.square(list(found.scaled.values()))))
 
 
 def test_two_mistakes_are_both_named(trials: dict[str, Recording]) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 from mocobot.files.provenance import PACKAGES, version_of
 from mocobot_sim.scene.model_files import models_dir
 
-SOURCES = ("discrepancy", "estimator", "mocobot", "mocobot_sim")
+SOURCES = ("discrepancy", "estimator", "mocobot", "mocobot_logs", "mocobot_sim")
 
 
 @cache

@@ -123,11 +123,27 @@ def test_what_stays_open_is_said(team: Team) -> None:
     assert "--known-mass" in scale
     assert "1 deg" in theta_x
     assert "--parallel-flanges" in theta_x
+    assert "Where each is known to 5 % only" in masses
     assert "--free" in masses
     assert single.startswith("first: with one recording none can be left out")
+    farthest_mm = 1e3 * np.linalg.norm(alone.payloads[0].grasps.p_1i, axis=1).max()
+    assert f"up to {farthest_mm * np.deg2rad(1.0):.2g} mm" in theta_x
+    held = alone.payloads[0]
+    assert f"brings that to {100 * np.sqrt(held.covariance[12, 12]) / held.parameters[0]:.1g} %" in scale
     weighed = calibrate(team[2][:2], known_mass={"": (alone.payloads[0].parameters[0], 0.001)})
     assert not any("--known-mass" in sentence for sentence in weighed.open)
     assert len(weighed.open) == 2
+
+
+def test_what_is_assumed_to_be_known_does_not_stay_open(team: Team) -> None:
+    two = team[2][:2]
+    assert len(calibrate(two).open) == 3
+    zeros = calibrate(two, prior=Prior(encoder_zero_rad=0.0)).open
+    assert not any("theta_x" in sentence for sentence in zeros)
+    assert len(zeros) == 2
+    masses = calibrate(two, prior=Prior(arm_mass_ratio=0.05)).open
+    assert not any("--arm-masses" in sentence for sentence in masses)
+    assert len(masses) == 2
 
 
 def test_a_sensitivity_to_arm_masses_is_that_of_heavier_arms(team: Team) -> None:
@@ -145,3 +161,16 @@ def test_a_sensitivity_to_arm_masses_is_that_of_heavier_arms(team: Team) -> None
                       for _ in range(2)]  # fmt: skip
         off.append(100.0 * (calibrate(recordings).payloads[0].parameters[0] / held.mass - 1.0))
     assert 0.5 * share < np.sqrt(np.mean(np.square(off))) < 1.7 * share
+
+
+def test_the_recording_that_fits_worst_is_named(team: Team) -> None:
+    """All robots rub in both, and in one of them more."""
+    rubbing = []
+    for recording, size in zip(team[2][:2], (0.1, 0.3), strict=True):
+        tau = recording.tau.copy()
+        tau[:, 0, 1] += size * np.sign(np.gradient(low_pass(recording.phi[:, 0, 1], 100.0, 5.0)))
+        rubbing.append(replace(recording, tau=tau))
+    (found,) = calibrate(rubbing).findings
+    assert found.startswith("No calibration explains first (")
+    assert "; second (" in found
+    assert "most in second" in found

@@ -11,7 +11,8 @@ from estimator.estimate.grasps import estimate_grasps
 from estimator.estimate.payload import estimate_payload
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.text import format_estimate
-from estimator.leftover.leftover import left_over
+from estimator.leftover.contradiction import beyond_noise, contradiction
+from estimator.leftover.leftover import Leftover, left_over
 from estimator.leftover.steps import FINEST_NM, FINEST_RAD, UNKNOWN_NM, UNKNOWN_RAD, steps_of
 from estimator.signals.process import process_recording
 from recorded_team import Sines, carry
@@ -108,3 +109,27 @@ def test_an_estimate_of_an_earlier_version_does_not_know():
     values = estimate_payload([sensed()], "joint").to_dict()
     del values["contradicts"], values["recordings"][0]["leftovers"]
     assert PayloadEstimate.from_dict(values).contradicts is None
+
+
+@pytest.mark.parametrize("name", ["flange_position", "flange_rotation", "force", "moment"])
+def test_three_times_the_noise_is_a_contradiction(name):
+    """The threshold that the pages state, of each quantity."""
+    noise, rest = 0.02, [Leftover("force", "N", 0.01, 0.01)]
+    for times, wrong in ((2.9, False), (3.1, True)):
+        one = Leftover(name, "", times * noise, noise)
+        assert beyond_noise([*rest, one]) == ([one] if wrong else [])
+        assert (contradiction([("first", [*rest, one])]) is not None) is wrong
+
+
+def test_a_contradiction_names_the_worst_recording():
+    def of(times):
+        return [Leftover("flange_position", "m", times * 1e-3, 1e-3)]
+
+    assert "(first)" in (contradiction([("first", of(4.0)), ("second", of(2.0))]) or "")
+    said = contradiction([("first", of(4.0)), ("second", of(9.0)), ("third", of(2.0))]) or ""
+    assert "(in 2 of 3 recordings, most in second)" in said
+    assert "flanges miss their grasps by 9 mm rms (9 times noise)" in said
+    assert "The robots contradict each other" in said
+    alone = contradiction([("first", [Leftover("moment", "N m", 0.5, 0.1)])]) or ""
+    assert "The robot contradicts itself" in alone
+    assert "moments by 0.5 N m rms (5 times noise)" in alone
