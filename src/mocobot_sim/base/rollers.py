@@ -8,6 +8,8 @@ axes (l, r, r) whose axle is turned away from the floor by t reaches below the w
 so twelve of them make a wheel that is round within 0.09 mm.
 """
 
+from __future__ import annotations
+
 from typing import Any
 
 import numpy as np

@@ -1,5 +1,7 @@
 """One Omnid alone on a floor, its arm locked at home: to see what its base does."""
 
+from __future__ import annotations
+
 import mujoco
 
 from mocobot_sim.base.design import WHEELS, BaseDesign, base_design

@@ -1,5 +1,7 @@
 """One Omnid in MJCF: loaded, parked, put where it stands (PyMJCF)."""
 
+from __future__ import annotations
+
 from typing import Any
 
 from numpy.typing import ArrayLike

@@ -1,5 +1,7 @@
 """A payload's MJCF: one rigid body, its frame at the first grasp, a site at every grasp."""
 
+from __future__ import annotations
+
 import re
 from pathlib import Path
 from typing import Any
@@ -28,8 +30,9 @@ def load_payload(payload: str | Path) -> mjcf.RootElement:
         InputError: it cannot be read, or something in it would act on the robots, too.
     """
     path = Path(payload) if Path(payload).suffix == ".xml" else payload_path(str(payload))
+    read = mjcf.from_path  # a refusal of its own where dm-control is missing
     try:
-        root = mjcf.from_path(str(path))
+        root = read(str(path))
     except (OSError, ValueError, AttributeError, KeyError, SyntaxError) as error:
         said = " ".join(str(getattr(error, "strerror", None) or error).split())
         quoted = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in said)  # of a damaged file

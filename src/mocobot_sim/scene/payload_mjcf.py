@@ -1,5 +1,7 @@
 """The MJCF of a payload that is known by its numbers only, such as an estimated one."""
 
+from __future__ import annotations
+
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 

@@ -10,6 +10,8 @@ for ``solref = (-s, -b)``, a constant impedance d = ``solimp[0] = solimp[1]`` an
 coordinate in the model's zero pose. So x has stiffness s / ((1 - d) A), or, with s = 0, damping b / ((1 - d) A).
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass
 
