@@ -99,7 +99,7 @@ class ControlGains:
         Raises:
             InputError: a gain is missing, no number or out of its range.
         """
-        gains = {entry.name: values.get(entry.name) for entry in fields(cls)}
+        gains: dict[str, Any] = {entry.name: values.get(entry.name) for entry in fields(cls)}
         return cls(**{name: float(value) if is_number(value) else value for name, value in gains.items()})
 
 

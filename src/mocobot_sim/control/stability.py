@@ -18,7 +18,7 @@ from estimator.arrays import Array
 from mocobot_sim.control.control import ControlGains, TeamController
 from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.design import omnid_design
-from mocobot_sim.scene.team_index import TeamIndex
+from mocobot_sim.scene.team_index import Index, TeamIndex
 
 if TYPE_CHECKING:
     from mocobot_sim.scene.scene import TeamScene
@@ -123,7 +123,7 @@ def control_stability(
     )
 
 
-def _linear(controller: TeamController, rest: mujoco.MjData, read: Array) -> Array:
+def _linear(controller: TeamController, rest: mujoco.MjData, read: Index) -> Array:
     """Slopes of (``ctrl``, next state) by (positions ``read``, state) of controllers at rest, the load taken up."""
     controller.tick()
     controller.feed_forward = controller.feed_forward
