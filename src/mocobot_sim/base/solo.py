@@ -1,7 +1,5 @@
 """One Omnid alone on a floor, its arm locked at home: to see what its base does."""
 
-from __future__ import annotations
-
 import mujoco
 
 from mocobot_sim.base.design import WHEELS, BaseDesign, base_design
@@ -15,7 +13,7 @@ from mocobot_sim.scene.scene import TIMESTEP_S
 from mocobot_sim.trial.trajectories import RATE_HZ
 
 
-def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S) -> mjcf.RootElement:
+def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S) -> "mjcf.RootElement":
     """One released Omnid at the world's origin, heading along x; its arm is rigid.
 
     Args:
@@ -43,7 +41,7 @@ def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S)
     return root
 
 
-def compile_solo(root: mjcf.RootElement) -> mujoco.MjModel:
+def compile_solo(root: "mjcf.RootElement") -> mujoco.MjModel:
     """Compile what ``build_solo`` returned."""
     return compiled(root)
 

@@ -36,17 +36,11 @@ TAKE_UP_TICKS = 15
 
 
 RANGES = {
-    "rate_hz": (1.0, 1e5),
-    "stiffness_N_per_m": (0.0, 1e6),
-    "damping_Ns_per_m": (0.0, 1e5),
-    "torque_gain": (0.0, 1e3),
-    "torque_rate_gain_s": (0.0, 10.0),
-    "rate_filter_s": (0.0, 10.0),
-    "take_up_s": (0.0, 3600.0),
-    "take_up_time_constant_s": (1e-6, 3600.0),
-    "motor_torque_limit_Nm": (1e-3, 1e5),
-}
-"""Allowed gains; whether a team is stable with them is for ``control_stability`` to say."""
+    "rate_hz": (1.0, 1e5), "stiffness_N_per_m": (0.0, 1e6), "damping_Ns_per_m": (0.0, 1e5),
+    "torque_gain": (0.0, 1e3), "torque_rate_gain_s": (0.0, 10.0), "rate_filter_s": (0.0, 10.0),
+    "take_up_s": (0.0, 3600.0), "take_up_time_constant_s": (1e-6, 3600.0), "motor_torque_limit_Nm": (1e-3, 1e5),
+}  # fmt: skip
+"""Of gains; whether a team is stable with them is for ``control_stability`` to say."""
 
 
 @dataclass(frozen=True)
@@ -76,11 +70,7 @@ class ControlGains:
     motor_torque_limit_Nm: float = 40.0
 
     def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            InputError: a gain is no number or out of its range.
-        """
+        """Refuse a gain that is no number, or out of its range, with an ``InputError``."""
         for name, (low, high) in RANGES.items():
             value = getattr(self, name)
             if not is_number(value) or not low <= value <= high:

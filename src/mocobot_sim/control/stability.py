@@ -1,8 +1,7 @@
 """Whether a team's control is stable: the eigenvalues of one control period at the pose where a trial starts.
 
-MuJoCo linearises the physics, central differences linearise the controllers, whose states are the last readings and
-their filtered rates; the load is taken up. Left out are dry friction, which stops small swings but no large ones, and
-actors and sensors that misread.
+MuJoCo linearises the physics, central differences linearise the controllers; the load is taken up. Left out are dry
+friction, which stops small swings but no large ones, and actors and sensors that misread.
 """
 
 from __future__ import annotations
@@ -16,20 +15,15 @@ import numpy as np
 
 from estimator.arrays import Array
 from mocobot_sim.control.control import ControlGains, TeamController
-from mocobot_sim.errors import TrialError
 from mocobot_sim.scene.design import omnid_design
 from mocobot_sim.scene.team_index import Index, TeamIndex
 
 if TYPE_CHECKING:
     from mocobot_sim.scene.scene import TeamScene
 
-STEP = 1e-6
-"""Of all differences, in SI units."""
-HARDLY_DAMPED = 0.02
-"""Damping ratio below which a swing loses less than a factor e in eight periods, and is amplified 25 times in
-resonance."""
-AT_REST_PER_S = 0.05
-"""Slower modes are none: what nothing holds in place (a gimbal without load) neither swings nor grows."""
+STEP = 1e-6  # of all differences, in SI units
+HARDLY_DAMPED = 0.02  # damping ratio: a swing is amplified 25 times in resonance
+AT_REST_PER_S = 0.05  # slower modes are none: what nothing holds in place, such as a gimbal without load
 
 
 @dataclass(frozen=True)
@@ -37,7 +31,7 @@ class Stability:
     """The least damped mode of the closed loop.
 
     Attributes:
-        damping_ratio: minus growth over angular frequency (undamped); 1 without a swing, below 0 if it grows.
+        damping_ratio: minus growth over undamped angular frequency; below 0 the control is unstable.
         frequency_Hz: how fast it swings.
         growth_per_s: how fast it grows; below 0 if it decays.
     """
@@ -49,7 +43,7 @@ class Stability:
     @property
     def stable(self) -> bool:
         """Whether every swing decays."""
-        return self.damping_ratio > 0
+        return self.growth_per_s < 0
 
     @property
     def warning(self) -> str | None:
@@ -60,9 +54,8 @@ class Stability:
                 f"The control is unstable: {swing} grows by a factor of e every {1 / self.growth_per_s:.2g} s, "
                 "so torques and angles oscillate whatever is commanded."
             )
-        if self.damping_ratio < HARDLY_DAMPED:
-            return f"The control is stable, but {swing} is hardly damped (damping ratio {self.damping_ratio:.2g})."
-        return None
+        hardly = f"The control is stable, but {swing} is hardly damped (ratio {self.damping_ratio:.2g})."
+        return hardly if self.damping_ratio < HARDLY_DAMPED else None
 
     def to_dict(self) -> dict[str, Any]:
         """JSON-able form."""
@@ -70,56 +63,36 @@ class Stability:
 
 
 def control_stability(
-    scene: TeamScene,
-    model: mujoco.MjModel,
-    data: mujoco.MjData,
-    gains: ControlGains,
-    ref_b: Array,
-    feed_forward: Array | None,
+    scene: TeamScene, model: mujoco.MjModel, data: mujoco.MjData, gains: ControlGains, ref_b: Array
 ) -> Stability:
-    """Judge the control of a team at rest.
-
-    Args:
-        scene: the team; its bases are parked.
-        model, data: the trial's, at rest; they stay as they are.
-        gains: control gains.
-        ref_b: commanded wrist positions at rest [m], shape (N, 3).
-        feed_forward: F_ff of every robot in its {b} [N], shape (N, 3); None to take it up.
-
-    Raises:
-        TrialError: the physics is not finite there.
-    """
+    """Judge the control of a team with parked bases, at rest as ``data`` is, wrists commanded to ``ref_b`` (N, 3)."""
     index, model = TeamIndex.of(model, scene.carries), copy.copy(model)
     model.dof_frictionloss[:] = 0.0
     rest = mujoco.MjData(model)
     rest.qpos[:], rest.ctrl[:] = data.qpos, data.ctrl
-    size, periods = 2 * model.nv + model.na, round(1.0 / (gains.rate_hz * model.opt.timestep))
+    size = 2 * model.nv + model.na
     step, push = np.zeros((size, size)), np.zeros((size, model.nu))
     mujoco.mjd_transitionFD(model, rest, STEP, True, step, push, None, None)
     free, pushed = np.eye(size), np.zeros_like(push)
-    for _ in range(periods):
+    for _ in range(round(1.0 / (gains.rate_hz * model.opt.timestep))):
         free, pushed = step @ free, step @ pushed + push
-    commands = np.stack([ref_b, np.zeros_like(ref_b)])[None]
+    still = np.stack([ref_b, np.zeros_like(ref_b)])[None]
     controller = TeamController(
-        index, omnid_design(), gains, rest, scene.units, scene.sensors, feed_forward, commands
+        index, omnid_design(), gains, rest, scene.units, scene.sensors, commands=still
     )
-    told = _linear(controller, rest, np.concatenate([index.motor_qpos.ravel(), index.spring_qpos.ravel()]))
-    seen = np.concatenate([index.motor_dof.ravel(), index.spring_dof.ravel()])
-    known = len(told) - model.nu
-    loop = np.zeros((size + known, size + known))
+    answer = _linear(controller, rest, np.concatenate([index.motor_qpos.ravel(), index.spring_qpos.ravel()]))
+    # The whole state: physics, then controllers, which read driven angles and springs.
+    read = np.concatenate([index.motor_dof.ravel(), index.spring_dof.ravel()])
+    read = np.concatenate([read, size + np.arange(controller.state.size)])
+    loop = np.zeros((size + controller.state.size,) * 2)
     loop[:size, :size] = free
-    for rows, of in ((slice(size), pushed @ told[: model.nu]), (slice(size, None), told[model.nu :])):
-        loop[rows, seen] += of[:, : len(seen)]
-        loop[rows, size:] = of[:, len(seen) :]
-    if not np.isfinite(loop).all():
-        raise TrialError("the state is not finite at t = 0 s")
+    loop[:, read] += np.concatenate([pushed @ answer[: model.nu], answer[model.nu :]])
     values = np.linalg.eigvals(loop).astype(complex)
     rates = np.log(values[np.abs(values) > 1e-12]) * gains.rate_hz
     rates = rates[np.abs(rates) > AT_REST_PER_S]
-    damping = -rates.real / np.abs(rates)
-    worst = int(np.argmin(damping))
+    worst = rates[np.argmin(-rates.real / np.abs(rates))]
     return Stability(
-        float(damping[worst]), float(abs(rates[worst].imag)) / (2.0 * np.pi), float(rates[worst].real)
+        float(-worst.real / abs(worst)), float(abs(worst.imag) / (2.0 * np.pi)), float(worst.real)
     )
 
 

@@ -1,7 +1,5 @@
 """A payload's MJCF: one rigid body, its frame at the first grasp, a site at every grasp."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any
@@ -20,7 +18,7 @@ OWN_ELEMENTS = ("asset", "compiler", "default", "statistic", "visual", "worldbod
 GRASP = re.compile(r"grasp([0-9]+)")
 
 
-def load_payload(payload: str | Path) -> mjcf.RootElement:
+def load_payload(payload: str | Path) -> "mjcf.RootElement":
     """Read a payload's MJCF.
 
     Args:
@@ -61,7 +59,7 @@ def _is_set(element: Any) -> bool:
     return bool(element.get_attributes()) or any(_is_set(child) for child in element.all_children())
 
 
-def grasp_frames(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
+def grasp_frames(payload_root: "mjcf.RootElement", where: str) -> RigidTransform:
     """Grasp frames X_1i, N transforms; from the compiled payload, so every MJCF orientation attribute works.
 
     Raises:

@@ -10,8 +10,6 @@ for ``solref = (-s, -b)``, a constant impedance d = ``solimp[0] = solimp[1]`` an
 coordinate in the model's zero pose. So x has stiffness s / ((1 - d) A), or, with s = 0, damping b / ((1 - d) A).
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -86,7 +84,7 @@ def _constant_impedance(d: float) -> list[float]:
     return [float(d), float(d), 0.001, 0.5, 2.0]
 
 
-def tune(root: mjcf.RootElement, model: mujoco.MjModel, rows: Sequence[SoftRow]) -> None:
+def tune(root: "mjcf.RootElement", model: mujoco.MjModel, rows: Sequence[SoftRow]) -> None:
     """Set soft rows of a PyMJCF tree for the inertias of the model that it compiles to."""
     for row in rows:
         equality = model.equality(row.equality).id

@@ -70,9 +70,8 @@ def run_trial(
     commands = np.stack(between_commands(trajectory.ref_b, ticks), axis=1)
     if feed_forward is None and not scene.carries:
         feed_forward = np.zeros((index.robots, 3))
-    stability = None
-    if not actors and not index.base_dof.size:
-        stability = control_stability(scene, model, data, gains, trajectory.ref_b[0], feed_forward)
+    parked = not actors and not index.base_dof.size
+    stability = control_stability(scene, model, data, gains, trajectory.ref_b[0]) if parked else None
     sensed = np.empty((len(commands), index.robots, 3, 3))
     others = Others.of(scene, trial_number, actors)
     seen = data.qpos.copy() if others.readers else data.qpos
