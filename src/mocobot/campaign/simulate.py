@@ -23,7 +23,8 @@ from mocobot_sim.trial.trajectories import Trajectory
 def simulate_set(
     plan: CampaignPlan, one: CampaignSet, limits: MeasuredLimits | None
 ) -> tuple[list[Recording], dict[str, Any]]:
-    """Recordings of a set as any others are, and the truth: ``effects``, ``units`` and ``gimbal_axes_1``.
+    """Recordings of a set as any others are, and the truth: ``effects``, ``units``, ``gimbal_axes_1`` and
+    ``control``, whether that was stable in each trial.
 
     Args:
         plan: the campaign.
@@ -53,6 +54,7 @@ def simulate_set(
         "effects": [_told(effect) for effect in hidden],
         "units": [unit.to_dict() for unit in units],
         "gimbal_axes_1": gimbal_axes(nominal),
+        "control": [one.log.stability and one.log.stability.to_dict() for one in done],
     }
     return list(recordings_of(done)), truth
 

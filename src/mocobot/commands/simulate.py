@@ -61,4 +61,6 @@ def _progress(
 
 
 def _line(path: Path, done: SimulatedRecording, options: Simulate) -> str:
-    return f"{path}: {done.time[-1]:.1f} s of {done.metadata.trial} motion, {options.preset} sensors"
+    warning = done.log.stability and done.log.stability.warning
+    line = f"{path}: {done.time[-1]:.1f} s of {done.metadata.trial} motion, {options.preset} sensors"
+    return f"{line}\n{warning}" if warning else line

@@ -13,7 +13,7 @@ from mocobot_sim.scene.scene import TIMESTEP_S
 from mocobot_sim.trial.trajectories import RATE_HZ
 
 
-def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S) -> mjcf.RootElement:
+def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S) -> "mjcf.RootElement":
     """One released Omnid at the world's origin, heading along x; its arm is rigid.
 
     Args:
@@ -41,7 +41,7 @@ def build_solo(design: BaseDesign | None = None, timestep_s: float = TIMESTEP_S)
     return root
 
 
-def compile_solo(root: mjcf.RootElement) -> mujoco.MjModel:
+def compile_solo(root: "mjcf.RootElement") -> mujoco.MjModel:
     """Compile what ``build_solo`` returned."""
     return compiled(root)
 

@@ -114,7 +114,8 @@ class PaperPlan:
 
 @dataclass(frozen=True)
 class TrialSummary:
-    """Extremes of one trial: payload rotation [deg], SEA torque [N m], rod and weld errors [m], weld angle [deg]."""
+    """Extremes of one trial: payload rotation [deg], SEA torque [N m], rod and weld errors [m], weld angle [deg], and
+    the damping ratio of its control, below 0 if that was unstable."""
 
     name: str
     rotation_deg: float
@@ -122,6 +123,7 @@ class TrialSummary:
     rod_error_m: float
     weld_error_m: float
     weld_error_deg: float
+    damping_ratio: float | None
 
 
 @dataclass
@@ -264,6 +266,7 @@ def _trial(
         rod_error_m=done.log.rod_error_m,
         weld_error_m=done.log.weld_error_m,
         weld_error_deg=float(np.rad2deg(done.log.weld_error_rad)),
+        damping_ratio=done.log.stability and done.log.stability.damping_ratio,
     )
     return done.recordings, summary
 

@@ -20,7 +20,7 @@ OWN_ELEMENTS = ("asset", "compiler", "default", "statistic", "visual", "worldbod
 GRASP = re.compile(r"grasp([0-9]+)")
 
 
-def load_payload(payload: str | Path) -> mjcf.RootElement:
+def load_payload(payload: str | Path) -> "mjcf.RootElement":
     """Read a payload's MJCF.
 
     Args:
@@ -32,8 +32,9 @@ def load_payload(payload: str | Path) -> mjcf.RootElement:
     path = Path(payload) if Path(payload).suffix == ".xml" else payload_path(str(payload))
     if path.exists():
         check_model(path)
+    read = mjcf.from_path  # a refusal of its own where dm-control is missing
     try:
-        root = mjcf.from_path(str(path))
+        root = read(str(path))
     except (OSError, ValueError, AttributeError, KeyError, SyntaxError) as error:
         said = " ".join(str(getattr(error, "strerror", None) or error).split())
         raise InputError(f"{path}: not a readable MJCF ({printable(said)})") from error
@@ -61,7 +62,7 @@ def _is_set(element: Any) -> bool:
     return bool(element.get_attributes()) or any(_is_set(child) for child in element.all_children())
 
 
-def grasp_frames(payload_root: mjcf.RootElement, where: str) -> RigidTransform:
+def grasp_frames(payload_root: "mjcf.RootElement", where: str) -> RigidTransform:
     """Grasp frames X_1i, N transforms; from the compiled payload, so every MJCF orientation attribute works.
 
     Raises:

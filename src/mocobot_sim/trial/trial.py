@@ -9,6 +9,7 @@ from scipy.interpolate import CubicSpline
 from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_sim.control.control import ControlGains, TeamController
+from mocobot_sim.control.stability import control_stability
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.team_index import TeamIndex
@@ -69,6 +70,8 @@ def run_trial(
     commands = np.stack(between_commands(trajectory.ref_b, ticks), axis=1)
     if feed_forward is None and not scene.carries:
         feed_forward = np.zeros((index.robots, 3))
+    parked = not actors and not index.base_dof.size
+    stability = control_stability(scene, model, data, gains, trajectory.ref_b[0]) if parked else None
     sensed = np.empty((len(commands), index.robots, 3, 3))
     others = Others.of(scene, trial_number, actors)
     seen = data.qpos.copy() if others.readers else data.qpos
@@ -105,9 +108,8 @@ def run_trial(
                 progress(sample + 1, last + 1)
             reported = sample + 1
     phi, theta, tau = (np.ascontiguousarray(sensed[:, :, k]) for k in range(3))
-    return log.finish(
-        trajectory, controller.feed_forward, gains, scene, SensedLog(gains.rate_hz, ticks, phi, theta, tau)
-    )
+    seen_by_sensors = SensedLog(gains.rate_hz, ticks, phi, theta, tau)
+    return log.finish(trajectory, controller.feed_forward, gains, scene, seen_by_sensors, stability)
 
 
 def _whole(name: str, ratio: float) -> int:
