@@ -48,9 +48,11 @@ class Repeats:
         edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int))).reshape(-1, 2)
         lengths = edges[:, 1] - edges[:, 0]
         for least in np.unique(lengths):
-            usual = len(readings) * chance**least
+            usual = len(readings) * chance ** (
+                (least + 1) / 2
+            )  # as the likeliest reading is at most its root
             if np.sum(lengths >= least) > usual + _SIGMAS * np.sqrt(usual):
                 for start, stop in edges[lengths >= least]:
                     repeats[start:stop] = True
-                break
+                return repeats
         return repeats

@@ -30,9 +30,11 @@ class Readings:
         """
         streams = [_Stream(self.channels) for _ in range(self.robots)]
         for robot, samples in self._source.chunks(advance):
-            yield from ((robot, kept) for kept in streams[robot].push(samples))
+            if (told := streams[robot].push(samples)) is not None:
+                yield robot, told
         for robot, stream in enumerate(streams):
-            yield from ((robot, kept) for kept in stream.finish())
+            if len((told := stream.finish()).stamp_ns):
+                yield robot, told
 
 
 class _Stream:
@@ -40,42 +42,36 @@ class _Stream:
 
     def __init__(self, channels: tuple[str, ...]) -> None:
         self._measured = [k for k, name in enumerate(channels) if not name.startswith(_UNMEASURED)]
-        named = [channels[k] for k in self._measured]
-        self._repeats = Repeats([k for k, name in enumerate(named) if name.startswith(_EFFORTS)])
+        efforts = [k for k, of in enumerate(self._measured) if channels[of].startswith(_EFFORTS)]
+        self._repeats, self._channels = Repeats(efforts), len(channels)
+        self._held = joined([], self._channels)
         self._waiting: list[Samples] = []
-        self._rows, self._channels = 0, len(channels)
-        self._held: Samples | None = None
+        self._rows = 0
 
-    def push(self, samples: Samples) -> Iterator[Samples]:
-        if self._waiting and (self._waiting[0].log_ns is None) != (samples.log_ns is None):
-            yield from self._flush(self._rows)
+    def push(self, samples: Samples) -> Samples | None:
+        """Take rows; readings that are complete, once ``BLOCK`` rows are there."""
         self._waiting.append(samples)
         self._rows += len(samples.stamp_ns)
-        if self._rows >= BLOCK:  # a source may hand out rows one by one
-            yield from self._flush(self._rows // BLOCK * BLOCK)
+        return self._judged(self._rows // BLOCK * BLOCK) if self._rows >= BLOCK else None
 
-    def finish(self) -> Iterator[Samples]:
-        yield from self._flush(self._rows)
-        if self._held is not None:
-            yield self._held
+    def finish(self) -> Samples:
+        """The last readings."""
+        return joined([self._judged(self._rows), self._held], self._channels)
 
-    def _flush(self, rows: int) -> Iterator[Samples]:
-        """Judge the next rows and give out readings but the last."""
-        if not rows:
-            return
+    def _judged(self, rows: int) -> Samples:
+        """Readings among the next rows, but for the last."""
         samples = joined(self._waiting, self._channels)
         self._waiting, self._rows = [rows_of(samples, slice(rows, None))], self._rows - rows
-        samples = rows_of(samples, slice(rows))
-        again = self._repeats.of(samples.values[:, self._measured])
-        if self._held is not None:
-            samples, again = joined([self._held, samples], self._channels), np.concatenate([[False], again])
+        again = self._repeats.of(samples.values[:rows, self._measured])
+        held = [self._held] * len(self._held.stamp_ns)
+        samples = joined([*held, rows_of(samples, slice(rows))], self._channels)
+        again = np.concatenate([np.zeros(len(held), dtype=bool), again])
         again[1:] &= np.diff(samples.stamp_ns) != 0  # rows with one stamp are another matter
         kept = np.flatnonzero(~again)
         readings = rows_of(samples, kept)
         readings.repeats[:] += np.diff(kept, append=len(again)) - 1
         self._held = rows_of(readings, slice(-1, None))
-        if len(kept) > 1:
-            yield rows_of(readings, slice(-1))
+        return rows_of(readings, slice(-1))
 
 
 def repeated(rows: int) -> str:

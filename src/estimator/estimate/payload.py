@@ -30,10 +30,10 @@ from estimator.estimate.uncertainty import WINDOW_S
 from estimator.estimate.withheld import withheld
 from estimator.leftover.contradiction import contradiction
 from estimator.leftover.leftover import left_over
-from estimator.leftover.steps import rounded, steps_of
+from estimator.leftover.steps import steps_of
 from estimator.recording.checks import check_carries
 from estimator.recording.model import Recording
-from estimator.signals.holds import BATCH_S, Hold, find_holds
+from estimator.signals.holds import Hold, find_holds
 from estimator.signals.process import process_recording
 
 Method = Literal["auto", "staged", "joint"]
@@ -161,8 +161,7 @@ def estimate_from_trials(
             raise InputError(f"nothing can be estimated jointly: {_why(steps)}")
         say("mass, centre of mass and inertia")
         joint, joint_steps = estimate_joint([trial.data for trial in trials], grasps, window_s)
-        resting = sum(map(_length_s, every_hold)) / sum(record.duration_s for record in records)
-        least = resting * rounding_kg(every_hold, trials[0].data.gravity_mps2)
+        least = rounding_kg(every_hold, trials[0].data.gravity_mps2)
         mass, com, inertia = replace(joint.mass, se=max(joint.mass.se, least)), joint.com, joint.inertia
         steps += joint_steps
     else:
@@ -212,20 +211,10 @@ def estimate_from_trials(
     return withheld(estimate, max(trial.team for trial in trials)) if withhold else estimate
 
 
-def _length_s(hold: Hold) -> float:
-    return hold.end_s - hold.start_s
-
-
 def _holds(trial: Trial) -> list[Hold]:
     """Static holds, with what rounding leaves of their forces."""
-    holds, steps = find_holds(trial.data), trial.steps
-    if steps is None:
-        return holds
-    noise = [BATCH_S * steps.read_hz * np.var(hold.batches[..., 3:], axis=0).mean() for hold in holds]
-    return [
-        replace(hold, rounding_N2=float(rounded(steps.force_N, x)))
-        for hold, x in zip(holds, noise, strict=True)
-    ]
+    holds = find_holds(trial.data)
+    return holds if trial.steps is None else [trial.steps.of_hold(hold) for hold in holds]
 
 
 def _units(trials: Sequence[Trial]) -> ArmUnit | None:
@@ -259,14 +248,12 @@ def _grasps_of(
 ) -> tuple[GraspEstimate | None, tuple[StepReport, ...]]:
     """Grasps, with what rounding leaves of joints that rest."""
     grasps, reports = estimate_grasps([trial.data for trial in trials], window_s)
-    told = [trial.steps.still_rad2 for trial in trials if trial.steps is not None]
-    return grasps and grasps.rounded(
-        np.sum(told or np.zeros((1, grasps.robots)), axis=0) / len(trials) ** 2
-    ), reports
+    told = [trial.steps.still_rad2 / len(trials) ** 2 for trial in trials if trial.steps is not None]
+    return (grasps.rounded(np.sum(told, axis=0)) if grasps and told else grasps), reports
 
 
 def _moving(trials: Sequence[Trial], holds: Sequence[Sequence[Hold]]) -> list[int]:
-    rest = [sum(map(_length_s, found)) for found in holds]
+    rest = [sum(hold.end_s - hold.start_s for hold in found) for found in holds]
     length = [float(trial.data.time[-1] - trial.data.time[0]) for trial in trials]
     moving = [k for k in range(len(trials)) if rest[k] <= RESTING * length[k]]
     return moving or list(range(len(trials)))

@@ -1,6 +1,6 @@
 """Rounding of a recording's channels, as far as the samples show it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -8,6 +8,7 @@ from estimator.arm.delta import jacobian
 from estimator.arrays import Array
 from estimator.quantisation import quantisation_step, rounding_step
 from estimator.recording.model import Recording
+from estimator.signals.holds import BATCH_S, Hold
 
 FINEST_RAD, FINEST_NM = 2 * np.pi / 2**17, 2e-3
 """Steps below which the model's own errors count (rods and welds that give, integration). Measured: noise-free
@@ -41,40 +42,44 @@ class Steps:
     read_hz: float
     still_rad2: Array
 
+    def of_hold(self, hold: Hold) -> Hold:
+        """A hold with what rounding leaves of its forces."""
+        noise_N2 = BATCH_S * self.read_hz * np.var(hold.batches[..., 3:], axis=0)
+        return replace(hold, rounding_N2=float(rounded(self.force_N, noise_N2).mean()))
+
 
 def steps_of(recording: Recording, cutoff_hz: float) -> Steps:
     """Steps of a recording that is filtered at ``cutoff_hz``."""
-    told = recording.metadata.sampling
-    steps = [rounding_step(x) for x in recording.tau.reshape(len(recording.time), -1).T]
-    if told is not None:
-        steps = [step for sampling in told for step in sampling.steps_of(2)]
-    elif not np.ptp(recording.tau, axis=0).any():
-        steps = [UNKNOWN_NM]
-    theta = _coarsest(recording, 1) or 0.0
+    told = recording.metadata.sampling or ()
     dh = jacobian(np.median(recording.phi, axis=(0, 1)), recording.metadata.design)
-    force_per_Nm = float(np.sqrt(np.linalg.inv(dh @ dh.T).diagonal().max()))
+    per_Nm = float(np.sqrt(np.linalg.inv(dh @ dh.T).diagonal().max()))
+    forces = [step * (per_Nm if of.level == "joint" else 1.0) for of in told for step in of.steps[6:]]
+    if not told:
+        tau = recording.tau.reshape(len(recording.time), -1)
+        forces = [per_Nm * (rounding_step(x) if np.ptp(tau, axis=0).any() else UNKNOWN_NM) for x in tau.T]
     return Steps(
         phi_rad=max(FINEST_RAD, _coarsest(recording, 0) or UNKNOWN_RAD),
         theta_rad=max(FINEST_RAD, _coarsest(recording, 1) or UNKNOWN_RAD),
         tau_Nm=max(FINEST_NM, _coarsest(recording, 2) or UNKNOWN_NM),
         arm_m=recording.metadata.design.proximal_length_m,
         cutoff_hz=cutoff_hz,
-        force_N=float(np.median([step for step in steps if step] or [0.0])) * force_per_Nm,
-        read_hz=min((sampling.native_hz for sampling in told or ()), default=recording.metadata.rate_hz),
-        still_rad2=rounded(theta, np.var(recording.theta, axis=0)).mean(axis=-1),
+        force_N=float(np.median([step for step in forces if step] or [0.0])),
+        read_hz=min((of.native_hz for of in told), default=recording.metadata.rate_hz),
+        still_rad2=rounded(_coarsest(recording, 1) or 0.0, np.var(recording.theta, axis=0)).mean(axis=-1),
     )
 
 
 def rounded(step: float, noise: Array) -> Array:
     """Variance that rounding leaves of a mean over readings with a variance ``noise``: none where that dithers it.
 
-    By the first term of the Fourier series of the rounding error (B. Widrow, IRE Trans. Circuit Theory 3, 1956); what
-    rounding adds to the noise is taken out: all of it above a third of a step, in proportion to the noise below.
+    By the first term of the Fourier series of the rounding error (B. Widrow, IRE Trans. Circuit Theory 3, 1956). That
+    of a noise x before rounding is x + (1 - exp(-4 pi^2 x)) / 12 after it, in steps; 1 - exp(-y) is y / (1 + y / 2).
     """
     if not step:
         return np.zeros_like(noise)
-    before = np.maximum(noise / (1.0 + np.pi**2 / 3.0), noise - step**2 / 12.0)
-    return step**2 / 12.0 * np.exp(-before * (2.0 * np.pi / step) ** 2)
+    a, after = 2.0 * np.pi**2, noise / step**2
+    b = a * after - 1.0 - np.pi**2 / 3.0
+    return step**2 / 12.0 * np.exp(-b - np.sqrt(b**2 + 4.0 * a * after))
 
 
 def _coarsest(recording: Recording, kind: int) -> float | None:

@@ -23,7 +23,7 @@ _MOST = 0.9  # of the rows: the few that a filter drew through a jump by a full 
 
 
 def check_recording(recording: Recording) -> None:
-    """Check number of rows, finiteness, time axis, repeated rows, joint ranges, torques and leg geometry of a recording.
+    """Check number of rows, finiteness, time axis, repeats, joint ranges, torques and legs of a recording.
 
     Raises:
         InputError: names the recording, the column, the row (counted from 0), the value and what is allowed.

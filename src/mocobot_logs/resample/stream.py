@@ -83,10 +83,8 @@ class RobotStream:
         rows = screen.rows - screen.duplicates - screen.blank - screen.repeats
         if screen.first_ns is None or screen.last_ns is None or rows < MIN_SAMPLES:
             blank = f" ({screen.blank} rows lack a value)" if screen.blank else ""
-            again = f" ({repeated(screen.repeats)})" if screen.repeats else ""
-            raise InputError(
-                f"{self._where} has {rows} samples{blank}{again}; at least {MIN_SAMPLES} are needed"
-            )
+            blank += f" ({repeated(screen.repeats)})" if screen.repeats else ""
+            raise InputError(f"{self._where} has {rows} samples{blank}; at least {MIN_SAMPLES} are needed")
         pipe = self._pipe or self._begin()
         values = pipe.finish(rows)
         span_s = (screen.last_ns - screen.first_ns) * NS
@@ -163,15 +161,10 @@ class RobotStream:
         interval = np.diff(time_ns)
         short = ~is_hole(interval, period_ns, self._max_gap_s)
         lost = np.sum(np.rint(interval[short] / period_ns)) - np.sum(short)
-        again = self.screen.repeats > 0 and lost > MOST_MISSING * len(
-            time_ns
-        )  # readings by a logger's count of time
-        if (
-            self._may_fit
-            and not again
-            and abs(period_ns / spacing_ns - 1.0) < _SAME_RATE
-            and fitting.holds(time_ns)
-        ):
+        # A logger that is faster than its messages stamps each with the time of its own next row.
+        again = self.screen.repeats > 0 and lost > MOST_MISSING * len(time_ns)
+        fits = self._may_fit and not again and abs(period_ns / spacing_ns - 1.0) < _SAME_RATE
+        if fits and fitting.holds(time_ns):
             return fitting, k
         jitter_ns = interval - np.maximum(np.rint(interval / period_ns), 1.0) * period_ns
         uneven = (
