@@ -44,13 +44,11 @@ class Repeats:
         if not self._efforts or self._live + 1 < _LIVE * self._readings:
             return repeats
         again = np.all(readings[2:] == readings[:-2], axis=1).sum()
-        chance = (again + _EQUAL) / (len(readings) + _OF)
+        likeliest = np.sqrt((again + _EQUAL) / (len(readings) + _OF))  # no reading comes more often
         edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int))).reshape(-1, 2)
         lengths = edges[:, 1] - edges[:, 0]
         for least in np.unique(lengths):
-            usual = len(readings) * chance ** (
-                (least + 1) / 2
-            )  # as the likeliest reading is at most its root
+            usual = len(readings) * likeliest ** (least + 1)
             if np.sum(lengths >= least) > usual + _SIGMAS * np.sqrt(usual):
                 for start, stop in edges[lengths >= least]:
                     repeats[start:stop] = True

@@ -6,7 +6,7 @@ import numpy as np
 
 from estimator.repeats import BLOCK, Repeats
 from mocobot_logs.joints.quantities import COMMANDS, DUTIES, EFFORTS
-from mocobot_logs.log import LogSource, Samples, joined, rows_of
+from mocobot_logs.log import Level, LogSource, Samples, joined, rows_of
 
 _EFFORTS = ("tau", "force_", *EFFORTS)
 _UNMEASURED = ("ref_", *COMMANDS, *DUTIES, "supply", "enabled")
@@ -18,9 +18,9 @@ class Readings:
 
     def __init__(self, source: LogSource) -> None:
         """Take the log; nothing is read yet."""
-        self.name, self.level, self.robots = source.name, source.level, source.robots
-        self.channels, self.metadata, self.size = source.channels, source.metadata, source.size
-        self._source = source
+        self.level: Level = source.level
+        self.name, self.robots, self.channels = source.name, source.robots, source.channels
+        self.metadata, self.size, self._source = source.metadata, source.size, source
 
     def chunks(self, advance: Callable[[int], object]) -> Iterator[tuple[int, Samples]]:
         """As ``LogSource.chunks``.

@@ -1,6 +1,7 @@
 """Recordings as a caller may give them: in memory, as files, or as logs that are converted when their turn comes."""
 
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 
@@ -113,19 +114,16 @@ class Logs:
         Raises:
             InputError: the file cannot be read, or is not a plausible recording.
         """
-        if not _is_log(path):
-            try:
+        is_log = _is_log(path)
+        with suppress(RepeatedRowsError):
+            if not is_log:
                 return read(path)
-            except RepeatedRowsError:
-                return self._converted(path, open_log(path), Labels())
-        trial = None if self._map is None else self._map.trial
-        return self._converted(path, open_log(path, self._map), Labels(trial=trial))
-
-    def _converted(self, path: Path, source: LogSource, labels: Labels) -> Recording:
         from mocobot_sim.scene.models import omnid_design  # needs MuJoCo; a recording does not
 
-        rate_hz = RATE_HZ if source.metadata is None else source.metadata.rate_hz
-        self.converted[path] = done = convert(source, labels, omnid_design(), rate_hz=rate_hz)
+        log_map = self._map if is_log else None
+        source, trial = open_log(path, log_map), None if log_map is None else log_map.trial
+        rate_hz = RATE_HZ if is_log or source.metadata is None else source.metadata.rate_hz
+        self.converted[path] = done = convert(source, Labels(trial=trial), omnid_design(), rate_hz=rate_hz)
         return done.recording
 
     def check_map(self) -> None:
