@@ -14,6 +14,7 @@ from mocobot_inspect.wiring.check import Found
 from mocobot_inspect.wiring.misfit import SUSPICIOUS, Misfit
 from mocobot_inspect.wiring.mistakes.base import listed
 from mocobot_logs.log import NS
+from mocobot_logs.readings import repeated
 
 Topic = Literal["time", "samples", "clocks", "wiring", "estimate"]
 
@@ -72,6 +73,8 @@ def _of_time(found: Inspection) -> Iterator[str]:
 
 def of_stream(t: Timing) -> Iterator[str]:
     """What is wrong with the stamps of one stream."""
+    if t.repeats:
+        yield repeated(t.repeats)
     if t.rate_hz is None:
         yield f"{t.samples} samples are too few"
         return

@@ -6,7 +6,7 @@
     log           name, level, robots, channels, assumed_design, calibrated (whether robots are as a calibration
                 has them), free (whether the robots hold nothing)
     streams       per robot: samples, start_s and duration_s (after the log's first stamp), rate_hz, jitter_rms_s,
-                  jitter_max_s, gaps, missing, longest_gap_s, longest_gap_at_s, duplicates, backwards,
+                  jitter_max_s, gaps, missing, longest_gap_s, longest_gap_at_s, duplicates, repeats, backwards,
                   farthest_back_s, farthest_back_at_s, recorder_s
                   (least and largest lead of the recorder's time over the stamps)
     channels      per robot and channel: lowest, highest, nans, infinities, step, noise, stuck_count, clipped_count,

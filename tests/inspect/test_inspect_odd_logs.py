@@ -39,7 +39,7 @@ def test_robots_that_stand_and_read_the_same_all_the_time(tmp_path: Path) -> Non
         RECORDING,
         phi=np.broadcast_to(RECORDING.phi[:1], RECORDING.phi.shape).copy(),
         theta=np.broadcast_to(RECORDING.theta[:1], RECORDING.theta.shape).copy(),
-        tau=np.full_like(RECORDING.tau, 4.0),
+        tau=4.0 + 1e-9 * np.random.default_rng(0).normal(size=RECORDING.tau.shape),  # or it is one reading
     )
     write_recording(still, tmp_path / "rec.parquet")
     found = inspect_log(open_log(tmp_path / "rec.parquet"), DESIGN)

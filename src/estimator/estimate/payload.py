@@ -25,7 +25,7 @@ from estimator.estimate.inertia import InertiaEstimate, estimate_inertia
 from estimator.estimate.joint import estimate_joint
 from estimator.estimate.one_payload import check_one_payload, mass_alone
 from estimator.estimate.result import PayloadEstimate, RecordingEstimate
-from estimator.estimate.statics import CONTRADICTION, ComEstimate, estimate_from_holds
+from estimator.estimate.statics import CONTRADICTION, ComEstimate, estimate_from_holds, rounding_kg
 from estimator.estimate.uncertainty import WINDOW_S
 from estimator.estimate.withheld import withheld
 from estimator.leftover.contradiction import contradiction
@@ -131,7 +131,7 @@ def estimate_from_trials(
     names = _distinct([trial.name for trial in trials])
     trials = [replace(trial, name=name) for trial, name in zip(trials, names, strict=True)]
     say("static holds")
-    holds = [find_holds(trial.data) for trial in trials]
+    holds = [_holds(trial) for trial in trials]
     records = [
         RecordingEstimate(t.name, t.kind, t.data.samples / t.data.rate_hz, len(h))
         for t, h in zip(trials, holds, strict=True)
@@ -161,7 +161,8 @@ def estimate_from_trials(
             raise InputError(f"nothing can be estimated jointly: {_why(steps)}")
         say("mass, centre of mass and inertia")
         joint, joint_steps = estimate_joint([trial.data for trial in trials], grasps, window_s)
-        mass, com, inertia = joint.mass, joint.com, joint.inertia
+        least = rounding_kg(every_hold, trials[0].data.gravity_mps2)
+        mass, com, inertia = replace(joint.mass, se=max(joint.mass.se, least)), joint.com, joint.inertia
         steps += joint_steps
     else:
         steps += [com_step] if com_step else []
@@ -210,6 +211,12 @@ def estimate_from_trials(
     return withheld(estimate, max(trial.team for trial in trials)) if withhold else estimate
 
 
+def _holds(trial: Trial) -> list[Hold]:
+    """Static holds, with what rounding leaves of their forces."""
+    holds = find_holds(trial.data)
+    return holds if trial.steps is None else [trial.steps.of_hold(hold) for hold in holds]
+
+
 def _units(trials: Sequence[Trial]) -> ArmUnit | None:
     """The robots as they are, if all recordings say the same of them."""
     first = trials[0].units
@@ -224,7 +231,7 @@ def _grasps(
 ) -> tuple[GraspEstimate | None, list[StepReport]]:
     """Grasps of every recording alone (into ``records``), checked against each other, and pooled."""
     for k, trial in enumerate(trials):
-        alone, steps = estimate_grasps([trial.data], window_s)
+        alone, steps = _grasps_of([trial], window_s)
         records[k] = replace(records[k], grasps=alone)
         if alone is not None:
             flags += check_rigid(trial.name, alone)
@@ -232,8 +239,17 @@ def _grasps(
             check_disagreement_is_noise(trial.name, steps)
     found = [(record.name, record.grasps) for record in records if record.grasps is not None]
     check_agreement([name for name, _ in found], [grasps for _, grasps in found])
-    pooled, steps = estimate_grasps([trial.data for trial in trials], window_s)
+    pooled, steps = _grasps_of(trials, window_s)
     return pooled, list(steps)
+
+
+def _grasps_of(
+    trials: Sequence[Trial], window_s: float
+) -> tuple[GraspEstimate | None, tuple[StepReport, ...]]:
+    """Grasps, with what rounding leaves of joints that rest."""
+    grasps, reports = estimate_grasps([trial.data for trial in trials], window_s)
+    told = [trial.steps.still_rad2 / len(trials) ** 2 for trial in trials if trial.steps is not None]
+    return (grasps.rounded(np.sum(told, axis=0)) if grasps and told else grasps), reports
 
 
 def _moving(trials: Sequence[Trial], holds: Sequence[Sequence[Hold]]) -> list[int]:

@@ -106,7 +106,7 @@ def inspect_joints(
     """
     samples = collect(source, advance).streams[0]
     timing = TimingTally()
-    timing.add(samples.stamp_ns, samples.log_ns)
+    timing.add(samples)
     keys = list(log_map.channels)
     found = JointInspection(
         name=source.name,

@@ -5,7 +5,7 @@
     format "mocobot-joint-inspection", version 1
     log           name, map, joints, columns
     stamps        samples, duration_s, rate_hz, jitter_rms_s, jitter_max_s, gaps, missing, longest_gap_s,
-                  longest_gap_at_s, duplicates, backwards, farthest_back_s, farthest_back_at_s, recorder_s
+                  longest_gap_at_s, duplicates, repeats, backwards, farthest_back_s, farthest_back_at_s, recorder_s
     channels      by column ("q of joint1"): as in an inspection of a team's log
     parts         start_s, duration_s, samples, rate_hz, resampled, notes
     unchecked     why motion and torques were not looked at, or null

@@ -100,7 +100,7 @@ class _Robot:
             return
         if self.first_ns is None:
             self.first_ns = int(samples.stamp_ns[0])
-        self._timing.add(samples.stamp_ns, samples.log_ns)
+        self._timing.add(samples)
         plain = Samples(samples.stamp_ns, samples.values)
         self._waiting.append(plain)
         self._waiting_rows += len(plain.stamp_ns)

@@ -248,3 +248,21 @@ def test_a_coarse_position_and_saturation_are_said(tmp_path: Path) -> None:
     assert any("steps of 20 um" in note for note in log.notes)
     assert any("saturates (+-10 V) in 10 of 7200 samples" in note for note in log.notes)
     assert log.saturated.sum() == 10
+
+
+def test_rows_that_repeat_count_once(tmp_path: Path) -> None:
+    rng = np.random.default_rng(0)
+    made = axis()
+    made = replace(made, voltage=made.voltage + rng.normal(0.0, 0.01, len(made.time)))
+    whole = read_emps(written(tmp_path, made))
+    assert whole.notes == ()
+    index = np.arange(len(made.time))
+    index[2000:2010] = 2000
+    fields = {name: getattr(made, name)[index] for name in ("position", "reference", "voltage")}
+    log = read_emps(written(tmp_path, replace(made, **fields)))
+    assert log.notes[0] == "9 rows repeat the one before, and a reading counts once."
+    assert "9 of" in log.notes[1]
+    np.testing.assert_allclose(log.position, whole.position, atol=1e-5)
+    index[2000:4000] = 2000
+    fields = {name: getattr(made, name)[index] for name in ("position", "reference", "voltage")}
+    assert "s are missing from t = 2 s on" in refused(written(tmp_path, replace(made, **fields)))

@@ -12,6 +12,7 @@ from discrepancy.emps.recording.whole import is_whole
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.inputs import open_input
+from estimator.repeats import Repeats
 
 SERIES = {
     "t": "time [s]",
@@ -59,7 +60,11 @@ def read_emps(path: Path) -> AxisLog:
         listed = ", ".join(f"{name} {length}" for name, length in lengths.items())
         raise InputError(f"{path}: the series have different lengths ({listed})")
     numbers = {name: _number(path, name, found[name]) for name in NUMBERS}
+    repeats = Repeats([2]).of(np.column_stack([series[name] for name in ("qm", "qg", "vir")]))
+    series = {name: values[~repeats] for name, values in series.items()}
     time, others, usable, notes = on_grid(str(path), series.pop("t"), series)
+    if repeats.any():
+        notes = [f"{repeats.sum()} rows repeat the one before, and a reading counts once.", *notes]
     return AxisLog(
         path.name,
         time,
