@@ -16,9 +16,12 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.dataset as ds
+import pyarrow.parquet as pq
 
 from estimator.errors import InputError
-from mocobot_logs.claims import check_claim, read_small
+from estimator.recording.parquet import row_groups
+from estimator.unpacked import Unpacked
+from mocobot_logs.claims import read_small
 from mocobot_logs.faults import detail_of, told_in_one_sentence
 from mocobot_logs.formats import DATASET_INFO, dataset_root
 from mocobot_logs.table.parquet import KIND, ParquetTable, check_names
@@ -88,6 +91,11 @@ class LeRobotTable(ParquetTable):
                 exact = self._exact(stamp, block.columns[FRAME].reshape(-1))
                 block = Block(block.columns, {**block.clocks, TIMESTAMP: (exact, given)})
             yield block
+
+    def _groups(self) -> Iterator[pq.RowGroupMetaData]:
+        with told_in_one_sentence(self.name, KIND):
+            for part in self._data.get_fragments():
+                yield from row_groups(part.metadata)
 
     def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
         return _read(self._data, self.name, columns=names, filter=self._filter, batch_size=rows)
@@ -193,7 +201,7 @@ def _dataset(paths: list[Path], name: str) -> ds.Dataset:
         if any(not part.physical_schema.equals(data.schema) for part in data.get_fragments()):
             raise InputError(f"{name}: its Parquet files have different columns")
         rows, stored_bytes = _extent(data)
-    check_claim(8 * len(NAME_COLUMNS) * rows, stored_bytes, name)
+    Unpacked(name, stored_bytes).add(8 * len(NAME_COLUMNS) * rows)
     return data
 
 
