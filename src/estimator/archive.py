@@ -43,6 +43,8 @@ def read_archive(path: Path, what: str) -> tuple[Any, dict[str, NDArray[Any]]]:
                 with archive.open(entry) as file:
                     name = entry.filename.removesuffix(".npy")
                     arrays[name] = np.lib.format.read_array(file, allow_pickle=False)
+        if "facts" not in arrays:
+            raise InputError(f"{path}: not {what}; 'facts' is missing")
         return json.loads(arrays.pop("facts").tobytes()), arrays
     except InputError:
         raise

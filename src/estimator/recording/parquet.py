@@ -2,7 +2,7 @@
 
 import contextlib
 import difflib
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +16,7 @@ from estimator.files import whole_file
 from estimator.recording.checks import check_finite, check_recording
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import CHANNELS, Recording
+from estimator.recording.parquet_claims import claimed_bytes
 from estimator.unpacked import Unpacked
 
 METADATA_KEY = b"mocobot"
@@ -63,7 +64,7 @@ def read_recording(path: Path | str) -> Recording:
             raise InputError(f"{path}: the file has no rows")
         for field in schema:
             _check_type(field, path)
-        claimed = claimed_bytes(row_groups(file.metadata), schema.names)
+        claimed = claimed_bytes(path, file.schema, schema.names)
         Unpacked(str(path), path.stat().st_size).add(
             max(claimed, 8 * file.metadata.num_rows * len(schema.names))
         )
@@ -81,23 +82,6 @@ def read_recording(path: Path | str) -> Recording:
     recording = Recording(time=time, ref=ref, metadata=metadata, name=str(path), **arrays)
     check_recording(recording)
     return recording
-
-
-def row_groups(footer: pq.FileMetaData) -> Iterator[pq.RowGroupMetaData]:
-    """The row groups that a footer lists."""
-    return map(footer.row_group, range(footer.num_row_groups))
-
-
-def claimed_bytes(groups: Iterable[pq.RowGroupMetaData], names: Collection[str]) -> int:
-    """What columns, and lists in them, unpack to by a footer: their pages, or their values at eight bytes each."""
-    total = 0
-    for group in groups:
-        for column in map(group.column, range(group.num_columns)):
-            if column.path_in_schema in names or any(
-                column.path_in_schema.startswith(f"{n}.") for n in names
-            ):
-                total += max(column.total_uncompressed_size, 8 * column.num_values)
-    return total
 
 
 def _read_columns(file: pq.ParquetFile, metadata: RecordingMetadata) -> tuple[Array, dict[str, Array]]:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from estimator.errors import InputError
 from estimator.recording.metadata import RecordingMetadata
-from estimator.recording.parquet import METADATA_KEY, claimed_bytes, row_groups
+from estimator.recording.parquet import METADATA_KEY
+from estimator.recording.parquet_claims import claimed_bytes
 from estimator.unpacked import Unpacked
 from mocobot_logs.faults import told_in_one_sentence
 from mocobot_logs.log import Stamps
@@ -70,7 +71,7 @@ class ParquetTable(Table):
         for name in names:
             self._check_type(name, time=name in wanted.clocks)
         cells = sum(int(np.prod(self.shapes[name], dtype=np.int64)) for name in names)
-        self._check(max(8 * cells * self._rows, claimed_bytes(self._groups(), names)))
+        self._check(names, 8 * cells * self._rows)
         row = 0
         for batch in self._batches(names, rows_at_a_time(cells)):
             yield self._block(batch, wanted, row)
@@ -78,12 +79,15 @@ class ParquetTable(Table):
             advance(batch.num_rows)
         pa.default_memory_pool().release_unused()
 
-    def _check(self, claimed: int) -> None:
-        Unpacked(self.name, self._stored_bytes).add(claimed)
+    def _check(self, names: list[str], claimed: int) -> None:
+        """Refuse columns that unpack to too much by another claim, or by what the files say."""
+        with told_in_one_sentence(self.name, KIND):
+            told = sum(claimed_bytes(path, schema, names) for path, schema in self._files())
+            Unpacked(self.name, self._stored_bytes).add(max(claimed, told))
 
-    def _groups(self) -> Iterator[pq.RowGroupMetaData]:
+    def _files(self) -> Iterator[tuple[Path, pq.ParquetSchema]]:
         with opened(self._path, self.name) as file:
-            yield from row_groups(file.metadata)
+            yield self._path, file.schema
 
     def _batches(self, names: list[str], rows: int) -> Iterator[pa.RecordBatch]:
         with opened(self._path, self.name) as file:
@@ -113,7 +117,7 @@ class ParquetTable(Table):
             n for n, s in shapes.items() if s is None and _is_number(_innermost(self._schema.field(n).type))
         ]
         if open_names:
-            self._check(max((claimed_bytes([group], open_names) for group in self._groups()), default=0))
+            self._check(open_names, 0)
         if open_names and (first := next(self._batches(open_names, 1), None)) is not None and len(first):
             shapes |= {name: np.shape(first.column(name)[0].as_py()) for name in open_names}
         return {name: shape or () for name, shape in shapes.items()}

@@ -17,6 +17,7 @@ from mocobot_sim.extended.poses import poses_to_list, read_poses
 from mocobot_sim.extended.readme import readme
 from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.as_built_file import unit_in
+from mocobot_sim.scene.named_files import ASSETS, owned
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.sensor_effects import SensorEffects
 from mocobot_sim.scene.team_index import TeamIndex
@@ -119,7 +120,7 @@ def load_extended(folder: Path) -> TeamScene:
     assets = {
         path.name: path.read_bytes()
         for path in sorted(folder.iterdir())
-        if path.is_file() and path.name not in (SCENE, NUMBERS, README)
+        if path.is_file() and path.suffix.lower() in ASSETS and owned(path, folder, ASSETS)
     }
     scene = TeamScene(
         root=None,
