@@ -64,7 +64,7 @@ def read_recording(path: Path | str) -> Recording:
             raise InputError(f"{path}: the file has no rows")
         for field in schema:
             _check_type(field, path)
-        claimed = claimed_bytes(path, file.schema, schema.names)
+        claimed = claimed_bytes(path, schema.names, schema.names)
         Unpacked(str(path), path.stat().st_size).add(
             max(claimed, 8 * file.metadata.num_rows * len(schema.names))
         )

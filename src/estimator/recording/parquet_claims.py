@@ -5,11 +5,9 @@ Both are structures of Thrift's compact protocol, by fields with numbers (https:
 ``parquet.thrift``). pyarrow tells neither pages nor, without ending the process, columns of a damaged footer.
 """
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
-
-import pyarrow.parquet as pq
 
 _TAIL_BYTES, _HEADER_BYTES = 8, 16 << 10
 """Footer's length and magic number; the longest header of a page, which holds two values of the column at most."""
@@ -18,14 +16,18 @@ _VALUES, _UNPACKED, _PACKED, _DATA, _DICTIONARY = 5, 6, 7, 9, 11  # of a column 
 _PAGE_UNPACKED, _PAGE_PACKED = 2, 3
 
 
-def claimed_bytes(path: Path, schema: pq.ParquetSchema, names: Collection[str]) -> int:
+def claimed_bytes(path: Path, columns: Sequence[str], names: Collection[str]) -> int:
     """The most that columns, and lists in them, unpack to by pages, by footer, or by values of eight bytes.
+
+    Args:
+        path: the file.
+        columns: paths of its columns, in the order of its schema.
+        names: of columns and lists that are read.
 
     Raises:
         Exception: of any type, on damaged bytes.
     """
-    paths = [schema.column(k).path for k in range(len(schema))]
-    wanted = [k for k, p in enumerate(paths) if p in names or any(p.startswith(f"{n}.") for n in names)]
+    wanted = [k for k, c in enumerate(columns) if c in names or any(c.startswith(f"{n}.") for n in names)]
     total = 0
     with path.open("rb") as file:
         end = file.seek(-_TAIL_BYTES, 2)

@@ -82,7 +82,7 @@ class ParquetTable(Table):
     def _check(self, names: list[str], claimed: int) -> None:
         """Refuse columns that unpack to too much by another claim, or by what the files say."""
         with told_in_one_sentence(self.name, KIND):
-            told = sum(claimed_bytes(path, schema, names) for path, schema in self._files())
+            told = sum(claimed_bytes(path, _columns(schema), names) for path, schema in self._files())
             Unpacked(self.name, self._stored_bytes).add(max(claimed, told))
 
     def _files(self) -> Iterator[tuple[Path, pq.ParquetSchema]]:
@@ -195,6 +195,10 @@ def _clock(column: pa.Array, shape: tuple[int, ...], unit_ns: int | None, where:
         ns = column.cast(pa.timestamp("ns", column.type.tz)).cast(pa.int64()).fill_null(0)
         return ns.to_numpy(zero_copy_only=False), given
     return from_numbers(numbers(column, shape, where).reshape(len(column)), unit_ns, where, row)
+
+
+def _columns(schema: pq.ParquetSchema) -> list[str]:
+    return [schema.column(k).path for k in range(len(schema))]
 
 
 def _is_number(kind: pa.DataType) -> bool:
