@@ -12,7 +12,9 @@ from mcap.writer import CompressionType
 from bag_refusals import refuses
 from bags import Team, assert_holds, raw_mcap, rosbags_bag
 from estimator import unpacked
+from estimator.errors import InputError
 from estimator.unpacked import set_max_unpacked
+from mocobot_logs.bag.storage.files import BagFiles
 
 TEAM = Team.draw(rows=60)
 MEGABYTE = "x" * 1_000_000
@@ -98,4 +100,6 @@ def test_rows_that_share_their_pages(tmp_path: Path) -> None:
     connection = sqlite3.connect(path)
     assert connection.execute("SELECT sum(length(data)) FROM messages").fetchone() == (100 * large,)
     connection.close()
-    refuses(path, "damaged, its messages are larger than the file: they share pages")
+    files = BagFiles(path)
+    with pytest.raises(InputError, match=r"damaged, its messages are larger than the file: they share pages"):
+        list(files.blocks(tuple(files.topics), lambda _: None))

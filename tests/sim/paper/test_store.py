@@ -16,7 +16,10 @@ from estimator.arm.unit import COUNT, ArmUnit
 from estimator.calibrate.calibration import CalibratedTrial, Calibration
 from estimator.calibrate.prior import Prior
 from estimator.errors import InputError
-from estimator.estimate.payload import estimate_payload
+from estimator.estimate.identifiability import StepReport, WeakDirection
+from estimator.estimate.result import PayloadEstimate, RecordingEstimate
+from estimator.estimate.statics import MassEstimate
+from estimator.leftover.leftover import Leftover
 from estimator.rigid_team.residual import Bases
 from mocobot_sim.paper.experiment import TrialSummary
 from mocobot_sim.paper.store import Store
@@ -33,7 +36,7 @@ def same(a: Any, b: Any) -> bool:
         return list(a) == list(b) and all(same(a[key], b[key]) for key in a)
     if isinstance(a, tuple | list):
         return type(a) is type(b) and len(a) == len(b) and all(map(same, a, b))
-    return type(a) is type(b) and (a == b or (a != a and b != b))
+    return isinstance(a, type(b)) and (a == b or (a != a and b != b))
 
 
 def outcomes() -> list[Any]:
@@ -48,10 +51,16 @@ def outcomes() -> list[Any]:
         units, rng.standard_normal((9, 9)), rng.standard_normal((3, COUNT)), 0.0, Prior(), (), (trial,), ("a",), 4, (),
         ("x",),
     )  # fmt: skip
+    weak = WeakDirection("mass", "m", (0.1, 0.2), "why")
+    estimate = PayloadEstimate(
+        None, 3, "staged", None, MassEstimate(np.float64(0.1) * 3, 0.2, 0.3), rng.standard_normal(3), None, None,
+        (StepReport("mass", ("m",), "kg", (1.0, 0.0), 0.1, (weak,)),),
+        (RecordingEstimate("a", "static", 1.0, 2, leftovers=(Leftover("force", "N", 0.1, 0.2),)),), ("flag",),
+    )  # fmt: skip
     return [
         1.5, None, (rng.standard_normal((2, 3)), np.zeros((2, 3, 3), order="F")),
         ({"ideal": recording}, TrialSummary("a", 0.1, 0.2, 1e-17, 0.3, -0.0)), calibration,
-        (estimate_payload([recording]), None),
+        (estimate, None),
     ]  # fmt: skip
 
 
