@@ -91,9 +91,9 @@ class Store:
 
 
 def _plain(value: Any, arrays: list[NDArray[Any]]) -> Any:
-    """A value as JSON has it: but for lists and scalars a pair of its kind and what it holds; arrays by number."""
-    if isinstance(value, np.ndarray):
-        arrays.append(value)
+    """A value as JSON has it: lists, plain scalars, and pairs of a kind and what it holds; arrays by number."""
+    if isinstance(value, np.ndarray | np.generic):
+        arrays.append(np.asarray(value))
         return {"array": len(arrays) - 1}
     if is_dataclass(value):
         return {type(value).__name__: {f.name: _plain(getattr(value, f.name), arrays) for f in fields(value)}}
@@ -102,7 +102,7 @@ def _plain(value: Any, arrays: list[NDArray[Any]]) -> Any:
     if isinstance(value, tuple | list):
         listed = [_plain(each, arrays) for each in value]
         return {"tuple": listed} if isinstance(value, tuple) else listed
-    return value.item() if isinstance(value, np.generic) else value
+    return value
 
 
 def _value(told: Any, arrays: dict[str, NDArray[Any]]) -> Any:
@@ -113,7 +113,7 @@ def _value(told: Any, arrays: dict[str, NDArray[Any]]) -> Any:
         return told
     ((kind, held),) = told.items()
     if kind == "array":
-        return arrays[str(held)]
+        return arrays[str(held)][()]  # a scalar as it was
     if kind == "tuple":
         return tuple(_value(each, arrays) for each in held)
     values = {key: _value(each, arrays) for key, each in held.items()}

@@ -14,6 +14,7 @@ from discrepancy.emps.recording.preflight import checked, stuck
 from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.recording.whole import is_whole
 from emps_made import GAIN, KP, KV, as_mat, reference, written
+from estimator import unpacked
 from estimator.errors import InputError
 
 RATE = 1000.0
@@ -248,3 +249,12 @@ def test_a_coarse_position_and_saturation_are_said(tmp_path: Path) -> None:
     assert any("steps of 20 um" in note for note in log.notes)
     assert any("saturates (+-10 V) in 10 of 7200 samples" in note for note in log.notes)
     assert log.saturated.sum() == 10
+
+
+def test_a_file_that_unpacks_to_too_much(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "axis.mat"
+    savemat(path, as_mat(axis()) | {"more": np.zeros(1 << 18)}, do_compression=True)
+    assert len(read_emps(path).time)
+    monkeypatch.setattr(unpacked, "FREE_BYTES", 1 << 20)
+    monkeypatch.setattr(unpacked, "LARGEST_RATIO", 2)
+    assert "axis.mat: unpacks to at least 0.00" in refused(path)
