@@ -21,10 +21,12 @@ def owned(named: Path, folder: Path, types: tuple[str, ...]) -> Path:
     source = named.resolve()
     if not source.is_relative_to(folder.resolve()):
         raise InputError(
-            f"{named}: lies outside the model's folder {folder}; a copy of the model takes nothing from there"
+            f"{str(named)!r:.200} lies outside the model's folder {folder}; a copy of the model takes nothing else"
         )
     if source.suffix.lower() not in types:
-        raise InputError(f"{named}: a copy of the model takes only files of the types {', '.join(types)}")
+        raise InputError(
+            f"{str(named)!r:.200}: a copy of the model takes only files of the types {', '.join(types)}"
+        )
     return source
 
 

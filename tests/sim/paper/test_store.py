@@ -106,4 +106,5 @@ def test_a_file_of_somebody_else_is_refused(tmp_path: Path, what: str) -> None:
     with pytest.raises(InputError) as caught:
         store.get("stage", 0)
     assert str(caught.value).startswith(f"{file}: ")
+    assert ("is not packed as numpy does it" in str(caught.value)) == (what == "an unlimited packing")
     assert not (tmp_path / "executed").exists()

@@ -52,12 +52,7 @@ class McapBag:
     """One MCAP file, see ``Storage``."""
 
     def __init__(self, path: Path, name: str, unpacked: Unpacked) -> None:
-        """Find the topics: in the summary, or in the whole file where there is none.
-
-        Args:
-            path: the file.
-            name: what messages call it.
-            unpacked: counts what chunks unpack to.
+        """Find the topics: in the summary, or in the whole file where there is none; ``unpacked`` counts chunks.
 
         Raises:
             InputError: not a complete MCAP file, or a damaged one.
@@ -286,9 +281,8 @@ class McapBag:
         if begin > length or stored > length - begin:
             raise self._damaged(at, "a chunk claims more bytes than it has")
         compression = content[_CHUNK.size : begin - 8].decode(errors="replace")
-        self._unpacked.add(
-            min(size, CHUNK_BYTES) if compression else 0
-        )  # of larger ones ``unpack`` says more
+        if compression:
+            self._unpacked.add(min(size, CHUNK_BYTES))  # of larger ones ``unpack`` says more
         try:
             block = unpack(content[begin : begin + stored], compression, size)
         except UnpackError as error:
