@@ -12,6 +12,7 @@ from typing import Any, NoReturn, TextIO, cast
 
 from estimator.errors import InputError
 from estimator.inputs import printable
+from estimator.unpacked import set_max_unpacked
 from mocobot import options
 from mocobot.config import with_config
 from mocobot.parsing import parse
@@ -126,6 +127,7 @@ def _run(arguments: Sequence[str]) -> None:
                 f"{error.filename}: cannot be written ({error.strerror})"
             ) from error  # a completion
         name = next(name for name, kind in COMMANDS.items() if isinstance(options, kind))
+        set_max_unpacked(getattr(options, "max_unpacked", None))
         import_module(f"mocobot.checks.{name}").check(options)
         # joblib stops workers that idle, and starts others: nothing is lost, and nobody can do anything about it.
         warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)

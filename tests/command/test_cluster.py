@@ -114,10 +114,10 @@ def test_an_interrupted_run_goes_on_with_the_same_bits(
         run_paper(PLAN, store=Store(tmp_path, "key", force=False))
     kept = {path.name for path in (tmp_path / FOLDER / "key").iterdir()}
     assert kept == {
-        "random-trials-0.joblib",
-        "random-trials-1.joblib",
-        "grasps-0.joblib",
-        "other-trials-0.joblib",
+        "random-trials-0.npz",
+        "random-trials-1.npz",
+        "grasps-0.npz",
+        "other-trials-0.npz",
     }
     result = run_paper(PLAN, store=(store := Store(tmp_path, "key", force=False)))
     assert json.dumps(result.scores) == reference

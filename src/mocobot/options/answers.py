@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 import tyro
 
 from discrepancy.rules.inference import PRIOR_ODDS
-from mocobot.options.common import Calibrated, Flag, Force, Model, Scheduler
+from mocobot.options.common import Calibrated, Flag, Force, MaxUnpacked, Model, Scheduler
 
 
 @dataclass(frozen=True)
@@ -32,6 +32,7 @@ class Estimate:
     rest. auto: the fit, if noise is all that it leaves."""
     cutoff_hz: float = 5.0
     """Cut-off of the low-pass filter [Hz]."""
+    max_unpacked: MaxUnpacked = None
 
 
 @dataclass(frozen=True)
@@ -61,6 +62,7 @@ class Calibrate:
     force: Force = False
     strict: Flag = False
     """Exit with 1 if there are findings that speak against the numbers."""
+    max_unpacked: MaxUnpacked = None
 
 
 @dataclass(frozen=True)
@@ -98,6 +100,7 @@ class Diagnose:
     """Odds of any cause being there before the data are seen; more where a fault is suspected."""
     whole: bool = False
     """Search all of a team's long recordings, not a choice of their parts."""
+    max_unpacked: MaxUnpacked = None
 
 
 @dataclass(frozen=True)
@@ -118,3 +121,4 @@ class Watch:
     """Exit with 1 if there is no estimate, or the verdict is neither consistent nor explained."""
     jobs: int = 2
     """Parallel processes."""
+    max_unpacked: MaxUnpacked = None

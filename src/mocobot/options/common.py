@@ -28,3 +28,10 @@ Calibrated = Annotated[
         help="The robots as `mocobot calibrate` found them, in place of what the recordings say of them.",
     ),
 ]
+MaxUnpacked = Annotated[
+    float | None,
+    tyro.conf.arg(
+        metavar="GIB",
+        help="Most that each file may unpack to; 100 times its size, at least 0.25 and at most 4 GiB, if not given.",
+    ),
+]

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from mocobot.options.common import Calibrated, Flag, Force, Model
+from mocobot.options.common import Calibrated, Flag, Force, MaxUnpacked, Model
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,7 @@ class Convert:
     """Write the report as JSON, too."""
     episode: int | None = None
     """Episode of a LeRobot dataset that holds several."""
+    max_unpacked: MaxUnpacked = None
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,7 @@ class Map:
     force: Force = False
     episode: int | None = None
     """Episode of a LeRobot dataset that holds several."""
+    max_unpacked: MaxUnpacked = None
 
 
 @dataclass(frozen=True)
@@ -79,3 +81,4 @@ class Inspect:
     calibration: Calibrated = None
     episode: int | None = None
     """Episode of a LeRobot dataset."""
+    max_unpacked: MaxUnpacked = None

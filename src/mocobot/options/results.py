@@ -6,7 +6,7 @@ from typing import Annotated
 
 import tyro
 
-from mocobot.options.common import Flag, Force, Scheduler
+from mocobot.options.common import Flag, Force, MaxUnpacked, Scheduler
 
 
 @dataclass(frozen=True)
@@ -44,6 +44,7 @@ class Report:
     out: Annotated[Path | None, tyro.conf.arg(metavar="FILE.html")] = None
     """Page to write; DIR/report.html if not given."""
     force: Force = False
+    max_unpacked: MaxUnpacked = None
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 import tyro
 
-from mocobot.options.common import Calibrated, Force, Model
+from mocobot.options.common import Calibrated, Force, MaxUnpacked, Model
 
 Kind = Literal["random", "periodic", "static", "free"]
 """Of a trial."""
@@ -82,3 +82,4 @@ class Replay:
     force: Force = False
     web: bool = False
     """Serve to a browser instead of opening the viewer."""
+    max_unpacked: MaxUnpacked = None

@@ -13,13 +13,14 @@ from estimator.errors import InputError
 from estimator.files import whole_folder
 from estimator.inputs import JSON_BYTES, read_input
 from estimator.strict import Fields, parse_json
-from estimator.written import LIST, holds
+from estimator.written import holds
 from mocobot_sim.effects import Effect, effect_from_dict, effect_to_dict
 from mocobot_sim.extended.poses import poses_to_list, read_poses
 from mocobot_sim.extended.readme import readme
 from mocobot_sim.model_check import check_model
 from mocobot_sim.scene.as_built import AsBuilt
 from mocobot_sim.scene.as_built_file import unit_in
+from mocobot_sim.scene.named_files import ASSETS, owned
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.scene.sensor_effects import SensorEffects
 from mocobot_sim.scene.team_index import TeamIndex
@@ -115,7 +116,7 @@ def load_extended(folder: Path) -> TeamScene:
     assets = {
         path.name: path.read_bytes()
         for path in sorted(folder.iterdir())
-        if path.is_file() and path.name not in (SCENE, NUMBERS, README, LIST)
+        if path.is_file() and path.suffix.lower() in ASSETS and owned(path, folder, ASSETS)
     }
     scene = TeamScene(
         root=None,

@@ -23,7 +23,7 @@ from estimator.recording.model import Recording
 from estimator.signals.process import process_recording
 from mocobot_sim.paper.fits import COLUMNS, SELF_CALIBRATED, TRANSFER, estimate_both, fit_trials, three_trials
 from mocobot_sim.paper.published import payload_truth
-from mocobot_sim.paper.scoring import score, score_fit
+from mocobot_sim.paper.scoring import TrialSummary, score, score_fit
 from mocobot_sim.paper.store import Store
 from mocobot_sim.paper.work import Progress, Work
 from mocobot_sim.scene.models import payload_path
@@ -110,20 +110,6 @@ class PaperPlan:
         for name in sorted(self.presets, key=list(PRESETS).index):
             groups.setdefault(sensor_preset(name).spread, []).append(sensor_preset(name))
         return list(groups.values())
-
-
-@dataclass(frozen=True)
-class TrialSummary:
-    """Extremes of one trial: payload rotation [deg], SEA torque [N m], rod and weld errors [m], weld angle [deg], and
-    the damping ratio of its control, below 0 if that was unstable."""
-
-    name: str
-    rotation_deg: float
-    torque_Nm: float
-    rod_error_m: float
-    weld_error_m: float
-    weld_error_deg: float
-    damping_ratio: float | None
 
 
 @dataclass

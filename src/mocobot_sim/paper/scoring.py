@@ -11,6 +11,7 @@ are therefore given in both frames: those of the CAD, as in the paper, and those
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,20 @@ ENCODER_FRAMES = "encoder_frames"
 """Key of the errors of grasps and centre of mass in the frames that the encoders define."""
 SPRING_SCALE = "spring_scale"
 """Key of what the team's common spring scale does to a calibrated mass and inertia, and of the errors beyond it."""
+
+
+@dataclass(frozen=True)
+class TrialSummary:
+    """Extremes of one trial: payload rotation [deg], SEA torque [N m], rod and weld errors [m], weld angle [deg], and
+    the damping ratio of its control, below 0 if that was unstable."""
+
+    name: str
+    rotation_deg: float
+    torque_Nm: float
+    rod_error_m: float
+    weld_error_m: float
+    weld_error_deg: float
+    damping_ratio: float | None
 
 
 def score(

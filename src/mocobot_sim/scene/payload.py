@@ -12,6 +12,7 @@ from estimator.errors import InputError
 from estimator.inputs import printable
 from mocobot_sim.model_check import check_model
 from mocobot_sim.scene.models import payload_path, posed
+from mocobot_sim.scene.named_files import check_named
 from mocobot_sim.scene.pymjcf import compiled, mjcf
 
 OWN_COMPILER_SETTINGS = ("angle", "autolimits", "eulerseq", "assetdir", "meshdir", "texturedir")
@@ -27,7 +28,8 @@ def load_payload(payload: str | Path) -> "mjcf.RootElement":
         payload: name of a shipped payload, or path of an ``.xml`` file.
 
     Raises:
-        InputError: it cannot be read, or something in it would act on the robots, too.
+        InputError: it cannot be read, or something in it would act on the robots, too, or it names files
+            that are not its own.
     """
     path = Path(payload) if Path(payload).suffix == ".xml" else payload_path(str(payload))
     if path.exists():
@@ -38,6 +40,7 @@ def load_payload(payload: str | Path) -> "mjcf.RootElement":
     except (OSError, ValueError, AttributeError, KeyError, SyntaxError) as error:
         said = " ".join(str(getattr(error, "strerror", None) or error).split())
         raise InputError(f"{path}: not a readable MJCF ({printable(said)})") from error
+    check_named(path, assets=True)
     if root.compiler.angle != "radian":
         # The composed scene has one compiler setting for all parts; degrees here would be read as radians.
         raise InputError(f'{path}: compiler angle is {root.compiler.angle or "degree"}; it must be "radian"')

@@ -13,7 +13,7 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.files import write_json, write_text
 from estimator.strict import Fields, read_json
-from mocobot_sim.serial.assets import take_along
+from mocobot_sim.serial.assets import put, take_along
 from mocobot_sim.serial.built import Effect, refused, steps
 from mocobot_sim.serial.effects import DRY, RobotEffect, dry_levels, resistances
 from mocobot_sim.serial.law import ActingLaw, JointLaw
@@ -47,7 +47,8 @@ def write_extended(
         reference: whether it is what has changed since other logs, whose own errors are then in no model.
 
     Raises:
-        InputError: the folder cannot be written, or an effect makes a model that MuJoCo refuses.
+        InputError: the folder cannot be written, an effect makes a model that MuJoCo refuses, or a mesh or texture is
+            not the model's own.
     """
     try:
         inside = [isinstance(e, RobotEffect) and into_mjcf(spec, e) for e in effects]
@@ -57,9 +58,10 @@ def write_extended(
     places = [
         SCENE if said else NUMBERS if steps(e) else "none" for e, said in zip(effects, inside, strict=True)
     ]
+    taken = take_along(spec)
     try:
         folder.mkdir()
-        take_along(spec, folder)
+        put(taken, spec, folder)
     except OSError as error:
         raise InputError(f"{folder}: cannot be written ({error.strerror or error})") from error
     write_text(folder / SCENE, spec.to_xml())

@@ -14,6 +14,7 @@ from discrepancy.emps.recording.preflight import checked, stuck
 from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.recording.whole import is_whole
 from emps_made import GAIN, KP, KV, as_mat, reference, written
+from estimator import unpacked
 from estimator.errors import InputError
 
 RATE = 1000.0
@@ -266,3 +267,12 @@ def test_rows_that_repeat_count_once(tmp_path: Path) -> None:
     index[2000:4000] = 2000
     fields = {name: getattr(made, name)[index] for name in ("position", "reference", "voltage")}
     assert "s are missing from t = 2 s on" in refused(written(tmp_path, replace(made, **fields)))
+
+
+def test_a_file_that_unpacks_to_too_much(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path = tmp_path / "axis.mat"
+    savemat(path, as_mat(axis()) | {"more": np.zeros(1 << 18)}, do_compression=True)
+    assert len(read_emps(path).time)
+    monkeypatch.setattr(unpacked, "FREE_BYTES", 1 << 20)
+    monkeypatch.setattr(unpacked, "LARGEST_RATIO", 2)
+    assert "axis.mat: unpacks to at least 0.00" in refused(path)

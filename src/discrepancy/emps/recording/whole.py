@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import struct
+import zlib
 from pathlib import Path
 
 from estimator.inputs import open_input
+from estimator.unpacked import Unpacked
 
 HEADER_BYTES, TAG_BYTES = 128, 8
+COMPRESSED = 15
+"""Type of an element that zlib packed."""
+_STEP = 1 << 20
 
 
 def is_whole(path: Path) -> bool:
@@ -19,8 +24,10 @@ def is_whole(path: Path) -> bool:
 
     Raises:
         OSError: it cannot be read.
+        InputError: it unpacks to too much.
     """
     size = path.stat().st_size
+    unpacked = Unpacked(str(path), size)
     with open_input(path) as file:
         header = file.read(HEADER_BYTES)
         order = {b"IM": "<", b"MI": ">"}.get(header[126:])
@@ -32,5 +39,11 @@ def is_whole(path: Path) -> bool:
             tag = file.read(TAG_BYTES)
             if len(tag) < TAG_BYTES:
                 return False
-            at += TAG_BYTES + struct.unpack(f"{order}II", tag)[1]
+            kind, count = struct.unpack(f"{order}II", tag)
+            at += TAG_BYTES + count
+            if kind == COMPRESSED and at <= size:
+                packed, stream = file.read(count), zlib.decompressobj()
+                while packed:
+                    unpacked.add(len(stream.decompress(packed, _STEP)))
+                    packed = stream.unconsumed_tail
     return at == size
