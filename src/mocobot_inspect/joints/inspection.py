@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_inspect.joints.lags import (
     Follows,
@@ -20,8 +19,9 @@ from mocobot_inspect.joints.lags import (
 from mocobot_inspect.joints.motion import Motion, motion_of
 from mocobot_inspect.joints.robot import Robot
 from mocobot_inspect.joints.samples import wrapped
-from mocobot_inspect.joints.wiring import Wiring, check_wiring, fit
+from mocobot_inspect.joints.wiring import Wiring, check_wiring
 from mocobot_inspect.stream.channels import Channel, ChannelTally, seconds
+from mocobot_inspect.stream.noise import wild
 from mocobot_inspect.stream.timing import Timing, TimingTally
 from mocobot_logs.joints.joint_log import JointLog
 from mocobot_logs.joints.joint_map import JointMap, label
@@ -38,11 +38,12 @@ class TorqueDelay:
     """How torques lag behind the motion.
 
     Attributes:
-        delay_s: of all torques [s].
+        delay_s, delay_se_s: of all torques, and its standard error [s].
         before, after: share of their variance that model and friction leave, without and with it.
     """
 
     delay_s: float
+    delay_se_s: float
     before: float
     after: float
 
@@ -62,7 +63,6 @@ class JointInspection:
         unchecked: why motion and torques could not be looked at, or None.
         moves: whether each joint moves, shape (J,).
         wiring: signs, order and units against the model, or None without torques.
-        gains: of the model's torque in each joint's, NaN where it does not show, shape (J,).
         velocities, commands: how they follow the motion, part by part.
         crossed: pairs of joints whose commands are exchanged, from 0.
         delay: of the torques, or None.
@@ -78,7 +78,6 @@ class JointInspection:
     unchecked: str | None
     moves: NDArray[np.bool_]
     wiring: Wiring | None = None
-    gains: Array | None = None
     velocities: tuple[Follows, ...] = ()
     commands: tuple[Follows, ...] = ()
     crossed: tuple[tuple[int, int], ...] = ()
@@ -119,6 +118,10 @@ def inspect_joints(
         unchecked=None,
         moves=np.zeros(len(robot.joints), dtype=bool),
     )
+    odd = np.apply_along_axis(
+        wild, 0, samples.values
+    )  # refused, or taken for readings: they count as missing
+    samples = replace(samples, values=np.where(odd, np.nan, samples.values))
     try:
         logs = joint_logs_of(source.name, samples, log_map)
     except InputError as error:
@@ -157,36 +160,16 @@ def _with_motion(
     log, motion = max(whole, key=lambda part: len(part[1].q))
     moves = np.any([part.moves for _, part in whole], axis=0)
     wiring = check_wiring([part for _, part in whole], robot, advance)
-    gains, delay = None, None
+    delay = None
     if wiring is not None and not wiring.found:
-        asked = robot.inverse(motion.q, motion.dq, motion.ddq)
-        gains = _gains(motion, asked)
-        late = torque_delay(log, motion, asked)
+        late = torque_delay(log, motion, robot.asked(motion.q, motion.dq, motion.ddq, wiring.payload))
         delay = None if late is None else TorqueDelay(*late)
     return replace(
         found,
         moves=moves,
         wiring=wiring,
-        gains=gains,
         velocities=tuple(velocity_follows(log, motion)),
         commands=tuple(command_follows(log, motion)),
         crossed=tuple(exchanged_commands(log, motion)),
         delay=delay,
     )
-
-
-SHOWS = 0.3
-"""Share of a torque's variance that the model's must make up for its gain to be known."""
-
-
-def _gains(motion: Motion, asked: Array) -> Array:
-    """Gain of the model's torque in each joint's, NaN where friction hides it, shape (J,)."""
-    out = np.full(asked.shape[1], np.nan)
-    for j in range(asked.shape[1]):
-        torque = motion.torque[:, j]
-        if not np.isfinite(torque).all() or np.std(torque) == 0 or not motion.moves[j]:
-            continue
-        values, _ = fit(asked[:, j], motion.dq[:, j], motion.ddq[:, j], torque)
-        if np.var(values[0] * asked[:, j]) > SHOWS * np.var(torque):
-            out[j] = values[0]
-    return out
