@@ -76,7 +76,8 @@ def model_text(rng: np.random.Generator, count: int) -> str:
         mass, at = 12.0 * length * rng.uniform(0.7, 1.3), length * rng.uniform(0.3, 0.6)
         size = mass * (length**2 / 12.0 + 1e-3)
         text += (
-            f'<body name="b{k}" pos="0 0 {lengths[k - 1] if k else 0.2}"><joint name="j{k}" axis="{AXES[k]}" range="-3 3"/>'
+            f'<body name="b{k}" pos="0 0 {lengths[k - 1] if k else 0.2}">'
+            f'<joint name="j{k}" axis="{AXES[k]}" range="-3 3"/>'
             f'<inertial mass="{mass}" pos="{0.02 * rng.standard_normal()} {0.02 * rng.standard_normal()} {at}" '
             f'diaginertia="{size} {size} {0.4 * size}"/>'
         )

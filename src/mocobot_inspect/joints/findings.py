@@ -10,16 +10,17 @@ import numpy as np
 from mocobot_inspect.findings import Finding, Topic, no_readings, of_stream, stands
 from mocobot_inspect.joints.inspection import JointInspection
 from mocobot_inspect.joints.lags import SIGMAS
-from mocobot_inspect.joints.motion import NOISES
 from mocobot_inspect.joints.numbers import milliseconds, percent
 from mocobot_inspect.joints.samples import beyond_range, coarse, of_velocities, saturated, unit_of
 from mocobot_inspect.joints.wiring import SUSPICIOUS, Found, Mistake
 from mocobot_inspect.wiring.mistakes.base import listed
-from mocobot_logs.joints.quantities import POSITIONS
 
 LATE = 1.1
 """So much more of the torques must be left without a delay than with it."""
-_NEVER = 1e-3  # of its largest value may a torque be negative that never is
+_NEVER, _NEAR = (
+    1e-3,
+    0.02,
+)  # of its largest value may a torque be negative that never is; so near it comes to zero
 
 
 def joint_findings(found: JointInspection) -> list[Finding]:
@@ -41,12 +42,9 @@ def _of_stamps(found: JointInspection) -> Iterator[str]:
 
 
 def _of_samples(found: JointInspection) -> Iterator[str]:
-    keys = list(found.log_map.channels)
-    for (quantity, joint), c in zip(keys, found.channels, strict=True):
+    for c in found.channels:
         yield from no_readings(c.name, c, found.timing.samples)
-        rests = quantity in POSITIONS and c.lowest == c.highest and not _is_driven(found, joint)
-        if not rests:
-            yield from stands(c.name, c, found.timing.duration_s)
+        yield from stands(c.name, c, found.timing.duration_s)
     yield from found.signs_lost
     for log in found.logs[:1]:
         yield from coarse(log, found.moves)
@@ -57,17 +55,6 @@ def _of_samples(found: JointInspection) -> Iterator[str]:
         if not known:
             yield from beyond_range(log, found.robot)
         yield from saturated(log, found.robot)
-
-
-def _is_driven(found: JointInspection, joint: str) -> bool:
-    """Whether a joint has a velocity or a command that moves by more than noise."""
-    keys = list(found.log_map.channels)
-    moving = ("dq", "motor_velocity", "command", "motor_command")
-    return any(
-        c.lowest is not None and c.highest is not None and c.highest - c.lowest > NOISES * c.white_noise
-        for (quantity, of), c in zip(keys, found.channels, strict=True)
-        if of == joint and quantity in moving
-    )
 
 
 def _of_wiring(found: JointInspection) -> Iterator[str]:
@@ -109,11 +96,11 @@ def _magnitudes(found: JointInspection) -> Iterator[str]:
         if (
             not torques
             or found.wiring is None
-            or not (found.wiring.undone[j] > SUSPICIOUS and found.moves.any())
+            or not (found.wiring.undone[j] > SUSPICIOUS and found.moves[j])
         ):
             continue
         torque = np.concatenate(torques)
-        if np.isfinite(torque).all() and torque.max() > 0 and torque.min() > -_NEVER * torque.max():
+        if np.isfinite(torque).all() and -_NEVER < torque.min() / max(torque.max(), 1e-300) < _NEAR:
             yield f"torque of {name} is never negative: has it lost its sign?"
 
 

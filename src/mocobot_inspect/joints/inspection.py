@@ -20,17 +20,18 @@ from mocobot_inspect.joints.motion import Motion, motion_of
 from mocobot_inspect.joints.robot import Robot
 from mocobot_inspect.joints.samples import wrapped
 from mocobot_inspect.joints.wiring import Wiring, check_wiring
-from mocobot_inspect.stream.channels import Channel, ChannelTally, seconds
+from mocobot_inspect.stream.channels import Channel, ChannelTally, Stretch, seconds
 from mocobot_inspect.stream.noise import wild
 from mocobot_inspect.stream.timing import Timing, TimingTally
 from mocobot_logs.joints.joint_log import JointLog
 from mocobot_logs.joints.joint_map import JointMap, label
-from mocobot_logs.joints.quantities import EFFORTS, POSITIONS, VELOCITIES
+from mocobot_logs.joints.quantities import COMMANDS, EFFORTS, POSITIONS, VELOCITIES
 from mocobot_logs.joints.read import joint_logs_of
 from mocobot_logs.log import LogSource, Samples, collect
 
 LEAST_ROWS = 50
 """Fewer samples of smooth motion tell nothing."""
+_NOISES, _MOVES = 3.0, 0.05  # a velocity is one beyond so much of its noise, and of its rms
 
 
 @dataclass(frozen=True)
@@ -148,7 +149,39 @@ def _channels(samples: Samples, log_map: JointMap) -> tuple[Channel, ...]:
         with np.errstate(all="ignore"):  # absurd values overflow; they are reported by their range
             tally.add(time_s, samples.values[:, order], rate_hz)
     told = dict(zip(order, tally.finish(), strict=True))
-    return tuple(told[k] for k in range(len(keys)))
+    return tuple(_without_rests(k, told, log_map, samples) for k in range(len(keys)))
+
+
+def _without_rests(k: int, told: dict[int, Channel], log_map: JointMap, samples: Samples) -> Channel:
+    """A channel, without stretches in which a position stands because its joint's velocity or command does, too."""
+    c, (quantity, joint) = told[k], list(log_map.channels)[k]
+    if quantity not in POSITIONS or not (c.stuck or c.clipped):
+        return c
+    time_s, command = seconds(samples.stamp_ns, int(samples.stamp_ns[0])), log_map.control.command
+    speeds = []
+    for i, (other, of) in enumerate(log_map.channels):
+        if of == joint and (
+            other in VELOCITIES or (other in COMMANDS and command in ("position", "velocity"))
+        ):
+            placed = other in COMMANDS and command == "position"
+            x = samples.values[:, i]
+            speed = np.abs(np.diff(x, prepend=x[:1]) if placed else x)
+            noise = told[i].noise * (np.sqrt(2.0) if placed else 1.0)
+            speeds.append((speed, max(_NOISES * noise, _MOVES * float(np.sqrt(np.nanmean(speed**2))))))
+
+    def stays(s: Stretch) -> bool:
+        inside = (time_s > s.start_s) & (time_s < s.start_s + s.duration_s)
+        moves = [bool(np.sqrt(np.nanmean(speed[inside] ** 2)) > least) for speed, least in speeds]
+        return any(moves) or s.jumps or (not moves and c.lowest != c.highest)
+
+    stuck, clipped = tuple(filter(stays, c.stuck)), tuple(filter(stays, c.clipped))
+    return replace(
+        c,
+        stuck=stuck,
+        clipped=clipped,
+        stuck_count=c.stuck_count - len(c.stuck) + len(stuck),
+        clipped_count=c.clipped_count - len(c.clipped) + len(clipped),
+    )
 
 
 def _with_motion(

@@ -210,7 +210,7 @@ def _solved(columns: Array, y: Array) -> tuple[Array, Array]:
     scores = scaled * (y - scaled @ values)[:, None]
     sums = np.stack([block.sum(axis=0) for block in np.array_split(scores, _BLOCKS)])
     covariance = inverse @ (sums.T @ sums) @ inverse * _BLOCKS / (_BLOCKS - 1.0)
-    return values / size, np.sqrt(np.diag(covariance)) / size
+    return values / size, np.sqrt(np.maximum(np.diag(covariance), 0.0)) / size
 
 
 def _correlation(one: Array, other: Array) -> float:

@@ -26,11 +26,13 @@ class Stretch:
         start_s: when it begins after the robot's first stamp [s].
         duration_s: how long it lasts [s].
         value: where the channel stands [SI].
+        jumps: whether it jumps there or from there.
     """
 
     start_s: float
     duration_s: float
     value: float
+    jumps: bool
 
 
 @dataclass(frozen=True)
@@ -116,7 +118,9 @@ class ChannelTally:
 
     def _keep(self, found: Frozen, time_s: Array, rate_hz: float) -> None:
         start_s = float(time_s[found.start])
-        stretch = Stretch(start_s, float(time_s[found.stop - 1]) - start_s + 1.0 / rate_hz, found.value)
+        stretch = Stretch(
+            start_s, float(time_s[found.stop - 1]) - start_s + 1.0 / rate_hz, found.value, found.jumps
+        )
         key = found.kind, found.channel
         kept = self._frozen.setdefault(key, [])
         last = kept[-1] if kept else None
@@ -126,7 +130,9 @@ class ChannelTally:
             and last.value == stretch.value
             and start_s <= last.start_s + last.duration_s + 2 / rate_hz
         ):
-            kept[-1] = Stretch(last.start_s, stretch.start_s + stretch.duration_s - last.start_s, last.value)
+            kept[-1] = Stretch(
+                last.start_s, stretch.start_s + stretch.duration_s - last.start_s, last.value, stretch.jumps
+            )
             return
         self._counts[key] = self._counts.get(key, 0) + 1
         if len(kept) < LISTED:

@@ -34,6 +34,7 @@ class Frozen:
         channel: which channel, from 0.
         start, stop: rows, the last one not included.
         value: where it stands [SI].
+        jumps: whether it jumps there or from there.
     """
 
     kind: Literal["stuck", "clipped"]
@@ -41,6 +42,7 @@ class Frozen:
     start: int
     stop: int
     value: float
+    jumps: bool = False
 
 
 def frozen(values: Array, rate_hz: float) -> list[Frozen]:
@@ -72,12 +74,11 @@ def frozen(values: Array, rate_hz: float) -> list[Frozen]:
                 continue
             back = steps[stop - 1] if stop < len(x) else 0.0
             into = steps[start - 1] if start else 0.0
+            jumps = bool(max(back, into) > _JUMP * usual)
             if stop - start >= max(STUCK_S * rate_hz, CLIPPED_SAMPLES) and (
-                stop - start > repeats
-                or max(back, into) > _JUMP * usual
-                or _stops_dead(x, steps, start, stop, rate_hz)
+                jumps or stop - start > repeats or _stops_dead(x, steps, start, stop, rate_hz)
             ):
-                found.append(Frozen("stuck", channel, start, stop, float(x[start])))
+                found.append(Frozen("stuck", channel, start, stop, float(x[start]), jumps))
     return found + _clipped(values)
 
 
