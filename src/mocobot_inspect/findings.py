@@ -24,8 +24,6 @@ EARLY_S = 1.0
 """Ends that are farther apart than this are worth a word."""
 RECORDER_S = 1.0
 """Spread of the recorder's lead over the stamps from which on two clocks are mixed."""
-LIMITED = ("phi", "theta", "tau")
-"""Channels that have a range, by the first letters of their names."""
 _NAMED = 4  # channels of a sentence
 _TURN = 2 * np.pi
 _ONE_TURN = 0.01  # angles that cover a full turn to this share of it are an encoder's that starts again there
@@ -140,7 +138,7 @@ def _of_samples(found: Inspection) -> Iterator[str]:
             who = f"omnid{robot + 1}.{c.name}"
             yield from no_readings(who, c, found.survey.timing[robot].samples)
             yield from stands(who, c, duration)
-    for kind in LIMITED:
+    for kind in ("phi", "theta", "tau"):
         yield from _limits(kind, found)
     yield from _oscillating(found)
 
@@ -191,34 +189,27 @@ def _times(stretches: tuple[Stretch, ...], count: int) -> str:
     return at if count == 1 else f"{count} times, longest {at}"
 
 
-def beyond_limits(kind: str, found: Inspection) -> tuple[list[tuple[str, float, float]], tuple[float, float]]:
-    """Channels of one kind that leave their range, unless a mistake in their wiring is found anyway, and the range.
-
-    Each with its extremes.
-    """
+def _limits(kind: str, found: Inspection) -> Iterator[str]:
+    """Channels of one kind that leave their range, unless a mistake in their wiring is found anyway."""
     d = found.design
-    low, high = {
-        "phi": (d.phi_min_rad, d.phi_max_rad),
-        "theta": (-d.gimbal_limit_rad, d.gimbal_limit_rad),
-        "tau": (-TORQUE_FACTOR * d.torque_limit_Nm, TORQUE_FACTOR * d.torque_limit_Nm),
+    low, high, unit = {
+        "phi": (d.phi_min_rad, d.phi_max_rad, "rad"),
+        "theta": (-d.gimbal_limit_rad, d.gimbal_limit_rad, "rad"),
+        "tau": (-TORQUE_FACTOR * d.torque_limit_Nm, TORQUE_FACTOR * d.torque_limit_Nm, "N m"),
     }[kind]
     known = found.wiring.found if found.wiring is not None else ()
     blamed = {(robot, name) for f in known for robot in f.mistake.robots for name in f.mistake.channels}
-    beyond = [
-        (f"omnid{robot + 1}.{c.name}", c.lowest, c.highest)
-        for robot, channels in enumerate(found.survey.channels)
-        for c in channels
-        if c.name.startswith(kind) and c.lowest is not None and c.highest is not None and not c.wild
-        if (c.lowest < low or c.highest > high) and (robot, c.name) not in blamed
-    ]
-    return beyond, (low, high)
-
-
-def _limits(kind: str, found: Inspection) -> Iterator[str]:
-    told, (low, high) = beyond_limits(kind, found)
-    beyond, unit = [who for who, _, _ in told], "N m" if kind == "tau" else "rad"
+    beyond, extremes, spans = [], [], []
+    for robot, channels in enumerate(found.survey.channels):
+        for c in channels:
+            if not c.name.startswith(kind) or c.wild or c.lowest is None or c.highest is None:
+                continue
+            if (c.lowest < low or c.highest > high) and (robot, c.name) not in blamed:
+                beyond.append(f"omnid{robot + 1}.{c.name}")
+                extremes += [c.lowest, c.highest]
+                spans.append(c.highest - c.lowest)
     if beyond:
-        wraps = kind != "tau" and any(abs((b - a) / _TURN - 1.0) < _ONE_TURN for _, a, b in told)
+        wraps = kind != "tau" and any(abs(span / _TURN - 1.0) < _ONE_TURN for span in spans)
         turn = (
             ": do they jump by a full turn, which has to be taken out before (numpy.unwrap)?" if wraps else ""
         )
@@ -228,8 +219,8 @@ def _limits(kind: str, found: Inspection) -> Iterator[str]:
             else ", ".join(beyond[:_NAMED]) + f" and {len(beyond) - _NAMED} more"
         )
         yield (
-            f"{names} reach{'es' * (len(beyond) == 1)} {min(a for _, a, _ in told):.4g} to "
-            f"{max(b for _, _, b in told):.4g} {unit}, beyond the range of {low:.4g} to {high:.4g}" + turn
+            f"{names} reach{'es' * (len(beyond) == 1)} {min(extremes):.4g} to {max(extremes):.4g} {unit}, beyond the "
+            f"range of {low:.4g} to {high:.4g}" + turn
         )
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mocobot_inspect.findings import LIMITED, beyond_limits, evidence, findings
+from mocobot_inspect.findings import evidence, findings
 from mocobot_inspect.inspection import Inspection
 from mocobot_inspect.readiness import AXES, Readiness
 from mocobot_inspect.stream.channels import UNITS, Channel
@@ -185,15 +185,11 @@ def ready_line(found: Inspection) -> str:
 def _first(found: Inspection) -> list[str]:
     """What has to be done before, or a conversion and an estimate refuse the log."""
     timing, channels = found.survey.timing, [c for of_robot in found.survey.channels for c in of_robot]
-    beyond = any(beyond_limits(kind, found)[0] for kind in LIMITED)
     return [
         what
         for what, needed in (
             ("time that runs back mended", any(t.backwards for t in timing)),
-            (
-                "absurd values left out (convert --drop)",
-                beyond or any(c.infinities or c.wild for c in channels),
-            ),
+            ("absurd values left out (convert --drop)", any(c.infinities or c.wild for c in channels)),
             ("missing values filled in (convert)", any(c.nans for c in channels)),
             ("the parts between gaps taken (convert --split-at-gaps)", any(map(_gap, found.survey.whole))),
         )

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from estimator.arrays import Array
 from estimator.errors import InputError
 from mocobot_inspect.joints.lags import (
     Follows,
@@ -31,7 +32,7 @@ from mocobot_logs.log import LogSource, Samples, collect
 
 LEAST_ROWS = 50
 """Fewer samples of smooth motion tell nothing."""
-_NOISES, _MOVES = 3.0, 0.05  # a velocity is one beyond so much of its noise, and of its rms
+_NOISES, _MOVES = 4.0, 0.05  # a velocity is one beyond so much of its noise, and of its rms
 
 
 @dataclass(frozen=True)
@@ -119,9 +120,8 @@ def inspect_joints(
         unchecked=None,
         moves=np.zeros(len(robot.joints), dtype=bool),
     )
-    odd = np.apply_along_axis(
-        wild, 0, samples.values
-    )  # refused, or taken for readings: they count as missing
+    # Refused, or taken for readings otherwise: they count as missing.
+    odd = np.apply_along_axis(wild, 0, samples.values)
     samples = replace(samples, values=np.where(odd, np.nan, samples.values))
     try:
         logs = joint_logs_of(source.name, samples, log_map)
@@ -152,26 +152,28 @@ def _channels(samples: Samples, log_map: JointMap) -> tuple[Channel, ...]:
     return tuple(_without_rests(k, told, log_map, samples) for k in range(len(keys)))
 
 
+def _rms(x: Array) -> float:
+    """Of what is known."""
+    return float(np.sqrt(np.nansum(x**2) / max(len(x), 1)))
+
+
 def _without_rests(k: int, told: dict[int, Channel], log_map: JointMap, samples: Samples) -> Channel:
     """A channel, without stretches in which a position stands because its joint's velocity or command does, too."""
     c, (quantity, joint) = told[k], list(log_map.channels)[k]
     if quantity not in POSITIONS or not (c.stuck or c.clipped):
         return c
-    time_s, command = seconds(samples.stamp_ns, int(samples.stamp_ns[0])), log_map.control.command
+    time_s = seconds(samples.stamp_ns, int(samples.stamp_ns[0]))
+    moving = (*VELOCITIES, *(COMMANDS if log_map.control.command == "position" else ()))
+    of_joint = [i for i, (other, of) in enumerate(log_map.channels) if of == joint and other in moving]
     speeds = []
-    for i, (other, of) in enumerate(log_map.channels):
-        if of == joint and (
-            other in VELOCITIES or (other in COMMANDS and command in ("position", "velocity"))
-        ):
-            placed = other in COMMANDS and command == "position"
-            x = samples.values[:, i]
-            speed = np.abs(np.diff(x, prepend=x[:1]) if placed else x)
-            noise = told[i].noise * (np.sqrt(2.0) if placed else 1.0)
-            speeds.append((speed, max(_NOISES * noise, _MOVES * float(np.sqrt(np.nanmean(speed**2))))))
+    for i in of_joint:
+        x = np.where(wild(samples.values[:, i]), np.nan, samples.values[:, i])
+        speed = np.diff(x, prepend=x[:1]) if list(log_map.channels)[i][0] in COMMANDS else x
+        speeds.append((speed, max(_NOISES * told[i].noise, _MOVES * _rms(speed))))
 
     def stays(s: Stretch) -> bool:
         inside = (time_s > s.start_s) & (time_s < s.start_s + s.duration_s)
-        moves = [bool(np.sqrt(np.nanmean(speed[inside] ** 2)) > least) for speed, least in speeds]
+        moves = [_rms(speed[inside]) > least for speed, least in speeds]
         return any(moves) or s.jumps or (not moves and c.lowest != c.highest)
 
     stuck, clipped = tuple(filter(stays, c.stuck)), tuple(filter(stays, c.clipped))

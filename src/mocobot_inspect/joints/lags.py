@@ -178,15 +178,15 @@ def _pairs(log: JointLog, motion: Motion, late_raw: Array, early: Array, noise: 
         y = late[motion.at, j]
         if not (np.isfinite(y).all() and np.isfinite(early[:, j]).all()) or np.std(y) == 0:
             continue
-        delay, step = 0.0, np.inf
+        delay, step, gain, se, now = 0.0, np.inf, 0.0, np.zeros(3), y
         for _ in range(_ITERATIONS):  # the delay enters linearly, and then what is left of it
             at = motion.at - delay * log.rate_hz
             now, slope = np.interp(at, samples, early[:, j]), np.interp(at, samples, rate[:, j])
             (gain, shift, _), se = _solved(np.column_stack([now, -slope, np.ones_like(now)]), y)
-            step = shift / gain if gain else np.inf
+            step = float(shift / gain) if gain else np.inf
             if abs(delay + step) > LONGEST_S:
                 break
-            delay += float(step)
+            delay += step
         delay_se = float(np.hypot(se[1] / abs(gain), _GRID / log.rate_hz)) if gain else np.inf
         clear = 1.0 - np.minimum([noise[j] ** 2 / np.var(now), late_noise[j] ** 2 / np.var(y)], 1.0)
         correlation = _correlation(now, y)

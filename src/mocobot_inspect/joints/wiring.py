@@ -172,10 +172,9 @@ class _Case:
         """The same with a mistake undone."""
         q, dq, ddq = (mistake.moved(x) for x in (self.q, self.dq, self.ddq))
         torque = mistake.torques(self.torque)
-        if mistake.kind == "payload":
-            return _Case.of(robot, (q, dq, ddq, torque), _payload(self, robot))
-        if mistake.of_positions:
-            return _Case.of(robot, (q, dq, ddq, torque), self.payload)
+        if mistake.of_positions or mistake.kind == "payload":
+            payload = _payload(self, robot) if mistake.kind == "payload" else self.payload
+            return _Case.of(robot, (q, dq, ddq, torque), payload)
         return _Case(q, dq, ddq, torque, self.asked, *misfits(self.asked, dq, ddq, torque), self.payload)
 
     @property
@@ -297,9 +296,8 @@ def columns_of(asked: Array, dq: Array, ddq: Array) -> Array:
 def _nonnegative(columns: Array, y: Array) -> tuple[Array, Array]:
     """Least squares without negative values, and what they leave."""
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-12)
-    together = np.linalg.qr(np.column_stack([columns / size, y]), mode="r") if len(y) > 1000 else None
-    values, _ = nnls(columns / size, y) if together is None else nnls(together[:, :-1], together[:, -1])
-    values = values / size
+    short = np.asarray(np.linalg.qr(np.column_stack([columns / size, y]), mode="r"))
+    values = nnls(short[:, :-1], short[:, -1], maxiter=30 * len(size))[0] / size
     return values, y - columns @ values
 
 
@@ -338,9 +336,8 @@ def _judged(mistake: Mistake, case: _Case, undone: _Case) -> tuple[float, float]
     if np.any(after[known] > np.maximum(2.0 * before[known], SUSPICIOUS)):
         return None
     own = np.zeros(len(before), dtype=bool)
-    if mistake.of_torques or len(mistake.joints) in (
-        1,
-        2,
+    if (
+        mistake.of_torques or 1 <= len(mistake.joints) <= 2
     ):  # not every joint shows that all positions are wrong
         own[list(mistake.joints)] = True
     if not mistake.kind.startswith("torque"):
