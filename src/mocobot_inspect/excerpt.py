@@ -12,12 +12,11 @@ from scipy.interpolate import make_interp_spline
 from estimator.arrays import Array
 from estimator.clocks.offsets import ClockEstimate
 from mocobot_inspect.signals import RATE_HZ, TRIM_S
+from mocobot_inspect.stream.noise import wild
 from mocobot_logs.log import NS, Samples
 
 MAX_GAP_S = 0.05
 SHORTEST_S = 2 * TRIM_S + 2.0
-ABSURD = 1e9
-"""No angle, length, torque or force in any unit is as large [SI]."""
 _PERIODS = 3.5  # a gap in a slow log
 
 
@@ -36,7 +35,7 @@ def clean_stream(
     """
     time_s = np.asarray((samples.stamp_ns - origin_ns) * NS, dtype=np.float64)
     values = samples.values[:, :9]
-    good = (np.abs(values) < ABSURD).all(axis=1)  # neither NaN nor infinite, either
+    good = np.isfinite(values).all(axis=1) & ~np.apply_along_axis(wild, 0, values).any(axis=1)
     for start_ns, stop_ns in faulty:
         good &= (samples.stamp_ns < start_ns) | (samples.stamp_ns >= stop_ns)
     time_s, values = time_s[good], values[good]

@@ -6,11 +6,14 @@ from mocobot_inspect.findings import evidence, findings
 from mocobot_inspect.inspection import Inspection
 from mocobot_inspect.readiness import AXES, Readiness
 from mocobot_inspect.stream.channels import UNITS, Channel
+from mocobot_inspect.stream.timing import Timing
 from mocobot_inspect.wiring.mistakes import Mistake
 from mocobot_inspect.wiring.mistakes.base import listed
 from mocobot_logs.resample.log import MAX_GAP_S
+from mocobot_logs.resample.tally import MOST_MISSING
 
 _HIDDEN = 6
+_AS_IT_IS = "nothing as it is; with "
 
 
 def format_inspection(found: Inspection) -> str:
@@ -172,12 +175,11 @@ def hidden_words(mistakes: tuple[Mistake, ...]) -> list[str]:
 
 def ready_line(found: Inspection) -> str:
     """The verdict; an estimate takes all of a log, so stretches in which a channel stands spoil it."""
-    line = _ready(found)
-    return (
-        line
-        if line.startswith("ready for: nothing (")
-        else line + "".join(f"; {what}" for what in _first(found))
-    )
+    line, first = _ready(found), _first(found)
+    if line.startswith("ready for: nothing (") or not first:
+        return line
+    later = line.removeprefix("ready for: ").removeprefix(_AS_IT_IS)
+    return f"ready for: {_AS_IT_IS}{listed(first)}{' and ' if _AS_IT_IS in line else ': '}{later}"
 
 
 def _first(found: Inspection) -> list[str]:
@@ -186,20 +188,28 @@ def _first(found: Inspection) -> list[str]:
     return [
         what
         for what, needed in (
-            ("time that runs back to be mended", any(t.backwards for t in timing)),
-            ("infinite values to be left out (convert --drop)", any(c.infinities for c in channels)),
-            (
-                "the parts between gaps to be taken (convert --split-at-gaps)",
-                any(t.rate_hz is not None and t.longest_gap_s > MAX_GAP_S + 1 / t.rate_hz for t in timing),
-            ),
+            ("time that runs back mended", any(t.backwards for t in timing)),
+            ("absurd values left out (convert --drop)", any(c.infinities or c.wild for c in channels)),
+            ("missing values filled in (convert)", any(c.nans for c in channels)),
+            ("the parts between gaps taken (convert --split-at-gaps)", any(map(_gap, found.survey.whole))),
         )
         if needed
     ]
 
 
+def _gap(t: Timing) -> bool:
+    """Whether samples are missing for too long to be filled in."""
+    return t.rate_hz is not None and t.longest_gap_s > MAX_GAP_S + 1 / t.rate_hz
+
+
 def _ready(found: Inspection) -> str:
     if found.unchecked is not None or not (found.free or (found.ready and found.wiring)):
         return f"ready for: nothing ({found.unchecked})"
+    for robot, t in enumerate(found.survey.whole):
+        if t.missing > MOST_MISSING * (t.samples + t.missing) and not _gap(t):
+            return (
+                f"ready for: nothing (robot {robot + 1} lacks {t.missing} samples, too many to be filled in)"
+            )
     clocks = "; clocks to be corrected" if found.skewed else ""
     standing = found.standing
     if any(stands.mostly for stands in standing):
@@ -212,18 +222,18 @@ def _ready(found: Inspection) -> str:
         out = f"the {worst.seconds:.2g} s left out in which {who} still"
     if found.free or found.ready is None or found.wiring is None:
         good = "mocobot calibrate --free yes, an estimate no (the robots hold nothing)"
-        return f"ready for: nothing as it is; with {out}: {good}" if out else f"ready for: {good}"
+        return f"ready for: {_AS_IT_IS}{out}: {good}" if out else f"ready for: {good}"
     if found.ready_undone is not None:
         count = len(found.wiring.found)
         what = "the mistake above" if count == 1 else f"the {count} mistakes above"
         if found.wiring.undone.suspicious:
             return f"ready for: nothing (even with {what} undone, the robots do not carry one rigid payload)"
         undone = f"{what} undone{f' and {out}' if out else ''}"
-        return f"ready for: nothing as it is; with {undone}: {verdict(found.ready_undone)}{clocks}"
+        return f"ready for: {_AS_IT_IS}{undone}: {verdict(found.ready_undone)}{clocks}"
     if found.wiring.as_is.suspicious:
         return "ready for: nothing (the channels do not fit robots that carry one rigid payload)"
     if out:
-        return f"ready for: nothing as it is; with {out}: {verdict(found.ready)}{clocks}"
+        return f"ready for: {_AS_IT_IS}{out}: {verdict(found.ready)}{clocks}"
     return f"ready for: {verdict(found.ready)}{clocks}"
 
 

@@ -59,7 +59,11 @@ def write_map(folder: Path, text: str = MAP) -> Path:
 
 
 def made(
-    seconds: float = 8.0, seed: int = 0, heavier: float = 1.3, rate_hz: float = RATE_HZ
+    seconds: float = 8.0,
+    seed: int = 0,
+    heavier: float = 1.3,
+    rate_hz: float = RATE_HZ,
+    payload_kg: float = 0.0,
 ) -> dict[str, np.ndarray]:
     """Columns of a log: the arm's masses are off, and its joints rub and have rotors.
 
@@ -68,12 +72,14 @@ def made(
         seed: of motion and noise.
         heavier: factor of masses and inertias.
         rate_hz: of the log.
+        payload_kg: of what the fore arm carries at its end, a point.
     """
     rng = np.random.default_rng(seed)
     time = np.arange(round(seconds * rate_hz)) / rate_hz
-    model = mujoco.MjModel.from_xml_string(MODEL)
-    model.body_mass[:] *= heavier
-    model.body_inertia[:] *= heavier
+    held = f'<body pos="0 0 0.3"><geom size="0.001" mass="{payload_kg}"/></body>' if payload_kg else ""
+    model = mujoco.MjModel.from_xml_string(MODEL.replace("        </body>", f"        {held}</body>", 1))
+    model.body_mass[:4] *= heavier
+    model.body_inertia[:4] *= heavier
     rate = 2.0 * np.pi * rng.uniform(0.2, 0.7, (3, 3))
     size = np.array([0.6, 0.5, 0.7]) * rng.uniform(0.4, 0.8, (3, 3))
     phase = np.multiply.outer(time, rate) + rng.uniform(0.0, 6.0, (3, 3))

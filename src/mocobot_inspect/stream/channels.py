@@ -8,7 +8,7 @@ from estimator.arrays import Array
 from estimator.quantisation import quantisation_step
 from estimator.recording.sampling import SENSORS
 from mocobot_inspect.stream.frozen import Frozen, frozen
-from mocobot_inspect.stream.noise import noise_level
+from mocobot_inspect.stream.noise import noise_level, wild
 from mocobot_inspect.stream.oscillation import Oscillation, joined, oscillation
 from mocobot_logs.log import NS, Stamps
 
@@ -26,11 +26,13 @@ class Stretch:
         start_s: when it begins after the robot's first stamp [s].
         duration_s: how long it lasts [s].
         value: where the channel stands [SI].
+        jumps: whether it jumps there or from there.
     """
 
     start_s: float
     duration_s: float
     value: float
+    jumps: bool
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,7 @@ class Channel:
         name: as in ``CHANNELS``.
         lowest, highest: extremes of its finite samples, None without any.
         nans, infinities: samples that are not finite.
+        wild: finite samples that no sensor reads (``noise.wild``).
         step: quantisation step, or None where there is none.
         noise: white noise of a sample; 0 where it is below the step.
         stuck, clipped: stretches in which it stands while others move, the first ``LISTED``.
@@ -53,6 +56,7 @@ class Channel:
     highest: float | None
     nans: int
     infinities: int
+    wild: int
     step: float | None
     noise: float
     stuck: tuple[Stretch, ...]
@@ -75,7 +79,7 @@ class ChannelTally:
         count = len(names)
         self._names, self._sensors = names, sensors
         self._low, self._high = np.full(count, np.inf), np.full(count, -np.inf)
-        self._nans, self._infinities = np.zeros(count, int), np.zeros(count, int)
+        self._nans, self._infinities, self._wild = np.zeros((3, count), int)
         self._steps: list[list[float | None]] = [[] for _ in names]
         self._noise: list[list[float]] = [[] for _ in names]
         self._lines: list[list[Oscillation]] = [[] for _ in names]
@@ -95,14 +99,17 @@ class ChannelTally:
         finite = np.isfinite(values)
         self._low = np.minimum(self._low, np.where(finite, values, np.inf).min(axis=0, initial=np.inf))
         self._high = np.maximum(self._high, np.where(finite, values, -np.inf).max(axis=0, initial=-np.inf))
-        whole = finite.all(axis=1)
         for k in range(len(self._names)):
+            odd = wild(values[:, k]) & finite[:, k]
+            self._wild[k] += odd.sum()
+            finite[:, k] &= ~odd
             x = values[finite[:, k], k]
             self._steps[k].append(quantisation_step(x) if len(x) else None)
             self._noise[k].append(noise_level(x))
             line = oscillation(x, rate_hz) if rate_hz is not None and k < self._sensors else None
             if line is not None:
                 self._lines[k].append(line)
+        whole = finite.all(axis=1)
         if rate_hz is not None and whole.any():
             kept = time_s[whole]
             # Commands stand when they please.
@@ -111,7 +118,9 @@ class ChannelTally:
 
     def _keep(self, found: Frozen, time_s: Array, rate_hz: float) -> None:
         start_s = float(time_s[found.start])
-        stretch = Stretch(start_s, float(time_s[found.stop - 1]) - start_s + 1.0 / rate_hz, found.value)
+        stretch = Stretch(
+            start_s, float(time_s[found.stop - 1]) - start_s + 1.0 / rate_hz, found.value, found.jumps
+        )
         key = found.kind, found.channel
         kept = self._frozen.setdefault(key, [])
         last = kept[-1] if kept else None
@@ -121,7 +130,9 @@ class ChannelTally:
             and last.value == stretch.value
             and start_s <= last.start_s + last.duration_s + 2 / rate_hz
         ):
-            kept[-1] = Stretch(last.start_s, stretch.start_s + stretch.duration_s - last.start_s, last.value)
+            kept[-1] = Stretch(
+                last.start_s, stretch.start_s + stretch.duration_s - last.start_s, last.value, stretch.jumps
+            )
             return
         self._counts[key] = self._counts.get(key, 0) + 1
         if len(kept) < LISTED:
@@ -140,6 +151,7 @@ class ChannelTally:
                     highest=float(self._high[k]) if known else None,
                     nans=int(self._nans[k]),
                     infinities=int(self._infinities[k]),
+                    wild=int(self._wild[k]),
                     step=float(np.median(steps)) if 2 * len(steps) > len(self._steps[k]) else None,
                     noise=float(np.median(self._noise[k])) if self._noise[k] else 0.0,
                     stuck=tuple(self._frozen.get(("stuck", k), ())),

@@ -5,6 +5,7 @@ from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import erf
 
 from estimator.arrays import Array
 from estimator.quantisation import quantisation_step
@@ -19,6 +20,8 @@ _MOVES = 0.05  # others move: by this share of their range
 _JUMP = 4.0  # times the usual large step from sample to sample
 _CORNER = 0.3  # of the same
 _NOISY = 0.5  # of the quantisation step; rounding alone looks like 0.3
+_CHANCE = 1e-3  # a run that noise makes by chance in so many logs is no sign
+_CLEAR = 1.5  # steps of the resolution; what approaches an end one by one may just be slow
 _SPEED_S, _AT_SPEED = 0.1, 0.5  # time over which speed is taken; share of the usual high speed
 
 
@@ -31,6 +34,7 @@ class Frozen:
         channel: which channel, from 0.
         start, stop: rows, the last one not included.
         value: where it stands [SI].
+        jumps: whether it jumps there or from there.
     """
 
     kind: Literal["stuck", "clipped"]
@@ -38,6 +42,7 @@ class Frozen:
     start: int
     stop: int
     value: float
+    jumps: bool = False
 
 
 def frozen(values: Array, rate_hz: float) -> list[Frozen]:
@@ -61,9 +66,7 @@ def frozen(values: Array, rate_hz: float) -> list[Frozen]:
                 found.append(Frozen("stuck", channel, 0, len(x), float(x[0])))
             continue
         usual = float(np.quantile(steps[steps > 0], 0.95))
-        # Without a resolution, or with noise that covers it, a live channel does not repeat itself for long.
-        resolution = quantisation_step(x)
-        restless = np.mean(steps == 0) < 0.5 and (resolution is None or noise_level(x) > _NOISY * resolution)
+        repeats = _longest_by_chance(x) if np.mean(steps == 0) < 0.5 else np.inf
         for start, stop in _runs(x):
             if stop - start < CLIPPED_SAMPLES or not _others_move(
                 values, least, channel, start, stop, rate_hz
@@ -71,11 +74,23 @@ def frozen(values: Array, rate_hz: float) -> list[Frozen]:
                 continue
             back = steps[stop - 1] if stop < len(x) else 0.0
             into = steps[start - 1] if start else 0.0
+            jumps = bool(max(back, into) > _JUMP * usual)
             if stop - start >= max(STUCK_S * rate_hz, CLIPPED_SAMPLES) and (
-                restless or max(back, into) > _JUMP * usual or _stops_dead(x, steps, start, stop, rate_hz)
+                jumps or stop - start > repeats or _stops_dead(x, steps, start, stop, rate_hz)
             ):
-                found.append(Frozen("stuck", channel, start, stop, float(x[start])))
+                found.append(Frozen("stuck", channel, start, stop, float(x[start]), jumps))
     return found + _clipped(values)
+
+
+def _longest_by_chance(x: Array) -> float:
+    """Samples for which noise alone repeats a rounded value at rest; infinite where rounding covers the noise."""
+    resolution, noise = quantisation_step(x), noise_level(x)
+    if resolution is None:
+        return 1.0
+    if noise <= _NOISY * resolution:
+        return np.inf
+    same = float(erf(resolution / np.sqrt(8.0 * (noise**2 - resolution**2 / 12.0))))
+    return np.log(_CHANCE / len(x)) / np.log(same)
 
 
 def _stops_dead(x: Array, steps: Array, start: int, stop: int, rate_hz: float) -> bool:
@@ -97,14 +112,14 @@ def _clipped(values: Array) -> list[Frozen]:
         if not steps.any():
             continue
         usual = float(np.quantile(steps[steps > 0], 0.95))
+        least = max(_CORNER * usual, _CLEAR * (quantisation_step(x, levels=2) or 0.0))
         for extreme in (x.min(), x.max()):
             runs = [(a, b) for a, b in _runs(x, x == extreme) if b - a >= CLIPPED_SAMPLES]
             # A peak is round; a clipped one has corners: speed up to the limit, and none from there on.
             corners = [
                 (a, b)
                 for a, b in runs
-                if (a >= 2 and steps[a - 2] > _CORNER * usual)
-                or (b + 1 < len(x) and steps[b] > _CORNER * usual)
+                if (a >= 2 and steps[a - 2] > least) or (b + 1 < len(x) and steps[b] > least)
             ]
             if len(corners) >= 2:
                 found += [Frozen("clipped", channel, a, b, float(extreme)) for a, b in corners]
