@@ -128,6 +128,7 @@ def one_robot(recording: Recording) -> Recording:
 
 def at_rest(recording: Recording) -> Recording:
     parts = {name: np.repeat(getattr(recording, name)[:1], 1200, axis=0) for name in ("phi", "theta", "tau")}
+    parts["tau"] += 1e-6 * np.random.default_rng(0).normal(size=parts["tau"].shape)  # or it is one reading
     return replace(recording, time=recording.time[:1200], **parts)
 
 
