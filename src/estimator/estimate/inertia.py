@@ -16,7 +16,7 @@ from estimator import so3
 from estimator.arrays import Array
 from estimator.estimate.fusion import acceleration_noise, fuse, fusion_changes
 from estimator.estimate.grasp_estimate import GraspEstimate
-from estimator.estimate.identifiability import StepReport, WeakDirection, combination, judge
+from estimator.estimate.identifiability import StepReport, WeakDirection, axis, combination, judge
 from estimator.estimate.principal import PrincipalInertia, inertia_matrix, principal_inertia, project_positive
 from estimator.estimate.uncertainty import (
     WINDOW_S,
@@ -185,11 +185,12 @@ def rotational_excitation(X: Array, alpha_noise: float, step: str) -> StepReport
 
 def refuse(report: StepReport, directions: Array, why: str) -> StepReport:
     """The report with the given directions (K, parameters) added as not determined."""
-    weak = tuple(
-        WeakDirection(report.step, combination(d, report.parameters), tuple(float(v) for v in d), why)
-        for d in directions
-    )
-    return replace(report, weak=report.weak + weak)
+    weak = []
+    for d in directions:
+        d = d * np.sign(d[np.argmax(np.abs(d))])
+        words = f"along {axis(d)} of {{1}}" if len(d) == 3 else combination(d, report.parameters)
+        weak.append(WeakDirection(report.step, words, tuple(float(v) for v in d), why))
+    return replace(report, weak=(*report.weak, *weak))
 
 
 def refuse_uncertain(report: StepReport, covariance: Array, limit: float, why: str = UNCERTAIN) -> StepReport:

@@ -146,15 +146,15 @@ def _repeats(angles: Array, rate_hz: float) -> Array | float:
     alike = correlate(x, x, method="fft")[len(x) - 1 :] / np.arange(len(x), 0, -1)
     lags = find_peaks(alike[: len(x) - shortest])[0]
     lags = lags[lags >= shortest]
-    lags = lags[np.argsort(-alike[lags])[: rules.PERIODS]]
-    shares = [(float(np.mean(np.abs(angles[lag:] - angles[:-lag]) < 1e-9)), int(lag)) for lag in lags]
-    # Of multiples of the period, the period itself.
-    most = max((share for share, _ in shares), default=0.0)
-    if most < rules.REPEATED:
+    best = lags[np.argsort(-alike[lags])[: rules.PERIODS]]
+    lags = np.union1d(best, lags[alike[lags] > 0.9 * alike[best].max(initial=0.0)][: rules.PERIODS])
+    shares = np.array([np.mean(np.abs(angles[lag:] - angles[:-lag]) < 1e-9, axis=0) for lag in lags])
+    if not len(lags) or shares.mean(axis=(1, 2)).max() < rules.REPEATED:
         return 1.0
-    lag = min(lag for share, lag in shares if share > 0.8 * most)
-    again = np.mean(np.abs(angles[lag:] - angles[:-lag]) < 1e-9, axis=0)
-    return 1.0 + np.concatenate([again, again[:, :3]], axis=1) * (len(angles) / lag - 1.0)
+    # Of multiples of the period, the shortest after which a joint reads much the same: a slow one after any.
+    first = np.argmax(shares > 0.8 * shares.max(axis=0), axis=0)
+    again = 1.0 + np.take_along_axis(shares, first[None], axis=0)[0] * (len(angles) / lags[first] - 1.0)
+    return np.concatenate([again, again[:, :3]], axis=1)
 
 
 def _kernel(rate_hz: float) -> tuple[Array, int]:
