@@ -122,7 +122,7 @@ class TrialSummary:
     rod_error_m: float
     weld_error_m: float
     weld_error_deg: float
-    damping_ratio: float | None
+    damping_ratio: float
 
 
 @dataclass
@@ -263,7 +263,7 @@ def _trial(
         rod_error_m=done.log.rod_error_m,
         weld_error_m=done.log.weld_error_m,
         weld_error_deg=float(np.rad2deg(done.log.weld_error_rad)),
-        damping_ratio=done.log.stability and done.log.stability.damping_ratio,
+        damping_ratio=done.log.stability.damping_ratio if done.log.stability else np.nan,
     )
     return done.recordings, summary
 
