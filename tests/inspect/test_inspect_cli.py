@@ -200,6 +200,7 @@ def test_a_broken_log_is_reported_and_not_refused(
             "start_s": pytest.approx(9.0),
             "duration_s": pytest.approx(1.0, abs=0.02),
             "value": value,
+            "jumps": True,
         }
     ]
     last = out.splitlines()[-1]
@@ -225,6 +226,7 @@ def test_a_stuck_channel_is_not_ready_and_a_dead_one_never(
         ready=1,
         wiring=1,
         skewed=False,
+        survey=SimpleNamespace(whole=()),
         standing=(Standing("omnid2.phi2", 19.0, mostly=True),),
     )
     assert ready_line(dead) == "ready for: nothing (omnid2.phi2 stands still)"

@@ -252,7 +252,7 @@ def _trial(
         rod_error_m=done.log.rod_error_m,
         weld_error_m=done.log.weld_error_m,
         weld_error_deg=float(np.rad2deg(done.log.weld_error_rad)),
-        damping_ratio=done.log.stability and done.log.stability.damping_ratio,
+        damping_ratio=done.log.stability.damping_ratio if done.log.stability else None,
     )
     return done.recordings, summary
 

@@ -188,7 +188,8 @@ def test_blocks_join_seamlessly(path: Path, monkeypatch: pytest.MonkeyPatch) -> 
     recording = small_recording(rows=333)
     write_recording(recording, path)
     source, steps = open_log(path), []
-    assert len(list(source.chunks(steps.append))) == 6 * 3
+    assert len(list(source.chunks(steps.append))) >= 3
+    assert len(steps) == 6
     assert sum(steps) == source.size == 333
     assert_same(read_log(path), recording)
 
