@@ -109,7 +109,8 @@ def _read(seen: _Seen, options: Watch, say: Say) -> None:
         say(f"inspecting {path.name}")
         found = inspect(path, map=options.map)
         ready = found.ready_for
-        if ready.startswith("ready for: nothing"):
+        # What "as it is" has to be done first, conversion does, but for leaving out where a channel stands still.
+        if ready.startswith("ready for: nothing (") or "left out in which" in ready:
             why = "; ".join(finding.sentence for finding in found.findings)
             seen.lines.append(f"{path}: left out, {ready}{f': {why}' if why else ''}.")
             continue
@@ -126,7 +127,8 @@ def _read(seen: _Seen, options: Watch, say: Say) -> None:
         seen.recordings |= recordings
         if done:
             seen.converted += recordings
-            ready = f"{ready.partition(';')[0]} ({done})"  # what is to be done first was
+            verdict = ready.removeprefix("ready for: ").rpartition(": ")[2].partition(";")[0]
+            ready = f"ready for: {verdict} ({done})"  # what is to be done first was
         seen.lines.append(f"{path}: {ready}.")
 
 
