@@ -59,7 +59,7 @@ def outcomes() -> list[Any]:
     )  # fmt: skip
     return [
         1.5, None, (rng.standard_normal((2, 3)), np.zeros((2, 3, 3), order="F")),
-        ({"ideal": recording}, TrialSummary("a", 0.1, 0.2, 1e-17, 0.3, -0.0)), calibration,
+        ({"ideal": recording}, TrialSummary("a", 0.1, 0.2, 1e-17, 0.3, -0.0, None)), calibration,
         (estimate, None),
     ]  # fmt: skip
 
