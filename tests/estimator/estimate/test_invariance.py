@@ -181,3 +181,15 @@ def test_a_recording_in_two_parts() -> None:
     np.testing.assert_allclose(found.grasps.p_1i, expected.grasps.p_1i, rtol=1e-9, atol=1e-9)
     assert found.p_1c == pytest.approx(expected.p_1c, rel=1e-6)
     assert 0.5 < found.mass.se / expected.mass.se < 2.0
+
+
+@pytest.mark.parametrize(("rest_s", "tells"), [(9.0, True), (11.0, False)])
+def test_recordings_at_rest_half_of_the_time_tell_no_inertia(rest_s: float, tells: bool) -> None:
+    body = make_body(3)
+    moves, rests = moving(body, 10, seed=3, **NOISE), still(body, TILTS[:1], rest_s, seed=4, **NOISE)
+    names = ("R_bi", "p_bi", "twist", "twist_dot", "wrench")
+    both = {name: np.concatenate([getattr(moves, name), getattr(rests, name)]) for name in names}
+    time = np.arange(len(both["twist"])) / moves.rate_hz
+    found = estimated([*trials(), replace(moves, time=time, **both)], "staged")
+    assert [record.inertia is not None for record in found.recordings] == [True, False, tells]
+    assert [record.holds for record in found.recordings] == [0, 4, 1]
