@@ -19,9 +19,10 @@ from estimator.estimate.consistency import (
 from estimator.estimate.grasp_estimate import GraspEstimate, single_robot
 from estimator.estimate.identifiability import StepReport, combination, judge
 from estimator.estimate.inertia import estimate_inertia
+from estimator.estimate.statics import estimate_com, estimate_mass
 from estimator.estimate.uncertainty import norm_se, standard_errors, windows
-from rigid_body_data import make_body, moving
-from test_statics import exact_grasps
+from rigid_body_data import GRAVITY, make_body, moving
+from test_statics import exact_grasps, exact_hold
 
 
 def grasps(
@@ -244,3 +245,30 @@ def test_errors_of_lengths() -> None:
     assert norm_se(np.array([3.0, 4.0, 0.0]), covariance) == pytest.approx(np.sqrt(0.36 * 4 + 0.64 * 9))
     assert norm_se(np.zeros(3), covariance) == pytest.approx(np.sqrt(29.0))
     np.testing.assert_allclose(standard_errors(np.diag([4.0, -1e-20])), [2.0, 0.0])
+
+
+def test_an_inertia_whose_errors_are_large_is_not_told() -> None:
+    body = make_body(3)
+    held, reasons = exact_grasps(body), {}
+    for noise_N in (1.0, 2.0, 6.0):
+        found, report = estimate_inertia([moving(body, 6, wrench_noise=noise_N)], held, body.p_1c)
+        assert (found is None) == bool(report.weak)
+        reasons[noise_N] = {weak.reason.partition(" (")[0] for weak in report.weak}
+    assert reasons == {
+        1.0: set(),
+        2.0: {"its standard error is as large as a third of the inertia"},
+        6.0: {"the moments do not follow the motion"},
+    }
+
+
+def test_noise_of_one_hold_is_that_within_it() -> None:
+    """Moments of force errors at the grasps; the mean over many draws, in closed form."""
+    body = make_body(3)
+    held, noise = exact_grasps(body), []
+    for seed in range(60):
+        hold = exact_hold(body, np.eye(3), np.random.default_rng(seed), noise=0.02)
+        mass = estimate_mass([hold], GRAVITY)
+        _, report = estimate_com([hold], mass, held, GRAVITY)
+        noise.append(report.noise * mass.mass * GRAVITY)
+    expected = np.sum(2.0 * np.sum(body.p_1i**2, axis=1)) * 0.02**2 / len(hold.batches) / 3.0
+    assert np.mean(np.square(noise)) == pytest.approx(expected, rel=0.12)
