@@ -175,23 +175,28 @@ def hidden_words(mistakes: tuple[Mistake, ...]) -> list[str]:
 
 def ready_line(found: Inspection) -> str:
     """The verdict; an estimate takes all of a log, so stretches in which a channel stands spoil it."""
-    line, first = _ready(found), _first(found)
-    if line.startswith("ready for: nothing (") or not first:
+    line = _ready(found)
+    if line.startswith("ready for: nothing ("):
         return line
-    later = line.removeprefix("ready for: ").removeprefix(_AS_IT_IS)
-    return f"ready for: {_AS_IT_IS}{listed(first)}{' and ' if _AS_IT_IS in line else ': '}{later}"
+    if any(c.infinities or c.wild for of_robot in found.survey.channels for c in of_robot):
+        later = line.removeprefix("ready for: ").removeprefix(_AS_IT_IS)
+        joint = " and " if _AS_IT_IS in line else ": "
+        line = f"ready for: {_AS_IT_IS}absurd values left out (convert --drop){joint}{later}"
+    return line + "".join(f"; {what}" for what in _first(found))
 
 
 def _first(found: Inspection) -> list[str]:
-    """What has to be done before, or a conversion and an estimate refuse the log."""
-    timing, channels = found.survey.timing, [c for of_robot in found.survey.channels for c in of_robot]
+    """What a conversion has to do before, or an estimate refuses the log."""
+    survey = found.survey
     return [
         what
         for what, needed in (
-            ("time that runs back mended", any(t.backwards for t in timing)),
-            ("absurd values left out (convert --drop)", any(c.infinities or c.wild for c in channels)),
-            ("missing values filled in (convert)", any(c.nans for c in channels)),
-            ("the parts between gaps taken (convert --split-at-gaps)", any(map(_gap, found.survey.whole))),
+            ("time that runs back to be mended", any(t.backwards for t in survey.timing)),
+            (
+                "missing values to be filled in (convert)",
+                any(c.nans for of_robot in survey.channels for c in of_robot),
+            ),
+            ("the parts between gaps to be taken (convert --split-at-gaps)", any(map(_gap, survey.whole))),
         )
         if needed
     ]
@@ -215,6 +220,11 @@ def _ready(found: Inspection) -> str:
     if any(stands.mostly for stands in standing):
         names = listed([stands.channel for stands in standing if stands.mostly][:_HIDDEN])
         return f"ready for: nothing ({names} stand{'s' * (names.count('omnid') == 1)} still)"
+    for robot, t in enumerate(found.survey.whole):
+        if t.missing > MOST_MISSING * (t.samples + t.missing) and not _gap(t):
+            return (
+                f"ready for: nothing (robot {robot + 1} lacks {t.missing} samples, too many to be filled in)"
+            )
     out = ""
     if standing:
         worst = max(standing, key=lambda stands: stands.seconds)

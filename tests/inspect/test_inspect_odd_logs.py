@@ -30,6 +30,10 @@ READY = Readiness((), 0, None, dict.fromkeys(QUANTITIES), ())
 """In place of those of robots that carry something, which these do not."""
 
 
+GOOD = "grasps yes, mass yes, centre of mass yes, inertia yes"
+ABSURD = "nothing as it is; with absurd values left out (convert --drop): "
+
+
 def said(found: Inspection) -> list[str]:
     return [finding.sentence for finding in findings(found)]
 
@@ -61,18 +65,18 @@ def test_encoders_that_start_again_after_a_turn(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("spoil", "what"),
     [
-        (lambda t, x: (np.where(t >= 5.0, t - 0.015, t), x), "time that runs back mended"),
+        (lambda t, x: (np.where(t >= 5.0, t - 0.015, t), x), "; time that runs back to be mended"),
         (
             lambda t, x: (np.where(t >= 5.0, t + 1.0, t), x),
-            "the parts between gaps taken (convert --split-at-gaps)",
+            "; the parts between gaps to be taken (convert --split-at-gaps)",
         ),
-        (lambda t, x: (t, np.where(t == t[400], np.inf, x)), "absurd values left out (convert --drop)"),
-        (lambda t, x: (t, np.where(t == t[400], 1e300, x)), "absurd values left out (convert --drop)"),
-        (lambda t, x: (t, np.where(t == t[400], -2e4, x)), "absurd values left out (convert --drop)"),
-        (lambda t, x: (t, np.where(t == t[400], np.nan, x)), "missing values filled in (convert)"),
+        (lambda t, x: (t, np.where(t == t[400], np.inf, x)), ABSURD),
+        (lambda t, x: (t, np.where(t == t[400], 1e300, x)), ABSURD),
+        (lambda t, x: (t, np.where(t == t[400], -2e4, x)), ABSURD),
+        (lambda t, x: (t, np.where(t == t[400], np.nan, x)), "; missing values to be filled in (convert)"),
         (
             lambda t, x: (t, np.where((t > 8.0) & (t < 8.5), np.nan, x)),
-            "missing values filled in (convert) and the parts between gaps taken (convert --split-at-gaps)",
+            "; missing values to be filled in (convert); the parts between gaps to be taken (convert --split-at-gaps)",
         ),
     ],
     ids=["back", "gap", "infinite", "1e300", "far", "NaN", "half a second of NaN"],
@@ -86,9 +90,9 @@ def test_what_is_refused_as_it_is_is_said_in_the_last_line(
     columns["time"], columns["omnid2.tau1"] = spoil(columns["time"], columns["omnid2.tau1"])
     found = inspect_log(open_log(write_table(tmp_path / f"log{suffix}", columns)), DESIGN)
     line = ready_line(replace(found, wiring=HEALTHY, ready=READY))
-    assert line.startswith(f"ready for: nothing as it is; with {what}: grasps yes")
+    assert line == (f"ready for: {what}{GOOD}" if what == ABSURD else f"ready for: {GOOD}{what}")
     unspoilt = inspect_log(open_log(write_table(tmp_path / f"good{suffix}", RECORDING.columns())), DESIGN)
-    assert ready_line(replace(unspoilt, wiring=HEALTHY, ready=READY)).startswith("ready for: grasps yes")
+    assert ready_line(replace(unspoilt, wiring=HEALTHY, ready=READY)).endswith(f": {GOOD}")
 
 
 def test_too_many_missing_values_are_ready_for_nothing(tmp_path: Path) -> None:
