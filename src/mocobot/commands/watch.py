@@ -109,8 +109,7 @@ def _read(seen: _Seen, options: Watch, say: Say) -> None:
         say(f"inspecting {path.name}")
         found = inspect(path, map=options.map)
         ready = found.ready_for
-        # What "as it is" has to be done first, conversion does, but for leaving out where a channel stands still.
-        if ready.startswith("ready for: nothing (") or "left out in which" in ready:
+        if ready.startswith("ready for: nothing"):
             why = "; ".join(finding.sentence for finding in found.findings)
             seen.lines.append(f"{path}: left out, {ready}{f': {why}' if why else ''}.")
             continue
@@ -127,8 +126,7 @@ def _read(seen: _Seen, options: Watch, say: Say) -> None:
         seen.recordings |= recordings
         if done:
             seen.converted += recordings
-            verdict = ready.removeprefix("ready for: ").rpartition(": ")[2].partition(";")[0]
-            ready = f"ready for: {verdict} ({done})"  # what is to be done first was
+            ready = f"{ready.partition(';')[0]} ({done})"  # what is to be done first was
         seen.lines.append(f"{path}: {ready}.")
 
 
