@@ -179,7 +179,7 @@ def test_the_units_are_those_of_the_seeds_carrying_trials() -> None:
     for one, other in zip(done.truth.units, draw_units("c", preset, 5)[:2], strict=True):
         assert one.to_dict() == other.to_dict()
     assert np.any(done.truth.units[0].phi_zero_rad)
-    assert set(done.truth.to_dict()) == {"as_built", "effects"}
+    assert set(done.truth.to_dict()) == {"as_built", "effects", "control"}
     recording = done.recordings["uncalibrated"]
     metadata = recording.metadata
     assert (metadata.trial, metadata.payload, metadata.robots, metadata.seed) == ("free", None, 2, 5)
