@@ -18,6 +18,7 @@ from mocobot_sim.scene.free import build_free_team
 from mocobot_sim.scene.scene import TeamScene
 from mocobot_sim.trial.trajectories import Trajectory
 from mocobot_sim.trial.trial import run_trial
+from mocobot_view.facts.fact_files import read_truth
 
 
 def held(scene: TeamScene, samples: int = 2) -> Trajectory:
@@ -79,6 +80,7 @@ def test_the_truth_beside_a_recording_says_it(tmp_path: Path) -> None:
         control = json.loads((tmp_path / f"{damping}.truth.json").read_text(encoding="utf-8"))["control"]
         assert control["stable"] is stable
         assert set(control) == {"stable", "damping_ratio", "frequency_Hz", "growth_per_s"}
+        assert read_truth(tmp_path / f"{damping}.parquet", robots=3).mass_kg == done.truth.mass_kg
         assert "stable" not in (done.metadata.control or {})  # nothing that diagnoses is told
 
 
