@@ -260,6 +260,13 @@ def build(model: SerialModel, parts: list[Signals], values: Mapping[str, float] 
                     B.reversals[j].append(add(f"{names[j]} reversal {t} {a} {k}", dry[j] / np.sqrt(3.0) / (1 + k), {j: x}))
         for k in range(3):
             B.reversals_mean.setdefault(j, []).append(add(f"{names[j]} turning {k}", 0.5 * dry[j], {j: common[k]}))
+    # The columns' values count from the model, not from where they are linear.
+    for i, label in enumerate(B.labels):
+        if values.get(label):
+            for c, x in series[i].items():
+                for t, own in enumerate(x):
+                    residual[t][:, c] += values[label] * own
+    B.cells = cells = Cells.of(bands, residual)
     cells.add(series)
     B.series = series
     return B
