@@ -1,18 +1,19 @@
-"""The likeliest set of causes: add, delete, exchange on exact evidence, noise learnt with every set."""
+"""The likeliest set of causes: add, delete, exchange on exact evidence, with the noise learnt for every set."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Protocol
 
 import numpy as np
 
-from discrepancy.evidence.cells import Cells
-from discrepancy.evidence.posterior import Group, Noise, Posterior, smoothed_floor
+from discrepancy.evidence.cells import Cells, Series
+from discrepancy.evidence.posterior import Group, Posterior
+from discrepancy.evidence.settings import SETTINGS, Settings
 from estimator.arrays import Array
 
-Forms = Callable[[Group, Array], list]
-"""Columns that a cause of such values brings besides."""
+Key = tuple[str, str]
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,10 +21,9 @@ class Chosen:
     """A cause in the model.
 
     Attributes:
-        group: it.
+        group: what and where.
         scale: of its prior's standard deviation.
-        forms: indices of the columns that its law's error brings.
-        form_std: their standard deviation.
+        forms: columns of its law's error.
     """
 
     group: Group
@@ -31,117 +31,188 @@ class Chosen:
     forms: tuple[int, ...] = ()
 
 
+class Linear(Protocol):
+    """A machine's logs as a linear problem."""
+
+    cells: Cells
+    groups: Sequence[Group]
+    families: Sequence[Sequence[int]]
+
+    def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
+        """Variances of all columns that are always in the model, beside some causes of some values, shape (K,)."""
+        ...
+
+    def forms(self, group: Group, values: Array) -> list[Series]:
+        """What a cause of such values leaves if its law has another form, one standard deviation each."""
+        ...
+
+
 @dataclass(frozen=True, eq=False)
 class State:
+    """A set of causes with everything else at its likeliest.
+
+    Attributes:
+        chosen: the causes.
+        posterior: of all columns.
+        evidence: log probability of the set and of the data, up to a constant.
+    """
+
     chosen: tuple[Chosen, ...]
     posterior: Posterior
     evidence: float
 
     @property
-    def keys(self):
-        return {(c.group.cause, c.group.place) for c in self.chosen}
+    def keys(self) -> set[Key]:
+        """What and where the causes are."""
+        return {c.group.key for c in self.chosen}
 
 
 @dataclass(eq=False)
 class Search:
-    cells: Cells
-    base: Array
-    groups: Mapping[str, Group]
-    noise: Noise
-    make_forms: Callable[[Group, Array], list]
-    reprior: Callable[[Sequence[Chosen], Array], Array]
-    prior_nats: float
-    delta: float = 0.1
-    families: Sequence = ()
-    fw: float = 5.0
+    """The search on one linear problem.
+
+    Attributes:
+        problem: columns and groups.
+        floor: of the noise, shape (C, bands).
+        settings: numbers.
+        say: takes a line about each step.
+    """
+
+    problem: Linear
+    floor: Array
+    settings: Settings = SETTINGS
     say: Callable[[str], object] = lambda _: None
+    against: float = field(init=False)
 
-    def prior(self, chosen: Sequence[Chosen], x: Array | None = None) -> Array:
-        S = np.zeros(self.cells.count)
-        S[: len(self.base)] = self.base
-        if x is not None:
-            S = self.reprior(chosen, S, x)
-        for c in chosen:
-            S[list(c.group.columns)] += (np.array(c.group.slab) * c.scale) ** 2
-            S[list(c.forms)] += self.delta**2
-        return S
+    def __post_init__(self) -> None:
+        self.against = self.settings.cause_nats + float(np.log(len({g.key for g in self.problem.groups})))
 
-    def value(self, chosen: Sequence[Chosen], variance: Array, x: Array | None, rounds: int = 2) -> State:
-        nominal = self.prior(chosen, x)
-        p = Posterior(self.cells, nominal, variance)
-        spread = np.ones(len(self.families))
-        for _ in range(rounds):
+    def value(
+        self, chosen: Sequence[Chosen], near: Posterior | None, steps: int | None = None, *, open_at: int | None = None
+    ) -> State:
+        """A set's evidence with its own noise and spreads, learnt from those of a posterior nearby.
+
+        Args:
+            chosen: the set.
+            near: where learning begins; None begins at the floor.
+            steps: of learning.
+            open_at: a channel whose noise may be anything.
+        """
+        cells, s = self.problem.cells, self.settings
+        nominal = self.prior(chosen, None if near is None else near.mean)
+        p = Posterior(cells, nominal, self.floor if near is None else near.variance)
+        weight = np.full((len(cells.channels), 1), s.floor_rows)
+        if open_at is not None:
+            weight[open_at] = 1.0
+        spread = np.ones(len(self.problem.families))
+        for _ in range(steps or (s.start_steps if near is None else s.noise_steps)):
             S = nominal.copy()
-            for f, idx in enumerate(self.families):
+            for f, family in enumerate(self.problem.families):
+                idx = np.asarray(family)
                 if nominal[idx[0]] > 0:
                     share = (p.mean[idx] ** 2 + np.diag(p.covariance)[idx]) / nominal[idx]
-                    spread[f] = (self.fw + share.sum()) / (self.fw + len(idx))
+                    spread[f] = (s.spread_rows + share.sum()) / (s.spread_rows + len(idx))
                     S[idx] *= spread[f]
-            p = Posterior(self.cells, S, p.noise(self.noise.floor, self.noise.weight))
-        e = self.noise.evidence(p) + sum(c.group.log_prior - self.prior_nats for c in chosen)
-        e -= 0.5 * self.fw * float(np.sum(np.log(spread) + 1.0 / spread - 1.0))
-        return State(tuple(chosen), p, e)
+            p = Posterior(cells, S, p.better_noise(self.floor, weight))
+        evidence = p.log_evidence + sum(c.group.log_prior - self.against for c in chosen)
+        evidence -= 0.5 * float(np.sum(weight * (np.log(p.variance / self.floor) + self.floor / p.variance - 1.0)))
+        evidence -= 0.5 * s.spread_rows * float(np.sum(np.log(spread) + 1.0 / spread - 1.0))
+        return State(tuple(chosen), p, evidence)
 
-    def run(self, most: int = 12, need: float = 1.0) -> State:
-        start = self.value((), self.noise.floor, None, 8)
-        state = start
-        while len(state.chosen) < most:
-            best = self.best_addition(state)
-            if best is None or best.evidence - state.evidence < need:
-                break
-            gain = best.evidence - state.evidence
-            count = self.cells.count
-            grown = self.pruned(self.with_forms(best))
-            if grown.evidence - state.evidence < need:
-                self.cells.truncate(count)
-                break
+    def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
+        """Variances of all columns with some causes in the model."""
+        S = np.zeros(self.problem.cells.count)
+        base = self.problem.prior(chosen, values)
+        S[: len(base)] = base
+        for c in chosen:
+            S[list(c.group.columns)] += (np.array(c.group.slab) * c.scale) ** 2
+            S[list(c.forms)] += self.settings.form_share**2
+        return S
+
+    def run(self, start: Iterable[Chosen] = ()) -> State:
+        """The likeliest set from a start on."""
+        state = self.value((), None)
+        for chosen in start:
+            state = self._formed(self.value((*state.chosen, chosen), state.posterior))
+        state = self._pruned(state, fresh=False)
+        while len(state.chosen) < self.settings.most_causes:
+            grown = self._grown(state)
+            if grown is None:
+                return state
             state = grown
-            self.say(f"+ {best.chosen[-1].group.name} {gain:.0f} -> {state.evidence:.0f}")
         return state
 
-    def best_addition(self, state: State, count: int = 6) -> State | None:
-        p = state.posterior
-        offers = []
-        for g in self.groups.values():
-            if (g.cause, g.place) in state.keys:
+    def offers(self, state: State, taken: set[Key]) -> list[tuple[float, Chosen]]:
+        """Every group beside a set by its linear gain, the likeliest first."""
+        out = []
+        for g in self.problem.groups:
+            if g.key in taken or self._contains(taken, g):
                 continue
-            gain, scale = p.gain(g)
-            offers.append((gain + g.log_prior, scale, g))
-        offers.sort(key=lambda o: -o[0])
-        seen, tried = set(), []
-        for gain, scale, g in offers:
-            if gain < self.prior_nats - 3.0 or len(tried) == count:
-                break
-            tried.append(self.value((*state.chosen, Chosen(g, scale)), p.variance, p.mean))
-        return max(tried, key=lambda s: s.evidence, default=None)
+            gain, scale = state.posterior.gain(g, self.settings.octaves)
+            out.append((gain + g.log_prior - self.against, Chosen(g, scale)))
+        return sorted(out, key=lambda offer: -offer[0])
 
-    def with_forms(self, state: State) -> State:
-        """Give the last cause its forms."""
+    @staticmethod
+    def _contains(taken: set[Key], group: Group) -> bool:
+        """Whether all members of its kind are in a set already."""
+        return (group.cause, "all joints") in taken
+
+    def _grown(self, state: State) -> State | None:
+        """A set with one cause more that is likelier, its law's errors included, or one exchanged; None if none is."""
+        tried = []
+        for gain, chosen in self.offers(state, state.keys)[: self.settings.tried]:
+            if gain < -5.0:
+                break
+            kept = [c for c in state.chosen if not (chosen.group.members and c.group.cause == chosen.group.cause)]
+            tried.append(self.value((*kept, chosen), state.posterior))
+        for best in sorted(tried, key=lambda t: -t.evidence)[:2]:
+            if best.evidence - state.evidence < self.settings.need_nats:
+                return None
+            count = self.problem.cells.count
+            grown = self._pruned(self._formed(best))
+            if grown.evidence - state.evidence >= self.settings.need_nats:
+                self.say(f"+ {best.chosen[-1].group.name}: {grown.evidence - state.evidence:.0f} nats")
+                return grown
+            self.problem.cells.truncate(count)
+        return None
+
+    def _formed(self, state: State) -> State:
+        """The set with the law's errors of its last cause."""
         last = state.chosen[-1]
-        forms = self.make_forms(last.group, state.posterior.mean)
+        forms = self.problem.forms(last.group, state.posterior.mean)
         if not forms:
             return state
-        index = tuple(self.cells.add(forms))
-        chosen = (*state.chosen[:-1], replace(last, forms=index))
-        return self.value(chosen, state.posterior.variance, state.posterior.mean, 3)
+        index = tuple(self.problem.cells.add(forms))
+        return self.value((*state.chosen[:-1], replace(last, forms=index)), state.posterior, 3)
 
-    def pruned(self, state: State) -> State:
-        while len(state.chosen) > 1:
-            others = [self.value([c for c in state.chosen if c is not out], state.posterior.variance, state.posterior.mean) for out in state.chosen]
-            best = max(others, key=lambda s: s.evidence)
+    def _pruned(self, state: State, *, fresh: bool = True) -> State:
+        """The set without causes that it is likelier without; ``fresh``: the last is kept."""
+        while len(state.chosen) > fresh:
+            shorter = [
+                self.value([c for c in state.chosen if c is not out], state.posterior)
+                for out in state.chosen[: len(state.chosen) - fresh]
+            ]
+            best = max(shorter, key=lambda s: s.evidence)
             if best.evidence < state.evidence:
                 return state
-            (gone,) = [c for c in state.chosen if c not in best.chosen]
-            self.say(f"- {gone.group.name} {best.evidence - state.evidence:.1f}")
+            (gone,) = set(state.keys) - best.keys
+            self.say(f"- {gone[0]} at {gone[1]}: {best.evidence - state.evidence:.0f} nats")
             state = best
         return state
 
 
-def floor_of(cells: Cells, full: Array, rounds: int = 8) -> Array:
-    """Noise that the whole dictionary leaves."""
-    start = np.array([c.squares / np.maximum(np.diff(c.starts), 1) for c in cells.channels])
-    p = Posterior(cells, full, start)
-    rows = cells.rows
-    for _ in range(rounds):
-        p = Posterior(cells, full, p.noise(start, 0.0))
-    return smoothed_floor(cells, p.variance * rows)
+def floor_of(problem: Linear, slabs: Array, steps: int) -> Array:
+    """Variances that the whole dictionary leaves, smoothed over neighbouring bands, shape (C, bands).
+
+    Args:
+        problem: columns.
+        slabs: prior variances with every cause in the model, shape (K,).
+        steps: of learning.
+    """
+    cells = problem.cells
+    start = np.array([c.squares for c in cells.channels]) / cells.rows
+    p = Posterior(cells, slabs, start)
+    for _ in range(steps):
+        p = Posterior(cells, slabs, p.better_noise(start, 0.0))
+    log = np.pad(np.log(p.variance), ((0, 0), (1, 1)), mode="edge")
+    return np.exp(0.25 * log[:, :-2] + 0.5 * log[:, 1:-1] + 0.25 * log[:, 2:])

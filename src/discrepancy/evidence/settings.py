@@ -1,0 +1,41 @@
+"""Every number of the engine that decides."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Numbers of the search and of the noise.
+
+    Attributes:
+        floor_rows: observations that the noise's floor counts (20: a band of 0.25 Hz in 40 s).
+        spread_rows: observations that the nominal spread of a family of random effects counts.
+        form_share: standard deviation of a law's error, of the law's own trace, in each of its forms.
+        need_nats: log odds by which a set must be likelier to replace another (1: a factor of e).
+        cause_nats: log odds against any one cause before the data are seen, beside the number of causes.
+        most_causes: largest set.
+        tried: candidates whose exact evidence is computed in each step, the likeliest by the linear one.
+        octaves: scales of a cause's prior, by halves from the slab down.
+        noise_steps: steps in which noise and spreads are learnt for a candidate.
+        start_steps: the same where nothing was learnt before.
+        rounds: times the problem is made linear again.
+        rival_nats: gap beyond which a rival is not told.
+    """
+
+    floor_rows: float = 20.0
+    spread_rows: float = 5.0
+    form_share: float = 0.1
+    need_nats: float = 1.0
+    cause_nats: float = 3.0
+    most_causes: int = 30
+    tried: int = 6
+    octaves: int = 5
+    noise_steps: int = 2
+    start_steps: int = 8
+    rounds: int = 3
+    rival_nats: float = 10.0
+
+
+SETTINGS = Settings()
