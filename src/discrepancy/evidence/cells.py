@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import dct
+from scipy.fft import dct, idct
 
 from estimator.arrays import Array
 
@@ -138,6 +138,23 @@ class Cells:
             channel.columns, channel.X = channel.columns[:keep], channel.X[:, :keep]
             channel.grams, channel.products = channel.grams[:, :keep, :keep], channel.products[:, :keep]
         self.count = count
+
+    def weighted_residual(self, x: Array, variance: Array) -> list[Array]:
+        """Time series of W (y - X x), one array (W, C) a trial: its product with a column is that column's score."""
+        spectra = []
+        for channel, own in zip(self.channels, variance, strict=True):
+            left = channel.y - channel.X @ x[channel.columns]
+            rows = np.empty_like(left)
+            rows[self._order] = left / np.repeat(own, np.diff(channel.starts))
+            spectra.append(rows)
+        out, first = [], 0
+        for t, length in enumerate(self.bands.lengths):
+            n = len(self.bands.of_trial(t))
+            wide = np.zeros((length, len(spectra)))
+            wide[:n] = np.column_stack([rows[first : first + n] for rows in spectra])
+            out.append(idct(wide, axis=0, norm="ortho"))
+            first += n
+        return out
 
     def weighted(self, variance: Array) -> tuple[Array, Array, float]:
         """X' W X (K, K), X' W y (K,) and y' W y for noise variances (C, bands)."""

@@ -26,6 +26,7 @@ class Group:
         log_prior: relative to other groups.
         shape: numbers inside the columns.
         least: smallest possible value of each, -inf without a bound; empty where none has a bound.
+        event: whether it acts for a while; its columns exist only while it is in the set.
         members: of a kind, the columns of each of its members; their values are alike by half of their variance.
     """
 
@@ -37,6 +38,7 @@ class Group:
     shape: tuple[tuple[str, float], ...] = ()
     least: tuple[float, ...] = ()
     members: tuple[tuple[int, ...], ...] = ()
+    event: bool = False
 
     @property
     def key(self) -> tuple[str, str]:

@@ -42,6 +42,10 @@ class Linear(Protocol):
         """Variances of all columns that are always in the model, beside some causes of some values, shape (K,)."""
         ...
 
+    def events(self, posterior: Posterior) -> list[tuple[Group, list[Series]]]:
+        """What may have acted for a while, the likeliest first: groups whose columns are yet to be added."""
+        ...
+
     def forms(self, group: Group, values: Array) -> list[Series]:
         """What a cause of such values leaves if its law has another form, one standard deviation each."""
         ...
@@ -133,14 +137,32 @@ class Search:
         """The likeliest set from a start on."""
         state = self.value((), None)
         for chosen in start:
-            state = self._formed(self.value((*state.chosen, chosen), state.posterior))
+            state = self.formed(self.value((*state.chosen, chosen), state.posterior))
         state = self._pruned(state, fresh=False)
         while len(state.chosen) < self.settings.most_causes:
-            grown = self._grown(state)
+            grown = self._grown(state) or self._exchanged(state)
             if grown is None:
-                return state
+                break
             state = grown
         return state
+
+    def _exchanged(self, state: State) -> State | None:
+        """A likelier set with another cause in the place of one; None if there is none."""
+        cells = self.problem.cells
+        for out in state.chosen:
+            rest = [c for c in state.chosen if c is not out]
+            without = self.value(rest, state.posterior)
+            for gain, chosen in self.offers(without, without.keys)[: self.settings.tried]:
+                if chosen.group.name == out.group.name or without.evidence + gain < state.evidence - 5.0:
+                    continue
+                count = cells.count
+                other = self.formed(self.value((*rest, chosen), without.posterior))
+                if other.evidence - state.evidence >= self.settings.need_nats:
+                    gap = other.evidence - state.evidence
+                    self.say(f"{out.group.name} -> {chosen.group.name}: {gap:.0f} nats")
+                    return other
+                cells.truncate(count)
+        return None
 
     def offers(self, state: State, taken: set[Key]) -> list[tuple[float, Chosen]]:
         """Every group beside a set by its linear gain, the likeliest first."""
@@ -159,7 +181,8 @@ class Search:
 
     def _grown(self, state: State) -> State | None:
         """A set with one cause more that is likelier, its law's errors included, or one exchanged; None if none is."""
-        tried = []
+        count = self.problem.cells.count
+        tried = [self.value((*state.chosen, c), state.posterior) for c in self._events(state)]
         for gain, chosen in self.offers(state, state.keys)[: self.settings.tried]:
             if gain < -5.0:
                 break
@@ -167,16 +190,29 @@ class Search:
             tried.append(self.value((*kept, chosen), state.posterior))
         for best in sorted(tried, key=lambda t: -t.evidence)[:2]:
             if best.evidence - state.evidence < self.settings.need_nats:
-                return None
-            count = self.problem.cells.count
-            grown = self._pruned(self._formed(best))
+                break
+            if not best.chosen[-1].group.event:
+                self.problem.cells.truncate(count)
+            grown = self._pruned(self.formed(best))
             if grown.evidence - state.evidence >= self.settings.need_nats:
                 self.say(f"+ {best.chosen[-1].group.name}: {grown.evidence - state.evidence:.0f} nats")
                 return grown
             self.problem.cells.truncate(count)
+        self.problem.cells.truncate(count)
         return None
 
-    def _formed(self, state: State) -> State:
+    def _events(self, state: State) -> list[Chosen]:
+        """The likeliest events, with their columns added."""
+        cells = self.problem.cells
+        found = [
+            replace(group, columns=tuple(cells.add(series)))
+            for group, series in self.problem.events(state.posterior)
+            if group.key not in state.keys
+        ]
+        wider = Posterior(cells, self.prior(state.chosen, state.posterior.mean), state.posterior.variance)
+        return [Chosen(group, wider.gain(group, self.settings.octaves)[1]) for group in found]
+
+    def formed(self, state: State) -> State:
         """The set with the law's errors of its last cause."""
         last = state.chosen[-1]
         forms = self.problem.forms(last.group, state.posterior.mean)

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from discrepancy.evidence.cells import Bands, Cells, Series
-from discrepancy.evidence.posterior import Group
+from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import friction
 from discrepancy.joints.causes import CAUSES, JointCause, JointSignals, Span
@@ -39,6 +39,8 @@ FORM = 0.1
 """Share of the friction that a model names by which that may differ from its law."""
 PAYLOAD_M, PAYLOAD_KG = 0.15, 2.0
 MOMENTS = ("m", "mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz")
+PUSH_S, PUSH_N, PUSH_BAND_HZ = (0.3, 0.6, 1.2, 2.4), 30.0, 1.5
+"""Durations of pushes that are tried, standard deviation of their force, and the band whose noise ranks them."""
 REST = 1.5
 """Speed of a rest over that below which the direction of motion fades (``Signals.slow``)."""
 
@@ -58,6 +60,7 @@ class JointProblem:
         series: the columns.
         joints: signals by joint and log.
         dry: dry friction that the model names, shape (J,).
+        pushed: torques per newton on the last link along the world's axes, shape (W, J, 3) a log.
         resting: columns of friction at rest by joint, and their standard deviations per newton metre.
         rubbing: by group key, which joint's friction its first value is.
     """
@@ -73,6 +76,8 @@ class JointProblem:
     joints: list[list[JointSignals]] = field(default_factory=list)
     dry: Array = field(default_factory=lambda: np.zeros(0))
     resting: list[tuple[list[int], Array]] = field(default_factory=list)
+    pushed: list[Array] = field(default_factory=list)
+    _windows: dict[tuple[str, str], tuple[int, int, int]] = field(default_factory=dict)
 
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
         """Variances of what is always in the model; friction at rest follows the friction there is."""
@@ -101,8 +106,51 @@ class JointProblem:
             S[columns] = np.maximum(S[columns], (unit * 0.1 * self.joints[j][0].span.torque) ** 2)
         return S
 
+    def events(self, posterior: Posterior) -> list[tuple[Group, list[Series]]]:
+        """The likeliest two pushes at the last link: force along the world's axes during a window."""
+        scores = self.cells.weighted_residual(posterior.mean, posterior.variance)
+        middle = int(np.searchsorted(self.cells.bands.edges_hz, PUSH_BAND_HZ)) - 1
+        weight = 1.0 / posterior.variance[:, middle]
+        found, windows = [], 0
+        for t, score in enumerate(scores):
+            force = self.pushed[t]  # (W, C, 3)
+            Q = np.concatenate([np.zeros((1, 3)), np.cumsum(np.einsum("wck,wc->wk", force, score), axis=0)])
+            each = np.einsum("wck,wcl,c->wkl", force, force, weight)
+            R = np.concatenate([np.zeros((1, 3, 3)), np.cumsum(each, axis=0)])
+            rate = self.cells.bands.rates_hz[t]
+            for seconds in PUSH_S:
+                n, step = round(seconds * rate), max(1, round(0.25 * seconds * rate))
+                first = np.arange(0, len(score) - n, step)
+                q, r = Q[first + n] - Q[first], R[first + n] - R[first] + 1e-9 * np.trace(R[-1]) * np.eye(3)
+                gain = 0.5 * np.einsum("wk,wk->w", q, np.linalg.solve(r, q[..., None])[..., 0])
+                windows += len(first)
+                best = int(np.argmax(gain))
+                found.append((float(gain[best]), t, int(first[best]), n))
+        out: list[tuple[Group, list[Series]]] = []
+        for _, t, first, n in sorted(found, reverse=True)[:2]:
+            series = [self._push(t, first, n, np.eye(3)[k], 1) for k in range(3)]
+            start, rate = first / self.cells.bands.rates_hz[t], self.cells.bands.rates_hz[t]
+            shape = (("trial", float(t)), ("start_s", start), ("duration_s", n / rate))
+            place = f"last link from {start:.1f} s of log {t + 1}"
+            group = Group("push", place, (), (PUSH_N,) * 3, -math.log(windows), shape, event=True)
+            self._windows[group.key] = t, first, n
+            out.append((group, series))
+        return out
+
+    def _push(self, trial: int, first: int, n: int, force: Array, wave: int) -> Series:
+        """Torques of a force during a window, ``wave`` half sines long."""
+        window = np.sin(wave * np.pi * (np.arange(n) + 0.5) / n)
+        by: dict[int, list[Array]] = {}
+        for c in range(self.pushed[trial].shape[1]):
+            by[c] = [np.zeros(len(f)) for f in self.pushed]
+            by[c][trial][first : first + n] = -(self.pushed[trial][first : first + n, c] @ force) * window
+        return by
+
     def forms(self, group: Group, values: Array) -> list[Series]:
         """Traces of a cause times smooth functions; none of what inertia and geometry do."""
+        if group.event:
+            force = 3.0 * values[list(group.columns)]
+            return [self._push(*self._windows[group.key], force, wave) for wave in (2, 3, 4)]
         named = {cause.name: cause for cause in CAUSES}
         if group.cause not in named and group.cause not in ("coupled_drive", "elasticity"):
             return []
@@ -125,7 +173,6 @@ class JointProblem:
                 slope = [np.gradient(e, s.step_s) for e, s in zip(trace, signals, strict=True)]
                 steep = np.sqrt(np.mean(np.concatenate(slope) ** 2)) + 1e-12
                 out.append({c: [x * size / steep for x in slope]})
-        self.series += out
         return out
 
 
@@ -258,6 +305,10 @@ class _Builder:
         for j in range(self.J):
             self._rests(j)
         out = self.out
+        body = int(self.tree.joint_body[self.tree.last_link])
+        out.pushed = [
+            force_torque(s.motion, body, self.tree.com[body])[c] for s, c in zip(self.parts, self.cut, strict=True)
+        ]
         for i, label in enumerate(out.labels):  # values count from the model, not from where columns are linear
             if self.values.get(label):
                 for c, x in out.series[i].items():
