@@ -94,8 +94,13 @@ class Cells:
             squares = np.array([y[a:b] @ y[a:b] for a, b in zip(starts[:-1], starts[1:], strict=True)])
             channels.append(
                 Channel(
-                    y, starts, np.zeros(0, dtype=np.intp), np.zeros((len(y), 0)), np.zeros((number, 0, 0)),
-                    np.zeros((number, 0)), squares,
+                    y,
+                    starts,
+                    np.zeros(0, dtype=np.intp),
+                    np.zeros((len(y), 0)),
+                    np.zeros((number, 0, 0)),
+                    np.zeros((number, 0)),
+                    squares,
                 )  # fmt: skip
             )
         return cls(bands, channels, 0, order)
@@ -172,6 +177,10 @@ class Cells:
         out = np.zeros((2, len(self.channels), len(self.bands.edges_hz) - 1))
         for c, channel in enumerate(self.channels):
             own, at = x[channel.columns], channel.columns
-            out[0, c] = channel.squares - 2.0 * channel.products @ own + np.einsum("bij,i,j->b", channel.grams, own, own, optimize=True)
+            out[0, c] = (
+                channel.squares
+                - 2.0 * channel.products @ own
+                + np.einsum("bij,i,j->b", channel.grams, own, own, optimize=True)
+            )
             out[1, c] = np.einsum("bij,ij->b", channel.grams, covariance[np.ix_(at, at)])
         return np.maximum(out[0], 0.0), out[1]

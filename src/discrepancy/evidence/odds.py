@@ -74,11 +74,13 @@ def _odds(search: Search, state: State, own: Chosen, open_nats: float) -> Odds:
     rest = [c for c in state.chosen if c is not own]
     without = search.value(rest, state.posterior)
     weighed: list[tuple[float, Group | None, bool]] = [(without.evidence, None, False)]
-    channels = {c for c, channel in enumerate(cells.channels) if set(own.group.columns) & set(channel.columns)}
+    channels = {
+        c for c, channel in enumerate(cells.channels) if set(own.group.columns) & set(channel.columns)
+    }
     if len(channels) == 1:
         free = search.value(rest, without.posterior, open_at=channels.pop())
         weighed.append((free.evidence - search.against - open_nats, None, True))
-    offers = [o for o in search.offers(without, without.keys) if o[1].group.name != own.group.name]
+    offers = [o for o in search.offers(without) if o[1].group.name != own.group.name]
     best = state.evidence
     for gain, chosen in offers[:MOST]:
         if without.evidence + gain < best - WITHIN_NATS:

@@ -27,6 +27,7 @@ class Group:
         shape: numbers inside the columns.
         least: smallest possible value of each, -inf without a bound; empty where none has a bound.
         event: whether it acts for a while; its columns exist only while it is in the set.
+        family: groups of one family span each other and exclude each other; empty of those that have none.
         members: of a kind, the columns of each of its members; their values are alike by half of their variance.
     """
 
@@ -39,6 +40,7 @@ class Group:
     least: tuple[float, ...] = ()
     members: tuple[tuple[int, ...], ...] = ()
     event: bool = False
+    family: str = ""
 
     @property
     def key(self) -> tuple[str, str]:
@@ -97,7 +99,7 @@ class Posterior:
     def mean(self) -> Array:
         """Values of all columns, shape (K,)."""
         s, L, z = self._factor
-        x = np.zeros(self.cells.count)
+        x = np.zeros(len(self.prior))
         x[self.active] = s * solve_triangular(L, z, lower=True, trans=1, check_finite=False)
         return x
 
@@ -107,7 +109,7 @@ class Posterior:
         s, L, _ = self._factor
         inverse, _ = dpotri(L, lower=1)
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
-        out = np.zeros((self.cells.count, self.cells.count))
+        out = np.zeros((len(self.prior), len(self.prior)))
         out[np.ix_(self.active, self.active)] = s[:, None] * inverse * s
         return out
 

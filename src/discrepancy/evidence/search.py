@@ -14,6 +14,8 @@ from discrepancy.evidence.settings import SETTINGS, Settings
 from estimator.arrays import Array
 
 Key = tuple[str, str]
+LEAST_FLOOR = 0.1
+"""Least of the noise's variance over that of the quietest band, in which there is noise at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,10 @@ class Linear(Protocol):
 
     def events(self, posterior: Posterior) -> list[tuple[Group, list[Series]]]:
         """What may have acted for a while, the likeliest first: groups whose columns are yet to be added."""
+        ...
+
+    def nearby(self, group: Group) -> list[tuple[Group, list[Series]]]:
+        """The same event a little earlier, later, shorter and longer, with columns yet to be added."""
         ...
 
     def forms(self, group: Group, values: Array) -> list[Series]:
@@ -92,7 +98,12 @@ class Search:
         self.against = self.settings.cause_nats + float(np.log(len({g.key for g in self.problem.groups})))
 
     def value(
-        self, chosen: Sequence[Chosen], near: Posterior | None, steps: int | None = None, *, open_at: int | None = None
+        self,
+        chosen: Sequence[Chosen],
+        near: Posterior | None,
+        steps: int | None = None,
+        *,
+        open_at: int | None = None,
     ) -> State:
         """A set's evidence with its own noise and spreads, learnt from those of a posterior nearby.
 
@@ -119,7 +130,9 @@ class Search:
                     S[idx] *= spread[f]
             p = Posterior(cells, S, p.better_noise(self.floor, weight))
         evidence = p.log_evidence + sum(c.group.log_prior - self.against for c in chosen)
-        evidence -= 0.5 * float(np.sum(weight * (np.log(p.variance / self.floor) + self.floor / p.variance - 1.0)))
+        evidence -= 0.5 * float(
+            np.sum(weight * (np.log(p.variance / self.floor) + self.floor / p.variance - 1.0))
+        )
         evidence -= 0.5 * s.spread_rows * float(np.sum(np.log(spread) + 1.0 / spread - 1.0))
         return State(tuple(chosen), p, evidence)
 
@@ -133,11 +146,15 @@ class Search:
             S[list(c.forms)] += self.settings.form_share**2
         return S
 
-    def run(self, start: Iterable[Chosen] = ()) -> State:
-        """The likeliest set from a start on."""
+    def fixed(self, chosen: Iterable[Chosen]) -> State:
+        """A set as it is, with its laws' errors."""
         state = self.value((), None)
-        for chosen in start:
-            state = self.formed(self.value((*state.chosen, chosen), state.posterior))
+        for one in chosen:
+            state = self.formed(self.value((*state.chosen, replace(one, forms=())), state.posterior))
+        return state
+
+    def run(self, state: State) -> State:
+        """The likeliest set from another on."""
         state = self._pruned(state, fresh=False)
         while len(state.chosen) < self.settings.most_causes:
             grown = self._grown(state) or self._exchanged(state)
@@ -152,7 +169,7 @@ class Search:
         for out in state.chosen:
             rest = [c for c in state.chosen if c is not out]
             without = self.value(rest, state.posterior)
-            for gain, chosen in self.offers(without, without.keys)[: self.settings.tried]:
+            for gain, chosen in self.offers(without)[: self.settings.tried]:
                 if chosen.group.name == out.group.name or without.evidence + gain < state.evidence - 5.0:
                     continue
                 count = cells.count
@@ -164,29 +181,27 @@ class Search:
                 cells.truncate(count)
         return None
 
-    def offers(self, state: State, taken: set[Key]) -> list[tuple[float, Chosen]]:
-        """Every group beside a set by its linear gain, the likeliest first."""
+    def offers(self, state: State) -> list[tuple[float, Chosen]]:
+        """Every group that a set has room for by its linear gain, the likeliest first."""
+        taken, families = state.keys, {c.group.family for c in state.chosen} - {""}
         out = []
         for g in self.problem.groups:
-            if g.key in taken or self._contains(taken, g):
+            if g.key in taken or (g.cause, "all joints") in taken or g.family in families:
                 continue
             gain, scale = state.posterior.gain(g, self.settings.octaves)
             out.append((gain + g.log_prior - self.against, Chosen(g, scale)))
         return sorted(out, key=lambda offer: -offer[0])
 
-    @staticmethod
-    def _contains(taken: set[Key], group: Group) -> bool:
-        """Whether all members of its kind are in a set already."""
-        return (group.cause, "all joints") in taken
-
     def _grown(self, state: State) -> State | None:
         """A set with one cause more that is likelier, its law's errors included, or one exchanged; None if none is."""
         count = self.problem.cells.count
         tried = [self.value((*state.chosen, c), state.posterior) for c in self._events(state)]
-        for gain, chosen in self.offers(state, state.keys)[: self.settings.tried]:
+        for gain, chosen in self.offers(state)[: self.settings.tried]:
             if gain < -5.0:
                 break
-            kept = [c for c in state.chosen if not (chosen.group.members and c.group.cause == chosen.group.cause)]
+            kept = [
+                c for c in state.chosen if not (chosen.group.members and c.group.cause == chosen.group.cause)
+            ]
             tried.append(self.value((*kept, chosen), state.posterior))
         for best in sorted(tried, key=lambda t: -t.evidence)[:2]:
             if best.evidence - state.evidence < self.settings.need_nats:
@@ -214,12 +229,29 @@ class Search:
 
     def formed(self, state: State) -> State:
         """The set with the law's errors of its last cause."""
+        if state.chosen[-1].group.event:
+            state = self._moved(state)
         last = state.chosen[-1]
         forms = self.problem.forms(last.group, state.posterior.mean)
         if not forms:
             return state
         index = tuple(self.problem.cells.add(forms))
         return self.value((*state.chosen[:-1], replace(last, forms=index)), state.posterior, 3)
+
+    def _moved(self, state: State) -> State:
+        """The set with its last event at the likeliest instants nearby."""
+        cells, (*rest, last) = self.problem.cells, state.chosen
+        for _ in range(self.settings.event_steps):
+            count, tried = cells.count, []
+            for group, series in self.problem.nearby(last.group):
+                moved = Chosen(replace(group, columns=tuple(cells.add(series))), last.scale)
+                tried.append(self.value((*rest, moved), state.posterior))
+            better = max(tried, key=lambda t: t.evidence)
+            if better.evidence <= state.evidence:
+                cells.truncate(count)
+                return state
+            state, last = better, better.chosen[-1]
+        return state
 
     def _pruned(self, state: State, *, fresh: bool = True) -> State:
         """The set without causes that it is likelier without; ``fresh``: the last is kept."""
@@ -246,9 +278,12 @@ def floor_of(problem: Linear, slabs: Array, steps: int) -> Array:
         steps: of learning.
     """
     cells = problem.cells
-    start = np.array([c.squares for c in cells.channels]) / cells.rows
+    power = np.array([c.squares for c in cells.channels]) / cells.rows
+    # From below: noise that explains everything is a solution, too.
+    start = np.broadcast_to(power.min(axis=1, keepdims=True), power.shape)
     p = Posterior(cells, slabs, start)
-    for _ in range(steps):
-        p = Posterior(cells, slabs, p.better_noise(start, 0.0))
+    for _ in range(steps):  # expectation and maximisation: MacKay's step is not safe with more columns than rows
+        left, fitted = cells.left(p.mean, p.covariance)
+        p = Posterior(cells, slabs, np.maximum((left + fitted) / cells.rows, LEAST_FLOOR * start))
     log = np.pad(np.log(p.variance), ((0, 0), (1, 1)), mode="edge")
     return np.exp(0.25 * log[:, :-2] + 0.5 * log[:, 1:-1] + 0.25 * log[:, 2:])

@@ -20,7 +20,9 @@ class Settings:
         octaves: scales of a cause's prior, by halves from the slab down.
         noise_steps: steps in which noise and spreads are learnt for a candidate.
         start_steps: the same where nothing was learnt before.
+        floor_steps: the same for the noise that the whole dictionary leaves.
         rounds: times the problem is made linear again.
+        event_steps: times the instants of an event are moved.
         rival_nats: gap beyond which a rival is not told.
     """
 
@@ -34,7 +36,9 @@ class Settings:
     octaves: int = 5
     noise_steps: int = 2
     start_steps: int = 8
+    floor_steps: int = 15
     rounds: int = 3
+    event_steps: int = 4
     rival_nats: float = 10.0
 
 

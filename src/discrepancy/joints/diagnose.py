@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from discrepancy.evidence.posterior import Posterior
 from discrepancy.evidence.search import Chosen, Search, State, floor_of
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.joints.problem import JointProblem, joint_problem, smoothed
 from discrepancy.serial.model import SerialModel
+from discrepancy.serial.rows.signals import Signals
+from estimator.arrays import Array
 from discrepancy.serial.recording.joint_log import JointLog
 
-MOVED = (" zero", " mass share", " com ", " inertia share", " length ", "tilt ", " delay_s", " scale", "payload ",
+PLAIN = 3.0
+"""Of a cause's prior standard deviation, with which its values are fitted."""
+MOVED = (" zero", " mass share", " com ", " inertia share", " length ", " tilt ", " delay_s", " scale", " payload ",
          " armature_kgm2", " coulomb_Nm", " viscous_Nms_per_rad")  # fmt: skip
 """Columns around whose values the problem is made linear again."""
 
@@ -39,34 +44,61 @@ def diagnose(
 ) -> Outcome:  # fmt: skip
     """The likeliest causes; the problem is made linear again around what was found until the set stays."""
     smooth = smoothed(model, logs)
-    values: dict[str, float] = {}
-    before: set[tuple[str, str]] | None = None
-    start: list[tuple[tuple[str, str], tuple[tuple[str, float], ...], float]] = []
-    for _ in range(settings.rounds):
-        problem = joint_problem(model, smooth, values)
-        search = Search(problem, floor_of(problem, problem.slabs(), settings.start_steps), settings, say)
-        again = [
-            Chosen(g, scale) for key, shape, scale in start for g in problem.groups
-            if g.key == key and g.shape == shape
-        ]  # fmt: skip
-        state = search.run(again)
-        if state.keys == before:
+    problem = joint_problem(model, smooth)
+    search = Search(problem, floor_of(problem, problem.slabs(), settings.floor_steps), settings, say)
+    best = Outcome(problem, search, search.run(search.fixed(())))
+    for k in range(settings.rounds):
+        around = _around(best, model, smooth, settings, say, None if k == 0 else best.search.floor)
+        if k and around.state.evidence < best.state.evidence + settings.need_nats and around.state.keys != best.state.keys:
+            break  # linear around itself the new set is no likelier than the one before
+        state = around.search.run(around.state)
+        if state.keys == around.state.keys:
+            return Outcome(around.problem, around.search, state)
+        best, found = around, Outcome(around.problem, around.search, state)
+        other = _around(found, model, smooth, settings, say, around.search.floor)
+        if other.state.evidence < around.state.evidence + settings.need_nats:
             break
-        before = state.keys
-        start = [(c.group.key, c.group.shape, c.scale) for c in state.chosen]
-        x = state.posterior.mean
-        values = {
-            label: float(x[i]) for i, label in enumerate(problem.labels)
-            if x[i] and any(word in label or label.startswith(word.strip()) for word in MOVED) and "{" not in label
-        }  # fmt: skip
-    return Outcome(problem, search, state)
+        best = other
+    return best
+
+
+def _around(
+    found: Outcome, model: SerialModel, smooth: Sequence[Signals], settings: Settings, say: Callable[[str], object],
+    floor: Array | None,
+) -> Outcome:  # fmt: skip
+    """The same set, linear around its own values; noise about a floor, or about one of its own."""
+    x = found.state.posterior.mean
+    values = {
+        label: float(x[i])
+        for i, label in enumerate(found.problem.labels)
+        if x[i] and any(word in f" {label}" for word in MOVED) and "{" not in label
+    }
+    problem = joint_problem(model, smooth, values)
+    if floor is None:
+        floor = floor_of(problem, problem.slabs(), settings.floor_steps)
+    search = Search(problem, floor, settings, say)
+    chosen = []
+    for c in found.state.chosen:
+        if c.group.event:
+            group, series = problem.event(c.group)
+            chosen.append(Chosen(replace(group, columns=tuple(problem.cells.add(series))), c.scale))
+        else:
+            chosen += [Chosen(g, c.scale) for g in problem.groups if g.key == c.group.key and g.shape == c.group.shape]
+    return Outcome(problem, search, search.fixed(chosen))
 
 
 def labels_of(outcome: Outcome) -> dict[str, tuple[float, float]]:
-    """Values and standard errors of the chosen causes' columns, by label."""
-    p = outcome.state.posterior
+    """Values and standard errors of the chosen causes' columns, by label, fitted with priors that shrink nothing."""
+    search, state = outcome.search, outcome.state
+    plain = [replace(c, scale=PLAIN) for c in state.chosen]
+    prior = np.maximum(search.prior(plain, state.posterior.mean)[: len(state.posterior.prior)], state.posterior.prior)
+    p = Posterior(outcome.problem.cells, prior, state.posterior.variance)
     se = np.sqrt(np.diag(p.covariance))
     return {
-        outcome.problem.labels[k]: (float(p.mean[k]), float(se[k]))
-        for c in outcome.state.chosen for k in c.group.columns
-    }  # fmt: skip
+        outcome.problem.labels[k] if k < len(outcome.problem.labels) else f"{c.group.place} {n}": (
+            float(p.mean[k]),
+            float(se[k]),
+        )
+        for c in state.chosen
+        for n, k in enumerate(c.group.columns)
+    }

@@ -54,7 +54,7 @@ def resting(v: Array, step_s: float, slow: float) -> tuple[list[list[tuple[int, 
     """What friction of one newton metre may do beside its straight line while a joint rests or turns round.
 
     Returns:
-        For each rest, pairs of the first sample and a series, the k-th of standard deviation 1 / (sqrt(3) (1 + k)); and
+        For each rest, pairs of the first sample and a series, the k-th of standard deviation 1 / sqrt(3 (1 + k)); and
         series (W,) that are common to all reversals.
     """
     own: list[list[tuple[int, Array]]] = []
@@ -62,7 +62,9 @@ def resting(v: Array, step_s: float, slow: float) -> tuple[list[list[tuple[int, 
     for a, b in rests(v, step_s, slow):
         n = b - a
         place = (np.arange(n) + 0.5) / n
-        cosines = [np.cos(np.pi * k * place) for k in range(max(3, 1 + min(int(n * step_s / KNOT_S), MOST_KNOTS)))]
+        cosines = [
+            np.cos(np.pi * k * place) for k in range(max(3, 1 + min(int(n * step_s / KNOT_S), MOST_KNOTS)))
+        ]
         before, after = ends(v, a, b)
         if not np.isnan(before):
             for k in range(3):
@@ -109,5 +111,6 @@ def other_forms(
     each = [smooth(s) for s in signals]
     for i in range(len(each[0])):
         yield [
-            0.5 * share * (coulomb * s.direction + viscous * s.v) * f[i] for s, f in zip(signals, each, strict=True)
+            0.5 * share * (coulomb * s.direction + viscous * s.v) * f[i]
+            for s, f in zip(signals, each, strict=True)
         ]

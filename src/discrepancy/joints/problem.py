@@ -9,15 +9,21 @@ from functools import partial
 
 import numpy as np
 from scipy.interpolate import CubicSpline
+from scipy.signal import fftconvolve
 
 from discrepancy.evidence.cells import Bands, Cells, Series
 from discrepancy.evidence.posterior import Group, Posterior
 from discrepancy.evidence.search import Chosen
 from discrepancy.joints import friction
-from discrepancy.joints.causes import CAUSES, JointCause, JointSignals, Span
+from discrepancy.joints.causes import CAUSES, JointSignals, Span
 from discrepancy.serial.causes.elasticity import along
 from discrepancy.serial.mechanics.nominal import inverse_torque
-from discrepancy.serial.mechanics.regressor import body_regressor, force_torque, inertial_parameters, torque_of
+from discrepancy.serial.mechanics.regressor import (
+    body_regressor,
+    force_torque,
+    inertial_parameters,
+    torque_of,
+)
 from discrepancy.serial.mechanics.shift import by_acceleration, by_displacement
 from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel
@@ -39,8 +45,8 @@ FORM = 0.1
 """Share of the friction that a model names by which that may differ from its law."""
 PAYLOAD_M, PAYLOAD_KG = 0.15, 2.0
 MOMENTS = ("m", "mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz")
-PUSH_S, PUSH_N, PUSH_BAND_HZ = (0.3, 0.6, 1.2, 2.4), 30.0, 1.5
-"""Durations of pushes that are tried, standard deviation of their force, and the band whose noise ranks them."""
+PUSH_S, PUSH_N, PUSH_BAND_HZ, EVENTS = (0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 2.4), 30.0, 1.5, 6
+"""Durations of pushes that are tried, standard deviation of their force, the band whose noise ranks them, and how many are weighed exactly."""
 REST = 1.5
 """Speed of a rest over that below which the direction of motion fades (``Signals.slow``)."""
 
@@ -77,7 +83,6 @@ class JointProblem:
     dry: Array = field(default_factory=lambda: np.zeros(0))
     resting: list[tuple[list[int], Array]] = field(default_factory=list)
     pushed: list[Array] = field(default_factory=list)
-    _windows: dict[tuple[str, str], tuple[int, int, int]] = field(default_factory=dict)
 
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
         """Variances of what is always in the model; friction at rest follows the friction there is."""
@@ -103,42 +108,66 @@ class JointProblem:
             k = list(g.columns)
             S[k] = np.maximum(S[k], np.array(g.slab) ** 2)
         for j, (columns, unit) in enumerate(self.resting):
-            S[columns] = np.maximum(S[columns], (unit * 0.1 * self.joints[j][0].span.torque) ** 2)
+            S[columns] = np.maximum(S[columns], (unit * max(self.dry[j], 0.1 * self.joints[j][0].span.torque)) ** 2)
         return S
 
     def events(self, posterior: Posterior) -> list[tuple[Group, list[Series]]]:
-        """The likeliest two pushes at the last link: force along the world's axes during a window."""
+        """The likeliest push at the last link of each duration: force along the world's axes, half a sine long."""
         scores = self.cells.weighted_residual(posterior.mean, posterior.variance)
         middle = int(np.searchsorted(self.cells.bands.edges_hz, PUSH_BAND_HZ)) - 1
         weight = 1.0 / posterior.variance[:, middle]
         found, windows = [], 0
         for t, score in enumerate(scores):
-            force = self.pushed[t]  # (W, C, 3)
-            Q = np.concatenate([np.zeros((1, 3)), np.cumsum(np.einsum("wck,wc->wk", force, score), axis=0)])
-            each = np.einsum("wck,wcl,c->wkl", force, force, weight)
-            R = np.concatenate([np.zeros((1, 3, 3)), np.cumsum(each, axis=0)])
-            rate = self.cells.bands.rates_hz[t]
+            force, rate = self.pushed[t], self.cells.bands.rates_hz[t]
+            Q = np.einsum("wck,wc->wk", force, score)
+            R = np.einsum("wck,wcl,c->wkl", force, force, weight)
+            ridge = 1e-9 * np.trace(R.sum(axis=0)) * np.eye(3)
             for seconds in PUSH_S:
-                n, step = round(seconds * rate), max(1, round(0.25 * seconds * rate))
-                first = np.arange(0, len(score) - n, step)
-                q, r = Q[first + n] - Q[first], R[first + n] - R[first] + 1e-9 * np.trace(R[-1]) * np.eye(3)
+                n = round(seconds * rate)
+                if n < 3 or 4 * n > len(score):
+                    continue
+                sine = np.sin(np.pi * (np.arange(n) + 0.5) / n)
+                q = fftconvolve(Q, sine[:, None], mode="valid", axes=0)
+                r = fftconvolve(R, (sine**2)[:, None, None], mode="valid", axes=0) + ridge
                 gain = 0.5 * np.einsum("wk,wk->w", q, np.linalg.solve(r, q[..., None])[..., 0])
-                windows += len(first)
+                windows += len(gain) * 4 // n
                 best = int(np.argmax(gain))
-                found.append((float(gain[best]), t, int(first[best]), n))
-        out: list[tuple[Group, list[Series]]] = []
-        for _, t, first, n in sorted(found, reverse=True)[:2]:
-            series = [self._push(t, first, n, np.eye(3)[k], 1) for k in range(3)]
-            start, rate = first / self.cells.bands.rates_hz[t], self.cells.bands.rates_hz[t]
-            shape = (("trial", float(t)), ("start_s", start), ("duration_s", n / rate))
-            place = f"last link from {start:.1f} s of log {t + 1}"
-            group = Group("push", place, (), (PUSH_N,) * 3, -math.log(windows), shape, event=True)
-            self._windows[group.key] = t, first, n
-            out.append((group, series))
+                found.append((float(gain[best]), t, best, n))
+        return [
+            self.event(self._window(t, first, n, -math.log(windows)))
+            for _, t, first, n in sorted(found, reverse=True)[:EVENTS]
+        ]
+
+    def _window(self, trial: int, first: int, n: int, log_prior: float) -> Group:
+        rate = self.cells.bands.rates_hz[trial]
+        shape = (("trial", float(trial)), ("start_s", first / rate), ("duration_s", n / rate))
+        place = f"last link from {first / rate:.1f} s of log {trial + 1}"
+        return Group("push", place, (), (PUSH_N,) * 3, log_prior, shape, event=True)
+
+    def event(self, group: Group) -> tuple[Group, list[Series]]:
+        """A push with its columns: force along the world's axes, half a sine long."""
+        return group, [self._push(group, np.eye(3)[k], 1) for k in range(3)]
+
+    def nearby(self, group: Group) -> list[tuple[Group, list[Series]]]:
+        """The same push a little earlier, later, shorter and longer."""
+        shape = dict(group.shape)
+        trial = int(shape["trial"])
+        rate, most = self.cells.bands.rates_hz[trial], len(self.pushed[trial])
+        middle, n = (shape["start_s"] + 0.5 * shape["duration_s"]) * rate, shape["duration_s"] * rate
+        out = []
+        for shift, stretch in ((-0.15, 1.0), (0.15, 1.0), (0.0, 0.75), (0.0, 1.33), (-0.15, 1.33), (0.15, 1.33)):
+            length = round(stretch * n)
+            first = round(middle + shift * n - 0.5 * length)
+            if length > 2 and 0 <= first and first + length <= most:
+                out.append(self.event(self._window(trial, first, length, group.log_prior)))
         return out
 
-    def _push(self, trial: int, first: int, n: int, force: Array, wave: int) -> Series:
-        """Torques of a force during a window, ``wave`` half sines long."""
+    def _push(self, group: Group, force: Array, wave: int) -> Series:
+        """Torques of a force during a push, ``wave`` half sines long."""
+        shape = dict(group.shape)
+        trial = int(shape["trial"])
+        rate = self.cells.bands.rates_hz[trial]
+        first, n = round(shape["start_s"] * rate), round(shape["duration_s"] * rate)
         window = np.sin(wave * np.pi * (np.arange(n) + 0.5) / n)
         by: dict[int, list[Array]] = {}
         for c in range(self.pushed[trial].shape[1]):
@@ -150,7 +179,7 @@ class JointProblem:
         """Traces of a cause times smooth functions; none of what inertia and geometry do."""
         if group.event:
             force = 3.0 * values[list(group.columns)]
-            return [self._push(*self._windows[group.key], force, wave) for wave in (2, 3, 4)]
+            return [self._push(group, force, wave) for wave in (2, 3, 4)]
         named = {cause.name: cause for cause in CAUSES}
         if group.cause not in named and group.cause not in ("coupled_drive", "elasticity"):
             return []
@@ -168,7 +197,9 @@ class JointProblem:
                     for t in range(len(signals))
                 ]
                 each = [friction.smooth(s) for s in signals]
-                out += [{c: [e * f[i] for e, f in zip(trace, each, strict=True)]} for i in range(len(each[0]))]
+                out += [
+                    {c: [e * f[i] for e, f in zip(trace, each, strict=True)]} for i in range(len(each[0]))
+                ]
                 size = np.sqrt(np.mean(np.concatenate(trace) ** 2))
                 slope = [np.gradient(e, s.step_s) for e, s in zip(trace, signals, strict=True)]
                 steep = np.sqrt(np.mean(np.concatenate(slope) ** 2)) + 1e-12
@@ -184,7 +215,9 @@ def smoothed(model: SerialModel, logs: Sequence[JointLog]) -> list[Signals]:
     return [replace(s, typical=np.maximum(typical, 1e-6)) for s in parts]
 
 
-def joint_problem(model: SerialModel, smooth: Sequence[Signals], values: Values | None = None) -> JointProblem:
+def joint_problem(
+    model: SerialModel, smooth: Sequence[Signals], values: Values | None = None
+) -> JointProblem:
     """The linear problem around some values of its columns, by label; None: the model as it is."""
     return _Builder(model, list(smooth), values or {}).built()
 
@@ -209,7 +242,7 @@ class _Builder:
         residual = [self._residual(s, c) for s, c in zip(self.parts, self.cut, strict=True)]
         rates = [s.rate_hz for s in self.parts]
         top = min(TOP_SHARE * min(s.log.rate_hz for s in smooth), EDGES_HZ[-1])
-        edges = np.append(EDGES_HZ[EDGES_HZ < 0.8 * top], top)
+        edges = np.append(EDGES_HZ[0.8 * top > EDGES_HZ], top)
         self.bands = Bands(rates, [len(r) for r in residual], edges)
         self.residual = residual
         self.out = JointProblem(model, self.parts, Cells.of(self.bands, residual), joints=self.joints)
@@ -269,8 +302,15 @@ class _Builder:
         for j in range(self.J):
             self.joints[j].append(
                 JointSignals(
-                    s.q[c, j], s.dq[c, j], s.ddq[c, j], side[c, j], s.inverse[c, j], asked[c, j], torque[c, j],
-                    s.time[c], self.spans[j],
+                    s.q[c, j],
+                    s.dq[c, j],
+                    s.ddq[c, j],
+                    side[c, j],
+                    s.inverse[c, j],
+                    asked[c, j],
+                    torque[c, j],
+                    s.time[c],
+                    self.spans[j],
                 )  # fmt: skip
             )
         return (torque - asked * (1.0 + of("scale")))[c]
@@ -288,7 +328,9 @@ class _Builder:
         done = [of(s)[c] for s, c in zip(self.parts, self.cut, strict=True)]
         return {j: [d[:, j] for d in done] for j in range(self.J) if any(d[:, j].any() for d in done)}
 
-    def group(self, cause: str, place: str, columns: Sequence[int], slab: Sequence[float], **more: object) -> None:
+    def group(
+        self, cause: str, place: str, columns: Sequence[int], slab: Sequence[float], **more: object
+    ) -> None:
         self.out.groups.append(Group(cause, place, tuple(columns), tuple(map(float, slab)), **more))  # type: ignore[arg-type]
 
     def built(self) -> JointProblem:
@@ -307,9 +349,12 @@ class _Builder:
         out = self.out
         body = int(self.tree.joint_body[self.tree.last_link])
         out.pushed = [
-            force_torque(s.motion, body, self.tree.com[body])[c] for s, c in zip(self.parts, self.cut, strict=True)
+            force_torque(s.motion, body, self.tree.com[body])[c]
+            for s, c in zip(self.parts, self.cut, strict=True)
         ]
-        for i, label in enumerate(out.labels):  # values count from the model, not from where columns are linear
+        for i, label in enumerate(
+            out.labels
+        ):  # values count from the model, not from where columns are linear
             if self.values.get(label):
                 for c, x in out.series[i].items():
                     for t, own in enumerate(x):
@@ -327,7 +372,11 @@ class _Builder:
 
     def _joint(self, j: int) -> None:
         n, t = self.names[j], self.given
-        own = {"coulomb_Nm": t.coulomb[j], "viscous_Nms_per_rad": t.viscous[j], "armature_kgm2": t.armature[j]}
+        own = {
+            "coulomb_Nm": t.coulomb[j],
+            "viscous_Nms_per_rad": t.viscous[j],
+            "armature_kgm2": t.armature[j],
+        }
         for cause in CAUSES:
             for shape in cause.shapes:
                 plain = not any(shape.values())
@@ -417,27 +466,33 @@ class _Builder:
         n, t, zero = self.model.model.body(body).name, self.tree, np.zeros((3, 3))
         Y = {id(s): body_regressor(s.motion, body) for s in self.parts}
         m, c = self.given.mass[body], t.com[body]
+        loaded = body == self.tree.joint_body[self.tree.last_link] or body == self.tree.links[-1]
+        family = f"load of {n}" if loaded else ""
 
         def column(label: str, tolerance: float, change: Array) -> int:
             return self.add(label, tolerance, self.wide(lambda s: Y[id(s)] @ change))
 
         mass = column(f"{n} mass share", INERTIA, inertial_parameters(m, c, zero))
-        self.group("link_mass", n, [mass], [1.0])
+        self.group("link_mass", n, [mass], [1.0], family=family)
         coms = []
         for k in range(3):
             e = 1e-4 * np.eye(3)[k]
-            change = inertial_parameters(t.mass[body], c + e, zero) - inertial_parameters(t.mass[body], c - e, zero)
+            change = inertial_parameters(t.mass[body], c + e, zero) - inertial_parameters(
+                t.mass[body], c - e, zero
+            )
             tolerance = INERTIA * max(abs(self.given.com[body][k]), LEAST_COM_M)
             coms.append(column(f"{n} com {'xyz'[k]}", tolerance, change / 2e-4))
-        self.group("link_com", n, coms, [0.1] * 3)
-        inertia = column(f"{n} inertia share", INERTIA, inertial_parameters(0.0, np.zeros(3), self.given.inertia[body]))
-        self.group("link_inertia", n, [inertia], [2.0])
-        if body == self.tree.joint_body[self.tree.last_link] or body == self.tree.links[-1]:
+        self.group("link_com", n, coms, [0.1] * 3, family=family)
+        inertia = column(
+            f"{n} inertia share", INERTIA, inertial_parameters(0.0, np.zeros(3), self.given.inertia[body])
+        )
+        self.group("link_inertia", n, [inertia], [2.0], family=family)
+        if loaded:
             r = PAYLOAD_M
             index = [self.add(f"payload {n} {x}", 0.0, self.wide(lambda s, i=i: Y[id(s)][:, :, i]))
                      for i, x in enumerate(MOMENTS)]  # fmt: skip
             slab = PAYLOAD_KG * np.array([1.0, r, r, r] + [0.5 * r * r] * 6)
-            self.group("payload", n, index, slab, least=(0.0,) + (-np.inf,) * 9)
+            self.group("payload", n, index, slab, least=(0.0,) + (-np.inf,) * 9, family=family)
 
     def _rests(self, j: int) -> None:
         columns, unit = [], []
@@ -451,7 +506,7 @@ class _Builder:
                     by = [np.zeros(len(o.v)) for o in self.joints[j]]
                     by[t][first : first + len(x)] = x
                     columns.append(self.add(f"{self.names[j]} rest {t} {number} {k}", 0.0, {j: by}))
-                    unit.append(1.0 / np.sqrt(3.0) / (1 + k))
+                    unit.append(1.0 / np.sqrt(3.0 * (1 + k)))
         if columns:
             self.out.families.append(list(columns))
         for k in range(3):
