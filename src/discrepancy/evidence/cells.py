@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,11 +49,10 @@ class Channel:
     """The rows of one channel.
 
     Attributes:
-        y: residual, shape (n,).
-        order: rows sorted by band, shape (n,).
-        starts: first row of each band in that order, and the end, shape (bands + 1,).
+        y: residual, band after band, shape (n,).
+        starts: first row of each band, and the end, shape (bands + 1,).
         columns: indices of the columns that this channel sees, shape (k,).
-        X: their coefficients in the sorted order, shape (n, k).
+        X: their coefficients, shape (n, k).
         grams, products: of each band, shapes (bands, k, k) and (bands, k).
         squares: of each band, shape (bands,).
     """
@@ -88,21 +88,13 @@ class Cells:
         order = np.argsort(band, kind="stable")
         number = len(bands.edges_hz) - 1
         starts = np.searchsorted(band[order], np.arange(number + 1))
+        none = np.zeros(0, dtype=np.intp)
         channels = []
         for c in range(residual[0].shape[1]):
             y = bands.spectrum([r[:, c] for r in residual])[order]
-            squares = np.array([y[a:b] @ y[a:b] for a, b in zip(starts[:-1], starts[1:], strict=True)])
-            channels.append(
-                Channel(
-                    y,
-                    starts,
-                    np.zeros(0, dtype=np.intp),
-                    np.zeros((len(y), 0)),
-                    np.zeros((number, 0, 0)),
-                    np.zeros((number, 0)),
-                    squares,
-                )  # fmt: skip
-            )
+            squares = np.array([y[a:b] @ y[a:b] for a, b in pairwise(starts)])
+            X, grams, products = np.zeros((len(y), 0)), np.zeros((number, 0, 0)), np.zeros((number, 0))
+            channels.append(Channel(y, starts, none, X, grams, products, squares))
         return cls(bands, channels, 0, order)
 
     @property
@@ -128,7 +120,7 @@ class Cells:
         grams = np.zeros((len(channel.starts) - 1, old + new, old + new))
         products = np.zeros((len(channel.starts) - 1, old + new))
         grams[:, :old, :old], products[:, :old] = channel.grams, channel.products
-        for band, (a, b) in enumerate(zip(channel.starts[:-1], channel.starts[1:], strict=True)):
+        for band, (a, b) in enumerate(pairwise(channel.starts)):
             cross = channel.X[a:b].T @ X[a:b]
             grams[band, :old, old:], grams[band, old:, :old] = cross, cross.T
             grams[band, old:, old:] = X[a:b].T @ X[a:b]

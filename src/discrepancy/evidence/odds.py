@@ -9,10 +9,6 @@ import numpy as np
 from discrepancy.evidence.posterior import Group
 from discrepancy.evidence.search import Chosen, Search, State
 
-WITHIN_NATS = 15.0
-"""Candidates whose linear gain is farther below the best are not weighed. Derived: they have 3e-7 of its odds."""
-MOST = 8
-
 
 @dataclass(frozen=True)
 class Rival:
@@ -58,18 +54,12 @@ class Odds:
         return tuple(out)
 
 
-def odds_of(search: Search, state: State, open_nats: float) -> list[Odds]:
-    """Probabilities of all causes of a set.
-
-    Args:
-        search: it was found by.
-        state: the set.
-        open_nats: log odds of a cause over something unlisted at its place, before the data are seen.
-    """
-    return [_odds(search, state, c, open_nats) for c in state.chosen]
+def odds_of(search: Search, state: State) -> list[Odds]:
+    """Probabilities of all causes of a set, which a search found."""
+    return [_odds(search, state, c) for c in state.chosen]
 
 
-def _odds(search: Search, state: State, own: Chosen, open_nats: float) -> Odds:
+def _odds(search: Search, state: State, own: Chosen) -> Odds:
     cells = search.problem.cells
     rest = [c for c in state.chosen if c is not own]
     without = search.value(rest, state.posterior)
@@ -79,11 +69,11 @@ def _odds(search: Search, state: State, own: Chosen, open_nats: float) -> Odds:
     }
     if len(channels) == 1:
         free = search.value(rest, without.posterior, open_at=channels.pop())
-        weighed.append((free.evidence - search.against - open_nats, None, True))
+        weighed.append((free.evidence - search.against - search.settings.open_nats, None, True))
     offers = [o for o in search.offers(without) if o[1].group.name != own.group.name]
     best = state.evidence
-    for gain, chosen in offers[:MOST]:
-        if without.evidence + gain < best - WITHIN_NATS:
+    for gain, chosen in offers[: search.settings.most_rivals]:
+        if without.evidence + gain < best - search.settings.within_nats:
             break
         count = cells.count
         rival = search.formed(search.value((*rest, chosen), without.posterior))

@@ -1,4 +1,4 @@
-"""What the data say of all columns for given prior variances and noise, and what more variance of a group would gain."""
+"""What data say of all columns for given priors and noise, and what more variance of a group would gain."""
 
 from __future__ import annotations
 
@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cholesky, solve_triangular
-from scipy.linalg.lapack import dpotri
+from scipy.linalg import cholesky, get_lapack_funcs, solve_triangular
 from scipy.special import log_ndtr, logsumexp
 
 from discrepancy.evidence.cells import Cells
@@ -44,10 +43,12 @@ class Group:
 
     @property
     def key(self) -> tuple[str, str]:
+        """Cause and place."""
         return self.cause, self.place
 
     @property
     def name(self) -> str:
+        """Cause, place and shape in words."""
         shape = ", ".join(f"{k} {v:g}" for k, v in self.shape)
         return f"{self.cause} at {self.place}" + (f" ({shape})" if shape else "")
 
@@ -107,7 +108,8 @@ class Posterior:
     def covariance(self) -> Array:
         """Of the values, shape (K, K)."""
         s, L, _ = self._factor
-        inverse, _ = dpotri(L, lower=1)
+        (potri,) = get_lapack_funcs(("potri",), (L,))
+        inverse, _ = potri(L, lower=1)
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
         out = np.zeros((len(self.prior), len(self.prior)))
         out[np.ix_(self.active, self.active)] = s[:, None] * inverse * s

@@ -14,8 +14,6 @@ from discrepancy.evidence.settings import SETTINGS, Settings
 from estimator.arrays import Array
 
 Key = tuple[str, str]
-LEAST_FLOOR = 0.1
-"""Least of the noise's variance over that of the quietest band, in which there is noise at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +35,16 @@ class Linear(Protocol):
     """A machine's logs as a linear problem."""
 
     cells: Cells
-    groups: Sequence[Group]
-    families: Sequence[Sequence[int]]
+
+    @property
+    def groups(self) -> Sequence[Group]:
+        """Every cause at every place in every shape."""
+        ...
+
+    @property
+    def families(self) -> Sequence[Sequence[int]]:
+        """Columns of random effects whose common spread is learnt."""
+        ...
 
     def prior(self, chosen: Sequence[Chosen], values: Array | None) -> Array:
         """Variances of all columns that are always in the model, beside some causes of some values, shape (K,)."""
@@ -269,21 +275,23 @@ class Search:
         return state
 
 
-def floor_of(problem: Linear, slabs: Array, steps: int) -> Array:
+def floor_of(problem: Linear, slabs: Array, settings: Settings = SETTINGS) -> Array:
     """Variances that the whole dictionary leaves, smoothed over neighbouring bands, shape (C, bands).
 
     Args:
         problem: columns.
         slabs: prior variances with every cause in the model, shape (K,).
-        steps: of learning.
+        settings: numbers.
     """
     cells = problem.cells
     power = np.array([c.squares for c in cells.channels]) / cells.rows
     # From below: noise that explains everything is a solution, too.
     start = np.broadcast_to(power.min(axis=1, keepdims=True), power.shape)
     p = Posterior(cells, slabs, start)
-    for _ in range(steps):  # expectation and maximisation: MacKay's step is not safe with more columns than rows
+    for _ in range(
+        settings.floor_steps
+    ):  # expectation and maximisation: MacKay's step is not safe with more columns than rows
         left, fitted = cells.left(p.mean, p.covariance)
-        p = Posterior(cells, slabs, np.maximum((left + fitted) / cells.rows, LEAST_FLOOR * start))
+        p = Posterior(cells, slabs, np.maximum((left + fitted) / cells.rows, settings.least_floor * start))
     log = np.pad(np.log(p.variance), ((0, 0), (1, 1)), mode="edge")
     return np.exp(0.25 * log[:, :-2] + 0.5 * log[:, 1:-1] + 0.25 * log[:, 2:])

@@ -23,7 +23,10 @@ class Settings:
         floor_steps: the same for the noise that the whole dictionary leaves.
         rounds: times the problem is made linear again.
         event_steps: times the instants of an event are moved.
-        rival_nats: gap beyond which a rival is not told.
+        open_nats: log odds of a listed cause over something unlisted at its place, before the data are seen.
+        within_nats: linear gain below the best beyond which a rival is not weighed (15: 3e-7 of its odds).
+        most_rivals: rivals that are weighed exactly.
+        least_floor: least noise variance over that of the quietest band, in which there is noise at least.
     """
 
     floor_rows: float = 20.0
@@ -39,7 +42,10 @@ class Settings:
     floor_steps: int = 15
     rounds: int = 3
     event_steps: int = 4
-    rival_nats: float = 10.0
+    open_nats: float = 1.0
+    within_nats: float = 15.0
+    most_rivals: int = 8
+    least_floor: float = 0.1
 
 
 SETTINGS = Settings()

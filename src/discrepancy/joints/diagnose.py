@@ -12,9 +12,9 @@ from discrepancy.evidence.search import Chosen, Search, State, floor_of
 from discrepancy.evidence.settings import SETTINGS, Settings
 from discrepancy.joints.problem import JointProblem, joint_problem, smoothed
 from discrepancy.serial.model import SerialModel
+from discrepancy.serial.recording.joint_log import JointLog
 from discrepancy.serial.rows.signals import Signals
 from estimator.arrays import Array
-from discrepancy.serial.recording.joint_log import JointLog
 
 PLAIN = 3.0
 """Of a cause's prior standard deviation, with which its values are fitted."""
@@ -42,24 +42,31 @@ def diagnose(
     model: SerialModel, logs: Sequence[JointLog], settings: Settings = SETTINGS,
     say: Callable[[str], object] = lambda _: None,
 ) -> Outcome:  # fmt: skip
-    """The likeliest causes; the problem is made linear again around what was found until the set stays."""
+    """The likeliest causes of what a model leaves of its robot's torques.
+
+    The problem is made linear again around what was found until the set stays. A set takes another's place only
+    where it is likelier with each linear around itself.
+
+    Args:
+        model: the robot as described.
+        logs: of its joints, with torques.
+        settings: numbers of the engine.
+        say: takes a line about each step.
+    """
     smooth = smoothed(model, logs)
     problem = joint_problem(model, smooth)
-    search = Search(problem, floor_of(problem, problem.slabs(), settings.floor_steps), settings, say)
-    best = Outcome(problem, search, search.run(search.fixed(())))
-    for k in range(settings.rounds):
-        around = _around(best, model, smooth, settings, say, None if k == 0 else best.search.floor)
-        if k and around.state.evidence < best.state.evidence + settings.need_nats and around.state.keys != best.state.keys:
-            break  # linear around itself the new set is no likelier than the one before
-        state = around.search.run(around.state)
-        if state.keys == around.state.keys:
-            return Outcome(around.problem, around.search, state)
-        best, found = around, Outcome(around.problem, around.search, state)
+    search = Search(problem, floor_of(problem, problem.slabs(), settings), settings, say)
+    first = Outcome(problem, search, search.run(search.fixed(())))
+    around = _around(first, model, smooth, settings, say, None)
+    for _ in range(settings.rounds):
+        found = Outcome(around.problem, around.search, around.search.run(around.state))
+        if found.state.keys == around.state.keys:
+            return found
         other = _around(found, model, smooth, settings, say, around.search.floor)
         if other.state.evidence < around.state.evidence + settings.need_nats:
-            break
-        best = other
-    return best
+            break  # linear around itself, the new set is no likelier
+        around = other
+    return around
 
 
 def _around(
@@ -75,7 +82,7 @@ def _around(
     }
     problem = joint_problem(model, smooth, values)
     if floor is None:
-        floor = floor_of(problem, problem.slabs(), settings.floor_steps)
+        floor = floor_of(problem, problem.slabs(), settings)
     search = Search(problem, floor, settings, say)
     chosen = []
     for c in found.state.chosen:
@@ -83,7 +90,11 @@ def _around(
             group, series = problem.event(c.group)
             chosen.append(Chosen(replace(group, columns=tuple(problem.cells.add(series))), c.scale))
         else:
-            chosen += [Chosen(g, c.scale) for g in problem.groups if g.key == c.group.key and g.shape == c.group.shape]
+            chosen += [
+                Chosen(g, c.scale)
+                for g in problem.groups
+                if g.key == c.group.key and g.shape == c.group.shape
+            ]
     return Outcome(problem, search, search.fixed(chosen))
 
 
@@ -91,7 +102,9 @@ def labels_of(outcome: Outcome) -> dict[str, tuple[float, float]]:
     """Values and standard errors of the chosen causes' columns, by label, fitted with priors that shrink nothing."""
     search, state = outcome.search, outcome.state
     plain = [replace(c, scale=PLAIN) for c in state.chosen]
-    prior = np.maximum(search.prior(plain, state.posterior.mean)[: len(state.posterior.prior)], state.posterior.prior)
+    prior = np.maximum(
+        search.prior(plain, state.posterior.mean)[: len(state.posterior.prior)], state.posterior.prior
+    )
     p = Posterior(outcome.problem.cells, prior, state.posterior.variance)
     se = np.sqrt(np.diag(p.covariance))
     return {

@@ -1,4 +1,4 @@
-"""Dry friction as a function of the velocity: its direction, rests and reversals, and how it may differ from its law."""
+"""Dry friction as a function of the velocity: direction, rests and reversals, and how it may differ from its law."""
 
 from __future__ import annotations
 

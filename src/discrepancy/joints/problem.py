@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -45,8 +46,10 @@ FORM = 0.1
 """Share of the friction that a model names by which that may differ from its law."""
 PAYLOAD_M, PAYLOAD_KG = 0.15, 2.0
 MOMENTS = ("m", "mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz")
-PUSH_S, PUSH_N, PUSH_BAND_HZ, EVENTS = (0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 2.4), 30.0, 1.5, 6
-"""Durations of pushes that are tried, standard deviation of their force, the band whose noise ranks them, and how many are weighed exactly."""
+PUSH_S = (0.2, 0.3, 0.4, 0.6, 0.8, 1.2, 1.6, 2.4)
+PUSH_N, PUSH_BAND_HZ, EVENTS = 30.0, 1.5, 6
+"""Durations of pushes that are tried [s], standard deviation of their force [N], the frequency whose noise ranks them
+[Hz], and how many are weighed exactly."""
 REST = 1.5
 """Speed of a rest over that below which the direction of motion fades (``Signals.slow``)."""
 
@@ -108,7 +111,9 @@ class JointProblem:
             k = list(g.columns)
             S[k] = np.maximum(S[k], np.array(g.slab) ** 2)
         for j, (columns, unit) in enumerate(self.resting):
-            S[columns] = np.maximum(S[columns], (unit * max(self.dry[j], 0.1 * self.joints[j][0].span.torque)) ** 2)
+            S[columns] = np.maximum(
+                S[columns], (unit * max(self.dry[j], 0.1 * self.joints[j][0].span.torque)) ** 2
+            )
         return S
 
     def events(self, posterior: Posterior) -> list[tuple[Group, list[Series]]]:
@@ -155,10 +160,17 @@ class JointProblem:
         rate, most = self.cells.bands.rates_hz[trial], len(self.pushed[trial])
         middle, n = (shape["start_s"] + 0.5 * shape["duration_s"]) * rate, shape["duration_s"] * rate
         out = []
-        for shift, stretch in ((-0.15, 1.0), (0.15, 1.0), (0.0, 0.75), (0.0, 1.33), (-0.15, 1.33), (0.15, 1.33)):
+        for shift, stretch in (
+            (-0.15, 1.0),
+            (0.15, 1.0),
+            (0.0, 0.75),
+            (0.0, 1.33),
+            (-0.15, 1.33),
+            (0.15, 1.33),
+        ):
             length = round(stretch * n)
             first = round(middle + shift * n - 0.5 * length)
-            if length > 2 and 0 <= first and first + length <= most:
+            if length > 2 and first >= 0 and first + length <= most:
                 out.append(self.event(self._window(trial, first, length, group.log_prior)))
         return out
 
@@ -264,7 +276,7 @@ class _Builder:
             inertia[b] *= max(1.0 + v.get(f"{n} inertia share", 0.0), 0.05)
             load = [v.get(f"payload {n} {x}", 0.0) for x in MOMENTS]
             if any(load):
-                mass[b], com[b], inertia[b] = _with_load(mass[b], com[b], inertia[b], np.array(load))
+                mass[b], com[b], inertia[b] = _with_load(float(mass[b]), com[b], inertia[b], np.array(load))
         for j, n in enumerate(self.names):
             position[t.joint_body[j]] += [v.get(f"{n} length {x}", 0.0) for x in "xyz"]
         gravity = t.gravity.copy()
@@ -281,9 +293,13 @@ class _Builder:
 
         q, until = every(lambda s: s.q), max(float(s.time[-1]) for s in self.parts)
         middle = 0.5 * (q.max(axis=0) + q.min(axis=0))
-        columns = (size(every(lambda s: s.torque)), size(every(lambda s: s.dq)), size(every(lambda s: s.ddq)),
-                   np.ptp(q, axis=0) + 1e-9, middle)  # fmt: skip
-        return [Span(*(float(c[j]) for c in columns), until) for j in range(self.J)]
+        sizes = [size(every(of)) for of in (lambda s: s.torque, lambda s: s.dq, lambda s: s.ddq)]
+        travel = np.ptp(q, axis=0) + 1e-9
+        return [
+            Span(float(sizes[0][j]), float(sizes[1][j]), float(sizes[2][j]), float(travel[j]),
+                 float(middle[j]), until)
+            for j in range(self.J)
+        ]  # fmt: skip
 
     def _residual(self, s: Signals, c: slice) -> Array:
         v = self.values
@@ -300,19 +316,12 @@ class _Builder:
         asked = s.inverse + (self.given.coulomb + of("coulomb_Nm")) * side
         asked = asked + (self.given.viscous + of("viscous_Nms_per_rad")) * s.dq + of("armature_kgm2") * s.ddq
         for j in range(self.J):
-            self.joints[j].append(
-                JointSignals(
-                    s.q[c, j],
-                    s.dq[c, j],
-                    s.ddq[c, j],
-                    side[c, j],
-                    s.inverse[c, j],
-                    asked[c, j],
-                    torque[c, j],
-                    s.time[c],
-                    self.spans[j],
-                )  # fmt: skip
-            )
+            here = (c, j)
+            one = JointSignals(
+                q=s.q[here], v=s.dq[here], a=s.ddq[here], direction=side[here], load=s.inverse[here],
+                asked=asked[here], torque=torque[here], t=s.time[c], span=self.spans[j],
+            )  # fmt: skip
+            self.joints[j].append(one)
         return (torque - asked * (1.0 + of("scale")))[c]
 
     # --- columns
@@ -329,9 +338,10 @@ class _Builder:
         return {j: [d[:, j] for d in done] for j in range(self.J) if any(d[:, j].any() for d in done)}
 
     def group(
-        self, cause: str, place: str, columns: Sequence[int], slab: Sequence[float], **more: object
+        self, cause: str, place: str, columns: Sequence[int], slab: Sequence[float] | Array, **more: Any
     ) -> None:
-        self.out.groups.append(Group(cause, place, tuple(columns), tuple(map(float, slab)), **more))  # type: ignore[arg-type]
+        sizes = tuple(float(x) for x in slab)
+        self.out.groups.append(Group(cause, place, tuple(columns), sizes, **more))
 
     def built(self) -> JointProblem:
         for j in range(self.J):

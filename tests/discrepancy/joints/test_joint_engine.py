@@ -54,7 +54,7 @@ def test_a_model_without_friction_is_one_finding(folder: Path) -> None:
             assert se < 0.1
     value, se = numbers["elbow armature_kgm2"]
     assert abs(value - 0.08) < 4.0 * se
-    (friction, _) = odds_of(found.search, found.state, 1.0)
+    (friction, _) = odds_of(found.search, found.state)
     assert friction.probability > 0.99
 
 
