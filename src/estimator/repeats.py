@@ -11,6 +11,10 @@ BLOCK = 1024
 """Rows that are judged together."""
 _LIVE = 0.5  # of the readings differ in an effort from the one before, or the efforts have no noise
 _SIGMAS = 8.0  # by which runs of equal rows are more than chance makes of them
+_ORDER, _NOISE = (
+    6,
+    1e-6,
+)  # differences, and their share of the range beyond which they are noise: motion leaves less
 _EQUAL, _OF = 2, 8  # readings that are taken to be equal by chance, before any is seen
 
 
@@ -25,12 +29,25 @@ class Repeats:
         """Take the channels that hold measured torques, forces or currents; without any, no row is a repeated one."""
         self._efforts = list(efforts)
         self._last: Array | None = None
-        self._readings = self._live = 0
+        self._readings = self._live = self._differences = 0
+        self._noisy = np.zeros(len(self._efforts))
 
     def of(self, values: Array) -> NDArray[np.bool_]:
         """Which of the next rows (q, C) repeat the row before; q a multiple of ``BLOCK``, but for the last rows."""
+        self._look(values)
         blocks = [self._block(values[k : k + BLOCK]) for k in range(0, len(values), BLOCK)]
         return np.concatenate(blocks) if blocks else np.zeros(0, dtype=bool)
+
+    def _look(self, values: Array) -> None:
+        """Count high differences of the efforts that are noise; smooth efforts tell nothing of equal rows."""
+        changes = np.any(np.diff(values, axis=0) != 0, axis=1)
+        efforts = (
+            values[np.append(True, changes)][:, self._efforts] if len(values) else values[:, self._efforts]
+        )
+        high = np.abs(np.diff(efforts, n=_ORDER, axis=0))
+        if high.size:
+            self._noisy += np.sum(high > _NOISE * np.ptp(efforts, axis=0), axis=0)
+            self._differences += len(high)
 
     def _block(self, values: Array) -> NDArray[np.bool_]:
         above = np.concatenate([values[:1] if self._last is None else self._last[None], values[:-1]])
@@ -41,7 +58,8 @@ class Repeats:
         self._readings += len(readings)
         self._live += int(np.any((values != above)[:, self._efforts], axis=1).sum())
         repeats = np.zeros(len(values), dtype=bool)
-        if not self._efforts or self._live + 1 < _LIVE * self._readings:
+        smooth = self._differences > 0 and not np.any(self._noisy >= _LIVE * self._differences)
+        if not self._efforts or smooth or self._live + 1 < _LIVE * self._readings:
             return repeats
         again = np.all(readings[2:] == readings[:-2], axis=1).sum()
         likeliest = np.sqrt((again + _EQUAL) / (len(readings) + _OF))  # no reading comes more often

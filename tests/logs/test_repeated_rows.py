@@ -90,7 +90,12 @@ def test_joint_logs(tmp_path: Path) -> None:
     time = np.arange(3000) / 500.0
     index = np.arange(3000)
     index[1000:1300] = 1000
-    values = {name: (column if name == "t" else column[index]) for name, column in columns(time).items()}
+    rng = np.random.default_rng(0)
+    made = {
+        name: column + 0.01 * name.endswith(".tau") * rng.standard_normal(3000)
+        for name, column in columns(time).items()
+    }
+    values = {name: (column if name == "t" else column[index]) for name, column in made.items()}
     first, second = joint_logs.read(write_csv(tmp_path / "log.csv", values))
     assert first.notes[0] == "299 rows repeat the one before, and a reading counts once."
     assert second.start_s == pytest.approx(2.6)

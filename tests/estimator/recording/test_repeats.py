@@ -66,3 +66,14 @@ def test_a_recording_with_repeated_rows_is_refused(tmp_path) -> None:
         read_recording(path)
     write_recording(rows_of(small_recording(), np.arange(600) - (np.arange(600) == 300)), path)
     assert len(read_recording(path).time) == 600  # one row changes nothing
+
+
+def test_smooth_efforts_tell_nothing() -> None:
+    """Noise-free motion between holds, as a simulation without sensors has it: equal rows are the robot's."""
+    t = np.arange(4000) / 100.0
+    hold = np.clip(np.sin(0.5 * t), -0.5, 0.5)  # moves, then rests
+    values = np.column_stack([hold, np.cos(hold), 3.0 * hold**2])
+    assert not Repeats([2]).of(values).any()
+    noisy = values + np.array([0.0, 0.0, 0.01]) * np.random.default_rng(0).standard_normal(values.shape)
+    noisy[1000:1400] = noisy[1000]
+    assert Repeats([2]).of(noisy).sum() == 399
