@@ -210,6 +210,7 @@ def _gap(t: Timing) -> bool:
 def _ready(found: Inspection) -> str:
     if found.unchecked is not None or not (found.free or (found.ready and found.wiring)):
         return f"ready for: nothing ({found.unchecked})"
+            )
     clocks = "; clocks to be corrected" if found.skewed else ""
     standing = found.standing
     if any(stands.mostly for stands in standing):
@@ -220,6 +221,10 @@ def _ready(found: Inspection) -> str:
             return (
                 f"ready for: nothing (robot {robot + 1} lacks {t.missing} samples, too many to be filled in)"
             )
+    for robot, t in enumerate(found.survey.whole):
+        if t.missing > MOST_MISSING * (t.samples + t.missing) and not _gap(t):
+            return (
+                f"ready for: nothing (robot {robot + 1} lacks {t.missing} samples, too many to be filled in)"
     out = ""
     if standing:
         worst = max(standing, key=lambda stands: stands.seconds)
