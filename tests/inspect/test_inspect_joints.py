@@ -255,3 +255,15 @@ def test_map_beside_the_log_comes_first(tmp_path, healthy) -> None:
     assert serial.inspect(log, tmp_path / "arm.xml").log_map.name == str(tmp_path / "log.toml")
     write_map(tmp_path / "logs")
     assert serial.inspect(log, tmp_path / "arm.xml").log_map.name == str(tmp_path / "logs" / "log.toml")
+
+
+def test_a_torque_that_oscillates(tmp_path, healthy) -> None:
+    def change(values):
+        values["elbow torque"] = values["elbow torque"] + 2.0 * np.sin(2.0 * np.pi * 20.0 * values["time"])
+
+    found = inspected(tmp_path, changed(healthy, change))
+    (line,) = [c.oscillation for c in found.channels if c.name == "torque of elbow"]
+    assert line is not None
+    assert line.frequency_hz == pytest.approx(20.0, abs=0.3)
+    assert line.amplitude == pytest.approx(2.0, rel=0.1)
+    assert line.duration_s == pytest.approx(7.5)

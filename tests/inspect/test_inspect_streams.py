@@ -318,3 +318,12 @@ def test_streams_without_common_time() -> None:
     assert (
         stretches([clean_stream(stream(time, values), 0), clean_stream(stream(time + 60, values), 0)]) == []
     )
+
+
+def test_a_slow_joint_with_a_coarse_encoder_is_neither_stuck_nor_clipped() -> None:
+    """It stays on a step for a second, and on the highest and lowest one for longer, while others move."""
+    values = motion(60.0, noise=0.0)
+    time = np.arange(6000) / RATE
+    values[:, 3] = np.round(0.3 * np.sin(2 * np.pi * 0.05 * time) / 0.05) * 0.05
+    assert np.mean(np.diff(values[:, 3]) == 0) > 0.98
+    assert frozen(values, RATE) == []
