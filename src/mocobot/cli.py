@@ -36,7 +36,7 @@ COMMANDS = {
     "effects": options.Effects,
 }
 """Options by command; ``mocobot.commands`` has a module of each name, whose ``run`` takes them, and ``mocobot.checks``
-another, whose ``check`` refuses what it can before anything is loaded that takes time."""
+a function that refuses what it can before anything is loaded that takes time."""
 NOT_GOOD, REFUSED, INTERRUPTED, CLOSED = 1, 2, 130, 141
 """Exit codes; the last two are 128 and the signal that other programs die of."""
 ENDING = (signal.SIGTERM, signal.SIGHUP)
@@ -128,7 +128,7 @@ def _run(arguments: Sequence[str]) -> None:
             ) from error  # a completion
         name = next(name for name, kind in COMMANDS.items() if isinstance(options, kind))
         set_max_unpacked(getattr(options, "max_unpacked", None))
-        import_module(f"mocobot.checks.{name}").check(options)
+        getattr(import_module("mocobot.checks"), f"check_{name}")(options)
         # joblib stops workers that idle, and starts others: nothing is lost, and nobody can do anything about it.
         warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
         with redirect_stdout(cast("TextIO", _Shown(sys.stdout))):

@@ -22,7 +22,7 @@ from mocobot.api.conversion import convert, convert_parts
 from mocobot.api.diagnosis import Diagnosis, diagnose
 from mocobot.api.estimation import Estimate, estimate
 from mocobot.api.inspection import inspect
-from mocobot.checks.watch import PAGE, VERDICT
+from mocobot.checks import PAGE, VERDICT
 from mocobot.files.calibrations import NAME as CALIBRATION
 from mocobot.files.calibrations import write_calibration
 from mocobot.files.calibrations import write_into as write_calibration_into
