@@ -13,7 +13,7 @@ from typing import Any
 
 from estimator.errors import InputError
 from estimator.inputs import file_sha256, printable
-from estimator.scratch import scratch_name
+from estimator.processes import scratch_name
 from estimator.written import free_name, leave_others, list_written
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO)

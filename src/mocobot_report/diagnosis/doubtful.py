@@ -6,11 +6,10 @@ from typing import Any
 from discrepancy.result.evidence_list import label
 from discrepancy.result.read import kind_of
 from discrepancy.result.remains import farthest, remedy, sizes_of
-from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.book import Book, section
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import about
 from mocobot_report.blocks.prose import bullets, paragraph, tidy
-from mocobot_report.blocks.sections import section
 from mocobot_report.blocks.tables import Entry, Num, table, value
 from mocobot_report.diagnosis.keys import cause_name, chance_of
 

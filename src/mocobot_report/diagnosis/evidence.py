@@ -6,13 +6,12 @@ from typing import Any
 import plotly.graph_objects as go
 
 from discrepancy.result.evidence_list import drawn, label, relation
-from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.book import Book, section
 from mocobot_report.blocks.charts import Axis, axis, chart, dots, figure, log_axis, row_axis
 from mocobot_report.blocks.html import Node, el
 from mocobot_report.blocks.legend import Key
 from mocobot_report.blocks.numbers import percent, plain
 from mocobot_report.blocks.prose import paragraph, tidy
-from mocobot_report.blocks.sections import section
 from mocobot_report.diagnosis.keys import CLEAN, misfits
 from mocobot_report.folder import Diagnosed
 

@@ -12,12 +12,11 @@ from discrepancy.result.remains import remains, remedy
 from estimator.errors import InputError
 from estimator.estimate.grasp_estimate import GraspEstimate
 from estimator.estimate.result import PayloadEstimate
-from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.book import Book, section
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import about, percent, plain
 from mocobot_report.blocks.pictures import ASPECT
 from mocobot_report.blocks.prose import bullets, paragraph, tidy, tiles, verdict
-from mocobot_report.blocks.sections import section
 from mocobot_report.blocks.units import short_names
 from mocobot_report.diagnosis.causes import cause_tables
 from mocobot_report.diagnosis.doubtful import doubtful_sections

@@ -9,13 +9,12 @@ from discrepancy.causes.units import Shown
 from discrepancy.result.pictures.residual_statistics import binned, multiples, spectrum
 from discrepancy.result.traces import Group, Trace, group_units, groups
 from estimator.arrays import Array
-from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.book import Book, section, tabs
 from mocobot_report.blocks.charts import axis, chart, figure, line, log_axis
 from mocobot_report.blocks.html import Node, el
 from mocobot_report.blocks.legend import Key, shared_legend
 from mocobot_report.blocks.numbers import spelled
 from mocobot_report.blocks.prose import paragraph, verdict
-from mocobot_report.blocks.sections import section, tabs
 from mocobot_report.blocks.series import Line, Panel, runs, stacked_chart, thinned, with_breaks
 from mocobot_report.blocks.tables import Entry, table, value
 from mocobot_report.blocks.units import QUANTITIES

@@ -8,11 +8,10 @@ from discrepancy.causes.units import one_each, parameter
 from discrepancy.result.read import AS_FOUND, EXTENDED, kind_of
 from discrepancy.result.text import NOTHING_WRONG_HERE
 from estimator.written import LIST
-from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.book import Book, section
 from mocobot_report.blocks.html import Child, Node, el
 from mocobot_report.blocks.numbers import plain, size, spelled
 from mocobot_report.blocks.prose import bullets, folded, paragraph, tidy
-from mocobot_report.blocks.sections import section
 from mocobot_report.blocks.tables import Entry, Num, table
 from mocobot_report.diagnosis.keys import cause_name
 from mocobot_report.folder import Diagnosed

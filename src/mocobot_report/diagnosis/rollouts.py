@@ -4,11 +4,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from discrepancy.result.text_rollouts import blocks, diverged_sentences, lost, shown_units
-from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.book import Book, section
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import NONE, percent
 from mocobot_report.blocks.prose import paragraph, tidy
-from mocobot_report.blocks.sections import section
 from mocobot_report.blocks.tables import Entry, Num, table, value
 from mocobot_report.blocks.units import spelled_text
 

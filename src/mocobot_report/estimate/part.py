@@ -11,13 +11,12 @@ from estimator.errors import InputError
 from estimator.estimate.frames import frames_said
 from estimator.estimate.result import PayloadEstimate
 from estimator.leftover.contradiction import CONTRADICTS
-from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.book import Book, section
 from mocobot_report.blocks.html import Node
 from mocobot_report.blocks.numbers import NONE, percent, plain, with_error
 from mocobot_report.blocks.payload import distance, mass, moment, place
 from mocobot_report.blocks.pictures import ASPECT
 from mocobot_report.blocks.prose import bullets, folded, paragraph, tidy, tiles, verdict
-from mocobot_report.blocks.sections import section
 from mocobot_report.blocks.tables import Entry, Num, component, measurement, quantity, table, value
 from mocobot_report.estimate.charts import excitation_chart, grasp_charts, moment_chart
 from mocobot_report.estimate.signals import signal_sections

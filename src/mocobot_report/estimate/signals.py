@@ -9,12 +9,11 @@ from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.estimate.result import PayloadEstimate
 from estimator.statistics import rms_length
-from mocobot_report.blocks.book import Book
+from mocobot_report.blocks.book import Book, tabs
 from mocobot_report.blocks.charts import chart, figure, line, log_axis
 from mocobot_report.blocks.html import Node, el
 from mocobot_report.blocks.legend import Key
 from mocobot_report.blocks.prose import bullets, paragraph, verdict
-from mocobot_report.blocks.sections import tabs
 from mocobot_report.blocks.series import Line, Panel, stacked_chart, thinned
 from mocobot_report.blocks.tables import Entry, table, value
 from mocobot_report.sources import Source
