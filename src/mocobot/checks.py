@@ -12,11 +12,9 @@ from discrepancy.cause_names import emps, serial, team
 from discrepancy.causes.excluded import excluded_from
 from discrepancy.inference.odds import check_odds
 from estimator.errors import InputError
-from estimator.files import check_place
+from estimator.files import check_place, holds
 from estimator.strict import read_json
-from estimator.written import holds
 from mocobot import options as opt
-from mocobot.api.fits import check_fits
 from mocobot.campaign.folder import is_campaign
 from mocobot.files.targets import (
     calibration_file,
@@ -29,12 +27,26 @@ from mocobot.files.targets import (
     check_there,
     map_file,
 )
-from mocobot.options.simulation import Kind
-from mocobot_logs.output_kind import output_kind
+from mocobot.options import Kind
+from mocobot_logs.formats import output_kind
 from mocobot_report import sought
 from mocobot_sim.effect_names import check_effect_name
 from mocobot_sim.scene.model_files import payload_path
 from mocobot_sim.trial.sidecar import truth_path
+
+
+def check_fits(name: str, value: float | None, needed: tuple[str, ...], trajectories: Sequence[str]) -> None:
+    """Refuse a number that says nothing about any of the motions.
+
+    Raises:
+        InputError: it is given, and no trajectory is one of those that need it.
+    """
+    if value is not None and not set(needed) & set(trajectories):
+        given = "this one is" if len(trajectories) == 1 else "these are"
+        raise InputError(
+            f"{name} is for a {' or '.join(needed)} trajectory; {given} {', '.join(trajectories)}"
+        )
+
 
 VERDICT, PAGE = "verdict.txt", "report.html"
 

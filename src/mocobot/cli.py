@@ -11,8 +11,7 @@ from importlib import import_module
 from typing import Any, NoReturn, TextIO, cast
 
 from estimator.errors import InputError
-from estimator.inputs import printable
-from estimator.unpacked import set_max_unpacked
+from estimator.inputs import printable, set_max_unpacked
 from mocobot import options
 from mocobot.config import with_config
 from mocobot.parsing import parse

@@ -10,8 +10,7 @@ from typing import Any
 
 from plotly.offline import get_plotlyjs
 
-from estimator.files import check_target, file_facts, whole_file
-from estimator.written import add_written
+from estimator.files import add_written, check_target, file_facts, whole_file
 from mocobot_report.blocks import palette
 from mocobot_report.blocks.book import Book, section
 from mocobot_report.blocks.html import Node, data_block, el, raw, to_bytes, variables, words

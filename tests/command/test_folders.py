@@ -13,8 +13,7 @@ from pathlib import Path
 import pytest
 
 from estimator.errors import InputError
-from estimator.files import check_target, make_folder, whole_file, whole_folder, write_text
-from estimator.written import LIST, holds
+from estimator.files import LIST, check_target, holds, make_folder, whole_file, whole_folder, write_text
 from mocobot.files.targets import check_folder
 
 

@@ -41,10 +41,9 @@ from rosbags.typesys.store import Typestore
 
 from estimator.arm.wrist_level import wrist_of
 from estimator.errors import InputError
-from estimator.files import check_place, whole_file, whole_folder
+from estimator.files import check_place, holds, whole_file, whole_folder
 from estimator.processes import scratch_folder
 from estimator.recording.model import Recording
-from estimator.written import holds
 from mocobot_logs.bag.messages import Topic
 from mocobot_logs.bag.read import METADATA_TOPIC
 from mocobot_logs.bag.types import JOINT_STATE, STRING, message_type

@@ -14,10 +14,9 @@ from mocobot_report.blocks.charts import chart, column_axis, dots, figure, log_a
 from mocobot_report.blocks.html import Node, el
 from mocobot_report.blocks.legend import Key
 from mocobot_report.blocks.numbers import PLUS_MINUS, about, plain, spelled
-from mocobot_report.blocks.payload import distance, mass, moment, place
 from mocobot_report.blocks.pictures import ASPECT
 from mocobot_report.blocks.prose import bullets, folded, paragraph, tiles, verdict
-from mocobot_report.blocks.tables import Entry, Num, quantity, table, value
+from mocobot_report.blocks.tables import Entry, Num, distance, mass, moment, place, quantity, table, value
 from mocobot_report.blocks.units import spelled_text
 from mocobot_report.folder import Paper
 from mocobot_sim.paper.fits import ONE_FIT, SELF_CALIBRATED, TRANSFER

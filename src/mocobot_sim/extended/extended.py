@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from estimator.errors import InputError
-from estimator.files import whole_folder
+from estimator.files import holds, whole_folder
 from estimator.inputs import JSON_BYTES, read_input
 from estimator.strict import Fields, parse_json
-from estimator.written import holds
 from mocobot_sim.effects import Effect, effect_from_dict, effect_to_dict
 from mocobot_sim.model_check import check_model
 from mocobot_sim.scene.as_built import AsBuilt

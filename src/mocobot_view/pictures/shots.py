@@ -28,15 +28,13 @@ from mocobot_view import colours
 from mocobot_view.bodies.payload_shape import BAR_M, BAR_RGBA, drawn_payload
 from mocobot_view.bodies.poses import rod_angles
 from mocobot_view.bodies.robot import LEGS, TINTED, fit_design, robot_shapes
-from mocobot_view.colours import Colour
+from mocobot_view.colours import MARK_M, Colour
 from mocobot_view.facts.body_facts import BodyFacts, check_robots, facts_of, held
 from mocobot_view.facts.cause_body import body_of, by_place
-from mocobot_view.facts.known_robots import as_estimated, tilted
-from mocobot_view.facts.placement import Bases, Grasps, placed
+from mocobot_view.facts.placement import Bases, Grasps, as_estimated, placed, tilted
 from mocobot_view.pictures.camera import clearest, corners
 from mocobot_view.pictures.marks import Marks
 from mocobot_view.pictures.render import Shot
-from mocobot_view.sizes import MARK_M
 
 SAMPLES = 2000
 """Samples, spread over a recording, from which bases are placed."""

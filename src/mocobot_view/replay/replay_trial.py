@@ -25,8 +25,7 @@ from mocobot_view.bodies.poses import BodyMotion, body_motion
 from mocobot_view.bodies.robot import robot_shapes
 from mocobot_view.bodies.shapes import Shape
 from mocobot_view.facts.body_facts import BodyFacts, check_robots, facts_of, held
-from mocobot_view.facts.known_robots import as_estimated, tilted
-from mocobot_view.facts.placement import Bases, Grasps, PayloadMotion, placed
+from mocobot_view.facts.placement import Bases, Grasps, PayloadMotion, as_estimated, placed, tilted
 
 CUTOFF_HZ, FILTERED_HZ = 5.0, 50.0
 """Cut-off of the filter, and the rate at which its output is kept."""

@@ -12,15 +12,13 @@ from estimator.arrays import Array
 from estimator.estimate.frames import frames_said
 from estimator.statistics import rms, rms_length
 from mocobot_view import colours
-from mocobot_view.colours import Colour
+from mocobot_view.colours import FORCE_M_PER_N, FRAME_M, Colour
 from mocobot_view.facts.body_facts import BodyFacts
 from mocobot_view.facts.placement import Grasps
-from mocobot_view.replay.blueprint import blueprint
-from mocobot_view.replay.key import log_keys
+from mocobot_view.replay.blueprint import blueprint, log_keys
 from mocobot_view.replay.log_robots import log_causes, log_label, log_robots, log_shape
 from mocobot_view.replay.log_time import send, send_poses
 from mocobot_view.replay.replay_trial import ReplayTrial
-from mocobot_view.sizes import FORCE_M_PER_N, FRAME_M
 
 
 def log_payload(stream: rr.RecordingStream, trial: ReplayTrial) -> None:

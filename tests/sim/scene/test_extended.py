@@ -9,7 +9,7 @@ import pytest
 
 from effect_cases import example, one_robot, team_with
 from estimator.errors import InputError
-from estimator.written import LIST
+from estimator.files import LIST
 from mocobot.cli import main
 from mocobot_sim.effects import EFFECTS
 from mocobot_sim.extended.extended import extra_of, load_extended, readme, write_extended
