@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from estimator.errors import InputError
-from estimator.inputs import open_input, plain
-from estimator.unpacked import Unpacked
+from estimator.inputs import Unpacked, open_input, plain
 
 
 def write_archive(path: Path, facts: Any, arrays: Mapping[str, NDArray[Any]], *, compress: bool) -> None:

@@ -17,10 +17,10 @@ one_thread()
 
 if TYPE_CHECKING:
     from estimator.errors import InputError as InputError
+    from estimator.inputs import set_max_unpacked as set_max_unpacked
     from estimator.recording.model import Recording as Recording
     from estimator.recording.parquet import read_recording as read_recording
     from estimator.recording.parquet import write_recording as write_recording
-    from estimator.unpacked import set_max_unpacked as set_max_unpacked
     from mocobot import bases as bases
     from mocobot import emps as emps
     from mocobot import guiding as guiding
@@ -66,7 +66,7 @@ _NAMES = {
     "estimator.errors": "InputError",
     "estimator.recording.model": "Recording",
     "estimator.recording.parquet": "read_recording write_recording",
-    "estimator.unpacked": "set_max_unpacked",
+    "estimator.inputs": "set_max_unpacked",
     "mocobot": "bases emps guiding pictures robots serial trajectories",
     "mocobot.api.calibration": "Calibration calibrate read_calibration",
     "mocobot.api.comparison": "Comparison compare",

@@ -11,8 +11,7 @@ from importlib import import_module
 from typing import Any, NoReturn, TextIO, cast
 
 from estimator.errors import InputError
-from estimator.inputs import printable
-from estimator.unpacked import set_max_unpacked
+from estimator.inputs import printable, set_max_unpacked
 from mocobot import options
 from mocobot.config import with_config
 from mocobot.parsing import parse
@@ -36,7 +35,7 @@ COMMANDS = {
     "effects": options.Effects,
 }
 """Options by command; ``mocobot.commands`` has a module of each name, whose ``run`` takes them, and ``mocobot.checks``
-another, whose ``check`` refuses what it can before anything is loaded that takes time."""
+a function that refuses what it can before anything is loaded that takes time."""
 NOT_GOOD, REFUSED, INTERRUPTED, CLOSED = 1, 2, 130, 141
 """Exit codes; the last two are 128 and the signal that other programs die of."""
 ENDING = (signal.SIGTERM, signal.SIGHUP)
@@ -128,7 +127,7 @@ def _run(arguments: Sequence[str]) -> None:
             ) from error  # a completion
         name = next(name for name, kind in COMMANDS.items() if isinstance(options, kind))
         set_max_unpacked(getattr(options, "max_unpacked", None))
-        import_module(f"mocobot.checks.{name}").check(options)
+        getattr(import_module("mocobot.checks"), f"check_{name}")(options)
         # joblib stops workers that idle, and starts others: nothing is lost, and nobody can do anything about it.
         warnings.filterwarnings("ignore", message="A worker stopped while some jobs", category=UserWarning)
         with redirect_stdout(cast("TextIO", _Shown(sys.stdout))):

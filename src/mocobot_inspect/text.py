@@ -221,10 +221,6 @@ def _ready(found: Inspection) -> str:
             return (
                 f"ready for: nothing (robot {robot + 1} lacks {t.missing} samples, too many to be filled in)"
             )
-    for robot, t in enumerate(found.survey.whole):
-        if t.missing > MOST_MISSING * (t.samples + t.missing) and not _gap(t):
-            return (
-                f"ready for: nothing (robot {robot + 1} lacks {t.missing} samples, too many to be filled in)"
     out = ""
     if standing:
         worst = max(standing, key=lambda stands: stands.seconds)

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from estimator.repeats import BLOCK, Repeats
+from estimator.quantisation import BLOCK, Repeats
 from mocobot_logs.joints.quantities import COMMANDS, DUTIES, EFFORTS
 from mocobot_logs.log import Level, LogSource, Samples, joined, rows_of
 

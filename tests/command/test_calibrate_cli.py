@@ -13,8 +13,8 @@ import pytest
 
 import mocobot
 from command import refused, run
+from estimator.files import LIST
 from estimator.recording.parquet import read_recording, write_recording
-from estimator.written import LIST
 from mocobot.cli import main
 from mocobot_sim.extended.extended import load_extended
 

@@ -14,9 +14,8 @@ import pytest
 
 from command import refused
 from diagnosed import small_diagnosis
-from estimator.files import write_json
+from estimator.files import list_written, write_json
 from estimator.recording.parquet import write_recording
-from estimator.written import list_written
 from log_files import write_text
 from mocobot_logs.bag.write import write_bag
 from recordings import small_recording

@@ -10,7 +10,7 @@ import pytest
 
 import mocobot
 from command import refused, run
-from estimator.written import LIST
+from estimator.files import LIST
 from mocobot_sim.effects.catalogue import EFFECTS
 from mocobot_sim.effects.spec import allowed
 

@@ -56,7 +56,7 @@ LONG_CALLS = {
     "mocobot_logs.joints.even._finish": 8,
     "mocobot_report.blocks.charts.chart": 8,
     "mocobot_report.diagnosis.evidence._rows_chart": 11,
-    "mocobot_report.diagnosis.residuals._physical": 8,
+    "mocobot_report.diagnosis.evidence._physical": 8,
     "mocobot_sim.base.drive_kernel.update_drives": 15,
     "mocobot_sim.control.control.__init__": 10,
     "mocobot_sim.control.kernel.update_team": 9,

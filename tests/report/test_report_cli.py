@@ -10,7 +10,7 @@ import pytest
 
 import command
 from estimator.errors import InputError
-from estimator.written import holds, list_written
+from estimator.files import holds, list_written
 from report_folders import diagnosis_folder, estimate_folder, paper_folder
 
 

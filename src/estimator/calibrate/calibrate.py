@@ -16,12 +16,11 @@ from estimator.calibrate.equations.rows import Rows
 from estimator.calibrate.equations.sensing import Resolution, Sensing
 from estimator.calibrate.findings import findings
 from estimator.calibrate.fit import Fit, fit
-from estimator.calibrate.held_out import held_out
 from estimator.calibrate.left_out import Given
 from estimator.calibrate.outcome.shares import shares
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.prior import MASSES, Prior
 from estimator.calibrate.problem import KnownMass, Trial
-from estimator.calibrate.undecided import undecided
+from estimator.calibrate.quadratic import solved
 from estimator.calibrate.unknowns import Unknowns
 from estimator.errors import InputError
 from estimator.estimate.consistency import Trial as Processed
@@ -34,6 +33,105 @@ from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 from estimator.rigid_team.residual import Bases, Shared, robot_data
 from estimator.rigid_team.start import start_bases
+
+
+def held_out(fit: Fit) -> list[tuple[float, float] | None]:
+    """chi2 per number of loops and balance of every trial with a payload; None where the others do not suffice.
+
+    The problem is linear near its solution, so leaving one trial out takes one solution of normal equations. The bases
+    stood elsewhere in every trial and are fitted to the trial itself.
+    """
+    out: list[tuple[float, float] | None] = []
+    layout = fit.layout
+    payload = [int(trial.all.index[layout.of_units.stop]) for trial in fit.trials]
+    for k, trial in enumerate(fit.trials):
+        own = np.r_[layout.of_trial(k)]
+        others = [t for i, t in enumerate(fit.trials) if i != k]
+        if payload.count(payload[k]) < 2:
+            out.append(None)
+            continue
+        H, g = np.zeros((layout.size, layout.size)), np.zeros(layout.size)
+        for part in (*(t.all for t in others), *fit.alone, *fit.known):
+            part.add_to(H, g)
+        free = ~np.isin(np.arange(layout.size), own)
+        kept = fit.basis[free].any(axis=0)
+        columns, prior, z = fit.basis[:, kept], fit.prior[kept], fit.z[kept]
+        dz, _ = solved(columns.T @ H @ columns + np.diag(prior), columns.T @ g + prior * z)
+        dx = columns @ dz
+        at = np.flatnonzero(np.isin(trial.all.index, own))
+        score = trial.all.g + trial.all.H @ dx[trial.all.index]
+        if len(at):
+            dx[own] = solved(trial.all.H[np.ix_(at, at)], score[at])[0]
+        loops = trial.loops.at(dx) / max(1, trial.loops.count)
+        out.append((loops, trial.balance.at(dx) / trial.balance.count))
+    return out
+
+
+UNKNOWN_MASSES = 0.05
+"""Relative error of arm masses that is taken for granted where nobody has weighed them."""
+
+
+def undecided(
+    fit: Fit, prior: Prior, scale_sd: float, *, alone: bool, single: list[str], parallel: bool = False
+) -> list[str]:
+    """Sentences.
+
+    Args:
+        fit: the calibration.
+        prior: what was assumed.
+        scale_sd: standard deviation of the held common spring scale; 0 if it is not held.
+        alone: whether unloaded arms were recorded.
+        single: names of payloads with one recording.
+        parallel: whether the flanges are known to be parallel.
+    """
+    out = []
+    layout = fit.layout
+    masses = []
+    for k, shared in enumerate(fit.unknowns.carried):
+        place = layout.of_inertia(k).start
+        masses.append(np.sqrt(fit.covariance[place, place]) / shared.pi[0])
+    if scale_sd:
+        out.append(
+            "The common scale of all springs is held at its design value, for a carry tells it from the mass by the "
+            f"arms' own weight alone: all masses and inertias may be off together by {100 * scale_sd:.2g} % (one "
+            f"standard error). One weighed payload (--known-mass) brings that to {100 * min(masses):.1g} %."
+        )
+    if not parallel and prior.encoder_zero_rad:
+        reach = max(float(np.max(np.linalg.norm(s.grasps.p_1i, axis=1))) for s in fit.unknowns.carried)
+        degrees = np.rad2deg(prior.encoder_zero_rad)
+        out.append(
+            "The zeros of the last gimbal axes (theta_x) only turn the grasp frames, so frames are those that the "
+            f"encoders define. Frames drawn at the flanges may be turned against them by {degrees:.2g} deg about their "
+            "x axes (one standard error), which moves positions in {1} by up to "
+            f"{1e3 * reach * prior.encoder_zero_rad:.2g} mm. Flanges known to be parallel (--parallel-flanges), or an "
+            "index mark at each, decide them."
+        )
+    if not prior.arm_mass_ratio and not alone:
+        share = max(_by_masses(fit, k) for k in range(layout.payloads))
+        out.append(
+            "The arms' masses are taken as designed but for one common factor. Where each is known to "
+            f"{100 * UNKNOWN_MASSES:.0f} % only, a payload's mass is off by {100 * share:.2g} % besides (one standard "
+            "error): free them (--arm-masses), best with a recording of the unloaded arms (--free)."
+        )
+    for name in single:
+        out.append(
+            f"{name}: with one recording none can be left out, so nothing shows how well the calibration foretells "
+            "another; record a second motion of the same payload."
+        )
+    return out
+
+
+def _by_masses(fit: Fit, payload: int) -> float:
+    """Relative error of a payload's mass from errors of ``UNKNOWN_MASSES`` in every arm mass alone."""
+    layout = fit.layout
+    H = np.zeros((layout.size, layout.size))
+    g = np.zeros(layout.size)
+    for part in (*(trial.all for trial in fit.trials), *fit.alone, *fit.known):
+        part.add_to(H, g)
+    places = (np.arange(layout.robots)[:, None] * COUNT + MASSES).ravel()
+    at = layout.of_inertia(payload).start
+    by_mass = -(fit.covariance[at] @ H[:, places])
+    return float(UNKNOWN_MASSES * np.linalg.norm(by_mass) / fit.unknowns.carried[payload].pi[0])
 
 
 def calibrate(

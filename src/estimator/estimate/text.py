@@ -10,7 +10,7 @@ from estimator.estimate.inertia import PARAMETERS
 from estimator.estimate.principal import ORDER
 from estimator.estimate.result import PayloadEstimate
 from estimator.leftover.contradiction import beyond_noise
-from estimator.numbers import measured
+from estimator.statistics import measured
 
 _ZERO_SIGMAS = 2.0
 HOW = {"calibrated": "self-calibrated", "fit": "one-fit"}

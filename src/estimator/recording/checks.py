@@ -9,9 +9,9 @@ from estimator.arm.delta import stretches
 from estimator.arrays import Array
 from estimator.errors import InputError, RepeatedRowsError
 from estimator.filtering import MIN_SAMPLES, trim_slice
+from estimator.quantisation import Repeats
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
-from estimator.repeats import Repeats
 
 SPACING_TOLERANCE = 0.5  # of one sample period: a time stamp may jitter by so much
 TORQUE_FACTOR = 2.0  # of torque_limit_Nm: no spring reads beyond, so it is another unit or a spike

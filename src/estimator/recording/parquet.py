@@ -13,11 +13,11 @@ from estimator.arm.wrist_level import joints_of, wrist_fault
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.files import whole_file
+from estimator.inputs import Unpacked
 from estimator.recording.checks import check_finite, check_recording
 from estimator.recording.metadata import RecordingMetadata
 from estimator.recording.model import CHANNELS, Recording
 from estimator.recording.parquet_claims import claimed_bytes
-from estimator.unpacked import Unpacked
 
 METADATA_KEY = b"mocobot"
 

@@ -17,9 +17,8 @@ from estimator.calibrate.outcome.prior_file import read_prior
 from estimator.calibrate.outcome.text import format_calibration
 from estimator.calibrate.prior import Prior
 from estimator.errors import InputError
-from estimator.files import whole_folder
+from estimator.files import holds, whole_folder
 from estimator.recording.model import Recording
-from estimator.written import holds
 from mocobot.api.given import Given, recordings_of
 from mocobot.api.public import public
 from mocobot.files import calibrations

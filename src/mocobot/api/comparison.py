@@ -3,14 +3,12 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from estimator.files import whole_folder
-from estimator.written import holds
+from estimator.files import holds, whole_folder
 from mocobot.api.public import public
 from mocobot.comparison import comparison as below
 from mocobot.comparison.compare import Written
 from mocobot.comparison.compare import compare as compare_below
-from mocobot.comparison.files import write_into
-from mocobot.comparison.text import format_comparison
+from mocobot.comparison.text import format_comparison, write_into
 from mocobot.files.targets import check_folder
 
 

@@ -10,8 +10,7 @@ from discrepancy.engine.diagnose import Verdict, When
 from discrepancy.result.diagnosed import Diagnosed
 from discrepancy.team.diagnosis import against_truth, diagnose_team
 from discrepancy.team.tolerances import read_tolerances
-from estimator.files import whole_folder
-from estimator.written import holds
+from estimator.files import holds, whole_folder
 from mocobot.api.given import Given, GivenCalibration, Robots, recordings_of
 from mocobot.api.public import public
 from mocobot.files.targets import check_folder

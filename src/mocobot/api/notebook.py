@@ -11,9 +11,18 @@ from estimator.estimate.frames import frames_said
 from estimator.estimate.result import PayloadEstimate
 from mocobot_report.blocks.html import Child, Node, el
 from mocobot_report.blocks.numbers import percent, plain
-from mocobot_report.blocks.payload import distance, mass, moment, place
 from mocobot_report.blocks.prose import bullets, tidy
-from mocobot_report.blocks.tables import Entry, Num, measurement, quantity, table
+from mocobot_report.blocks.tables import (
+    Entry,
+    Num,
+    distance,
+    mass,
+    measurement,
+    moment,
+    place,
+    quantity,
+    table,
+)
 from mocobot_report.calibration.tables import deviation_tables, payload_table, trial_table
 from mocobot_report.diagnosis.keys import cause_name, chance_of
 

@@ -5,8 +5,7 @@ from dataclasses import asdict
 
 from estimator.files import whole_folder
 from mocobot.api.comparison import compare
-from mocobot.comparison.files import write_into
-from mocobot.comparison.text import what_changed
+from mocobot.comparison.text import what_changed, write_into
 from mocobot.files.provenance import provenance
 from mocobot.options import Compare
 from mocobot.strict import NotGood

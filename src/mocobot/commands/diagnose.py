@@ -18,7 +18,7 @@ from estimator.files import whole_folder
 from estimator.recording.model import Recording
 from estimator.strict import read_json
 from mocobot.api.given import Logs, Robots
-from mocobot.checks.diagnose import TRUTH
+from mocobot.checks import TRUTH
 from mocobot.cluster import workers_of
 from mocobot.commands import diagnose_joints
 from mocobot.files.provenance import file_facts, provenance

@@ -8,7 +8,7 @@ from estimator.calibrate.json import calibration_to_dict
 from estimator.extras import draws_plots
 from estimator.files import write_json, write_text
 from estimator.recording.parquet import write_recording
-from mocobot.checks.paper import SCORES
+from mocobot.checks import SCORES
 from mocobot.cluster import workers_of
 from mocobot.files.provenance import NAME, folder_provenance, provenance
 from mocobot.files.resume import run_key

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from estimator.files import whole_folder
 from mocobot.api.simulation import SimulatedRecording, simulate_trials
-from mocobot.checks.simulate import kinds_of
+from mocobot.checks import simulate_kinds
 from mocobot.options import Simulate
 from mocobot.progress import share_bar
 from mocobot_sim.effects.spec import parse_effect
@@ -19,7 +19,7 @@ def run(options: Simulate) -> None:
         InputError: an option that cannot be met, or an output that cannot be written.
         TrialError: the physics of a trial cannot be trusted.
     """
-    kinds = kinds_of(options)
+    kinds = simulate_kinds(options)
     effects = [parse_effect(text) for text in options.effect]
     length = f"{len(kinds)} trials" if len(kinds) > 1 else f"{kinds[0]} trial"
     with share_bar(length, "trial" if len(kinds) > 1 else "s") as tell:

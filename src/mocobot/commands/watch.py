@@ -13,16 +13,16 @@ from estimator.calibrate.outcome.text import SHOWN, shown_groups
 from estimator.errors import InputError
 from estimator.estimate.frames import frames_said
 from estimator.files import whole_folder, write_json, write_text
-from estimator.numbers import measured
 from estimator.recording.metadata import FREE
 from estimator.recording.model import Recording
 from estimator.recording.parquet import write_recording
+from estimator.statistics import measured
 from mocobot.api.calibration import Calibration, calibrate
 from mocobot.api.conversion import convert, convert_parts
 from mocobot.api.diagnosis import Diagnosis, diagnose
 from mocobot.api.estimation import Estimate, estimate
 from mocobot.api.inspection import inspect
-from mocobot.checks.watch import PAGE, VERDICT
+from mocobot.checks import PAGE, VERDICT
 from mocobot.files.calibrations import NAME as CALIBRATION
 from mocobot.files.calibrations import write_calibration
 from mocobot.files.calibrations import write_into as write_calibration_into

@@ -6,8 +6,7 @@ from pathlib import Path
 
 from estimator.errors import InputError
 from estimator.inputs import parse_toml
-from mocobot_logs.claims import read_small
-from mocobot_logs.faults import detail_of
+from mocobot_logs.faults import detail_of, read_small
 from mocobot_logs.map.log_map import ChannelMap, CsvMap, LogMap, TimeMap
 from mocobot_logs.map.parse import parse_map
 

@@ -19,10 +19,8 @@ import pyarrow.dataset as ds
 import pyarrow.parquet as pq
 
 from estimator.errors import InputError
-from estimator.inputs import plain
-from estimator.unpacked import Unpacked
-from mocobot_logs.claims import read_small
-from mocobot_logs.faults import detail_of, told_in_one_sentence
+from estimator.inputs import Unpacked, plain
+from mocobot_logs.faults import detail_of, read_small, told_in_one_sentence
 from mocobot_logs.formats import DATASET_INFO, dataset_root
 from mocobot_logs.table.parquet import KIND, ParquetTable, check_names
 from mocobot_logs.table.stamps import LARGEST_NS

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from estimator.archive import refuse_other_packing
 from estimator.errors import InputError
+from estimator.inputs import Unpacked
 from estimator.recording.metadata import RecordingMetadata
-from estimator.unpacked import Unpacked
 from mocobot_logs.faults import told_in_one_sentence
 from mocobot_logs.table.stamps import from_numbers
 from mocobot_logs.table.table import Block, Table, Wanted, rows_at_a_time

@@ -7,7 +7,7 @@ from threading import Event, Thread
 import numpy as np
 
 from estimator.arrays import Array
-from estimator.scratch import scratch_folder
+from estimator.processes import scratch_folder
 
 EVERY_S = 0.2
 """Time between two looks at the shares."""

@@ -14,7 +14,7 @@ from discrepancy.emps.recording.preflight import checked, stuck
 from discrepancy.emps.recording.reader import read_emps
 from discrepancy.emps.recording.whole import is_whole
 from emps_made import GAIN, KP, KV, as_mat, reference, written
-from estimator import unpacked
+from estimator import inputs
 from estimator.errors import InputError
 
 RATE = 1000.0
@@ -273,6 +273,6 @@ def test_a_file_that_unpacks_to_too_much(tmp_path: Path, monkeypatch: pytest.Mon
     path = tmp_path / "axis.mat"
     savemat(path, as_mat(axis()) | {"more": np.zeros(1 << 18)}, do_compression=True)
     assert len(read_emps(path).time)
-    monkeypatch.setattr(unpacked, "FREE_BYTES", 1 << 20)
-    monkeypatch.setattr(unpacked, "LARGEST_RATIO", 2)
+    monkeypatch.setattr(inputs, "FREE_BYTES", 1 << 20)
+    monkeypatch.setattr(inputs, "LARGEST_RATIO", 2)
     assert "axis.mat: unpacks to at least 0.00" in refused(path)

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from estimator.errors import InputError
+from estimator.quantisation import Repeats
 from estimator.recording.model import Recording
 from estimator.recording.parquet import read_recording, write_recording
-from estimator.repeats import Repeats
 from recordings import small_recording
 
 

@@ -11,9 +11,9 @@ from mcap.writer import CompressionType
 
 from bag_refusals import refuses
 from bags import Team, assert_holds, raw_mcap, rosbags_bag
-from estimator import unpacked
+from estimator import inputs
 from estimator.errors import InputError
-from estimator.unpacked import set_max_unpacked
+from estimator.inputs import set_max_unpacked
 from mocobot_logs.bag.storage.files import BagFiles
 
 TEAM = Team.draw(rows=60)
@@ -23,7 +23,7 @@ MEGABYTE = "x" * 1_000_000
 @pytest.fixture(autouse=True)
 def _usual(monkeypatch: pytest.MonkeyPatch):
     """What is free is lowered, so that tests need no gigabytes."""
-    monkeypatch.setattr(unpacked, "FREE_BYTES", 50 << 20)
+    monkeypatch.setattr(inputs, "FREE_BYTES", 50 << 20)
     yield
     set_max_unpacked(None)
 

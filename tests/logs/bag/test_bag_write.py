@@ -19,8 +19,8 @@ from ruamel.yaml import YAML
 
 from estimator.arm.delta import forward_kinematics
 from estimator.errors import InputError
+from estimator.files import LIST, holds
 from estimator.recording.model import Recording
-from estimator.written import LIST, holds
 from mocobot_logs.bag.read import METADATA_TOPIC, open_bag
 from mocobot_logs.bag.write import write_bag
 from mocobot_logs.log import CHANNELS, REF, collect

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from estimator import unpacked
-from estimator.unpacked import set_max_unpacked
+from estimator import inputs
+from estimator.inputs import set_max_unpacked
 from log_files import assert_same, read_log, refused
 from mocobot_logs.map.files import TimeMap, builtin_map
 from mocobot_logs.open_log import open_log
@@ -179,8 +179,8 @@ def test_claims_are_refused_before_anything_is_allocated(path: Path) -> None:
 
 def test_arrays_have_one_limit_together(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Each is within what is free, and packs a thousandfold."""
-    monkeypatch.setattr(unpacked, "FREE_BYTES", 1 << 20)
-    monkeypatch.setattr(unpacked, "LARGEST_RATIO", 1)
+    monkeypatch.setattr(inputs, "FREE_BYTES", 1 << 20)
+    monkeypatch.setattr(inputs, "LARGEST_RATIO", 1)
     rows = 12_000
     shapes = {name: np.zeros((rows, 3, 3)) for name in ("phi", "theta", "tau")} | {
         "time": np.arange(rows) * 0.01

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from estimator import unpacked
+from estimator import inputs
 from estimator.recording.parquet import write_recording
 from log_files import assert_same, channels_of, column, read_log, refused
 from mocobot_logs.map.files import TimeMap, builtin_map
@@ -201,7 +201,7 @@ def test_a_bomb(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pq.write_table(pa.table(columns), path, compression="zstd")
     assert path.stat().st_size < rows * 37 * 8 / 200
     assert read_log(path).robots == 3  # 118 MB do no harm
-    monkeypatch.setattr(unpacked, "FREE_BYTES", 1 << 20)
+    monkeypatch.setattr(inputs, "FREE_BYTES", 1 << 20)
     assert "unpacks to at least 0.1103 GiB; the limit is 0.0" in refused(path)
 
 

@@ -21,8 +21,7 @@ from mocobot_sim.scene.as_built import AsBuilt, CalibrationSpread
 from mocobot_sim.scene.free import build_free_team
 from mocobot_sim.scene.models import omnid_design
 from mocobot_sim.scene.team_index import TeamIndex
-from mocobot_sim.trial.assemble import assemble_at_home
-from mocobot_sim.trial.loops import close
+from mocobot_sim.trial.assemble import assemble_at_home, close
 from mocobot_sim.trial.resimulate import resimulate
 from mocobot_sim.trial.sensors import PRESETS
 from mocobot_sim.trial.simulate import TrialRequest, draw_units, simulate

@@ -12,7 +12,7 @@ from discrepancy.emps.recording.whole import is_whole
 from estimator.arrays import Array
 from estimator.errors import InputError
 from estimator.inputs import open_input
-from estimator.repeats import Repeats
+from estimator.quantisation import Repeats
 
 SERIES = {
     "t": "time [s]",

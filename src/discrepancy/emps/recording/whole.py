@@ -6,8 +6,7 @@ import struct
 import zlib
 from pathlib import Path
 
-from estimator.inputs import open_input
-from estimator.unpacked import Unpacked
+from estimator.inputs import Unpacked, open_input
 
 HEADER_BYTES, TAG_BYTES = 128, 8
 COMPRESSED = 15

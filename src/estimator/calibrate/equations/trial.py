@@ -13,12 +13,12 @@ from typing import NamedTuple
 
 import numpy as np
 
+from estimator.arm.delta import jacobian_of, leg_geometry, length_jacobians
+from estimator.arm.gimbal import rate_matrix, rotation
 from estimator.arm.unit import AT, COUNT, ArmUnit
 from estimator.arrays import Array
 from estimator.calibrate import rules
 from estimator.calibrate.equations.level import corrected
-from estimator.calibrate.equations.loops import pose_derivatives
-from estimator.calibrate.equations.noise import adjustment_of, covariance_of, noise_of
 from estimator.calibrate.equations.rows import Rows
 from estimator.calibrate.equations.sensing import Sensing
 from estimator.estimate.fusion import fusion_changes, fusion_with, total_wrench
@@ -30,6 +30,115 @@ from estimator.rigid_team.slots import PHI, TAU, THETA
 from estimator.signals.arm_changes import BY_UNIT, ArmChanges
 from estimator.signals.arm_data import ArmData
 from estimator.so3 import cross
+
+_POSE = np.r_[
+    AT["phi_zero"], AT["theta_zero"], AT["radius"], AT["proximal_length"], AT["rod_length"], AT["tilt"]
+]
+_AXES = np.eye(3)[:, :2]
+
+
+def pose_derivatives(rows: Rows, units: ArmUnit, shared: Shared, bases: Bases) -> tuple[Array, Array, Array]:
+    """Of the loops' 6 (N - 1) channels; n rows.
+
+    Returns:
+        By the robots' deviations, shape (n, 6 (N - 1), N, ``COUNT``), by ``Shared.moved``, (n, ., 6 (N - 1) + 10), and
+        by ``Bases.moved``, (n, ., 4 (N - 1)).
+    """
+    s = corrected(rows.s, units)
+    R_bi, h, turn, shift = _by_unit(s, units)
+    n, N = len(rows.time), h.shape[1]
+    channels = 6 * (N - 1)
+    by_units = np.zeros((n, channels, N, COUNT))
+    by_carried = np.zeros((n, channels, channels + 10))
+    by_bases = np.zeros((n, channels, 4 * (N - 1)))
+    R_b1 = rows(R_bi[:, 0])
+    mean_turn, mean_shift, mean_h = rows(turn), rows(shift), rows(h)
+    for j in range(1, N):
+        about, along = slice(6 * (j - 1), 6 * (j - 1) + 3), slice(6 * (j - 1) + 3, 6 * j)
+        lever = R_bi[:, 0] @ shared.grasps.p_1i[j]
+        swept = rows(np.asarray(np.cross(turn[:, 0], lever[:, :, None], axis=1), dtype=np.float64))
+        by_units[:, about, 0, _POSE] = -mean_turn[:, 0]
+        by_units[:, along, 0, _POSE] = -mean_shift[:, 0] - swept
+        by_units[:, about, j, _POSE] = bases.R[j] @ mean_turn[:, j]
+        by_units[:, along, j, _POSE] = bases.R[j] @ mean_shift[:, j]
+        by_carried[:, about, about] = by_carried[:, along, along] = -R_b1
+        column, turned = 4 * (j - 1), mean_h[:, j] @ bases.R[j].T
+        by_bases[:, along, column : column + 3] = np.eye(3)
+        by_bases[:, about.start + 2, column + 3] = 1.0
+        by_bases[:, along.start, column + 3] = -turned[:, 1]
+        by_bases[:, along.start + 1, column + 3] = turned[:, 0]
+    return by_units, by_carried, by_bases
+
+
+def _by_unit(s: Array, units: ArmUnit) -> tuple[Array, Array, Array, Array]:
+    """R_bi, h, and how deviations turn and shift them, shape (q, N, 3, len(_POSE)), in level base frames."""
+    phi, theta = s[..., PHI], s[..., THETA]
+    legs = leg_geometry(phi, units)
+    R_ai = rotation(theta)
+    shift = np.zeros((*phi.shape, len(_POSE)))
+    turn = np.zeros_like(shift)
+    shift[..., :3] = -jacobian_of(legs)
+    turn[..., 3:6] = -(R_ai @ rate_matrix(theta))
+    for k, part in enumerate(length_jacobians(legs, phi, units)):
+        shift[..., 6 + 3 * k : 9 + 3 * k] = part
+    R_ba = units.R_ba
+    R_bi, h = R_ba @ R_ai, (R_ba @ legs.h[..., None])[..., 0]
+    turn, shift = R_ba @ turn, R_ba @ shift
+    turn[..., 15:] = _AXES
+    shift[..., 15:] = np.cross(_AXES.T, h[..., None, :]).swapaxes(-1, -2)
+    return R_bi, h, turn, shift
+
+
+# Value, rate and acceleration of each joint; the three torques.
+_CHAINS = [np.array([first + k + 3 * order for order in range(3)]) for first in (0, 9) for k in range(3)] + [
+    np.arange(18, 21)
+]
+
+
+def covariance_of(J: Array, noise: Array) -> Array:
+    """Covariance of the rows' residual, shape (n, C, C).
+
+    Args:
+        J: derivative by the rows' signals, shape (n, C, N, ``SLOTS``).
+        noise: theirs, as ``noise_of`` has it.
+    """
+    total = np.zeros((len(J), J.shape[1], J.shape[1]))
+    for robot in range(J.shape[2]):
+        for joint, at in enumerate(_CHAINS):
+            part = J[:, :, robot, at]
+            total += part @ noise[:, robot, joint] @ np.swapaxes(part, 1, 2)
+    return total
+
+
+def adjustment_of(J: Array, noise: Array, covariance: Array, residual: Array) -> Array:
+    """The likeliest change of the rows' signals that makes loops and balance close, shape (n, N, ``SLOTS``).
+
+    Args:
+        J, noise: as for ``covariance_of``.
+        covariance: what that gives.
+        residual: what is to be closed, shape (n, C).
+    """
+    weighed = np.linalg.solve(covariance, residual[..., None])
+    out = np.zeros((len(J), J.shape[2], SLOTS))
+    for robot in range(J.shape[2]):
+        for joint, at in enumerate(_CHAINS):
+            moved = noise[:, robot, joint] @ (np.swapaxes(J[:, :, robot, at], 1, 2) @ weighed)
+            out[:, robot, at] -= moved[..., 0]
+    return out
+
+
+def noise_of(rows: Rows, variances: tuple[Array, Array]) -> Array:
+    """Covariance of every joint's (value, rate, acceleration) and of every torque in the rows: (n, N, 7, 3, 3)."""
+    moving, held = variances
+    n, N = moving.shape[:2]
+    out = np.zeros((n, N, 7, 3, 3))
+    at = slice(0, rows.moving)
+    out[at, :, :6] = moving[at, :, :6, None, None] * rows.gain
+    out[at, :, 6, range(3), range(3)] = moving[at, :, 6:] * rows.gain[0, 0]
+    at = slice(rows.moving, None)
+    out[at, :, :6, 0, 0] = held[at, :, :6]
+    out[at, :, 6, range(3), range(3)] = held[at, :, 6:]
+    return out
 
 
 class Rowed(NamedTuple):

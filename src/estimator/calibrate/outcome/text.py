@@ -15,7 +15,7 @@ from estimator.calibrate.calibration import CalibratedPayload, CalibratedTrial, 
 from estimator.calibrate.outcome.carried import carried, grasps_of
 from estimator.estimate.frames import frames_said, in_encoder_frames
 from estimator.estimate.uncertainty import standard_errors
-from estimator.numbers import measured
+from estimator.statistics import measured
 
 
 class Shown(NamedTuple):

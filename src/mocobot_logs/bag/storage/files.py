@@ -18,14 +18,12 @@ from ruamel.yaml import YAML
 from ruamel.yaml.tokens import AnchorToken
 
 from estimator.errors import InputError
-from estimator.inputs import plain
-from estimator.unpacked import Unpacked
+from estimator.inputs import Unpacked, plain
 from mocobot_logs.bag.messages import BLOCK_BYTES, MESSAGE_BYTES, Messages, Storage, joined, merged
 from mocobot_logs.bag.storage.mcap import McapBag
 from mocobot_logs.bag.storage.sqlite import SqliteBag
 from mocobot_logs.bag.storage.unpack import UnpackError, unpack_file, unpack_message
-from mocobot_logs.claims import read_small
-from mocobot_logs.faults import detail_of, readable
+from mocobot_logs.faults import detail_of, read_small, readable
 from mocobot_logs.formats import BAG_METADATA, MCAP, ROS1, SQLITE, has_bag_suffix
 
 VERSIONS = range(1, 10)

@@ -21,7 +21,7 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Schema, Statistics
 
 from estimator.errors import InputError
-from estimator.unpacked import Unpacked
+from estimator.inputs import Unpacked
 from mocobot_logs.bag.messages import BLOCK_BYTES, Messages, Topic, check_sizes, merged
 from mocobot_logs.bag.storage.unpack import CHUNK_BYTES, UnpackError, unpack
 from mocobot_logs.faults import readable

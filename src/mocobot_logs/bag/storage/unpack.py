@@ -6,7 +6,7 @@ import lz4.frame
 import zstandard
 
 from estimator.errors import InputError
-from estimator.unpacked import Unpacked
+from estimator.inputs import Unpacked
 from mocobot_logs.faults import detail_of
 
 CHUNK_BYTES = 256 << 20
