@@ -12,7 +12,7 @@ import json
 import sys
 import time
 import traceback
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -31,15 +31,15 @@ from discrepancy.serial.model import SerialModel
 from discrepancy.serial.recording.joint_log import JointLog
 from joints.foreign import make, thinned
 
-RATES_HZ = (1000.0, 250.0, 50.0)
+RATES_HZ = {"panda": (500.0,), "bare": (1000.0, 250.0, 50.0)}
 KINDS = ("clean", "single", "clean", "single", "pairs")
 """Of successive sets of the panda."""
-RUBS = ("friction", "stribeck", "sublinear_friction", "asymmetric_coulomb", "asymmetric_viscous", "warming", "load_friction")
+RUBS = ("friction", "stribeck", "sublinear_friction", "asymmetric_coulomb", "asymmetric_viscous", "warming",
+        "load_friction")  # fmt: skip
 ALIKE = (("torque_offset", "asymmetric_coulomb"), ("spring", "counterbalance", "ripple"), RUBS)
 """Names of one thing at one joint: no log without rests parts the first, terms of one friction are the last."""
 SURE = 0.9
 Item = dict[str, Any]
-Sets = Iterator[tuple[Item, SerialModel, list[JointLog], Item]]
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,6 @@ class Options:
         draws: how many sets.
         out: where results go.
         tables: print the tables of the results instead.
-        misses: print every set that is not right instead.
     """
 
     part: Literal["panda", "bare", "shapes", "clean-shapes"] = "panda"
@@ -62,29 +61,27 @@ class Options:
     draws: int = 10
     out: Path = Path("out/joints")
     tables: bool = False
-    misses: bool = False
 
 
 def main(options: Options) -> None:
     """Run, or print."""
     path = options.out / "results.jsonl"
     results = [json.loads(x) for x in path.read_text(encoding="utf-8").splitlines()] if path.is_file() else []
-    if options.tables or options.misses:
-        print(tables(results) if options.tables else "\n".join(misses(results)))
+    if options.tables:
+        print(tables(results))
         return
     options.out.mkdir(parents=True, exist_ok=True)
     done = {(r["part"], r["seed"], r["rate_hz"]) for r in results}
     for seed in range(options.first, options.first + options.draws):
-        rates = RATES_HZ if options.part == "bare" else (500.0 if options.part == "panda" else 250.0,)
-        left = [r for r in rates if (options.part, seed, r) not in done]
+        left = [r for r in RATES_HZ.get(options.part, (250.0,)) if (options.part, seed, r) not in done]
         if not left:
             continue
-        model, logs, truth = _made(options, seed)
+        made = _arm(options, seed) if options.part == "panda" else make(options.part, seed, options.out)
         for rate in left:
-            result = {"part": options.part, "seed": seed, "rate_hz": rate, "truth": truth, "error": None}
+            result = {"part": options.part, "seed": seed, "rate_hz": rate, "truth": made[2], "error": None}
             begun = time.process_time()
             try:
-                result |= _found(model, [thinned(g, rate) for g in logs], truth)
+                result |= _found(made[0], [thinned(g, rate) for g in made[1]], made[2])
             except Exception:  # one that fails must not end the campaign
                 result["error"] = traceback.format_exc()
             result["cpu_s"] = time.process_time() - begun
@@ -93,161 +90,113 @@ def main(options: Options) -> None:
             print("\n".join(told_of(result)), flush=True)
 
 
-def _made(options: Options, seed: int) -> tuple[SerialModel, list[JointLog], Item]:
-    if options.part != "panda":
-        model, logs, truth = make(options.part, seed, options.out)
-        return model, logs, {"faults": truth.faults, "values": truth.values, **truth.told}
+def _arm(options: Options, seed: int) -> tuple[SerialModel, list[JointLog], Item]:
     request = ArmSet.of(seed, options.kind or KINDS[seed % len(KINDS)], 4.0)  # type: ignore[arg-type]
-    made = make_arm(request, options.out)
-    model = machine.nominal(options.out)
+    made, model = make_arm(request, options.out), machine.nominal(options.out)
     places = {"payload": model.bodies[-1], "push": "last link", "gravity_direction": "base"}
-    faults = [
-        {"cause": e["cause"], "form": e["name"], "size": e["size"], "place": places.get(e["cause"], f"joint{e['joint']}")}
-        for e in made.truth["effects"]
-    ]  # fmt: skip
-    return model, [made.log], {"faults": faults, "values": {}, "kind": request.kind}
+    faults = [e | {"place": places.get(e["cause"], f"joint{e['joint']}")} for e in made.truth["effects"]]
+    return model, [made.log], {"kind": request.kind, "faults": faults, "values": {}}
 
 
 def _found(model: SerialModel, logs: list[JointLog], truth: Item) -> Item:
-    """The verdict: every cause with what is told of it, values, and what the next ones would gain."""
+    """Causes with all that is told of them, values, the search's steps, and what further causes would gain."""
     steps: list[str] = []
     outcome = diagnose(model, logs, say=lambda line: steps.append(str(line)))
     causes = []
     for o in odds_of(outcome.search, outcome.state, 1.0):
-        own = {"cause": o.chosen.group.cause, "place": o.chosen.group.place, "probability": o.probability}
-        rivals = [
-            {"cause": r.group.cause if r.group else ("open" if r.open else "nothing"),
-             "place": r.group.place if r.group else "", "probability": r.probability}
-            for r in o.rivals[:6]
-        ]  # fmt: skip
-        told = [None if g is None else [g.cause, g.place] for g in o.told()]
-        shape = dict(o.chosen.group.shape)
-        causes.append(own | {"shape": shape, "nats": o.over_nothing, "rivals": rivals, "told": told})
-    numbers = labels_of(outcome)
-    offers = outcome.search.offers(outcome.state)
-    hidden = {f["cause"] for f in truth["faults"]}
-    listed = [[round(g, 1), c.group.name] for k, (g, c) in enumerate(offers) if k < 3 or c.group.cause in hidden][:12]
-    z = {k: [numbers[k][0], numbers[k][1], v] for k, v in truth["values"].items() if k in numbers}
-    sizes = {k: [round(v, 6), round(e, 6)] for k, (v, e) in numbers.items()}
-    return {"causes": causes, "steps": steps, "offers": listed, "z": z, "sizes": sizes}
+        none = {True: ("open", ""), False: ("nothing", "")}
+        rivals = [(r.group.key if r.group else none[r.open], r.probability) for r in o.rivals]
+        every = sorted([(o.chosen.group.key, o.probability), *rivals], key=lambda r: -r[1])
+        told = [None if g is None else g.key for g in o.told()]
+        causes.append({"name": o.chosen.group.name, "nats": o.over_nothing, "every": every[:6], "told": told})
+    numbers, hidden = labels_of(outcome), {f["cause"] for f in truth["faults"]}
+    offers = enumerate(outcome.search.offers(outcome.state))
+    listed = [[round(g, 1), c.group.name] for k, (g, c) in offers if k < 3 or c.group.cause in hidden]
+    return {"causes": causes, "steps": steps, "offers": listed[:12], "values": numbers}
 
 
-# --- scoring
-
-
-def _same(fault: Item, key: Sequence[str] | None) -> bool:
+def _same(fault: Item, key: Sequence[str]) -> bool:
     """Whether a cause at a place is the fault, or what no log parts from it."""
-    if key is None:
-        return False
-    cause, place = key
     names = {n for family in ALIKE if fault["cause"] in family for n in family} | {fault["cause"]}
-    return cause in names and (place == fault["place"] or (cause == "push" and place.startswith("last link")))
+    return key[0] in names and (fault["cause"] == "push" or key[1] == fault["place"])
 
 
 def score(result: Item) -> Item:
-    """Hits by fault, and what was named besides; friction is none where the robot has it without its model's knowing."""
-    truth, found = result["truth"], result["causes"]
-    faults, named = truth["faults"], []
-    for c in found:
-        every = sorted([c, *c["rivals"]], key=lambda r: -r["probability"])
-        if every[0]["cause"] in ("open", "nothing"):
-            continue
-        named.append((every[0], c))
-    hits, right = [False] * len(faults), set()
-    for i, fault in enumerate(faults):
-        for k, (head, c) in enumerate(named):
-            if _same(fault, (head["cause"], head["place"])) or (
-                None not in c["told"] and any(_same(fault, t) for t in c["told"])
-            ):
-                hits[i] = True
-                right.add(k)
-        if fault["place"] == "all joints" and not hits[i]:
-            own = [k for k, (head, _) in enumerate(named) if head["cause"] == fault["cause"]]
-            right |= set(own)
-            hits[i] = len(own) == truth.get("joints")
-    strangers = [
-        (head, c["nats"]) for k, (head, c) in enumerate(named)
-        if k not in right and not (truth.get("foreign") and head["cause"] in RUBS)
-    ]  # fmt: skip
-    return {
-        "hits": hits, "missed": [f for f, hit in zip(faults, hits, strict=True) if not hit],
-        "certain": [s for s in strangers if s[0]["probability"] >= SURE],
-        "false": [s for s in strangers if s[0]["probability"] < SURE],
-        "right": all(hits) and not strangers,
-    }  # fmt: skip
+    """Which faults are named, and what is besides; a cause whose likeliest reading is open or nothing is not named."""
+    truth, faults = result["truth"], result["truth"]["faults"]
+    named = [c for c in result["causes"] if c["every"][0][0][1]]
+    head = [c["every"][0][0] for c in named]
+    hits, right = [], {k for k, h in enumerate(head) if truth.get("foreign") and h[0] in RUBS}
+    for fault in faults:
+        told = [[head[k], *([] if None in c["told"] else c["told"])] for k, c in enumerate(named)]
+        own = {k for k, keys in enumerate(told) if any(_same(fault, key) for key in keys)}
+        hit = bool(own)
+        if fault["place"] == "all joints" and not own:
+            own = {k for k, h in enumerate(head) if h[0] == fault["cause"]}
+            hit = len(own) == truth["joints"]
+        hits.append(hit)
+        right |= own
+    strangers = [c for k, c in enumerate(named) if k not in right]
+    sure = [c for c in strangers if c["every"][0][1] >= SURE]
+    missed = [f for f, hit in zip(faults, hits, strict=True) if not hit]
+    return {"hits": hits, "missed": missed, "certain": sure, "false": [c for c in strangers if c not in sure],
+            "right": not missed and not strangers}  # fmt: skip
 
 
 def told_of(result: Item) -> list[str]:
     """A set in words."""
     truth = result["truth"]
     said = {k: v for k, v in truth.items() if k not in ("faults", "values")}
-    hidden = [f"{f['cause']} at {f['place']}" + (f" ({f['size']:.3g})" if "size" in f else "") for f in truth["faults"]]
-    out = [f"{result['part']} {result['seed']} {result['rate_hz']:.0f} Hz {said}: {'; '.join(hidden)}"]
+    words = ("cause", "place", "name", "size")
+    hidden = [" ".join(str(f[k]) for k in words if k in f) for f in truth["faults"]]
+    begin = f"{result['part']} {result['seed']} {result['rate_hz']:.0f} Hz {said}: {'; '.join(hidden)}"
     if result["error"]:
-        return [*out, "    " + result["error"].splitlines()[-1]]
-    scored = score(result)
-    out[0] += f" -> {'RIGHT' if scored['right'] else 'not right'}, {result['cpu_s']:.1f} s"
+        return [begin, "    " + result["error"].splitlines()[-1]]
+    s = score(result)
+    out = [f"{begin} -> {'RIGHT' if s['right'] else 'not right'}, {result['cpu_s']:.1f} s"]
     for c in result["causes"]:
-        rivals = ", ".join(f"{r['cause']} {r['place']} {r['probability']:.2f}" for r in c["rivals"] if r["probability"] > 0.03)
-        mark = next((m for m in ("certain", "false") for s, _ in scored[m] if s is c or s in c["rivals"]), "")
-        out.append(f"    {mark:8s}{c['cause']} at {c['place']} {c['shape'] or ''} p {c['probability']:.2f}, {c['nats']:.0f} nats; {rivals}")
-    if scored["missed"]:
-        out += [f"    missed  {f['cause']} at {f['place']}" for f in scored["missed"]] + [f"    offers  {result['offers']}"]
-    return out
-
-
-def misses(results: Sequence[Item]) -> list[str]:
-    """Every set that is not right."""
-    return [line for r in results if r["error"] or not score(r)["right"] for line in told_of(r)]
+        mark = "CERTAIN" if c in s["certain"] else "false" if c in s["false"] else ""
+        every = ", ".join(f"{' '.join(key)} {p:.2f}" for key, p in c["every"] if p > 0.02)
+        out.append(f"    {mark:8s}{c['name']}, {c['nats']:.0f} nats: {every}")
+    return out + [f"    missed  {f['cause']} {f['place']}; offers {result['offers']}" for f in s["missed"]]
 
 
 def tables(results: Sequence[Item]) -> str:
-    """All tables there are results for, as Markdown."""
+    """All tables there are results for, as Markdown, and every set that is not right."""
     rows: dict[str, list[Item]] = {}
+    bare: dict[tuple[str, float], list[Sequence[float]]] = {}
+    verdicts: dict[int, list[list[str]]] = {}
     for r in results:
-        by = f" {r['truth']['kind']}" if r["part"] == "panda" else f" {r['rate_hz']:.0f} Hz" if r["part"] == "bare" else ""
-        rows.setdefault(r["part"] + by, []).append(r)
-    out = ["| sets | falsely certain | false below 0.9 | faults named | missed | wholly right | errors | CPU s median, most |",
-           "|---|---|---|---|---|---|---|---|"]  # fmt: skip
+        more = r["truth"].get("kind", f"{r['rate_hz']:.0f} Hz" if r["part"] == "bare" else "")
+        rows.setdefault(f"{r['part']} {more}", []).append(r)
+        if r["part"] == "bare" and not r["error"]:
+            verdicts.setdefault(r["seed"], []).append(sorted(c["name"] for c in r["causes"]))
+            true = r["truth"]["values"]
+            for label in true.keys() & r["values"].keys():
+                key = label.split()[-1], r["rate_hz"]
+                bare.setdefault(key, []).append((*r["values"][label], true[label]))
+    head = "| sets | falsely certain | false below 0.9 | faults named | wholly right | errors | CPU s median, most |"
+    out = [head, "|---|---|---|---|---|---|---|"]
     for name, own in sorted(rows.items()):
         good = [score(r) for r in own if not r["error"]]
-        of = lambda what: sum(len(s[what]) for s in good)  # noqa: E731
-        cpu = [r["cpu_s"] for r in own]
-        out.append(
-            f"| {name} ({len(own)}) | {of('certain')} | {of('false')} | {sum(sum(s['hits']) for s in good)} of {of('hits')} "
-            f"| {of('missed')} | {sum(s['right'] for s in good)} of {len(own)} | {len(own) - len(good)} "
-            f"| {np.median(cpu):.1f}, {max(cpu):.1f} |"
+        certain, false, hits = (sum(len(s[what]) for s in good) for what in ("certain", "false", "hits"))
+        named, right, bad = (
+            sum(sum(s["hits"]) for s in good),
+            sum(s["right"] for s in good),
+            len(own) - len(good),
         )
-    out += ["", *_calibration(results), *_rates(results)]
-    return "\n".join(out)
-
-
-def _calibration(results: Sequence[Item]) -> list[str]:
-    """Of values of bare robots: root mean square of error over standard error, and the median standard error's share."""
-    kinds: dict[tuple[str, float], list[list[float]]] = {}
-    for r in results:
-        if r["part"] == "bare" and not r["error"]:
-            for label, numbers in r["z"].items():
-                word = " ".join(label.split()[1:]) if label.startswith("joint") else f"payload {label.split()[-1]}"
-                kinds.setdefault((word, r["rate_hz"]), []).append(numbers)
-    if not kinds:
-        return []
-    out = ["| value | Hz | n | rms of error over se | median of se over size |", "|---|---|---|---|---|"]
-    for (word, rate), own in sorted(kinds.items()):
-        value, se, true = np.array(own).T
-        z = np.sqrt(np.mean(((value - true) / se) ** 2))
-        out.append(f"| {word} | {rate:.0f} | {len(own)} | {z:.2f} | {np.median(se / np.abs(true)):.3f} |")
-    return [*out, ""]
-
-
-def _rates(results: Sequence[Item]) -> list[str]:
-    """How many bare robots have one verdict at all rates."""
-    sets: dict[int, list[list[str]]] = {}
-    for r in results:
-        if r["part"] == "bare" and not r["error"]:
-            sets.setdefault(r["seed"], []).append(sorted(f"{c['cause']} {c['place']}" for c in r["causes"]))
-    whole = [v for v in sets.values() if len(v) == len(RATES_HZ)]
-    return [f"The same verdict at all rates: {sum(all(x == v[0] for x in v) for v in whole)} of {len(whole)}."] if whole else []
+        seconds = f"{np.median([r['cpu_s'] for r in own]):.1f}, {max(r['cpu_s'] for r in own):.1f}"
+        row = f"{certain} | {false} | {named} of {hits} | {right} | {bad} | {seconds}"
+        out.append(f"| {name} ({len(own)}) | {row} |")
+    out += ["", "| value | Hz | n | rms of error over se | median of se over size |", "|---|---|---|---|---|"]
+    for (word, rate), numbers in sorted(bare.items()):
+        value, se, true = np.array(numbers).T
+        z, share = np.sqrt(np.mean(((value - true) / se) ** 2)), np.median(se / np.abs(true))
+        out.append(f"| {word} | {rate:.0f} | {len(numbers)} | {z:.2f} | {share:.3f} |")
+    whole = [v for v in verdicts.values() if len(v) == len(RATES_HZ["bare"])]
+    same = sum(all(x == v[0] for x in v) for v in whole)
+    wrong = [line for r in results if r["error"] or not score(r)["right"] for line in told_of(r)]
+    return "\n".join([*out, "", f"One verdict at all rates: {same} of {len(whole)}.", "", *wrong])
 
 
 if __name__ == "__main__":
