@@ -196,7 +196,7 @@ def make(part: str, seed: int, folder: Path) -> tuple[SerialModel, list[JointLog
             kg = float(np.clip(rng.uniform(0.05, 0.12) * sum(c[2] for c in chain), 0.5, 3.0))
             _load(true, kg, rng, faults, values)
         else:
-            # A zero where it shows most; a scale not at the first joint, where it is the first link's inertia; one each.
+            # A zero where it shows most; a scale not at the first joint, where it is the link's inertia; one each.
             shows = {"joint_zero": np.argsort(slope * ~slides)[-3:], "torque_scale": np.arange(1, J)}
             taken = {f["place"] for f in faults}
             j = int(rng.choice([k for k in shows.get(cause, range(J)) if f"joint{k + 1}" not in taken]))
