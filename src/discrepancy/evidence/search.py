@@ -161,12 +161,20 @@ class Search:
 
     def run(self, state: State) -> State:
         """The likeliest set from another on."""
-        state = self._pruned(state, fresh=False)
+        state = self._pruned(self._settled(state), fresh=False)
         while len(state.chosen) < self.settings.most_causes:
             grown = self._grown(state) or self._exchanged(state)
             if grown is None:
                 break
-            state = grown
+            state = self._settled(grown)
+        return self._pruned(state, fresh=False)
+
+    def _settled(self, state: State) -> State:
+        """The same set with noise learnt to its end: a set with one cause more must not gain by what this one lacks."""
+        for _ in range(self.settings.settle_steps):
+            before, state = state.evidence, self.value(state.chosen, state.posterior)
+            if abs(state.evidence - before) < 0.1 * self.settings.need_nats:
+                break
         return state
 
     def _exchanged(self, state: State) -> State | None:

@@ -19,6 +19,7 @@ class Settings:
         tried: candidates whose exact evidence is computed in each step, the likeliest by the linear one.
         octaves: scales of a cause's prior, by halves from the slab down.
         noise_steps: steps in which noise and spreads are learnt for a candidate.
+        settle_steps: times that is repeated at most for a set that is taken.
         start_steps: the same where nothing was learnt before.
         floor_steps: the same for the noise that the whole dictionary leaves.
         rounds: times the problem is made linear again.
@@ -38,6 +39,7 @@ class Settings:
     tried: int = 6
     octaves: int = 5
     noise_steps: int = 2
+    settle_steps: int = 8
     start_steps: int = 8
     floor_steps: int = 15
     rounds: int = 3

@@ -73,7 +73,7 @@ class JointCause:
         shapes: numbers inside the columns that are tried.
         positive: parameters that, with the model's own, cannot be negative.
         kind: whether all joints may have it alike: a cause of the robot.
-        rubs: whether the amount of dry friction follows from the first parameter.
+        rubs: whether friction at rest has the first parameter in it.
     """
 
     name: str
@@ -136,7 +136,7 @@ CAUSES = (
     JointCause(
         "sublinear_friction", "sublinear friction in {joint}", ("bend_Nm",),
         lambda s, h: (s.direction * np.log1p(np.abs(s.v) / (h["share"] * s.span.speed)),), lambda z, h: (z.torque,),
-        SHARES, rubs=True,
+        SHARES,
     ),
     JointCause(
         "load_friction", "friction by load in {joint}", ("share",),

@@ -99,7 +99,7 @@ class JointProblem:
                     members = c.group.members or (c.group.columns,)
                     places = self.model.joints if c.group.members else (c.group.place,)
                     for place, member in zip(places, members, strict=True):
-                        rubs[index[place]] += abs(values[member[0]])
+                        rubs[index[place]] += values[member[0]]  # with its sign: terms share one torque
         for j, (columns, unit) in enumerate(self.resting):
             S[columns] = (unit * rubs[j]) ** 2
         return S

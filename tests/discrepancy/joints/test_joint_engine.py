@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from discrepancy.evidence.odds import odds_of
+from discrepancy.evidence.search import Chosen
 from discrepancy.joints import causes, problem
 from discrepancy.joints.diagnose import Outcome, diagnose, labels_of
 from followed_arm import Change, arm_log, arm_model, rubs
@@ -56,6 +57,8 @@ def test_a_model_without_friction_is_one_finding(folder: Path) -> None:
     assert abs(value - 0.08) < 4.0 * se
     (friction, _) = odds_of(found.search, found.state)
     assert friction.probability > 0.99
+    again = found.search.value(found.state.chosen, found.state.posterior)
+    assert again.evidence == pytest.approx(found.state.evidence, abs=0.5)  # its noise is learnt to the end
 
 
 def test_one_bad_joint_stays_one_bad_joint(folder: Path) -> None:
@@ -92,6 +95,24 @@ def test_the_verdict_does_not_depend_on_the_rate(folder: Path) -> None:
     assert [names(f) for f in found] == [{("friction", "all joints")}] * 2
     fast, slow = (labels_of(f)["elbow coulomb_Nm"] for f in found)
     assert abs(fast[0] - slow[0]) < 4.0 * slow[1]
+
+
+def test_friction_at_rest_is_that_of_all_terms_together(folder: Path) -> None:
+    """Coulomb friction of 2 N m, less 1.5 N m of Stribeck friction: what is left at rest is 0.5 N m."""
+    model = arm_model(folder)
+    linear = problem.joint_problem(model, problem.smoothed(model, [arm_log(rubs(0.5), 9)]))
+
+    def rests(**amounts: float) -> np.ndarray:
+        values, chosen = np.zeros(linear.cells.count), []
+        for cause, amount in amounts.items():
+            group = next(g for g in linear.groups if g.key == (cause, "elbow"))
+            values[group.columns[0]] = amount
+            chosen.append(Chosen(group, 1.0))
+        columns, _ = linear.resting[linear.model.joints.index("elbow")]
+        return linear.prior(chosen, values)[columns]
+
+    np.testing.assert_allclose(rests(friction=2.0, stribeck=-1.5), rests(friction=0.5))
+    np.testing.assert_allclose(rests(friction=2.0, sublinear_friction=-1.5), rests(friction=2.0))
 
 
 def test_a_push_has_its_instant(folder: Path) -> None:
