@@ -210,7 +210,6 @@ def _gap(t: Timing) -> bool:
 def _ready(found: Inspection) -> str:
     if found.unchecked is not None or not (found.free or (found.ready and found.wiring)):
         return f"ready for: nothing ({found.unchecked})"
-            )
     clocks = "; clocks to be corrected" if found.skewed else ""
     standing = found.standing
     if any(stands.mostly for stands in standing):
