@@ -44,9 +44,11 @@ class Repeats:
         efforts = (
             values[np.append(True, changes)][:, self._efforts] if len(values) else values[:, self._efforts]
         )
-        high = np.abs(np.diff(efforts, n=_ORDER, axis=0))
+        with np.errstate(over="ignore", invalid="ignore"):  # of values beyond floats, which others refuse
+            high = np.abs(np.diff(efforts, n=_ORDER, axis=0))
+            noisy = high > _NOISE * np.ptp(efforts, axis=0) if high.size else high
         if high.size:
-            self._noisy += np.sum(high > _NOISE * np.ptp(efforts, axis=0), axis=0)
+            self._noisy += np.sum(noisy, axis=0)
             self._differences += len(high)
 
     def _block(self, values: Array) -> NDArray[np.bool_]:
