@@ -1,6 +1,5 @@
 """Files and folders that appear whole or not at all: written beside their place, then renamed into it."""
 
-import contextlib
 import errno
 import json
 import os
@@ -138,7 +137,7 @@ def whole_file(path: Path) -> Iterator[Path]:
                 real.rename(free_name(real))
             temporary.replace(real)
         finally:
-            with contextlib.suppress(OSError):
+            with suppress(OSError):
                 temporary.unlink(missing_ok=True)
 
 
@@ -190,7 +189,7 @@ def whole_folder(path: Path, kind: str) -> Iterator[Path]:
             raise InputError(f"{path}: cannot be written ({error.strerror})") from error
         finally:
             if old.exists() and not real.exists():
-                with contextlib.suppress(OSError):
+                with suppress(OSError):
                     old.rename(real)
             shutil.rmtree(temporary, ignore_errors=True)
 
@@ -206,7 +205,7 @@ def _folders_above(path: Path) -> Iterator[None]:
         yield
     except BaseException:
         for folder in missing:
-            with contextlib.suppress(OSError):
+            with suppress(OSError):
                 folder.rmdir()
         raise
 
@@ -293,7 +292,7 @@ def write_json(path: Path, values: Mapping[str, Any]) -> None:
 
 
 @contextmanager
-def system_errors(path: Path, done: str = "written") -> Iterator[None]:
+def system_errors(path: Path | str, done: str = "written") -> Iterator[None]:
     """A block in which what the operating system refuses becomes one sentence: that ``path`` cannot be ``done``.
 
     Raises:

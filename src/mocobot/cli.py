@@ -13,8 +13,7 @@ from typing import Any, NoReturn, TextIO, cast
 from estimator.errors import InputError
 from estimator.inputs import printable, set_max_unpacked
 from mocobot import options
-from mocobot.config import with_config
-from mocobot.parsing import parse
+from mocobot.parsing import parse, with_config
 from mocobot.strict import NotGood
 from mocobot_sim.errors import TrialError
 

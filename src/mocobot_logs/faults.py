@@ -2,10 +2,16 @@
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 
 from estimator.errors import InputError
+from estimator.files import system_errors
 from estimator.inputs import open_input, printable
+
+LONGEST = 200
+readable = partial(system_errors, done="read")
+"""A block in which what the operating system refuses becomes one sentence: that a file cannot be read."""
 
 
 def read_small(path: Path, most_bytes: int, where: str, kind: str) -> bytes:
@@ -27,9 +33,6 @@ def read_small(path: Path, most_bytes: int, where: str, kind: str) -> bytes:
     return content
 
 
-LONGEST = 200
-
-
 def detail_of(error: BaseException) -> str:
     """The first line of an error's message, or its type where there is none: printable and short."""
     lines = str(error).splitlines()
@@ -39,19 +42,6 @@ def detail_of(error: BaseException) -> str:
 def shown(text: str, longest: int = 60) -> str:
     """Text of a file as a terminal may show it."""
     return printable(text[:longest], keep="")[:longest]
-
-
-@contextmanager
-def readable(where: str) -> Iterator[None]:
-    """What the operating system refuses inside the block, as one sentence.
-
-    Raises:
-        InputError: a file cannot be read.
-    """
-    try:
-        yield
-    except OSError as error:
-        raise InputError(f"{where}: cannot be read ({error.strerror or error})") from error
 
 
 @contextmanager

@@ -13,9 +13,8 @@ from estimator.calibrate.calibrate import calibrate as fit
 from estimator.calibrate.calibration import Calibration as Below
 from estimator.calibrate.json import calibration_to_dict
 from estimator.calibrate.outcome.flanges import in_drawing_frames
-from estimator.calibrate.outcome.prior_file import read_prior
 from estimator.calibrate.outcome.text import format_calibration
-from estimator.calibrate.prior import Prior
+from estimator.calibrate.prior import Prior, read_prior
 from estimator.errors import InputError
 from estimator.files import holds, whole_folder
 from estimator.recording.model import Recording

@@ -18,9 +18,8 @@ from mocobot_sim.scene.named_files import ASSETS as TYPES
 from mocobot_sim.scene.named_files import owned
 from mocobot_sim.serial.built import Effect, refused, steps
 from mocobot_sim.serial.effects import DRY, RobotEffect, dry_levels, resistances
-from mocobot_sim.serial.law import ActingLaw, JointLaw
+from mocobot_sim.serial.law import ActingLaw, JointLaw, State
 from mocobot_sim.serial.mjcf import into_mjcf
-from mocobot_sim.serial.state import State
 
 ASSETS = "assets"
 

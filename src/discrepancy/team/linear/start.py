@@ -25,8 +25,15 @@ from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.processes import ends_with_this
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Bases, Shared, balance, grasp_data, pose_residual, poses
-from estimator.rigid_team.start import start_bases
+from estimator.rigid_team.residual import (
+    Bases,
+    Shared,
+    balance,
+    grasp_data,
+    pose_residual,
+    poses,
+    start_bases,
+)
 
 
 def start_shared(estimate: PayloadEstimate) -> Shared:

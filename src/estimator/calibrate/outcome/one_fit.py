@@ -31,8 +31,7 @@ from estimator.estimate.principal import inertia_parameters
 from estimator.estimate.result import PayloadEstimate
 from estimator.estimate.withheld import withheld
 from estimator.recording.model import Recording
-from estimator.rigid_team.residual import Shared, robot_data
-from estimator.rigid_team.start import start_bases
+from estimator.rigid_team.residual import Shared, robot_data, start_bases
 
 METHOD = "fit"
 WITHOUT_ERRORS = (
