@@ -40,11 +40,13 @@ class Repeats:
 
     def _look(self, values: Array) -> None:
         """Count high differences of the efforts that are noise; smooth efforts tell nothing of equal rows."""
-        changes = np.any(np.diff(values, axis=0) != 0, axis=1)
-        efforts = (
-            values[np.append(True, changes)][:, self._efforts] if len(values) else values[:, self._efforts]
-        )
         with np.errstate(over="ignore", invalid="ignore"):  # of values beyond floats, which others refuse
+            changes = np.any(np.diff(values, axis=0) != 0, axis=1)
+            efforts = (
+                values[np.append(True, changes)][:, self._efforts]
+                if len(values)
+                else values[:, self._efforts]
+            )
             high = np.abs(np.diff(efforts, n=_ORDER, axis=0))
             noisy = high > _NOISE * np.ptp(efforts, axis=0) if high.size else high
         if high.size:

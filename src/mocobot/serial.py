@@ -20,7 +20,8 @@ from discrepancy.serial.mechanics.tree import Tree
 from discrepancy.serial.model import SerialModel, load_model
 from estimator.errors import InputError
 from mocobot.api.diagnosis import Diagnosis
-from mocobot.api.public import Look, public
+from mocobot.api.look import Look
+from mocobot.api.public import public
 from mocobot_inspect.joints import inspection
 from mocobot_inspect.joints.findings import joint_findings
 from mocobot_inspect.joints.json import joint_inspection_dict

@@ -11,14 +11,14 @@ import pytest
 from source_tree import SRC, module_files
 
 CEILINGS = {
-    "estimator": 7_140,
-    "mocobot_logs": 6_700,
-    "mocobot_inspect": 3_430,
-    "mocobot_sim": 6_690,
-    "discrepancy": 18_430,  # two engines until the small one (evidence, joints) takes the other's place
-    "mocobot_view": 2_260,
-    "mocobot_report": 3_630,
-    "mocobot": 5_020,
+    "estimator": 7_060,
+    "mocobot_logs": 6_630,
+    "mocobot_inspect": 3_410,
+    "mocobot_sim": 6_640,
+    "discrepancy": 18_440,  # two engines until the small one (evidence, joints) takes the other's place
+    "mocobot_view": 2_200,
+    "mocobot_report": 3_530,
+    "mocobot": 4_860,
 }
 """Most lines of code a package (no blanks, comments or docstrings). Raise one only within a planned budget."""
 MOST_LINES = 700

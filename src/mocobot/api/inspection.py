@@ -6,7 +6,8 @@ from pathlib import Path
 
 from estimator.arm.design import OmnidDesign, load_design
 from mocobot.api.given import GivenCalibration, Robots
-from mocobot.api.public import Look, public
+from mocobot.api.look import Look
+from mocobot.api.public import public
 from mocobot_inspect import inspection
 from mocobot_inspect.findings import findings
 from mocobot_inspect.json import inspection_dict
