@@ -11,14 +11,14 @@ import pytest
 from source_tree import SRC, module_files
 
 CEILINGS = {
-    "estimator": 7_130,
-    "mocobot_logs": 6_700,
-    "mocobot_inspect": 3_430,
-    "mocobot_sim": 6_690,
+    "estimator": 7_030,
+    "mocobot_logs": 6_630,
+    "mocobot_inspect": 3_400,
+    "mocobot_sim": 6_640,
     "discrepancy": 17_210,
-    "mocobot_view": 2_260,
-    "mocobot_report": 3_630,
-    "mocobot": 5_020,
+    "mocobot_view": 2_200,
+    "mocobot_report": 3_530,
+    "mocobot": 4_850,
 }
 """Most lines of code a package (no blanks, comments or docstrings). Raise one only within a planned budget."""
 MOST_LINES = 700
