@@ -76,7 +76,8 @@ def _odds(search: Search, state: State, own: Chosen) -> Odds:
         if without.evidence + gain < best - search.settings.within_nats:
             break
         count = cells.count
-        rival = search.formed(search.value((*rest, chosen), without.posterior))
+        kept = [c for c in rest if not (chosen.group.members and c.group.cause == chosen.group.cause)]
+        rival = search.formed(search.value((*kept, chosen), without.posterior))
         weighed.append((rival.evidence, chosen.group, False))
         cells.truncate(count)
     logs = np.array([state.evidence, *(w[0] for w in weighed)])

@@ -186,8 +186,9 @@ class Search:
             for gain, chosen in self.offers(without)[: self.settings.tried]:
                 if chosen.group.name == out.group.name or without.evidence + gain < state.evidence - 5.0:
                     continue
-                count = cells.count
-                other = self.formed(self.value((*rest, chosen), without.posterior))
+                count, kind = cells.count, chosen.group.cause if chosen.group.members else None
+                kept = [c for c in rest if c.group.cause != kind]
+                other = self.formed(self.value((*kept, chosen), without.posterior))
                 if other.evidence - state.evidence >= self.settings.need_nats:
                     gap = other.evidence - state.evidence
                     self.say(f"{out.group.name} -> {chosen.group.name}: {gap:.0f} nats")
