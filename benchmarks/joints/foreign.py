@@ -214,6 +214,7 @@ def _load(spec: mujoco.MjSpec, kg: float, rng: np.random.Generator, faults: list
     """A box on the last link, axes along the link's."""
     link = spec.bodies[-1]
     box, (a, b, c) = link.add_body(name="load"), rng.uniform(0.03, 0.07, 3) ** 2
+    box.ipos = [0.0, 0.0, 0.0]  # else MuJoCo puts the centre of mass at twice the box's position
     box.mass, box.explicitinertial, box.inertia = kg, True, kg / 3.0 * np.array([b + c, a + c, a + b])
     box.pos = rng.uniform(-1.0, 1.0, 3) * [0.08, 0.08, 0.04] + np.asarray(link.ipos)
     faults.append({"cause": "payload", "place": link.name, "size": kg})
